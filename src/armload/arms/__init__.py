@@ -1,0 +1,25 @@
+"""Robot arms: their rigid-body model, and the regressors through which a payload shows in the joint torques."""
+
+from armload.arms.catalogue import ARMS, arm
+from armload.arms.filtered import FilteredRegression, first_order_lag
+from armload.arms.model import Arm, BodyMotion, Limits
+from armload.arms.regressors import (
+    MomentumRegressor,
+    full_arm_regressor,
+    momentum_regressor,
+    payload_regressor,
+)
+
+__all__ = [
+    "ARMS",
+    "Arm",
+    "BodyMotion",
+    "FilteredRegression",
+    "Limits",
+    "MomentumRegressor",
+    "arm",
+    "first_order_lag",
+    "full_arm_regressor",
+    "momentum_regressor",
+    "payload_regressor",
+]

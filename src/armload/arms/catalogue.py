@@ -1,0 +1,64 @@
+"""The arms armload knows by name, and any other from a URDF file.
+
+| name    | what                                              | payload frame | source of the figures                       |
+|---------|---------------------------------------------------|---------------|---------------------------------------------|
+| `panda` | Franka Emika Panda (FER), bare to the flange      | `panda_link8` | Franka's documentation; Gaz et al., RA-L 2019 |
+| `ur10e` | Universal Robots UR10e, bare to the tool flange   | `tool0`       | Universal Robots' published figures          |
+
+Each description says more in its head. A Panda with its hand is `arm("panda").with_payload(franka_hand())`.
+"""
+
+from __future__ import annotations
+
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from armload.arms.model import STANDARD_GRAVITY, Arm
+from armload.errors import ArmError
+
+ARMS: dict[str, dict[str, Any]] = {
+    "panda": {
+        "frame": "panda_link8",
+        "rated_payload": 3.0,  # [kg]
+        # Franka Control Interface documentation, "Limits for Panda"
+        "acceleration": (15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0),  # [rad/s²]
+        "jerk": (7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0),  # [rad/s³]
+    },
+    "ur10e": {"frame": "tool0", "rated_payload": 12.5},
+}
+
+
+def arm(
+    robot: str | Path, frame: str | None = None, gravity: tuple[float, float, float] = STANDARD_GRAVITY
+) -> Arm:
+    """An arm by name, or from a URDF file.
+
+    >>> arm("ur10e").joint_names[2]
+    'elbow_joint'
+
+    Args:
+        robot: a name in `ARMS`, or the path of a URDF file.
+        frame: link whose frame the payload is about. Default: the catalogue's; for a URDF its last link.
+        gravity: gravity in the axes of the base [m/s²].
+
+    Raises:
+        ArmError: neither a known name nor a readable URDF file, or an unknown frame.
+    """
+    name = str(robot)
+    if name in ARMS:
+        facts = dict(ARMS[name])
+        if frame is not None:
+            facts["frame"] = frame
+        text = resources.files("armload.arms").joinpath(f"descriptions/{name}.urdf").read_text(encoding="utf-8")
+        return Arm(name, text, gravity=gravity, **facts)
+    path = Path(robot)
+    if not path.is_file():
+        raise ArmError(
+            f"unknown robot {name!r}: expected one of {', '.join(ARMS)}, or the path of a URDF file that exists"
+        )
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ArmError(f"robot description {name} cannot be read as text: {error}") from None
+    return Arm(path.stem, text, frame, gravity)

@@ -1,0 +1,99 @@
+"""Reading a robot description: a URDF becomes a plain chain of moving joints that both engines read alike."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass
+
+from armload.errors import ArmError
+
+_MOVING = ("revolute", "continuous", "prismatic")
+_ENDLESS = "1e4"  # [rad] limit given to a continuous joint, so that both engines treat it as one angle
+
+
+@dataclass(frozen=True)
+class Chain:
+    """A URDF without meshes whose only moving joints lead from the root to the payload frame."""
+
+    name: str
+    xml: str
+    frame: str
+    joint_names: tuple[str, ...]
+    frames: tuple[str, ...]
+
+
+def read_chain(xml: str, frame: str | None, where: str) -> Chain:
+    """The serial chain of a URDF that carries `frame`; every joint off the chain (fingers, say) is fixed at zero.
+
+    Args:
+        xml: the text of a URDF file.
+        frame: the link whose frame the payload is about. None: the last link, that is the leaf behind the most moving
+            joints, then the deepest, then the last in the file.
+        where: how to name the description in an error.
+
+    Raises:
+        ArmError: not a URDF, no moving joint, or an unknown frame.
+    """
+    try:
+        root = ET.fromstring(xml)
+    except ET.ParseError as error:
+        raise ArmError(f"{where} is not a URDF (XML error: {error})") from None
+    if root.tag != "robot":
+        raise ArmError(f"{where} is not a URDF: its root element is <{root.tag}>, expected <robot>")
+    _strip(root)
+    links = [str(link.get("name")) for link in root.findall("link")]
+    joints = {j.find("child").get("link"): j for j in root.findall("joint") if j.find("child") is not None}  # type: ignore[union-attr]
+    if not joints:
+        raise ArmError(f"{where} has no joints: expected a URDF of a robot arm")
+
+    def path(link: str) -> list[ET.Element]:
+        chain: list[ET.Element] = []
+        while link in joints and len(chain) <= len(links):
+            chain.append(joints[link])
+            link = str(joints[link].find("parent").get("link"))  # type: ignore[union-attr]
+        return chain[::-1]
+
+    if frame is None:
+        parents = {j.find("parent").get("link") for j in joints.values()}  # type: ignore[union-attr]
+        leaves = [link for link in links if link not in parents]
+
+        def rank(link: str) -> tuple[int, int, int]:
+            chain = path(link)
+            return sum(j.get("type") in _MOVING for j in chain), len(chain), links.index(link)
+
+        frame = max(leaves, key=rank)
+    elif frame not in links:
+        raise ArmError(f"unknown frame {frame!r} in {where}: expected one of {', '.join(links)}")
+
+    chain = path(frame)
+    moving = [j for j in chain if j.get("type") in _MOVING]
+    if not moving:
+        raise ArmError(f"no joint of {where} moves the frame {frame!r}: choose a frame behind the arm's joints")
+    for joint in joints.values():
+        if joint not in moving:
+            joint.set("type", "fixed")
+        elif joint.get("type") == "continuous":
+            joint.set("type", "revolute")
+            limit = joint.find("limit")
+            if limit is None:
+                limit = ET.SubElement(joint, "limit", effort="0", velocity="0")
+            limit.set("lower", "-" + _ENDLESS)
+            limit.set("upper", _ENDLESS)
+    return Chain(
+        name=root.get("name") or "robot",
+        xml=ET.tostring(root, encoding="unicode"),
+        frame=frame,
+        joint_names=tuple(str(j.get("name")) for j in moving),
+        frames=tuple(links),
+    )
+
+
+def _strip(root: ET.Element) -> None:
+    """Remove what dynamics does not need: meshes, materials, transmissions, simulator settings, mimic and damping."""
+    for child in list(root):
+        if child.tag not in ("link", "joint"):
+            root.remove(child)
+            continue
+        for part in list(child):
+            if part.tag in ("visual", "collision", "mimic", "safety_controller", "calibration", "dynamics"):
+                child.remove(part)

@@ -1,0 +1,279 @@
+"""The arm's rigid-body model (Pinocchio): bare torque, momentum, limits, and the motion of the payload frame."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from armload.arms.description import read_chain
+from armload.errors import ArmError
+from armload.inertia import InertialParameters, from_order, to_order
+
+STANDARD_GRAVITY = (0.0, 0.0, -9.81)
+
+
+class BodyMotion(NamedTuple):
+    """How a body frame moves with the joints, for N samples of an arm with n joints.
+
+    jacobian: body Jacobian J (N, 6, n), angular rows first: twist (omega, v) = J·dq in the frame's axes.
+    gravity: gravity g_b (N, 3) in the frame's axes [m/s²].
+    """
+
+    jacobian: NDArray[np.float64]
+    gravity: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the joints may do; each an array (n,). Acceleration and jerk are infinite where the maker gives none."""
+
+    position_low: NDArray[np.float64]  # [rad]
+    position_high: NDArray[np.float64]  # [rad]
+    velocity: NDArray[np.float64]  # [rad/s]
+    effort: NDArray[np.float64]  # [N·m]
+    acceleration: NDArray[np.float64]  # [rad/s²]
+    jerk: NDArray[np.float64]  # [rad/s³]
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """A serial arm, the frame its payload is about, and the gravity at its base.
+
+    >>> from armload.arms import arm
+    >>> panda = arm("panda")
+    >>> panda.n, panda.frame
+    (7, 'panda_link8')
+    >>> panda.torque([0, 0, 0, -1.5, 0, 1.5, 0])[1].round(2)  # joint 2 holds the forearm up [N·m]
+    np.float64(-14.09)
+
+    Args:
+        name: what the arm is called, in a log's header and in a model's artefact.
+        urdf: text of a URDF; meshes are ignored, joints off the chain to `frame` are fixed at zero.
+        frame: link whose frame the payload is about; None: the last link.
+        gravity: gravity in the base's axes (3,) [m/s²]; a tilted base has a tilted gravity.
+        attached: a payload that counts as part of the arm (a hand, say), about `frame`.
+        links: inertial parameters (n, 10) of the moving links about their joint frames, where they are to differ from
+            the URDF's.
+        rated_payload: the maker's rated payload [kg], if known.
+        acceleration, jerk: limits (n,) that a URDF cannot hold.
+    """
+
+    name: str
+    urdf: str = field(repr=False)
+    frame: str | None = None
+    gravity: tuple[float, float, float] = STANDARD_GRAVITY
+    attached: InertialParameters | None = field(default=None, repr=False)
+    links: NDArray[np.float64] | None = field(default=None, repr=False)
+    rated_payload: float | None = field(default=None, repr=False)
+    acceleration: tuple[float, ...] | None = field(default=None, repr=False)
+    jerk: tuple[float, ...] | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        gravity = np.asarray(self.gravity, dtype=float)
+        if gravity.shape != (3,) or not np.all(np.isfinite(gravity)):
+            raise ArmError(f"gravity is {self.gravity!r}: expected 3 finite numbers x,y,z in m/s², such as 0,0,-9.81")
+        if not 1.0 <= np.linalg.norm(gravity) <= 30.0:
+            raise ArmError(
+                f"gravity {tuple(gravity.tolist())} has magnitude {np.linalg.norm(gravity):.3g} m/s²: expected about "
+                "9.81; give it in the axes of the robot's base, pointing down"
+            )
+        object.__setattr__(self, "gravity", tuple(gravity.tolist()))
+        chain = read_chain(self.urdf, self.frame, self.name)
+        object.__setattr__(self, "urdf", chain.xml)
+        object.__setattr__(self, "frame", chain.frame)
+        object.__setattr__(self, "_joint_names", chain.joint_names)
+        object.__setattr__(self, "_frames", chain.frames)
+        _ = self._model  # fail now, not at the first sample
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {k: v for k, v in self.__dict__.items() if k not in ("_model", "_data", "limits")}
+
+    # ------------------------------------------------------------------ what it is
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return len(self.joint_names)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the moving joints, from the base to the payload frame; the order of every q, dq and tau."""
+        return self._joint_names  # type: ignore[attr-defined]
+
+    @property
+    def frames(self) -> tuple[str, ...]:
+        """Names of all links, each a possible payload frame if joints move it."""
+        return self._frames  # type: ignore[attr-defined]
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """SHA-256 of the masses, geometry, frame and gravity: two arms with the same one give the same torques."""
+        model = self._model
+        digest = hashlib.sha256()
+        for joint in range(1, self.n + 1):
+            digest.update(np.round(model.jointPlacements[joint].homogeneous, 9).tobytes())
+            digest.update(model.joints[joint].shortname().encode())
+            digest.update(np.round(model.inertias[joint].toDynamicParameters(), 9).tobytes())
+        digest.update(np.round(self._frame_placement.homogeneous, 9).tobytes())
+        digest.update(np.round(self.gravity, 6).tobytes())
+        return digest.hexdigest()
+
+    @cached_property
+    def limits(self) -> Limits:
+        """Joint limits, from the URDF and, for acceleration and jerk, from the catalogue."""
+        model, endless = self._model, np.full(self.n, np.inf)
+        wide = model.upperPositionLimit >= 1e3
+        return Limits(
+            np.where(wide, -np.inf, model.lowerPositionLimit),
+            np.where(wide, np.inf, model.upperPositionLimit),
+            np.where(model.upperVelocityLimit > 0, model.upperVelocityLimit, np.inf),
+            np.where(model.upperEffortLimit > 0, model.upperEffortLimit, np.inf),
+            endless if self.acceleration is None else np.array(self.acceleration),
+            endless if self.jerk is None else np.array(self.jerk),
+        )
+
+    @property
+    def link_parameters(self) -> NDArray[np.float64]:
+        """Inertial parameters (n, 10) of the moving links about their joint frames, the attached payload included."""
+        return np.array(
+            [from_order(self._model.inertias[k].toDynamicParameters(), "pinocchio").phi for k in range(1, self.n + 1)]
+        )
+
+    # ------------------------------------------------------------------ other arms made from it
+
+    def with_payload(self, payload: InertialParameters) -> Arm:
+        """The arm with a payload (about `frame`) counted as part of it; payloads add up."""
+        total = payload if self.attached is None else self.attached + payload
+        return replace(self, attached=total)
+
+    def with_links(self, links: ArrayLike) -> Arm:
+        """The arm with other inertial parameters (n, 10) of its moving links, before any attached payload."""
+        links = np.asarray(links, dtype=float)
+        if links.shape != (self.n, 10):
+            raise ArmError(f"link parameters have shape {links.shape}: expected ({self.n}, 10)")
+        return replace(self, links=links)
+
+    # ------------------------------------------------------------------ rigid-body dynamics
+
+    def torque(self, q: ArrayLike, dq: ArrayLike | None = None, ddq: ArrayLike | None = None) -> NDArray[np.float64]:
+        """Joint torque the bare arm needs: tau = M(q)·ddq + C(q, dq)·dq + g(q) (recursive Newton–Euler) [N·m].
+
+        Args:
+            q, dq, ddq: (n,) or (N, n) [rad, rad/s, rad/s²]; dq and ddq default to zero.
+        """
+        rows = zip(*self._samples(q, dq, ddq), strict=True)
+        out = np.array([pin.rnea(self._model, self._data, *row) for row in rows]).reshape(-1, self.n)
+        return out if np.ndim(q) == 2 else out[0]
+
+    def mass_matrix(self, q: ArrayLike) -> NDArray[np.float64]:
+        """Joint-space inertia M(q) (n, n) [kg·m²]."""
+        M = np.triu(pin.crba(self._model, self._data, np.asarray(q, dtype=float)))
+        return M + np.triu(M, 1).T
+
+    def momentum(self, q: ArrayLike, dq: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Generalised momentum and its drift, (N, n) each: p = M·dq and g − Cᵀ·dq, so that tau = dp/dt + g − Cᵀ·dq.
+
+        Source: De Luca, Albu-Schäffer, Haddadin, Hirzinger, IROS 2006 (the momentum observer).
+        """
+        q, dq, _ = self._samples(q, dq, None)
+        p, drift = np.empty_like(q), np.empty_like(q)
+        model, data = self._model, self._data
+        for k in range(len(q)):
+            C = pin.computeCoriolisMatrix(model, data, q[k], dq[k])
+            drift[k] = pin.computeGeneralizedGravity(model, data, q[k]) - C.T @ dq[k]
+            M = pin.crba(model, data, q[k])
+            p[k] = np.triu(M) @ dq[k] + np.triu(M, 1).T @ dq[k]
+        return p, drift
+
+    def frame_motion(self, q: ArrayLike) -> BodyMotion:
+        """Jacobian and gravity in the payload frame for samples q (N, n)."""
+        placement = self._frame_placement
+        return self._body_motion(q, [(self.n, placement.rotation, placement.translation)])[0]
+
+    def link_motions(self, q: ArrayLike) -> list[BodyMotion]:
+        """Jacobian and gravity in the joint frame of each moving link for samples q (N, n)."""
+        return self._body_motion(q, [(k, np.eye(3), np.zeros(3)) for k in range(1, self.n + 1)])
+
+    def frame_pose(self, q: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Rotation (N, 3, 3) and position (N, 3) [m] of the payload frame in the base."""
+        q = self._samples(q, None, None)[0]
+        R, p = np.empty((len(q), 3, 3)), np.empty((len(q), 3))
+        for k in range(len(q)):
+            pin.forwardKinematics(self._model, self._data, q[k])
+            placement = self._data.oMi[self.n] * self._frame_placement
+            R[k], p[k] = placement.rotation, placement.translation
+        return R, p
+
+    # ------------------------------------------------------------------ inside
+
+    @cached_property
+    def _model(self) -> pin.Model:
+        try:
+            model = pin.buildModelFromXML(self.urdf)
+        except (ValueError, RuntimeError) as error:
+            raise ArmError(f"the description of {self.name} cannot be used: {' '.join(str(error).split())}") from None
+        if model.nv != self.n or list(model.names[1:]) != list(self.joint_names):
+            raise ArmError(f"{self.name} is not a serial chain of 1-axis joints to the frame {self.frame!r}")
+        model.gravity.linear = np.array(self.gravity)
+        if self.links is not None:
+            for k, phi in enumerate(self.links, start=1):
+                model.inertias[k] = _pin_inertia(InertialParameters(phi))
+        if self.attached is not None:
+            placement = self._placement(model)
+            moved = self.attached.moved(placement.rotation, placement.translation)
+            model.inertias[self.n] = model.inertias[self.n] + _pin_inertia(moved)
+        if not any(model.inertias[k].mass > 0 for k in range(1, self.n + 1)):
+            raise ArmError(f"no link of {self.name} has a mass: expected a URDF with <inertial> elements")
+        return model
+
+    @cached_property
+    def _data(self) -> pin.Data:
+        return self._model.createData()
+
+    @property
+    def _frame_placement(self) -> pin.SE3:
+        return self._placement(self._model)
+
+    def _placement(self, model: pin.Model) -> pin.SE3:
+        return model.frames[model.getFrameId(self.frame, pin.FrameType.BODY)].placement
+
+    def _samples(self, q: ArrayLike, dq: ArrayLike | None, ddq: ArrayLike | None) -> tuple[NDArray[np.float64], ...]:
+        q = np.asarray(q, dtype=float)
+        rows = [q, np.zeros_like(q) if dq is None else dq, np.zeros_like(q) if ddq is None else ddq]
+        out = tuple(np.ascontiguousarray(np.atleast_2d(np.asarray(x, dtype=float))) for x in rows)
+        if any(x.shape != out[0].shape for x in out) or out[0].shape[1] != self.n:
+            raise ArmError(f"joint arrays have shapes {[x.shape for x in out]}: {self.name} has {self.n} joints")
+        return out
+
+    def _body_motion(
+        self, q: ArrayLike, bodies: list[tuple[int, NDArray[np.float64], NDArray[np.float64]]]
+    ) -> list[BodyMotion]:
+        q = self._samples(q, None, None)[0]
+        N, n, model, data = len(q), self.n, self._model, self._data
+        J = np.empty((N, 6, n))  # world frame, linear rows first
+        R, p = np.empty((len(bodies), N, 3, 3)), np.empty((len(bodies), N, 3))
+        for k in range(N):
+            J[k] = pin.computeJointJacobians(model, data, q[k])
+            for b, (joint, rotation, translation) in enumerate(bodies):
+                placement = data.oMi[joint]
+                R[b, k] = placement.rotation @ rotation
+                p[b, k] = placement.translation + placement.rotation @ translation
+        linear, angular = J[:, :3], J[:, 3:]
+        out = []
+        for b, (joint, _, _) in enumerate(bodies):
+            at_body = linear + np.cross(angular, p[b][:, :, None], axis=1)  # v_p = v_0 + omega × p
+            Rt = np.swapaxes(R[b], 1, 2)
+            jacobian = np.concatenate([Rt @ angular, Rt @ at_body], axis=1)  # (N, 6, n)
+            jacobian[:, :, joint:] = 0.0  # joints beyond the body do not move it
+            out.append(BodyMotion(jacobian, Rt @ np.array(self.gravity)))
+        return out
+
+
+def _pin_inertia(parameters: InertialParameters) -> pin.Inertia:
+    return pin.Inertia.FromDynamicParameters(to_order(parameters, "pinocchio"))

@@ -1,0 +1,37 @@
+"""Every exception armload raises on purpose. Each message says what was found, what was expected and what to do."""
+
+
+class ArmloadError(Exception):
+    """Base of all errors a user can cause or mend; the command line prints it as one sentence and exits with 2."""
+
+
+class InertiaError(ArmloadError, ValueError):
+    """Inertial parameters that cannot be read, converted or combined."""
+
+
+class ArmError(ArmloadError, ValueError):
+    """An unknown robot or frame, or a robot description that cannot be used."""
+
+
+class MotionError(ArmloadError, ValueError):
+    """A motion that cannot be read, or that the arm must not run."""
+
+
+class PayloadError(ArmloadError, ValueError):
+    """A payload that cannot be built or read."""
+
+
+class RecordingError(ArmloadError, ValueError):
+    """A log that is missing, unreadable, malformed or not plausible for the arm."""
+
+
+class DatasetError(ArmloadError, ValueError):
+    """A data set that is incomplete, damaged or of another arm or motion."""
+
+
+class ModelError(ArmloadError, ValueError):
+    """A learned model that is damaged or belongs to another arm, motion or frame."""
+
+
+class IdentificationError(ArmloadError, ValueError):
+    """An identification that cannot be made from what was given."""

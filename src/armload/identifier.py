@@ -1,0 +1,89 @@
+"""The stream contract: every way of identifying a payload, learned or not, is an `Identifier`.
+
+    identifier.reset()
+    for sample in recording:
+        estimate = identifier.update(sample)
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm
+from armload.errors import IdentificationError
+from armload.inertia import NAMES, UNITS, InertialParameters
+from armload.recording import Recording, Sample
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """What is known about the payload after the samples up to time t.
+
+    t: time of the last sample used [s].
+    phi: the ten parameters (10,) about the origin of `frame`.
+    covariance: (10, 10), what the method itself believes; infinite diagonal where it knows nothing.
+    n_samples: samples used.
+    frame: the payload frame.
+    """
+
+    t: float
+    phi: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    n_samples: int
+    frame: str
+
+    @property
+    def std(self) -> NDArray[np.float64]:
+        """Standard deviation of each parameter (10,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def parameters(self) -> InertialParameters:
+        """phi with its frame, ready to move, add, subtract or reorder."""
+        return InertialParameters(self.phi, self.frame)
+
+    def __str__(self) -> str:
+        rows = [
+            f"{n:>5} = {v:+.5f} ± {s:.5f} {u}" for n, v, s, u in zip(NAMES, self.phi, self.std, UNITS, strict=True)
+        ]
+        return f"payload about {self.frame} after {self.n_samples} samples:\n" + "\n".join(rows)
+
+
+class Identifier(ABC):
+    """A payload identifier fed sample by sample: constant memory, no acceleration needed from the caller.
+
+    Subclasses implement `reset` and `update`. `name` is how tables and the command line call the method.
+    """
+
+    name: str
+    arm: Arm
+
+    @abstractmethod
+    def reset(self) -> None:
+        """Forget everything; the next sample is the first."""
+
+    @abstractmethod
+    def update(self, sample: Sample) -> Estimate:
+        """Take one sample (t, q, dq, tau) and return the estimate so far."""
+
+    def trace(self, recording: Recording, every: int = 1) -> list[Estimate]:
+        """The estimates along a recording, from `reset` on: one per `every` samples, and always the last."""
+        if recording.n != self.arm.n:
+            raise IdentificationError(
+                f"{recording.source} has {recording.n} joints: {self.arm.name} has {self.arm.n}; name the right robot"
+            )
+        self.reset()
+        out = []
+        for k, sample in enumerate(recording):
+            estimate = self.update(sample)
+            if k % every == 0 or k == len(recording) - 1:
+                out.append(estimate)
+        return out
+
+    def run(self, recording: Recording) -> Estimate:
+        """The estimate after the whole recording."""
+        return self.trace(recording, every=len(recording))[-1]

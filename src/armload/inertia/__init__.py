@@ -1,0 +1,46 @@
+"""The ten inertial parameters: what they mean, their orders, frames and algebra, and what makes them physical.
+
+No other room packs, reorders, moves or projects the 10-vector.
+"""
+
+from armload.inertia.consistency import (
+    from_log_cholesky,
+    is_consistent,
+    log_cholesky,
+    nearest_consistent,
+    pseudo_inertia,
+    pseudo_inertia_to_phi,
+)
+from armload.inertia.orders import ORDERS, from_order, to_order
+from armload.inertia.parameters import (
+    NAMES,
+    UNITS,
+    InertialParameters,
+    com_to_phi,
+    frame_change_matrix,
+    inertia_matrix,
+    phi_to_com,
+    skew,
+    vech,
+)
+
+__all__ = [
+    "NAMES",
+    "ORDERS",
+    "UNITS",
+    "InertialParameters",
+    "com_to_phi",
+    "frame_change_matrix",
+    "from_log_cholesky",
+    "from_order",
+    "inertia_matrix",
+    "is_consistent",
+    "log_cholesky",
+    "nearest_consistent",
+    "phi_to_com",
+    "pseudo_inertia",
+    "pseudo_inertia_to_phi",
+    "skew",
+    "to_order",
+    "vech",
+]

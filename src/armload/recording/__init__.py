@@ -1,0 +1,5 @@
+"""Recordings: what a robot's joints did, and the files they come in."""
+
+from armload.recording.recording import CHANNELS, Recording, Sample
+
+__all__ = ["CHANNELS", "Recording", "Sample"]

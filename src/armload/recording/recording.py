@@ -1,0 +1,114 @@
+"""One `Recording`: time, joint position, velocity and torque of one arm, SI units, one row per sample."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.errors import RecordingError
+
+# What a torque column can mean; "measured" is the contract: rigid body + friction, gravity included.
+CHANNELS = ("measured", "desired", "external")
+
+
+class Sample(NamedTuple):
+    """One instant of a robot: what every stream identifier takes."""
+
+    t: float  # [s]
+    q: NDArray[np.float64]  # (n,) [rad]
+    dq: NDArray[np.float64]  # (n,) [rad/s]
+    tau: NDArray[np.float64]  # (n,) [N·m]
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Joint position, velocity and torque over time.
+
+    >>> log = Recording(np.arange(3) * 0.1, np.zeros((3, 2)), np.zeros((3, 2)), np.ones((3, 2)))
+    >>> len(log), log.n, round(log.duration, 3), round(log.rate, 3)
+    (3, 2, 0.2, 10.0)
+
+    Args:
+        t: time (N,) [s], strictly increasing, not necessarily even.
+        q, dq, tau: (N, n) [rad, rad/s, N·m].
+        channel: what tau is; "measured" (rigid body + friction, gravity included), "desired" or "external".
+        joint_names: names of the columns, where the source has them.
+        source: where it comes from (a path), for messages and provenance.
+
+    Raises:
+        RecordingError: wrong shapes, a number that is not finite, times out of order; the message names row and column
+            (rows counted from 0, as in the arrays).
+    """
+
+    t: NDArray[np.float64]
+    q: NDArray[np.float64]
+    dq: NDArray[np.float64]
+    tau: NDArray[np.float64]
+    channel: str = "measured"
+    joint_names: tuple[str, ...] | None = None
+    source: str = "recording"
+
+    def __post_init__(self) -> None:
+        for name in ("t", "q", "dq", "tau"):
+            value = np.ascontiguousarray(getattr(self, name), dtype=float)
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+        if self.channel not in CHANNELS:
+            raise RecordingError(f"unknown torque channel {self.channel!r}: expected one of {', '.join(CHANNELS)}")
+        if self.t.ndim != 1 or self.q.ndim != 2:
+            raise RecordingError(f"{self.source}: t must be (N,) and q (N, n), found {self.t.shape} and {self.q.shape}")
+        for name in ("q", "dq", "tau"):
+            value = getattr(self, name)
+            if value.shape != (len(self.t), self.q.shape[1]):
+                raise RecordingError(
+                    f"{self.source}: {name} has shape {value.shape}, expected {(len(self.t), self.q.shape[1])}"
+                )
+        if len(self.t) < 2:
+            raise RecordingError(f"{self.source} holds {len(self.t)} sample(s): expected at least 2")
+        for name in ("t", "q", "dq", "tau"):
+            bad = np.argwhere(~np.isfinite(getattr(self, name)))
+            if len(bad):
+                row, column = bad[0][0], name + (str(bad[0][1] + 1) if name != "t" else "")
+                raise RecordingError(f"{self.source}: {column} at row {row} is not a finite number")
+        late = np.flatnonzero(np.diff(self.t) <= 0)
+        if len(late):
+            k = int(late[0])
+            raise RecordingError(
+                f"{self.source}: time goes from {self.t[k]:.6f} s to {self.t[k + 1]:.6f} s at row {k + 1}: expected "
+                "strictly increasing times; sort the log or drop repeated rows"
+            )
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __iter__(self) -> Iterator[Sample]:
+        """The samples, one by one, as a live robot would give them."""
+        return (Sample(float(t), *row) for t, *row in zip(self.t, self.q, self.dq, self.tau, strict=True))
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self.q.shape[1]
+
+    @property
+    def duration(self) -> float:
+        """Time from the first sample to the last [s]."""
+        return float(self.t[-1] - self.t[0])
+
+    @property
+    def rate(self) -> float:
+        """Median sample rate [Hz]."""
+        return float(1.0 / np.median(np.diff(self.t)))
+
+    def between(self, start: float, stop: float) -> Recording:
+        """The samples with start ≤ t < stop [s], on the recording's own clock."""
+        keep = (self.t >= start) & (self.t < stop)
+        return self.select(keep)
+
+    def select(self, rows: NDArray | slice) -> Recording:
+        """The samples at the given rows (index array, mask or slice)."""
+        return replace(self, t=self.t[rows], q=self.q[rows], dq=self.dq[rows], tau=self.tau[rows])
