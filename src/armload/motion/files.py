@@ -1,0 +1,118 @@
+"""Motions as JSON files: every number of equations (5) and (6), readable by a person and by any program."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from armload.errors import MotionError
+from armload.motion.fourier import FourierMotion
+from armload.motion.motion import Motion
+
+FORMAT = "armload-motion-1"
+
+
+def taie2024() -> FourierMotion:
+    """The excitation with the form of Taie et al. 2024: 8 harmonics, T = 6 s, for the Panda. Our own re-design.
+
+    The paper adopts the trajectory of its reference [7] (Kurdas et al., ICRA 2022), whose coefficients are published
+    nowhere; these are ours, found by `python -m armload.motion.design`.
+
+    >>> motion = taie2024()
+    >>> motion.n, motion.harmonics, motion.duration
+    (7, 8, 6.0)
+    """
+    text = resources.files("armload.motion").joinpath("motions/taie2024.json").read_text(encoding="utf-8")
+    return _from_text(text, "taie2024.json")
+
+
+def load_motion(path: str | Path) -> FourierMotion:
+    """The motion in a JSON file written by `save_motion`.
+
+    Raises:
+        MotionError: the file is missing, not JSON, or not a motion; one sentence that names it.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise MotionError(f"motion file {path} does not exist: give a JSON file written by save_motion") from None
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
+        raise MotionError(f"motion file {path} cannot be read: {reason}") from None
+    return _from_text(text, str(path))
+
+
+def save_motion(path: str | Path, motion: Motion) -> None:
+    """Write a motion as JSON, complete or not at all; `load_motion` gives exactly the same motion back.
+
+    Raises:
+        MotionError: the motion has no coefficients to save, or the file cannot be written.
+    """
+    write_whole(path, motion_to_json(motion))
+
+
+def motion_to_json(motion: Motion) -> str:
+    """The JSON text of a Fourier motion, one joint per line."""
+    if not isinstance(motion, FourierMotion):
+        raise MotionError(
+            f"the motion {motion.name!r} is a {type(motion).__name__}: only a FourierMotion can be saved as JSON; "
+            "use export_motion for a table"
+        )
+    head = {"format": FORMAT, "name": motion.name, "note": motion.note, "period": motion.period}
+    lines = [f"  {json.dumps(key)}: {json.dumps(value, ensure_ascii=False)}" for key, value in head.items()]
+    lines.append(f'  "offset": {json.dumps(motion.offset.tolist())}')
+    for key in ("sine", "cosine"):
+        rows = ",\n".join(f"    {json.dumps(row)}" for row in getattr(motion, key).tolist())
+        lines.append(f'  "{key}": [\n{rows}\n  ]')
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def write_whole(path: str | Path, text: str) -> None:
+    """Write a text file under another name and move it into place, so that nobody ever sees half of it."""
+    path = Path(path)
+    try:
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    except OSError as error:
+        raise MotionError(f"{path} cannot be written: {error.strerror}") from None
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+        mask = os.umask(0)
+        os.umask(mask)
+        os.chmod(temporary, 0o666 & ~mask)  # mkstemp makes files for the owner only
+        os.replace(temporary, path)
+    except OSError as error:
+        raise MotionError(f"{path} cannot be written: {error.strerror}") from None
+    finally:
+        Path(temporary).unlink(missing_ok=True)
+
+
+def _from_text(text: str, where: str) -> FourierMotion:
+    try:
+        content: Any = json.loads(text)
+    except ValueError as error:
+        raise MotionError(f"{where} is not a motion: it is not JSON ({error})") from None
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise MotionError(f'{where} is not a motion: expected a JSON object with "format": "{FORMAT}"')
+    try:
+        return FourierMotion(
+            content["offset"],
+            content["sine"],
+            content["cosine"],
+            float(content["period"]),
+            str(content["name"]),
+            str(content.get("note", "")),
+        )
+    except KeyError as error:
+        raise MotionError(f"{where} is not a complete motion: the key {error} is missing") from None
+    except MotionError as error:
+        raise MotionError(f"{where}: {error}") from None
+    except (TypeError, ValueError):
+        raise MotionError(
+            f"{where} is not a motion: offset must be n numbers, sine and cosine n rows of K numbers each"
+        ) from None
