@@ -72,10 +72,7 @@ class Identifier(ABC):
 
     def trace(self, recording: Recording, every: int = 1) -> list[Estimate]:
         """The estimates along a recording, from `reset` on: one per `every` samples, and always the last."""
-        if recording.n != self.arm.n:
-            raise IdentificationError(
-                f"{recording.source} has {recording.n} joints: {self.arm.name} has {self.arm.n}; name the right robot"
-            )
+        self._check(recording)
         self.reset()
         out = []
         for k, sample in enumerate(recording):
@@ -87,3 +84,9 @@ class Identifier(ABC):
     def run(self, recording: Recording) -> Estimate:
         """The estimate after the whole recording."""
         return self.trace(recording, every=len(recording))[-1]
+
+    def _check(self, recording: Recording) -> None:
+        if recording.n != self.arm.n:
+            raise IdentificationError(
+                f"{recording.source} has {recording.n} joints: {self.arm.name} has {self.arm.n}; name the right robot"
+            )

@@ -21,6 +21,7 @@ ARMS: dict[str, dict[str, Any]] = {
     "panda": {
         "frame": "panda_link8",
         "rated_payload": 3.0,  # [kg]
+        "link_spread": 1.0,  # identified on the robot, not the maker's drawing
         # Franka Control Interface documentation, "Limits for Panda"
         "acceleration": (15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0),  # [rad/s²]
         "jerk": (7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0),  # [rad/s³]

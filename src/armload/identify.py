@@ -1,0 +1,239 @@
+"""One log in, one answer out: which method, relative to what, with which error bars, and what the log cannot tell."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm
+from armload.errors import IdentificationError
+from armload.identifier import Estimate, Identifier
+from armload.inertia import NAMES, UNITS, InertialParameters, is_consistent, nearest_consistent, phi_to_com
+from armload.least_squares import (
+    FilteredRecursiveLeastSquares,
+    PosteriorLeastSquares,
+    RecursiveLeastSquares,
+    payload_prior_std,
+)
+from armload.recording import Recording, check_plausible
+
+METHODS = {
+    "map": "MAP least squares with the arm's own mismatch as an unknown: any motion, any payload (the default)",
+    "rls": "recursive least squares on differentiated acceleration: the plain benchmark",
+    "rls-filter": "recursive least squares behind a momentum observer, virtual calibration from the tare",
+}
+LOWEST_RATE = 20.0  # [Hz]
+Z95 = 1.959963984540054  # half-width of a normal 95 % interval, in standard deviations
+# "determined" for a method without a prior: 95 % half-width below 50 g, 5 g·m, 5e-3 kg·m²
+_SMALL = np.array([0.05] + [0.005] * 3 + [0.005] * 6)
+_SHRINK = 3.0  # "determined" for a method with a prior: its half-width shrinks at least so much
+_HELD = 3.0  # standard deviations of mass above zero before something counts as held
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """What the arm holds, with 95 % intervals; the fields are those of `armload identify --json`.
+
+    method: the method's name; robot, frame: whose payload, about which frame's origin and axes.
+    relative_to: "arm" (the bare arm), "tool" (what `--tool` describes) or "tare" (what was mounted at the tare).
+    n_samples, duration: samples used and the time they span [s].
+    phi, phi_low, phi_high: ten parameters in the paper's order, and their 95 % interval.
+    interval: "calibrated" or "approximate".
+    determined: for each parameter, whether the log says more than was known before.
+    mass, com, inertia_com: the same payload about its centre of mass [kg, m, kg·m²], in the frame's axes.
+    consistent: whether a body with these parameters can exist.
+    held: whether anything is there at all (the mass lies at least three standard deviations above zero).
+    why: why this method, in a sentence; notes: what else the user should know. Neither is in the JSON.
+    """
+
+    method: str
+    robot: str
+    frame: str
+    relative_to: str
+    n_samples: int
+    duration: float
+    phi: list[float]
+    phi_low: list[float]
+    phi_high: list[float]
+    interval: str
+    determined: list[bool]
+    mass: float
+    com: list[float]
+    inertia_com: list[list[float]]
+    consistent: bool
+    held: bool
+    why: str = field(default="", repr=False)
+    notes: tuple[str, ...] = field(default=(), repr=False)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The contract's fields, ready for JSON; every number is finite."""
+        out = asdict(self)
+        del out["why"], out["notes"]
+        return out
+
+    @property
+    def parameters(self) -> InertialParameters:
+        """phi with its frame, ready to move, add, subtract or reorder."""
+        return InertialParameters(np.array(self.phi), self.frame)
+
+    def __str__(self) -> str:
+        lines = [
+            f"{self.robot}: payload about {self.frame}, relative to the {self.relative_to}, "
+            f"method {self.method}, {self.n_samples} samples, {self.duration:.2f} s"
+        ]
+        rows = zip(NAMES, self.phi, self.phi_low, self.phi_high, UNITS, self.determined, strict=True)
+        for name, value, low, high, unit, known in rows:
+            lines.append(
+                f"{name:>5} = {value:+.5f} [{low:+.5f}, {high:+.5f}] {unit}" + ("" if known else "  undetermined")
+            )
+        com = ", ".join(f"{x:+.4f}" for x in self.com)
+        lines.append(f" mass {self.mass:.4f} kg, centre of mass ({com}) m, intervals {self.interval}")
+        if not self.held:
+            lines.append(" nothing seems to be held: the mass is within three standard deviations of zero")
+        return "\n".join(lines)
+
+
+def identify(
+    recording: Recording,
+    arm: Arm,
+    *,
+    tare: Recording | None = None,
+    tool: InertialParameters | None = None,
+    method: str | Path | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Identification:
+    """Identify the payload of a log.
+
+    Args:
+        recording: measured joint torque (rigid body + friction, gravity included), position and velocity.
+        arm: the bare arm, with the frame and gravity wanted.
+        tare: an earlier log of the same arm, on any motion, with whatever was mounted then; the answer is what was
+            added since.
+        tool: a mounted tool whose parameters are known; the answer is what it carries.
+        method: a name in `METHODS`, or the path of a trained model; None: the most trustworthy for any log, "map".
+        progress: told in a few words what is being done.
+
+    Raises:
+        ArmloadError: the log is not plausible for this arm, or the method cannot be used on it.
+    """
+    say = progress or (lambda _: None)
+    for log in (recording, tare):
+        if log is not None:
+            _check(log, arm)
+    if tool is not None:
+        arm = arm.with_payload(arm.in_frame(tool))
+    say("identifying")
+    estimate, prior_std, shrinks, name, why = _run(recording, arm, tare, method)
+    relative_to = "tare" if tare is not None else "tool" if tool is not None else "arm"
+    return _answer(estimate, prior_std, shrinks, name, why, arm, recording, relative_to)
+
+
+def _check(log: Recording, arm: Arm) -> None:
+    check_plausible(log, arm)
+    if log.channel != "measured":
+        raise IdentificationError(
+            f"{log.source} holds {log.channel} torque: expected measured joint torque with gravity in it"
+        )
+    if log.rate < LOWEST_RATE:
+        raise IdentificationError(
+            f"{log.source} is sampled at {log.rate:.3g} Hz: expected at least {LOWEST_RATE:g} Hz; record faster"
+        )
+
+
+def _run(
+    recording: Recording, arm: Arm, tare: Recording | None, method: str | Path | None
+) -> tuple[Estimate, NDArray, bool, str, str]:
+    """The estimate, the standard deviation of what was known before, whether that was used as a prior, method, why."""
+    weak = payload_prior_std(arm)
+    if method is None or method == "map":
+        why = (
+            "map holds for any motion and payload; a trained model is taken only when named"
+            if method is None
+            else "asked for"
+        )
+        if tare is None:
+            why += "; without a tare the error bars allow for the model's errors"
+        return PosteriorLeastSquares(arm, tare).run(recording), weak, True, "map", why
+    if method in ("rls", "rls-filter"):
+        identifier = RecursiveLeastSquares(arm) if method == "rls" else FilteredRecursiveLeastSquares(arm)
+        return _minus_tare(identifier, recording, tare), weak, False, str(method), "asked for"
+    if not Path(method).exists():
+        raise IdentificationError(
+            f"unknown method {str(method)!r}: expected one of {', '.join(METHODS)}, or the path of a trained model"
+        )
+    from armload.learners import LearnedIdentifier, load_model
+
+    model = load_model(method)
+    model.check(arm, recording)
+    if tare is not None:
+        model.check(arm, tare)
+    estimate = _minus_tare(LearnedIdentifier(model, arm), recording, tare)
+    return estimate, model.phi_std, True, model.kind, f"asked for; {method} was trained on this arm and motion"
+
+
+def _minus_tare(identifier: Identifier, recording: Recording, tare: Recording | None) -> Estimate:
+    """Virtual calibration: the same method's estimate of the tare is subtracted, the covariances add."""
+    estimate = identifier.run(recording)
+    if tare is None:
+        return estimate
+    before = identifier.run(tare)
+    return Estimate(
+        estimate.t,
+        estimate.phi - before.phi,
+        estimate.covariance + before.covariance,
+        estimate.n_samples,
+        estimate.frame,
+    )
+
+
+def _answer(
+    estimate: Estimate,
+    prior_std: NDArray,
+    shrinks: bool,
+    name: str,
+    why: str,
+    arm: Arm,
+    recording: Recording,
+    relative_to: str,
+) -> Identification:
+    phi, half, before = estimate.phi.copy(), Z95 * estimate.std, Z95 * prior_std
+    determined = half <= (before / _SHRINK if shrinks else _SMALL)
+    held = bool(determined[0] and phi[0] > _HELD * estimate.std[0])
+    low, high = np.where(determined, phi - half, -before), np.where(determined, phi + half, before)
+    removed = determined[0] and phi[0] < -half[0]
+    notes = []
+    if removed:
+        notes.append("something was taken off since: the added mass is negative, so no body has these parameters")
+    elif not is_consistent(phi):
+        # the nearest parameters that a body can have, in the metric of what is known
+        phi = nearest_consistent(phi, np.linalg.inv(estimate.covariance), margin=1e-5)
+    low, high = np.minimum(low, phi), np.maximum(high, phi)
+    if not determined.all():
+        missing = ", ".join(n for n, known in zip(NAMES, determined, strict=True) if not known)
+        notes.append(f"this motion does not determine {missing}: what was known before is reported for them")
+    mass, com, inertia_com = phi_to_com(phi)
+    return Identification(
+        method=name,
+        robot=arm.name,
+        frame=str(arm.frame),
+        relative_to=relative_to,
+        n_samples=estimate.n_samples,
+        duration=recording.duration,
+        phi=phi.tolist(),
+        phi_low=low.tolist(),
+        phi_high=high.tolist(),
+        interval="approximate",
+        determined=[bool(x) for x in determined],
+        mass=mass,
+        com=com.tolist(),
+        inertia_com=inertia_com.tolist(),
+        consistent=is_consistent(phi),
+        held=held,
+        why=why,
+        notes=tuple(notes),
+    )

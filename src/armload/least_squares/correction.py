@@ -1,0 +1,103 @@
+"""The arm's own mismatch as linear unknowns: what the bare model leaves out of the measured torque.
+
+    tau_J = tau_bare + tau_L + Z·eta
+
+Each block of eta is written in the momentum form (Y_p, Y_g − Y_c), so that it passes the same lag as the payload and
+needs no acceleration either:
+
+| block    | per joint j                                   | momentum   | drift                 |
+|----------|-----------------------------------------------|------------|-----------------------|
+| offset   | constant torque                               | 0          | 1                     |
+| coulomb  | smooth Coulomb friction                       | 0          | tanh(dq_j / width)    |
+| viscous  | viscous friction                              | 0          | dq_j                  |
+| rotor    | motor inertia, where torque is motor-side     | dq_j       | 0                     |
+| links    | errors of the links' inertial parameters      | Y_p(links) | Y_g(links) − Y_c(links) |
+
+Prior standard deviations are fractions of the joint's effort limit, the same for every arm (two Pandas and a UR10e lie
+within a factor of 3 of each other so); `posterior.py` rescales all blocks but `links` from the data.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armload.arms import Arm, MomentumRegressor, full_arm_regressor
+from armload.inertia import InertialParameters
+
+FRICTION_WIDTH = 0.06  # [rad/s] of the smooth Coulomb friction
+
+# prior standard deviations, as fractions of the joint's effort limit (per rad/s, per rad/s²)
+_PER_JOINT = {"offset": 4e-3, "coulomb": 1e-2, "viscous": 5e-3, "rotor": 3e-4}
+# prior standard deviations of a link's mass [1], centre of mass [m] and inertia [1], times `Arm.link_spread`
+_LINK_MASS, _LINK_COM, _LINK_INERTIA = 0.02, 2e-3, 0.05
+_UNMODELLED_INERTIA = 5e-3  # [kg·m²] of every link at least: cables, covers, elastic joints
+
+
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """The unknowns eta of one arm, with their prior.
+
+    Args:
+        arm: the arm.
+        effort: torque scale of each joint (n,) [N·m], usually `effort_scale(arm, tau)`.
+    """
+
+    arm: Arm
+    effort: NDArray[np.float64]
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns p."""
+        return len(_PER_JOINT) * self.arm.n + 10 * self.arm.n
+
+    @property
+    def prior_std(self) -> NDArray[np.float64]:
+        """Prior standard deviation of eta (p,), its mean being zero."""
+        per_joint = [fraction * self.effort for fraction in _PER_JOINT.values()]
+        return np.concatenate([*per_joint, _link_std(self.arm)])
+
+    @property
+    def adaptive(self) -> NDArray[np.bool_]:
+        """Which unknowns have a prior whose scale the data may set (p,): all but the links'."""
+        return np.arange(self.size) < len(_PER_JOINT) * self.arm.n
+
+    def coulomb(self, eta: ArrayLike) -> NDArray[np.float64]:
+        """The Coulomb friction (n,) [N·m] among the unknowns."""
+        n, block = self.arm.n, list(_PER_JOINT).index("coulomb")
+        return np.asarray(eta)[block * n : (block + 1) * n]
+
+    def regressor(self, q: ArrayLike, dq: ArrayLike) -> MomentumRegressor:
+        """Momentum form of Z for samples (N, n): two arrays (N, n, p)."""
+        dq = np.atleast_2d(dq)
+        n, eye = self.arm.n, np.eye(self.arm.n)
+        nothing = np.zeros((len(dq), n, n))
+        momentum = [nothing, nothing, nothing, dq[:, :, None] * eye]
+        drift = [nothing + eye, np.tanh(dq / FRICTION_WIDTH)[:, :, None] * eye, dq[:, :, None] * eye, nothing]
+        links = full_arm_regressor(self.arm, q, dq)
+        return MomentumRegressor(
+            np.concatenate([*momentum, links.momentum], axis=2), np.concatenate([*drift, links.drift], axis=2)
+        )
+
+
+def effort_scale(arm: Arm, tau: ArrayLike) -> NDArray[np.float64]:
+    """Torque scale of each joint (n,): its effort limit; where that is unknown, 1.5 × the largest torque seen."""
+    seen = np.maximum(1.5 * np.abs(np.asarray(tau)).max(axis=0), 1.0)
+    return np.where(np.isfinite(arm.limits.effort), arm.limits.effort, seen)
+
+
+def _link_std(arm: Arm) -> NDArray[np.float64]:
+    """First-order spread of each link's ten parameters about its joint frame for the stated spread of m, r and I."""
+    mass_std, com_std, inertia_std = (arm.link_spread * x for x in (_LINK_MASS, _LINK_COM, _LINK_INERTIA))
+    out = []
+    for phi in arm.link_parameters:
+        link = InertialParameters(phi)
+        m = max(link.mass, 1e-3)
+        r = link.first_moment / m
+        inertia = np.abs(np.diag(link.inertia))
+        moment = np.sqrt((mass_std * m * r) ** 2 + (m * com_std) ** 2)
+        scale = _UNMODELLED_INERTIA + inertia_std * np.mean(inertia) + 2 * m * com_std * np.linalg.norm(r)
+        out.append(np.concatenate([[mass_std * m], moment, np.full(6, scale)]))
+    return np.concatenate(out)
