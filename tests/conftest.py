@@ -3,9 +3,11 @@
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from armload.arms import ARMS, arm
+from armload.recording import Recording
 
 
 @pytest.fixture(params=sorted(ARMS))
@@ -27,3 +29,20 @@ def real_data() -> Path:
     if not (folder / "panda_unloaded_1khz.csv").exists():
         pytest.skip(f"real logs not found in {folder}: set ARMLOAD_REAL_DATA to their folder")
     return folder
+
+
+@pytest.fixture
+def analytic_log():
+    """A factory of exact logs on an analytic motion: analytic_log(arm, payload, …) -> Recording."""
+
+    def make(arm, payload=None, *, duration=6.0, rate=200.0, phase=0.0, extra=None, start=0.0):
+        t = start + np.arange(int(duration * rate)) / rate
+        joints = np.arange(arm.n)
+        pose = np.array([0.2, -0.6, 0.3, -1.8, 0.2, 1.6, 0.4][: arm.n])
+        w, a = 2.0 + 0.35 * joints, 0.5 - 0.02 * joints
+        angle = t[:, None] * w + joints + phase
+        q, dq, ddq = pose + a * np.sin(angle), a * w * np.cos(angle), -a * w**2 * np.sin(angle)
+        tau = (arm if payload is None else arm.with_payload(payload)).torque(q, dq, ddq)
+        return Recording(t, q, dq, tau if extra is None else tau + extra(q, dq))
+
+    return make

@@ -32,14 +32,13 @@ GAP = 0.1  # [s] a longer pause between samples restarts the lags
 _PRESLIDING = (
     10.0  # variance of a joint's residual grows up to 1 + this where it stands still: friction is unknown there
 )
+_WIDE = 4.0  # the solution's prior is so much wider than the stated one: it must not pull a determined payload
 _PRIOR_COUNT = 4.0  # weight of the prior long-run variance, in blocks
 _PRIOR_RESIDUAL = 4e-3  # prior standard deviation of the unexplained torque, as a fraction of the effort limit
-_NOVELTY = (
-    10.0  # [s] the mismatch is a function of the configuration: more time on similar motions does not average it away
-)
-_MOTOR_SIDE = (
-    0.01  # Coulomb friction above this fraction of the effort limit: the torque is the motor's, not the link's
-)
+# [s] the mismatch is a function of the configuration: more time on similar motions does not average it away
+_NOVELTY = 10.0
+# Coulomb friction above this fraction of the effort limit: the torque is the motor's, not the link's
+_MOTOR_SIDE = 0.01
 _GAIN_STD = {"link": 0.005, "motor": 0.02}  # torque calibration, 1 sigma; motor constants are known to a few per cent
 
 
@@ -80,7 +79,7 @@ class RegressionData:
         lagged = self._torque(t, tau)
         rows, last = [], self._last_row
         for k, now in enumerate(t):
-            if now - last >= (1.0 - 1e-6) / REGRESSOR_RATE:
+            if now - last >= 0.9 / REGRESSOR_RATE:
                 rows.append(k)
                 last = now
         if not rows:
@@ -246,7 +245,7 @@ class PosteriorLeastSquares(Identifier):
     def _solve(self, t: float) -> None:
         assert self._run is not None
         runs = [self._run] if self._tare is None else [self._tare, self._run]
-        self._posterior, self._solved_at = solve(runs, payload_prior_std(self.arm)), t
+        self._posterior, self._solved_at = solve(runs, _WIDE * payload_prior_std(self.arm)), t
 
     def _estimate(self, t: float) -> Estimate:
         return Estimate(float(t), self.posterior.phi, self.posterior.covariance, self._count, str(self.arm.frame))

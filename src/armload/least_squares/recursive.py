@@ -24,6 +24,8 @@ from armload.least_squares.autocorrelation import BlockMeans
 from armload.recording import Recording, Sample
 
 # Initial P: standard deviations of 10 kg, 1 kg·m and 0.3 kg·m², so that the columns' units do not mix.
+_AT_REST = 0.01  # [rad/s]
+_TRANSIENT = 5.0  # time constants after which an observer started in motion has settled
 _INITIAL_STD = np.array([10.0] + [1.0] * 3 + [0.3] * 6)
 
 
@@ -189,13 +191,17 @@ class FilteredRecursiveLeastSquares(_Recursive):
 
     def _restart(self) -> None:
         self._observer, self._filter = Lag(self.gain), Lag(self.gain)
+        self._from: float | None = None  # time from which the observer is trusted
 
     def _equations(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> tuple[NDArray, NDArray]:
         p, drift = self.arm.momentum(q, dq)
-        # both lags start at their first input: an arm that starts at rest then shows no transient
+        # both lags start at their first input: exact from rest; after a start in motion the transient is left out
+        if self._from is None:
+            self._from = t[0] + (_TRANSIENT / self.gain if np.abs(dq[0]).max() > _AT_REST else 0.0)
         u = tau - drift + self.gain * p
         r = self._observer(t, u, initial=u[0]) - self.gain * p
         signal = np.stack([q, dq], axis=1)  # (N, 2, n)
         lagged = self._filter(t, signal, initial=signal[0])
         ddq = self.gain * (dq - lagged[:, 1])  # the derivative of the lag's output, exactly
+        r[t < self._from] = np.nan
         return r, payload_regressor(self.arm.frame_motion(lagged[:, 0]), lagged[:, 1], ddq)
