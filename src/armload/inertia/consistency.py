@@ -16,10 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armload.errors import InertiaError
-from armload.inertia.parameters import inertia_matrix, vech
+from armload.inertia.parameters import InertialParameters, inertia_matrix, vech
 
 # Lengths are divided by this before matrices are compared or projected, so that kg, kg·m and kg·m² weigh alike.
 _LENGTH = 0.1  # [m]
+# phi of the body whose J, lengths in units of _LENGTH, is the 4×4 identity
+_BALL = np.array([1.0, 0.0, 0.0, 0.0, *(2 * _LENGTH**2 * np.array([1.0, 0.0, 0.0, 1.0, 0.0, 1.0]))])
 
 
 def pseudo_inertia(phi: ArrayLike) -> NDArray[np.float64]:
@@ -63,35 +65,39 @@ def nearest_consistent(phi: ArrayLike, information: ArrayLike | None = None, mar
         margin: smallest eigenvalue of J allowed, lengths in units of 0.1 m [kg].
 
     Raises:
-        InertiaError: the solver found no answer.
+        InertiaError: phi is not ten finite numbers, or the solver found no answer.
     """
     import clarabel
     from scipy import sparse
 
-    phi = np.asarray(phi, dtype=float)
-    if np.linalg.eigvalsh(_scaled(pseudo_inertia(phi)))[0] >= margin:
+    phi = InertialParameters(phi).phi  # ten finite numbers, or a sentence
+    if np.linalg.eigvalsh(_scaled(pseudo_inertia(phi)))[0] >= 0.99 * margin:  # what the solver returns passes too
         return phi.copy()
     scale = _column_scale()
     weight = np.eye(10) if information is None else np.asarray(information, dtype=float) / np.outer(scale, scale)
     weight = 0.5 * (weight + weight.T) / max(np.abs(weight).max(), 1e-300) + 1e-12 * np.eye(10)
     target = phi * scale
+    size = np.abs(target).max() + margin
     svec, order = _svec_of_basis()
-    b = -margin * _svec_identity(order)
     settings = clarabel.DefaultSettings()
     settings.verbose = False
+    # solved for (x − phi) / size: numbers near 1 around 0, where the solver's relative tolerances mean most
     solver = clarabel.DefaultSolver(
         sparse.csc_matrix(np.triu(weight)),
-        -weight @ target,
+        np.zeros(10),
         sparse.csc_matrix(-svec),
-        b,
+        (svec @ target - margin * _svec_identity(order)) / size,
         [clarabel.PSDTriangleConeT(4)],
         settings,
     )
     solution = solver.solve()
-    x = np.asarray(solution.x)
+    x = (target + size * np.asarray(solution.x)) / scale
     if "Solved" not in str(solution.status) or not np.all(np.isfinite(x)):
         raise InertiaError(f"no consistent parameters found near {phi.tolist()} (solver: {solution.status})")
-    return x / scale
+    missing = margin - np.linalg.eigvalsh(_scaled(pseudo_inertia(x)))[0]
+    if missing > 0:  # rounding of the solver: a small ball at the origin makes up for it
+        x = x + missing * _BALL
+    return x
 
 
 def log_cholesky(phi: ArrayLike) -> NDArray[np.float64]:

@@ -38,17 +38,30 @@ def to_order(parameters: InertialParameters, order: str) -> NDArray[np.float64]:
     """
     if order in _ABOUT_ORIGIN:
         return np.concatenate([parameters.phi[:4], parameters.phi[4:][_ABOUT_ORIGIN[order]]])
+    _known(order)
     mass, com, inertia = phi_to_com(parameters.phi)
     if order == "franka":
         return np.concatenate([[mass], com, inertia.flatten(order="F")])
-    return np.concatenate([[mass], com, vech(inertia)[_ABOUT_COM[_known(order)]]])
+    return np.concatenate([[mass], com, vech(inertia)[_ABOUT_COM[order]]])
 
 
 def from_order(values: ArrayLike, order: str, frame: str | None = None) -> InertialParameters:
-    """The inverse of `to_order`: read what another program wrote."""
-    v = np.asarray(values, dtype=float)
-    expected = 13 if order == "franka" else 10
+    """The inverse of `to_order`: read what another program wrote.
+
+    Args:
+        values: (10,), Franka (13,).
+        order: one of `ORDERS`.
+        frame: the frame the numbers are about.
+
+    Raises:
+        InertiaError: the order is unknown, or the numbers do not fit it.
+    """
     _known(order)
+    expected = 13 if order == "franka" else 10
+    try:
+        v = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise InertiaError(f"{values!r} is not numeric: expected {expected} numbers in the order {order!r}") from None
     if v.shape != (expected,):
         raise InertiaError(f"{v.size} numbers given in the order {order!r}: expected {expected}")
     if order in _ABOUT_ORIGIN:
@@ -62,7 +75,6 @@ def from_order(values: ArrayLike, order: str, frame: str | None = None) -> Inert
     return InertialParameters.from_com(v[0], v[1:4], inertia_matrix(six), frame)
 
 
-def _known(order: str) -> str:
+def _known(order: str) -> None:
     if order not in ORDERS:
         raise InertiaError(f"unknown order {order!r}: expected one of {', '.join(ORDERS)}")
-    return order

@@ -189,8 +189,8 @@ class InertialParameters:
 def _phi(values: ArrayLike | Sequence[float]) -> NDArray[np.float64]:
     try:
         phi = np.asarray(values, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise InertiaError(f"phi is not numeric ({error}): expected 10 numbers") from None
+    except (TypeError, ValueError):
+        raise InertiaError(f"phi is not numeric: expected 10 numbers, found {values!r}") from None
     if phi.shape != (10,):
         raise InertiaError(f"phi has shape {phi.shape}: expected 10 numbers ({', '.join(NAMES)})")
     if not np.all(np.isfinite(phi)):
@@ -200,7 +200,10 @@ def _phi(values: ArrayLike | Sequence[float]) -> NDArray[np.float64]:
 
 
 def _vector3(values: ArrayLike, name: str) -> NDArray[np.float64]:
-    v = np.asarray(values, dtype=float)
+    try:
+        v = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        v = np.full(3, np.nan)
     if v.shape != (3,) or not np.all(np.isfinite(v)):
         raise InertiaError(f"{name} is {values!r}: expected 3 finite numbers")
     return v
