@@ -1,0 +1,78 @@
+"""The controller: joint impedance about the desired motion, with the bare nominal arm fed forward.
+
+    tau = tau_ff(q_d, dq_d, ddq_d) + kp·(q_d − q) + kd·(dq_d − dq)
+
+It knows neither the payload nor how the world's arm differs from the model, so that position, velocity and torque all
+carry the payload's trace (Taie et al., RA-L 2024, Section III-B).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from armload.arms import Arm
+from armload.motion import Motion
+from armload.simulate.ratings import poses, rated_effort
+
+# Joint stiffness that libfranka's example programs set before they move (`setJointImpedance` in examples_common.cpp);
+# Franka publishes no damping. With 2 kg at arm's length the Panda then sags 4 mrad in joint 2.
+_PANDA_STIFFNESS = (3000.0, 3000.0, 3000.0, 2500.0, 2500.0, 2000.0, 2000.0)  # [N·m/rad]
+# Other arms: the full rated torque bends a joint by this much [rad]; a payload takes about a third of it.
+_FULL_LOAD_SAG = 0.02
+_DAMPING_RATIO = 1.0  # our choice, for the bare arm; a payload lowers it
+_FEED_FORWARD_KNOTS = 2e-3  # [s] the feed-forward is computed at these instants and interpolated by a cubic spline
+
+
+@dataclass(frozen=True, eq=False)
+class Gains:
+    """Joint stiffness kp (n,) [N·m/rad] and damping kd (n,) [N·m·s/rad]."""
+
+    stiffness: NDArray[np.float64]
+    damping: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, arm: Arm) -> Gains:
+        """The gains an arm is simulated with: libfranka's stiffness for the Panda, by rated torque elsewhere.
+
+        Other arms bend by 20 mrad under their rated torque. The damping is critical for the bare arm's mean joint
+        inertia, kd = 2·sqrt(kp·M_ii); Franka publishes none.
+
+        >>> from armload.arms import arm
+        >>> Gains.of(arm("panda")).stiffness[0]
+        np.float64(3000.0)
+        """
+        inertia = np.mean([np.diag(arm.mass_matrix(q)) for q in poses(arm)], axis=0)
+        stiffness = (
+            np.array(_PANDA_STIFFNESS) if arm.name == "panda" and arm.n == 7 else rated_effort(arm) / _FULL_LOAD_SAG
+        )
+        return cls(stiffness, 2.0 * _DAMPING_RATIO * np.sqrt(stiffness * inertia))
+
+
+@dataclass(frozen=True, eq=False)
+class Command:
+    """What the controller is told along a motion, at steps j = 0 … N−1 of h seconds, each (N, n).
+
+    position: q_d(j·h) [rad].
+    velocity: dq_d at (j + ½)·h, the instant at which the integrator's damping acts [rad/s].
+    feed_forward: tau_ff(j·h) [N·m].
+    """
+
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    feed_forward: NDArray[np.float64]
+
+    @classmethod
+    def along(cls, arm: Arm, motion: Motion, step: float, steps: int) -> Command:
+        """The command for `steps` steps of a motion, with the inverse dynamics of `arm`, the controller's model."""
+        t = step * np.arange(steps)
+        knots = np.linspace(0.0, max(t[-1], step), max(4, int(np.ceil(t[-1] / _FEED_FORWARD_KNOTS)) + 1))
+        feed_forward = CubicSpline(knots, arm.torque(*motion(knots)))(t)
+        return cls(motion(t)[0], motion(t + 0.5 * step)[1], feed_forward)
+
+    def control(self, gains: Gains) -> NDArray[np.float64]:
+        """The actuators' input ctrl (N, n) = tau_ff + kp·q_d + kd·dq_d [N·m]."""
+        return self.feed_forward + gains.stiffness * self.position + gains.damping * self.velocity

@@ -1,0 +1,147 @@
+"""The native rollout, and how a log is read off it.
+
+MuJoCo steps whole runs in C++ threads. What is logged at time t_j = j·h makes the channels one instant of the leapfrog
+that the integrator is (see `simulate.plant`; v lives half a step before its q):
+
+    q = q_j,      dq = (v_j + v_{j+1})/2,      tau = ctrl_j − kp·q_j − kd·v_{j+1} + offset
+
+so tau equals the inverse dynamics at (q, dq, ddq) to second order in h, but for the Coriolis torque, which the
+integrator takes at v_j: an error of first order, below 1 mN·m rms for the Panda with 2 kg. h is an integer fraction of
+the log's period, so that logs are even at any rate.
+
+The rollout cannot call back into Python. Friction and residual d(q, dq) therefore act as a torque along time: first
+evaluated along the desired motion, then along the motion that came out (Picard iteration, `PASSES` rollouts). The log
+is exact whatever is left of that iteration, because it holds what moved the rigid bodies plus d at the logged q and dq.
+The rest only means that the controller acted as if it had misread its own torque by as much.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from armload.simulate.controller import Command, Gains
+from armload.simulate.worlds import World
+
+if TYPE_CHECKING:
+    import mujoco
+
+MAX_STEP = 5e-4  # [s]
+PASSES = 2
+_RESIDUAL_KNOTS = 2e-3  # [s] the residual is smooth: evaluated at these instants along a run, cubic between them
+
+
+@dataclass(frozen=True)
+class Clock:
+    """step: h [s]; every: steps per row of the log; samples: rows of the log."""
+
+    step: float
+    every: int
+    samples: int
+
+    @classmethod
+    def at(cls, rate: float, samples: int) -> Clock:
+        """The largest step up to `MAX_STEP` that divides the period of a log of the given rate [Hz].
+
+        >>> Clock.at(1000.0, 6000).every
+        2
+        """
+        every = max(1, int(np.ceil(1.0 / (rate * MAX_STEP) - 1e-9)))
+        return cls(1.0 / (rate * every), every, samples)
+
+    @property
+    def steps(self) -> int:
+        """Steps to the last row, and one more for the velocity half a step after it."""
+        return (self.samples - 1) * self.every + 1
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """Time of each row (samples,) [s]."""
+        return self.step * self.every * np.arange(self.samples)
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A run ready to go: its plant, world, command, and where it starts (q_0 and v_0, each (n,))."""
+
+    model: mujoco.MjModel
+    world: World
+    command: Command
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+
+
+def roll_out(
+    runs: Sequence[Prepared], gains: Gains, clock: Clock, workers: int
+) -> list[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]]:
+    """(q, dq, tau) of each run, each (samples, n), noise-free; NaN where a run diverged."""
+    states, applied = _picard(runs, gains, clock, workers)
+    logs = []
+    for run, state, disturbance in zip(runs, states, applied, strict=True):
+        rows = slice(None, None, clock.every)
+        q, v, after = (x[rows] for x in _leapfrog(run, state))
+        dq = 0.5 * (v + after)
+        rigid = run.command.control(gains)[rows] - disturbance[rows] - gains.stiffness * q - gains.damping * after
+        logs.append((q, dq, rigid + run.world.disturbance(q, dq) + run.world.offset))
+    return logs
+
+
+def iteration_error(runs: Sequence[Prepared], gains: Gains, clock: Clock, workers: int) -> list[NDArray[np.float64]]:
+    """What the Picard iteration leaves: d(applied) − d(at the motion that came out), (steps, n) per run [N·m]."""
+    states, applied = _picard(runs, gains, clock, workers)
+    return [u - _along(run, clock, state) for run, state, u in zip(runs, states, applied, strict=True)]
+
+
+def _picard(
+    runs: Sequence[Prepared], gains: Gains, clock: Clock, workers: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The last pass: states after each step (runs, steps, 1 + 2n) and the disturbance applied (runs, steps, n)."""
+    import mujoco
+    from mujoco import rollout
+
+    models = [run.model for run in runs]
+    threads = [mujoco.MjData(models[0]) for _ in range(max(1, min(workers, len(runs))))]
+    start = np.array([np.concatenate([[0.0], run.position, run.velocity]) for run in runs])
+    control = np.array([run.command.control(gains) for run in runs])
+    applied = np.array([_disturbance(run.world, clock, run.command.position, run.command.velocity) for run in runs])
+    states = rollout.rollout(models, threads, start, control - applied)[0]
+    if any(run.world.disturbed for run in runs):
+        for _ in range(PASSES - 1):
+            applied = np.array([_along(run, clock, state) for run, state in zip(runs, states, strict=True)])
+            states = rollout.rollout(models, threads, start, control - applied)[0]
+    return states, applied
+
+
+def _along(run: Prepared, clock: Clock, state: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The disturbance (steps, n) along the motion that came out."""
+    q, v, after = _leapfrog(run, state)
+    return _disturbance(run.world, clock, q, 0.5 * (v + after))
+
+
+def _leapfrog(
+    run: Prepared, state: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """q_j, v_j and v_{j+1} for j = 0 … steps − 1, each (steps, n); MuJoCo returns the state after each step."""
+    n = len(run.position)
+    q = np.concatenate([run.position[None], state[:-1, 1 : n + 1]])
+    v = np.concatenate([run.velocity[None], state[:-1, n + 1 : 2 * n + 1]])
+    return q, v, state[:, n + 1 : 2 * n + 1]
+
+
+def _disturbance(world: World, clock: Clock, q: NDArray[np.float64], dq: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Friction and residual (steps, n) along a motion given at every step."""
+    if not world.disturbed:
+        return np.zeros_like(q)
+    out = world.friction(dq)
+    if world.residual is None:
+        return out
+    every = max(1, int(_RESIDUAL_KNOTS / clock.step))
+    knots = np.unique(np.append(np.arange(0, len(q), every), len(q) - 1))
+    if len(knots) < 4 or not np.all(np.isfinite(q)):
+        return out + world.residual(q)
+    return out + CubicSpline(knots, world.residual(q[knots]))(np.arange(len(q)))
