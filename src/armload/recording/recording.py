@@ -38,6 +38,7 @@ class Recording:
         channel: what tau is; "measured" (rigid body + friction, gravity included), "desired" or "external".
         joint_names: names of the columns, where the source has them.
         source: where it comes from (a path), for messages and provenance.
+        notes: what a reader did to the log that its user should know (rows dropped, say), one sentence each.
 
     Raises:
         RecordingError: wrong shapes, a number that is not finite, times out of order; the message names row and column
@@ -51,6 +52,7 @@ class Recording:
     channel: str = "measured"
     joint_names: tuple[str, ...] | None = None
     source: str = "recording"
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("t", "q", "dq", "tau"):

@@ -1,0 +1,119 @@
+"""The columns of a log (t, q1…qn, dq1…dqn, tau1…taun) and the checks every reader shares."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm
+from armload.errors import RecordingError
+from armload.recording.recording import Recording
+
+QUANTITIES = ("q", "dq", "tau")
+_JOINT = re.compile(r"(q|dq|tau)([1-9][0-9]{0,2})")
+
+
+def column_names(n: int) -> list[str]:
+    """The names of all columns of an n-joint log, in the order they are written.
+
+    >>> column_names(2)
+    ['t', 'q1', 'q2', 'dq1', 'dq2', 'tau1', 'tau2']
+    """
+    return ["t", *(f"{quantity}{j}" for quantity in QUANTITIES for j in range(1, n + 1))]
+
+
+def joint_count(names: Sequence[str], where: str, arm: Arm | None = None) -> int:
+    """Number of joints n of a log with these column names, in any order.
+
+    Raises:
+        RecordingError: a name is missing, unexpected or there twice, or the arm has another number of joints.
+    """
+    names = list(names)
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise RecordingError(f"{where} has the column {twice[0]!r} more than once: expected {_header(arm)}")
+    n = max((int(m[2]) for m in map(_JOINT.fullmatch, names) if m), default=0)
+    if n == 0:
+        found = ", ".join(names[:6]) + (", …" if len(names) > 6 else "")
+        raise RecordingError(f"{where} has no columns named q1, dq1, tau1, …: found {found}; expected {_header(arm)}")
+    expected = column_names(n)
+    missing = [name for name in expected if name not in names]
+    unexpected = [name for name in names if name not in expected]
+    if arm is not None and n != arm.n and not any(_JOINT.fullmatch(name) for name in missing):
+        check_joint_count(n, where, arm)
+    if missing:
+        also = f" (it has {_some(unexpected)} instead)" if unexpected else ""
+        raise RecordingError(f"{where} lacks {_some(missing)}{also}: expected {_header(arm)}")
+    if unexpected:
+        raise RecordingError(f"{where} has the unexpected {_some(unexpected)}: expected only {_header(arm)}; remove it")
+    return n
+
+
+def check_joint_count(n: int, where: str, arm: Arm) -> None:
+    """Raise RecordingError if the log's n joints are not the arm's."""
+    if n != arm.n:
+        has = "1 joint (q1)" if n == 1 else f"{n} joints (q1..q{n})"
+        raise RecordingError(f"{where}: log has {has}, {arm.name} has {arm.n}: name the robot that made the log")
+
+
+def checked_recording(
+    table: NDArray[np.float64],
+    where: str,
+    row_name: Callable[[int], str],
+    *,
+    channel: str = "measured",
+    joint_names: tuple[str, ...] | None = None,
+    notes: tuple[str, ...] = (),
+) -> Recording:
+    """A Recording from a table (N, 1 + 3n) in the order of `column_names`, if every row of it can be believed.
+
+    Rows that repeat the row before them exactly are dropped, with a note: some loggers write every sample twice.
+
+    Args:
+        row_name: how to call row k in a message ("line 7").
+
+    Raises:
+        RecordingError: fewer than two rows, a number that is not finite, times out of order; names row and column.
+    """
+    names = column_names((table.shape[1] - 1) // 3)
+    if not np.isfinite(table).all():
+        row, column = np.argwhere(~np.isfinite(table))[0]
+        kind = "NaN" if np.isnan(table[row, column]) else "infinite"
+        raise RecordingError(
+            f"{where}, {row_name(row)}: {names[column]} is {kind}: expected a finite number; remove or repair the row"
+        )
+    step = np.diff(table[:, 0])
+    if np.any(step <= 0):
+        repeated = np.r_[False, (step == 0) & (table[1:] == table[:-1]).all(axis=1)]
+        late = np.flatnonzero((step <= 0) & ~repeated[1:])
+        if len(late):
+            k = int(late[0])
+            what = "repeats the time of" if step[k] == 0 else "goes back in time from"
+            raise RecordingError(
+                f"{where}, {row_name(k + 1)}: t = {table[k + 1, 0]:.6f} s {what} {row_name(k)} "
+                f"(t = {table[k, 0]:.6f} s): expected strictly increasing times; sort the log or drop the row"
+            )
+        first = row_name(int(np.flatnonzero(repeated)[0]))
+        notes = (
+            *notes,
+            f"{where}: dropped {repeated.sum()} row(s) that repeat the row before exactly (first: {first})",
+        )
+        table = table[~repeated]
+    if len(table) < 2:
+        rows = "no rows of data" if len(table) == 0 else "only 1 row of data"
+        raise RecordingError(f"{where} holds {rows}: expected at least 2, one per sample")
+    q, dq, tau = np.split(table[:, 1:], 3, axis=1)
+    return Recording(table[:, 0], q, dq, tau, channel, joint_names, where, notes)
+
+
+def _header(arm: Arm | None) -> str:
+    n = "n" if arm is None else str(arm.n)
+    return f"t,q1..q{n},dq1..dq{n},tau1..tau{n}"
+
+
+def _some(names: Sequence[str]) -> str:
+    shown = ", ".join(repr(name) for name in names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
+    return f"column{'s' if len(names) > 1 else ''} {shown}"

@@ -1,0 +1,196 @@
+"""Logs inside ROS bags: the sensor_msgs/JointState messages of one topic (ROS 1 .bag, ROS 2 .db3, .mcap or folder).
+
+The joints of a JointState are known by **name**: their order is the publisher's own (UR's driver may list the elbow
+first, grippers publish finger joints on the same topic). Time is the message's header stamp, counted from the first;
+where all stamps are equal, as with publishers that do not set them, it is the time of logging.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm
+from armload.errors import RecordingError
+from armload.recording.columns import checked_recording
+from armload.recording.recording import Recording
+
+JOINT_STATE = "sensor_msgs/msg/JointState"
+BAG_SUFFIXES = (".bag", ".db3", ".mcap")
+
+
+class _Message(NamedTuple):
+    log_time: int  # [ns]
+    stamp: int  # [ns]
+    names: tuple[str, ...]
+    values: tuple[NDArray[np.float64], ...]  # position, velocity, effort
+
+
+def read_bag(path: Path, where: str, arm: Arm | None = None, topic: str | None = None) -> Recording:
+    """Read the JointState messages of a bag; see `read_recording` for what it raises."""
+    try:
+        with ExitStack() as stack:
+            readers = [stack.enter_context(reader) for reader in _readers(path, where, stack)]
+            bag = _Bag(readers)
+            topic = _choose(bag, where, arm, topic)
+            recording = _recording(bag, topic, where, arm)
+    except RecordingError:
+        raise
+    except Exception as error:  # a damaged bag can fail anywhere between the index, the chunks and the messages
+        text = " ".join(str(error).split()) or type(error).__name__
+        raise RecordingError(f"{where} is not a bag that can be read (damaged or cut off?): {text[:160]}") from None
+    return recording
+
+
+class _Bag:
+    """The JointState topics of a bag, whichever ROS wrote it."""
+
+    def __init__(self, readers: list[Any]) -> None:
+        from rosbags.rosbag1 import Reader as Reader1
+        from rosbags.typesys import Stores, get_typestore
+
+        self._readers = readers
+        connections = [connection for reader in readers for connection in reader.connections]
+        self.types = {connection.topic: connection.msgtype for connection in connections}
+        self.topics = sorted({c.topic for c in connections if c.msgtype == JOINT_STATE})
+        # The message is read as the ROS release defines it, not as the file says: JointState never changed
+        if any(isinstance(reader, Reader1) for reader in readers):
+            self._decode = get_typestore(Stores.ROS1_NOETIC).deserialize_ros1
+        else:
+            self._decode = get_typestore(Stores.ROS2_HUMBLE).deserialize_cdr
+
+    def messages(self, topic: str) -> Iterator[_Message]:
+        """The messages of one topic in the order of logging."""
+        for reader in self._readers:
+            mine = [c for c in reader.connections if c.topic == topic and c.msgtype == JOINT_STATE]
+            if not mine:
+                continue
+            for _, log_time, raw in reader.messages(mine):
+                m: Any = self._decode(raw, JOINT_STATE)
+                stamp = m.header.stamp.sec * 1_000_000_000 + m.header.stamp.nanosec
+                yield _Message(log_time, stamp, tuple(m.name), (m.position, m.velocity, m.effort))
+
+
+def _readers(path: Path, where: str, stack: ExitStack) -> list[Any]:
+    from rosbags.rosbag1 import Reader as Reader1
+    from rosbags.rosbag2 import Reader as Reader2
+
+    if path.suffix.lower() == ".bag" and path.is_file():
+        return [Reader1(path)]
+    if path.is_file():
+        return [Reader2(_plain_name(path, stack))]
+    if (path / "metadata.yaml").is_file():
+        return [Reader2(_plain_name(path, stack))]
+    parts = sorted(part for part in path.iterdir() if part.suffix in (".db3", ".mcap"))
+    if not parts:
+        raise RecordingError(
+            f"{where} is a folder without metadata.yaml, .db3 or .mcap: expected a log file or a ROS 2 bag folder"
+        )
+    return [Reader2(_plain_name(part, stack)) for part in parts]
+
+
+def _plain_name(path: Path, stack: ExitStack) -> Path:
+    """The path, or a link to it where its suffix is in capitals or SQLite would take part of its name for a query."""
+    if path.suffix == path.suffix.lower() and not any(sign in str(path) for sign in "?#%"):
+        return path
+    link = Path(stack.enter_context(tempfile.TemporaryDirectory())) / f"bag{path.suffix.lower()}"
+    link.symlink_to(path.absolute(), target_is_directory=path.is_dir())
+    return link
+
+
+def _choose(bag: _Bag, where: str, arm: Arm | None, topic: str | None) -> str:
+    """The topic to read: the one named, or the only one that has the arm's joints."""
+    if not bag.topics:
+        others = ", ".join(f"{name} ({kind})" for name, kind in sorted(bag.types.items())[:6]) or "nothing"
+        raise RecordingError(f"{where} has no topic of type sensor_msgs/JointState: it has {others}")
+    if topic is not None:
+        if topic not in bag.topics:
+            raise RecordingError(f"{where} has no JointState topic {topic!r}: expected one of {', '.join(bag.topics)}")
+        return topic
+    if len(bag.topics) == 1:
+        return bag.topics[0]
+    if arm is None:
+        candidates = bag.topics
+    else:
+        wanted = set(arm.joint_names)
+        candidates = [name for name in bag.topics if any(wanted <= set(m.names) for m in bag.messages(name))]
+        if not candidates:
+            found = sorted({joint for name in bag.topics for m in bag.messages(name) for joint in m.names})
+            _refuse_joints(where, f"topics {', '.join(bag.topics)}", arm, found)
+    if len(candidates) > 1:
+        raise RecordingError(
+            f"{where} has {len(candidates)} JointState topics to choose from: {', '.join(candidates)}; "
+            "name one (--topic)"
+        )
+    return candidates[0]
+
+
+def _recording(bag: _Bag, topic: str, where: str, arm: Arm | None) -> Recording:
+    wanted = None if arm is None else arm.joint_names
+    columns: dict[tuple[str, ...], list[int] | None] = {}  # how each list of names maps to the arm's joints
+    stamps, log_times, rows, numbers = [], [], [], []
+    for number, message in enumerate(bag.messages(topic), start=1):
+        if wanted is None:
+            wanted = message.names
+        if message.names not in columns:
+            columns[message.names] = _columns(message.names, wanted)
+        order = columns[message.names]
+        if order is None:
+            continue  # another device on the same topic, such as a gripper
+        rows.append(np.concatenate(_values(message, order, f"{where}, {topic} message {number}")))
+        stamps.append(message.stamp)
+        log_times.append(message.log_time)
+        numbers.append(number)
+    if not rows:
+        if not columns or wanted is None:
+            raise RecordingError(f"{where}: topic {topic} has no messages: expected at least 2")
+        if arm is not None:
+            _refuse_joints(where, f"topic {topic}", arm, sorted({name for names in columns for name in names}))
+    notes = []
+    if len(set(stamps)) == 1 and len(stamps) > 1:
+        notes.append(f"{where}: the messages of {topic} are not stamped: took the times of logging")
+        stamps = log_times
+    t = np.array([stamp - stamps[0] for stamp in stamps], dtype=np.int64) * 1e-9  # exact to the ns, unlike since 1970
+    table = np.column_stack([t, np.array(rows)]).astype(float)
+    return checked_recording(
+        table,
+        where,
+        lambda k: f"{topic} message {numbers[k]}",
+        channel="desired" if "desired" in topic.rsplit("/", 1)[-1] else "measured",
+        joint_names=wanted,
+        notes=tuple(notes),
+    )
+
+
+def _columns(names: tuple[str, ...], wanted: tuple[str, ...]) -> list[int] | None:
+    """Where each wanted joint stands among the names; None if not all of them are there."""
+    return [names.index(name) for name in wanted] if wanted and set(wanted) <= set(names) else None
+
+
+def _values(message: _Message, order: list[int], place: str) -> list[NDArray[np.float64]]:
+    """Position, velocity and effort of the wanted joints."""
+    out = []
+    for what, values in zip(("position", "velocity", "effort"), message.values, strict=True):
+        if len(values) != len(message.names):
+            found = f"no {what}" if len(values) == 0 else f"{len(values)} values of {what}"
+            also = " (joint torque); record a topic that carries the torque" if what == "effort" else ""
+            raise RecordingError(f"{place} has {found} for {len(message.names)} joints: expected one per joint{also}")
+        out.append(np.asarray(values, dtype=float)[order])
+    return out
+
+
+def _refuse_joints(where: str, topics: str, arm: Arm, found: list[str]) -> None:
+    missing = [name for name in arm.joint_names if name not in found]
+    if not missing:
+        raise RecordingError(f"{where}: no single message of {topics} has all joints of {arm.name}")
+    raise RecordingError(
+        f"{where}: {arm.name}'s joint{'s' if len(missing) > 1 else ''} {', '.join(missing)} "
+        f"{'are' if len(missing) > 1 else 'is'} not on {topics}: found {', '.join(found[:20]) or 'no joints'}; "
+        "name the robot that made the bag"
+    )
