@@ -70,7 +70,7 @@ def nearest_consistent(phi: ArrayLike, information: ArrayLike | None = None, mar
     import clarabel
     from scipy import sparse
 
-    phi = InertialParameters(phi).phi  # ten finite numbers, or a sentence
+    phi = InertialParameters(np.asarray(phi, dtype=float)).phi  # ten finite numbers, or a sentence
     if np.linalg.eigvalsh(_scaled(pseudo_inertia(phi)))[0] >= 0.99 * margin:  # what the solver returns passes too
         return phi.copy()
     scale = _column_scale()
