@@ -23,7 +23,10 @@ from armload.simulate.ratings import poses, rated_effort
 _PANDA_STIFFNESS = (3000.0, 3000.0, 3000.0, 2500.0, 2500.0, 2000.0, 2000.0)  # [N·m/rad]
 # Other arms: the full rated torque bends a joint by this much [rad]; a payload takes about a third of it.
 _FULL_LOAD_SAG = 0.02
-_DAMPING_RATIO = 1.0  # our choice, for the bare arm; a payload lowers it
+# Critical damping of the bare links alone would leave the smallest wrists too loose against friction, as their motors'
+# inertia is not modelled: a displaced joint needs at least this long to come back. (franka_ros' joint impedance example
+# is slower still: its kd/kp lie between 0.03 and 0.2 s.)
+_SHORTEST_RETURN = 0.01  # [s]
 _FEED_FORWARD_KNOTS = 2e-3  # [s] the feed-forward is computed at these instants and interpolated by a cubic spline
 
 
@@ -38,8 +41,8 @@ class Gains:
     def of(cls, arm: Arm) -> Gains:
         """The gains an arm is simulated with: libfranka's stiffness for the Panda, by rated torque elsewhere.
 
-        Other arms bend by 20 mrad under their rated torque. The damping is critical for the bare arm's mean joint
-        inertia, kd = 2·sqrt(kp·M_ii); Franka publishes none.
+        Other arms bend by 20 mrad under their rated torque. The damping is our choice, as Franka publishes none:
+        critical for the bare arm's mean joint inertia and at least 10 ms·kp, kd = max(2·sqrt(kp·M_ii), 0.01·kp).
 
         >>> from armload.arms import arm
         >>> Gains.of(arm("panda")).stiffness[0]
@@ -49,7 +52,7 @@ class Gains:
         stiffness = (
             np.array(_PANDA_STIFFNESS) if arm.name == "panda" and arm.n == 7 else rated_effort(arm) / _FULL_LOAD_SAG
         )
-        return cls(stiffness, 2.0 * _DAMPING_RATIO * np.sqrt(stiffness * inertia))
+        return cls(stiffness, np.maximum(2.0 * np.sqrt(stiffness * inertia), _SHORTEST_RETURN * stiffness))
 
 
 @dataclass(frozen=True, eq=False)

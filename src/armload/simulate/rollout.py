@@ -62,7 +62,7 @@ class Clock:
     @property
     def times(self) -> NDArray[np.float64]:
         """Time of each row (samples,) [s]."""
-        return self.step * self.every * np.arange(self.samples)
+        return self.step * self.every * np.arange(self.samples, dtype=float)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,11 +109,11 @@ def _picard(
     start = np.array([np.concatenate([[0.0], run.position, run.velocity]) for run in runs])
     control = np.array([run.command.control(gains) for run in runs])
     applied = np.array([_disturbance(run.world, clock, run.command.position, run.command.velocity) for run in runs])
-    states = rollout.rollout(models, threads, start, control - applied)[0]
+    states = np.asarray(rollout.rollout(models, threads, start, control - applied)[0], dtype=float)
     if any(run.world.disturbed for run in runs):
         for _ in range(PASSES - 1):
             applied = np.array([_along(run, clock, state) for run, state in zip(runs, states, strict=True)])
-            states = rollout.rollout(models, threads, start, control - applied)[0]
+            states = np.asarray(rollout.rollout(models, threads, start, control - applied)[0], dtype=float)
     return states, applied
 
 

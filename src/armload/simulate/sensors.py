@@ -1,7 +1,7 @@
 """Sensors: from what happens in the joints to what a log says.
 
 Each effect is one field of `Sensors`; `dataclasses.replace(sensors, vibration=None)` switches one off. In order: lag
-behind the command, skew between channels, vibration, white noise, quantisation, jitter of the time stamps, lost samples.
+behind the command, skew between channels, vibration, white noise, quantisation, jitter of the stamps, lost samples.
 
 The Panda's figures are measured on a real log at 1 kHz. There, the velocity channel is aligned with the position
 channel to 0.3 ms, so no skew is modelled between them; the torque channel's skew cannot be told from the log, 1 ms is
