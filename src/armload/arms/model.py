@@ -78,7 +78,10 @@ class Arm:
     link_spread: float = field(default=10.0, repr=False)
 
     def __post_init__(self) -> None:
-        gravity = np.asarray(self.gravity, dtype=float)
+        try:
+            gravity = np.asarray(self.gravity, dtype=float)
+        except (TypeError, ValueError):
+            gravity = np.full(3, np.nan)
         if gravity.shape != (3,) or not np.all(np.isfinite(gravity)):
             raise ArmError(f"gravity is {self.gravity!r}: expected 3 finite numbers x,y,z in m/s², such as 0,0,-9.81")
         if not 1.0 <= np.linalg.norm(gravity) <= 30.0:
@@ -260,7 +263,8 @@ class Arm:
         if self.attached is not None:
             placement = self._placement(model)
             moved = self.attached.moved(placement.rotation, placement.translation)
-            model.inertias[self.n] = model.inertias[self.n] + _pin_inertia(moved)
+            last = from_order(model.inertias[self.n].toDynamicParameters(), "pinocchio")
+            model.inertias[self.n] = _pin_inertia(last + moved)  # added as numbers: a payload may weigh nothing
         if not any(model.inertias[k].mass > 0 for k in range(1, self.n + 1)):
             raise ArmError(f"no link of {self.name} has a mass: expected a URDF with <inertial> elements")
         return model
@@ -309,4 +313,8 @@ class Arm:
 
 
 def _pin_inertia(parameters: InertialParameters) -> pin.Inertia:
+    if parameters.mass == 0.0:  # Pinocchio keeps the CoM, which a massless body does not have
+        if np.any(parameters.first_moment):
+            raise ArmError("a link without mass has a first moment: Pinocchio cannot hold such a body; give it a mass")
+        return pin.Inertia(0.0, np.zeros(3), parameters.inertia)
     return pin.Inertia.FromDynamicParameters(to_order(parameters, "pinocchio"))

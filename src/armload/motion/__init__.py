@@ -1,13 +1,21 @@
 """Motions: the Fourier excitation, its design and checks, and the files other people's robots read."""
 
+from armload.motion.check import MotionCheck, check_motion, rated_load
 from armload.motion.files import load_motion, save_motion, taie2024
+from armload.motion.fingerprint import MotionFingerprint
 from armload.motion.fourier import FourierMotion, start_and_stop_at_rest
 from armload.motion.motion import Motion
+from armload.motion.random_fourier import random_motion
 
 __all__ = [
     "FourierMotion",
     "Motion",
+    "MotionCheck",
+    "MotionFingerprint",
+    "check_motion",
     "load_motion",
+    "random_motion",
+    "rated_load",
     "save_motion",
     "start_and_stop_at_rest",
     "taie2024",
