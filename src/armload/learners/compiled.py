@@ -1,0 +1,252 @@
+"""Prediction without scikit-learn or JAX: trees as flat arrays walked by numba, networks as stacked matrix products.
+
+Every trained ensemble predicts through one of these, so a saved model, a loaded one and a live stream give the same
+numbers. One row costs microseconds, where the training libraries' own `predict` costs most of a millisecond.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, overload
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+_CHUNK = 2048  # rows predicted at once: bounds the memory of a wide hidden layer
+
+
+class Compiled(ABC):
+    """The fitted members of an ensemble, M predictors of k outputs from d features."""
+
+    n_features: int
+    n_outputs: int
+    n_members: int
+
+    @abstractmethod
+    def members(self, X: ArrayLike) -> NDArray[np.float64]:
+        """What each member says: (M, N, k) for rows X (N, d)."""
+
+    @abstractmethod
+    def validate(self) -> None:
+        """Raise ValueError unless the arrays fit together; for arrays that come from a file."""
+
+    @overload
+    def predict(self, X: ArrayLike, return_std: Literal[False] = False) -> NDArray[np.float64]: ...
+    @overload
+    def predict(self, X: ArrayLike, return_std: Literal[True]) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+    def predict(self, X, return_std=False):
+        """Mean over the members, K = Σᵢ Kᵢ / M (Taie et al. 2024, eq. 8), and their spread.
+
+        Args:
+            X: (N, d).
+            return_std: also return the sample standard deviation of the members (M − 1 in the denominator; infinite
+                for a single member). It says how far the members disagree, not how far they are from the truth.
+
+        Returns:
+            mean (N, k), or mean and spread (N, k) each.
+        """
+        X = np.asarray(X, dtype=float)
+        mean, spread = np.empty((len(X), self.n_outputs)), np.empty((len(X), self.n_outputs))
+        for start in range(0, len(X), _CHUNK):
+            rows = slice(start, start + _CHUNK)
+            said = self.members(X[rows])
+            mean[rows] = said.mean(axis=0)
+            if return_std:
+                spread[rows] = member_spread(said)
+        return (mean, spread) if return_std else mean
+
+
+def member_spread(said: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Sample standard deviation over the first axis; infinite where there is only one member to ask."""
+    return said.std(axis=0, ddof=1) if len(said) > 1 else np.full(said.shape[1:], np.inf)
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledTrees(Compiled):
+    """Regression trees in one set of arrays; node k of all trees together, children after their parent.
+
+    roots: (M,) first node of each tree.
+    feature: (nodes,) column compared at the node; −1 at a leaf.
+    threshold: (nodes,) float32; a row goes left if x ≤ threshold, x rounded to float32 as scikit-learn does.
+    left, right: (nodes,) children; at a leaf, left is the row of `values`.
+    values: (rows, k) the distinct leaf outputs. A bag over few payloads has far fewer of them than leaves.
+    n_features: d.
+    """
+
+    roots: NDArray[np.int32]
+    feature: NDArray[np.int32]
+    threshold: NDArray[np.float32]
+    left: NDArray[np.int32]
+    right: NDArray[np.int32]
+    values: NDArray[np.float64]
+    n_features: int
+
+    @property
+    def n_members(self) -> int:  # type: ignore[override]
+        return len(self.roots)
+
+    @property
+    def n_outputs(self) -> int:  # type: ignore[override]
+        return self.values.shape[1]
+
+    def validate(self) -> None:
+        """Every walk ends at a leaf: children come after their parent, leaves have a row, columns exist."""
+        types = {"roots": "i4", "feature": "i4", "threshold": "f4", "left": "i4", "right": "i4", "values": "f8"}
+        for name, kind in types.items():
+            array = getattr(self, name)
+            if not isinstance(array, np.ndarray) or array.dtype != np.dtype(kind) or array.size == 0:
+                raise ValueError(f"{name} of the trees is not an array of type {kind}")
+        nodes, inner = np.arange(len(self.feature)), self.feature >= 0
+        for child in (self.left, self.right):
+            if (
+                child.shape != nodes.shape
+                or np.any((child <= nodes)[inner])
+                or child[inner].max(initial=0) >= len(nodes)
+            ):
+                raise ValueError("a node of the trees has a child that does not come after it")
+        leaf = self.left[~inner]
+        if self.values.ndim != 2 or np.any(leaf < 0) or np.any(leaf >= len(self.values)):
+            raise ValueError("a leaf of the trees has no value")
+        if self.threshold.shape != nodes.shape or self.feature.max() >= self.n_features:
+            raise ValueError("a node of the trees compares a feature that does not exist")
+        if np.any(self.roots < 0) or np.any(self.roots >= len(nodes)):
+            raise ValueError("a tree has no root")
+
+    def members(self, X: ArrayLike) -> NDArray[np.float64]:
+        X = np.ascontiguousarray(X, dtype=np.float32)
+        return _walk(X, self.roots, self.feature, self.threshold, self.left, self.right, self.values)
+
+
+@njit(cache=True, nogil=True)
+def _walk(X, roots, feature, threshold, left, right, values):  # pragma: no cover - compiled
+    out = np.empty((roots.shape[0], X.shape[0], values.shape[1]))
+    for m in range(roots.shape[0]):
+        for row in range(X.shape[0]):
+            node = roots[m]
+            while feature[node] >= 0:
+                node = left[node] if X[row, feature[node]] <= threshold[node] else right[node]
+            for j in range(values.shape[1]):
+                out[m, row, j] = values[left[node], j]
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledNetworks(Compiled):
+    """Networks with one hidden layer, y = relu(x·W1 + b1)·W2 + b2, any scaling of x and y folded into the weights.
+
+    W1: (M, d, h); b1: (M, h); W2: (M, h, k); b2: (M, k). Double precision: folding a mean that is large beside its
+    spread (gravity torque) into b1 would cost digits in single precision, and one row then equals its row in a batch.
+    """
+
+    W1: NDArray[np.float64]
+    b1: NDArray[np.float64]
+    W2: NDArray[np.float64]
+    b2: NDArray[np.float64]
+
+    @property
+    def n_features(self) -> int:  # type: ignore[override]
+        return self.W1.shape[1]
+
+    @property
+    def n_members(self) -> int:  # type: ignore[override]
+        return self.W1.shape[0]
+
+    @property
+    def n_outputs(self) -> int:  # type: ignore[override]
+        return self.W2.shape[2]
+
+    def validate(self) -> None:
+        """Shapes agree and every weight is finite."""
+        for name, ndim in {"W1": 3, "b1": 2, "W2": 3, "b2": 2}.items():
+            array = getattr(self, name)
+            if not isinstance(array, np.ndarray) or array.dtype != np.float64 or array.ndim != ndim:
+                raise ValueError(f"{name} of the networks is not a {ndim}-dimensional array of doubles")
+            if not np.isfinite(array).all():
+                raise ValueError(f"{name} of the networks holds a number that is not finite")
+        (M, _, h), k = self.W1.shape, self.n_outputs
+        if self.b1.shape != (M, h) or self.W2.shape != (M, h, k) or self.b2.shape != (M, k) or M == 0:
+            raise ValueError("the networks' weights do not fit together")
+
+    @cached_property
+    def _stacked(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        M, d, h = self.W1.shape
+        return np.ascontiguousarray(self.W1.transpose(1, 0, 2).reshape(d, M * h)), self.b1.reshape(M * h)
+
+    def members(self, X: ArrayLike) -> NDArray[np.float64]:
+        X = np.asarray(X, dtype=float)
+        W1, b1 = self._stacked
+        hidden = X @ W1  # (N, M·h): the hidden layers of all members in one product
+        hidden += b1
+        np.maximum(hidden, 0.0, out=hidden)
+        hidden = hidden.reshape(len(X), self.n_members, -1).swapaxes(0, 1)  # (M, N, h)
+        return hidden @ self.W2 + self.b2[:, None, :]
+
+
+@dataclass(frozen=True, eq=False)
+class Beside(Compiled):
+    """Ensembles of different outputs of the same rows, outputs side by side: the two stages of two-stage training."""
+
+    parts: tuple[Compiled, ...]
+
+    def __init__(self, parts: Sequence[Compiled]) -> None:
+        _same(parts, "n_features", "n_members")
+        object.__setattr__(self, "parts", tuple(parts))
+
+    @property
+    def n_features(self) -> int:  # type: ignore[override]
+        return self.parts[0].n_features
+
+    @property
+    def n_members(self) -> int:  # type: ignore[override]
+        return self.parts[0].n_members
+
+    @property
+    def n_outputs(self) -> int:  # type: ignore[override]
+        return sum(part.n_outputs for part in self.parts)
+
+    def validate(self) -> None:
+        for part in self.parts:
+            part.validate()
+
+    def members(self, X: ArrayLike) -> NDArray[np.float64]:
+        return np.concatenate([part.members(X) for part in self.parts], axis=2)
+
+
+@dataclass(frozen=True, eq=False)
+class Together(Compiled):
+    """Ensembles of the same outputs as one ensemble of all their members: trees and networks together."""
+
+    parts: tuple[Compiled, ...]
+
+    def __init__(self, parts: Sequence[Compiled]) -> None:
+        _same(parts, "n_features", "n_outputs")
+        object.__setattr__(self, "parts", tuple(parts))
+
+    @property
+    def n_features(self) -> int:  # type: ignore[override]
+        return self.parts[0].n_features
+
+    @property
+    def n_members(self) -> int:  # type: ignore[override]
+        return sum(part.n_members for part in self.parts)
+
+    @property
+    def n_outputs(self) -> int:  # type: ignore[override]
+        return self.parts[0].n_outputs
+
+    def validate(self) -> None:
+        for part in self.parts:
+            part.validate()
+
+    def members(self, X: ArrayLike) -> NDArray[np.float64]:
+        return np.concatenate([part.members(X) for part in self.parts], axis=0)
+
+
+def _same(parts: Sequence[Compiled], *attributes: str) -> None:
+    for attribute in attributes:
+        if len({getattr(part, attribute) for part in parts}) != 1:
+            raise ValueError(f"parts differ in {attribute}: {[getattr(part, attribute) for part in parts]}")

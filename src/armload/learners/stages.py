@@ -1,0 +1,161 @@
+"""Ensembles made of ensembles: two-stage training, and trees and networks together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armload.errors import ModelError
+from armload.learners.bag import Learner
+from armload.learners.bagging import BaggingEnsemble, Ensemble, as_learner
+from armload.learners.compiled import Beside, Together
+from armload.learners.progress import Report
+
+STAGES = (slice(0, 4), slice(4, 10))  # (m, m·r) and the inertia
+
+
+class TwoStage(Ensemble):
+    """Two ensembles, one for (m, m·r) and one for the inertia: "two-stage training" of Taie et al. 2024, Section IV.
+
+    Both stages draw the same rows: the model equals a `BaggingEnsemble` with the same seed on each group of columns.
+
+    Args:
+        kind, members, seed, bootstrap, scale, hold_out: of both ensembles; see `BaggingEnsemble`.
+
+    Attributes:
+        stages_: the two fitted ensembles.
+        compiled_: their members side by side, member i of one beside member i of the other.
+    """
+
+    def __init__(
+        self,
+        kind: str | Learner = "tree",
+        members: int = 5,
+        seed: int = 0,
+        bootstrap: bool = True,
+        scale: str = "standard",
+        hold_out: float = 0.15,
+    ) -> None:
+        self.kind = kind
+        self.members = members
+        self.seed = seed
+        self.bootstrap = bootstrap
+        self.scale = scale
+        self.hold_out = hold_out
+
+    def fit(
+        self,
+        X: ArrayLike,
+        y: ArrayLike,
+        X_val: ArrayLike | None = None,
+        y_val: ArrayLike | None = None,
+        *,
+        progress: bool | Report | None = None,
+        checkpoint: str | PathLike[str] | None = None,
+    ) -> TwoStage:
+        """Train both ensembles on y (N, 10); arguments as in `BaggingEnsemble.fit`.
+
+        Raises:
+            ModelError: y does not have the ten columns of phi, and as in `BaggingEnsemble.fit`.
+        """
+        X, y, validation = self._checked(X, y, X_val, y_val)
+        if y.shape[1] != 10:
+            raise ModelError(f"y has {y.shape[1]} column(s): two-stage training expects the ten of phi")
+        Xv, yv = validation or (None, None)
+        self.stages_ = [
+            BaggingEnsemble(self.kind, self.members, self.seed, self.bootstrap, self.scale, self.hold_out).fit(
+                X,
+                y[:, columns],
+                Xv,
+                None if yv is None else yv[:, columns],
+                progress=progress,
+                checkpoint=_beside(checkpoint, f"stage{k}"),
+            )
+            for k, columns in enumerate(STAGES, start=1)
+        ]
+        self.compiled_ = Beside([stage.compiled_ for stage in self.stages_])
+        return self
+
+    @property
+    def epochs_(self) -> np.ndarray | None:
+        """(2·M,) epochs of the networks, stage by stage; None for trees."""
+        return _epochs(self.stages_)
+
+    @property
+    def kind_name(self) -> str:
+        """Kind and stages, such as "two-stage tree"."""
+        return f"two-stage {as_learner(self.kind).kind}"
+
+
+class MixedEnsemble(Ensemble):
+    """Trees and networks in one ensemble, all members averaged alike: the hybrid the paper's Section VI proposes.
+
+    Args:
+        kinds: the kinds of learners; `members` of each.
+        members, seed, bootstrap, scale, hold_out: see `BaggingEnsemble`.
+    """
+
+    def __init__(
+        self,
+        kinds: Sequence[str | Learner] = ("tree", "network"),
+        members: int = 5,
+        seed: int = 0,
+        bootstrap: bool = True,
+        scale: str = "standard",
+        hold_out: float = 0.15,
+    ) -> None:
+        self.kinds = kinds
+        self.members = members
+        self.seed = seed
+        self.bootstrap = bootstrap
+        self.scale = scale
+        self.hold_out = hold_out
+
+    def fit(
+        self,
+        X: ArrayLike,
+        y: ArrayLike,
+        X_val: ArrayLike | None = None,
+        y_val: ArrayLike | None = None,
+        *,
+        progress: bool | Report | None = None,
+        checkpoint: str | PathLike[str] | None = None,
+    ) -> MixedEnsemble:
+        """Train the ensemble of each kind; arguments as in `BaggingEnsemble.fit`."""
+        X, y, validation = self._checked(X, y, X_val, y_val)
+        Xv, yv = validation or (None, None)
+        self.stages_ = [
+            BaggingEnsemble(kind, self.members, self.seed, self.bootstrap, self.scale, self.hold_out).fit(
+                X, y, Xv, yv, progress=progress, checkpoint=_beside(checkpoint, f"part{k}")
+            )
+            for k, kind in enumerate(self.kinds, start=1)
+        ]
+        self.compiled_ = Together([part.compiled_ for part in self.stages_])
+        return self
+
+    @property
+    def epochs_(self) -> np.ndarray | None:
+        """Epochs of the networks among the members; None without networks."""
+        return _epochs(self.stages_)
+
+    @property
+    def kind_name(self) -> str:
+        """The kinds, such as "tree + network"."""
+        return " + ".join(as_learner(kind).kind for kind in self.kinds)
+
+
+def _epochs(parts: Sequence[BaggingEnsemble]) -> np.ndarray | None:
+    found = [part.epochs_ for part in parts if part.epochs_ is not None]
+    return np.concatenate(found) if found else None
+
+
+def _beside(checkpoint: str | PathLike[str] | None, part: str) -> Path | None:
+    """The checkpoint of one part: training.npz → training.stage1.npz."""
+    if checkpoint is None:
+        return None
+    path = Path(checkpoint)
+    return path.with_name(f"{path.stem}.{part}{path.suffix}")
