@@ -1,0 +1,82 @@
+"""armload: tell a robot arm what it is holding, from joint position, velocity and torque.
+
+    from armload import arm, read_recording
+    from armload.identify import identify
+
+    panda = arm("panda")
+    print(identify(read_recording("run.csv", panda), panda))
+
+The names below are imported when they are first used, so that `import armload` is instant. `armload.identify` and
+`armload.simulate` are modules, with a function of the same name inside.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from armload.arms import ARMS, Arm, arm
+    from armload.errors import ArmloadError
+    from armload.identifier import Estimate, Identifier
+    from armload.identify import METHODS, Identification
+    from armload.inertia import InertialParameters
+    from armload.least_squares import (
+        FilteredRecursiveLeastSquares,
+        PosteriorLeastSquares,
+        RecursiveLeastSquares,
+    )
+    from armload.recording import Recording, Sample, read_recording, write_recording
+
+_ROOMS = {
+    "ARMS": "arms",
+    "Arm": "arms",
+    "arm": "arms",
+    "ArmloadError": "errors",
+    "Estimate": "identifier",
+    "Identifier": "identifier",
+    "METHODS": "identify",
+    "Identification": "identify",
+    "InertialParameters": "inertia",
+    "FilteredRecursiveLeastSquares": "least_squares",
+    "PosteriorLeastSquares": "least_squares",
+    "RecursiveLeastSquares": "least_squares",
+    "Recording": "recording",
+    "Sample": "recording",
+    "read_recording": "recording",
+    "write_recording": "recording",
+}
+
+__all__ = [
+    "ARMS",
+    "METHODS",
+    "Arm",
+    "ArmloadError",
+    "Estimate",
+    "FilteredRecursiveLeastSquares",
+    "Identification",
+    "Identifier",
+    "InertialParameters",
+    "PosteriorLeastSquares",
+    "Recording",
+    "RecursiveLeastSquares",
+    "Sample",
+    "__version__",
+    "arm",
+    "read_recording",
+    "write_recording",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _ROOMS:
+        raise AttributeError(f"module 'armload' has no attribute {name!r}")
+    value = getattr(importlib.import_module(f"armload.{_ROOMS[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

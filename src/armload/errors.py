@@ -35,3 +35,7 @@ class ModelError(ArmloadError, ValueError):
 
 class IdentificationError(ArmloadError, ValueError):
     """An identification that cannot be made from what was given."""
+
+
+class UsageError(ArmloadError):
+    """A command line that cannot be understood."""

@@ -1,0 +1,115 @@
+"""What the commands share: a parser that complains in one sentence, and the arguments that name an arm and a tool."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, NoReturn
+
+from armload.errors import UsageError
+
+if TYPE_CHECKING:
+    from armload.arms import Arm
+    from armload.inertia import InertialParameters
+
+# options whose value may begin with a minus sign: argparse would take "-1,0,-9.7" for an option
+_SIGNED = ("--gravity",)
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser whose errors are one sentence without usage, and whose help keeps its line breaks."""
+
+    def __init__(self, **settings) -> None:
+        super().__init__(allow_abbrev=False, formatter_class=_Help, **settings)
+
+    def error(self, message: str) -> NoReturn:
+        """Raise UsageError."""
+        raise UsageError(f"{message.replace('argument ', '', 1)}; see '{self.prog} --help'")
+
+
+class _Help(argparse.RawDescriptionHelpFormatter):
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog, max_help_position=28, width=110)
+
+
+def attach_values(arguments: list[str]) -> list[str]:
+    """Write `--gravity VALUE` as `--gravity=VALUE`, so that the value may begin with a minus sign.
+
+    >>> attach_values(["log.csv", "--gravity", "-1,0,-9.7", "--json"])
+    ['log.csv', '--gravity=-1,0,-9.7', '--json']
+    """
+    out: list[str] = []
+    for argument in arguments:
+        if out and out[-1] in _SIGNED and not argument.startswith("--"):
+            out[-1] += f"={argument}"
+        else:
+            out.append(argument)
+    return out
+
+
+def gravity(text: str) -> tuple[float, float, float]:
+    """Three numbers separated by commas; whether they make sense is for the arm to say.
+
+    >>> gravity("0,0,-9.81")
+    (0.0, 0.0, -9.81)
+    """
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a gravity: expected three numbers x,y,z in m/s², such as 0,0,-9.81"
+        ) from None
+    return x, y, z
+
+
+def at_least(least: float, kind: type = int):
+    """An argument type: a number of at least `least`."""
+
+    def read(text: str) -> float:
+        what = "a whole number" if kind is int else "a number"
+        try:
+            value = kind(text)
+        except ValueError:
+            value = None
+        if value is None or not least <= value < float("inf"):
+            raise argparse.ArgumentTypeError(f"{text!r} is not possible: expected {what} of at least {least}")
+        return value
+
+    return read
+
+
+def add_arm_arguments(parser: argparse.ArgumentParser, required: bool = True) -> None:
+    """`--robot`, `--frame` and `--gravity`."""
+    default = "" if required else " (default: panda)"
+    parser.add_argument(
+        "--robot",
+        required=required,
+        default=None if required else "panda",
+        metavar="NAME|FILE.urdf",
+        help=f"panda, ur10e, or the path of a URDF file{default}",
+    )
+    parser.add_argument(
+        "--frame", metavar="F", help="link whose frame the payload is about (default: the flange; a URDF's last link)"
+    )
+    parser.add_argument(
+        "--gravity",
+        type=gravity,
+        metavar="X,Y,Z",
+        help="gravity in the axes of the robot's base [m/s²], for a tilted base (default: 0,0,-9.81)",
+    )
+
+
+def arm_of(options: argparse.Namespace) -> Arm:
+    """The arm that `--robot`, `--frame` and `--gravity` name."""
+    from armload.arms import arm
+
+    settings = {} if options.gravity is None else {"gravity": options.gravity}
+    return arm(options.robot, options.frame, **settings)
+
+
+def payload_of(name: str | None) -> InertialParameters | None:
+    """The parameters of a payload file, or of a built-in one by name; None for None."""
+    if name is None:
+        return None
+    from armload.payloads import franka_hand, read_payload
+
+    return franka_hand().parameters if name == "franka-hand" else read_payload(name).parameters
