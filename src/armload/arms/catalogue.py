@@ -1,9 +1,9 @@
 """The arms armload knows by name, and any other from a URDF file.
 
-| name    | what                                              | payload frame | source of the figures                       |
-|---------|---------------------------------------------------|---------------|---------------------------------------------|
-| `panda` | Franka Emika Panda (FER), bare to the flange      | `panda_link8` | Franka's documentation; Gaz et al., RA-L 2019 |
-| `ur10e` | Universal Robots UR10e, bare to the tool flange   | `tool0`       | Universal Robots' published figures          |
+| name  | what                                            | payload frame | source of the figures                   |
+|-------|-------------------------------------------------|---------------|-----------------------------------------|
+| panda | Franka Emika Panda (FER), bare to the flange    | `panda_link8` | Franka's documentation; Gaz et al. 2019 |
+| ur10e | Universal Robots UR10e, bare to the tool flange | `tool0`       | Universal Robots' published figures     |
 
 Each description says more in its head. A Panda with its hand is `arm("panda").with_payload(franka_hand())`.
 """
@@ -30,9 +30,7 @@ ARMS: dict[str, dict[str, Any]] = {
 }
 
 
-def arm(
-    robot: str | Path, frame: str | None = None, gravity: tuple[float, float, float] = STANDARD_GRAVITY
-) -> Arm:
+def arm(robot: str | Path, frame: str | None = None, gravity: tuple[float, float, float] = STANDARD_GRAVITY) -> Arm:
     """An arm by name, or from a URDF file.
 
     >>> arm("ur10e").joint_names[2]

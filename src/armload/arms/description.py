@@ -9,6 +9,13 @@ from armload.errors import ArmError
 
 _MOVING = ("revolute", "continuous", "prismatic")
 _ENDLESS = "1e4"  # [rad] limit given to a continuous joint, so that both engines treat it as one angle
+_NUMBERS = {
+    "origin": ("xyz", "rpy"),
+    "axis": ("xyz",),
+    "mass": ("value",),
+    "inertia": ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
+    "limit": ("lower", "upper", "effort", "velocity"),
+}
 
 
 @dataclass(frozen=True)
@@ -41,8 +48,20 @@ def read_chain(xml: str, frame: str | None, where: str) -> Chain:
     if root.tag != "robot":
         raise ArmError(f"{where} is not a URDF: its root element is <{root.tag}>, expected <robot>")
     _strip(root)
+    _check_numbers(root, where)
     links = [str(link.get("name")) for link in root.findall("link")]
-    joints = {j.find("child").get("link"): j for j in root.findall("joint") if j.find("child") is not None}  # type: ignore[union-attr]
+    joints: dict[str, ET.Element] = {}  # by the link they carry
+    parents: dict[str, str] = {}  # link -> the link that carries it
+    for joint in root.findall("joint"):
+        ends = []
+        for end in ("parent", "child"):
+            element = joint.find(end)
+            link = None if element is None else element.get("link")
+            if link not in links:
+                raise ArmError(f"joint {joint.get('name')!r} of {where} has no <{end}> among the links of the file")
+            ends.append(link)
+        parents[ends[1]] = ends[0]
+        joints[ends[1]] = joint
     if not joints:
         raise ArmError(f"{where} has no joints: expected a URDF of a robot arm")
 
@@ -50,12 +69,13 @@ def read_chain(xml: str, frame: str | None, where: str) -> Chain:
         chain: list[ET.Element] = []
         while link in joints and len(chain) <= len(links):
             chain.append(joints[link])
-            link = str(joints[link].find("parent").get("link"))  # type: ignore[union-attr]
+            link = parents[link]
         return chain[::-1]
 
     if frame is None:
-        parents = {j.find("parent").get("link") for j in joints.values()}  # type: ignore[union-attr]
-        leaves = [link for link in links if link not in parents]
+        leaves = [link for link in links if link not in parents.values()]
+        if not leaves:
+            raise ArmError(f"the joints of {where} run in a circle: expected a tree from the base to the tool")
 
         def rank(link: str) -> tuple[int, int, int]:
             chain = path(link)
@@ -97,3 +117,18 @@ def _strip(root: ET.Element) -> None:
         for part in list(child):
             if part.tag in ("visual", "collision", "mimic", "safety_controller", "calibration", "dynamics"):
                 child.remove(part)
+
+
+def _check_numbers(root: ET.Element, where: str) -> None:
+    """Refuse what is no number: Pinocchio's reader drops such an element and goes on without it."""
+    for part in root:
+        for element in part.iter():
+            for key in _NUMBERS.get(element.tag, ()):
+                for word in (element.get(key) or "").split():
+                    try:
+                        float(word)
+                    except ValueError:
+                        raise ArmError(
+                            f"{where}: <{element.tag}> of {part.tag} {part.get('name')!r} has {key} = "
+                            f"{element.get(key)!r}, expected numbers"
+                        ) from None
