@@ -1,0 +1,27 @@
+"""Payloads: the paper's container and its 77 loadings, the Franka Hand, solids, meshes, random families, files.
+
+A payload is about the origin and in the axes of the arm's payload frame.
+"""
+
+from armload.payloads import solids
+from armload.payloads.container import container, container_loadings, test_payload
+from armload.payloads.families import random_payload, random_payloads
+from armload.payloads.files import read_payload, write_payload
+from armload.payloads.hand import franka_hand
+from armload.payloads.mesh import from_mesh
+from armload.payloads.payload import Box, Payload
+
+__all__ = [
+    "Box",
+    "Payload",
+    "container",
+    "container_loadings",
+    "franka_hand",
+    "from_mesh",
+    "random_payload",
+    "random_payloads",
+    "read_payload",
+    "solids",
+    "test_payload",
+    "write_payload",
+]

@@ -1,0 +1,177 @@
+"""Payloads as JSON files, one payload a file.
+
+    {"format": "armload-payload/1", "name": "hand", "frame": "panda_link8",
+     "phi": [m, m·rx, m·ry, m·rz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz],
+     "mass": 0.73, "com": [x, y, z], "inertia_com": [[...], [...], [...]],
+     "boxes": [{"size": [x, y, z], "centre": [x, y, z], "mass": 0.73}]}
+
+phi or the three (mass, com, inertia_com) are enough, SI units; phi is about the frame's origin, inertia_com about the
+centre of mass. Everything else is optional and unknown keys are ignored, so that the JSON result of an identification
+reads as the payload it found.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.errors import ArmloadError, PayloadError
+from armload.inertia import NAMES, InertialParameters
+from armload.payloads.payload import Box, Payload, require_consistent
+
+FORMAT = "armload-payload/1"
+_TRIPLE = ("mass", "com", "inertia_com")
+_FARTHEST = 5.0  # [m] a centre of mass farther from the flange than this is in other units
+# Where a file gives phi and (mass, com, inertia_com) they may differ by printed digits, not by an edit.
+_AGREE = {"mass": 1e-3, "com": 1e-3, "inertia_com": 1e-4}  # [kg, m, kg·m²]
+
+
+def read_payload(path: str | Path) -> Payload:
+    """The payload in a JSON file: one of `write_payload`, written by hand, or a saved result of `armload identify`.
+
+    Raises:
+        PayloadError: the file is missing or not JSON, lacks the parameters, gives them twice and differently, or holds
+            parameters that no body can have.
+    """
+    path = Path(path)
+    content = _read_json(path)
+    try:
+        parameters = _parameters(content, path)
+        require_consistent(parameters, f"the payload in {path}")
+        return Payload(_text(content, "name", path) or path.stem, parameters, _boxes(content, path))
+    except PayloadError:
+        raise
+    except ArmloadError as error:  # a matrix that is not symmetric, say: name the file
+        raise PayloadError(f"payload file {path}: {error}") from None
+
+
+def write_payload(path: str | Path, payload: Payload) -> None:
+    """Write a payload as JSON; `read_payload` gives back the same phi to the last bit.
+
+    Raises:
+        PayloadError: the file cannot be written.
+    """
+    p = payload.parameters
+    content: dict[str, Any] = {
+        "format": FORMAT,
+        "name": payload.name,
+        "frame": p.frame,
+        "phi": p.phi.tolist(),
+        "mass": p.mass,
+    }
+    if p.mass > 0:  # nothing at all has no centre of mass
+        content |= {"com": p.com.tolist(), "inertia_com": p.inertia_com.tolist()}
+    if payload.boxes:
+        content["boxes"] = [{"size": b.size, "centre": b.centre, "mass": b.mass} for b in payload.boxes]
+    try:
+        Path(path).write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise PayloadError(f"payload file {path} cannot be written: {error.strerror or error}") from None
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    if path.is_dir():
+        raise PayloadError(f"payload file {path} is a folder: expected a JSON file")
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise PayloadError(f"payload file {path} does not exist: expected a JSON file with a payload") from None
+    except UnicodeDecodeError:
+        raise PayloadError(f"payload file {path} is not text: expected JSON in UTF-8") from None
+    except (OSError, ValueError) as error:
+        raise PayloadError(f"payload file {path} cannot be read: {error}") from None
+    if not text.strip():
+        raise PayloadError(f"payload file {path} is empty: expected JSON with phi, or mass, com and inertia_com")
+    try:
+        content = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise PayloadError(f"payload file {path} is not JSON: {error.msg} at line {error.lineno}") from None
+    except (ValueError, RecursionError) as error:
+        raise PayloadError(f"payload file {path} cannot be read as JSON: {error}") from None
+    if not isinstance(content, dict):
+        raise PayloadError(f"payload file {path} holds a JSON {type(content).__name__}: expected an object with keys")
+    return content
+
+
+def _parameters(content: dict[str, Any], path: Path) -> InertialParameters:
+    frame = _text(content, "frame", path)
+    missing = [key for key in _TRIPLE if content.get(key) is None]
+    from_triple = None
+    if not missing:
+        mass, com, inertia = (
+            _numbers(content[k], s, k, path) for k, s in zip(_TRIPLE, ((), (3,), (3, 3)), strict=True)
+        )
+        from_triple = InertialParameters.from_com(float(mass), com, inertia, frame)
+    if content.get("phi") is None:
+        if from_triple is None:
+            found = ", ".join(map(str, content)) or "no keys at all"
+            raise PayloadError(
+                f"payload file {path} lacks {' and '.join(missing)} (found: {found}): expected phi, or mass, com and "
+                "inertia_com"
+            )
+        parameters = from_triple
+    else:
+        parameters = InertialParameters(_numbers(content["phi"], (10,), "phi", path), frame)
+        if from_triple is not None and parameters.mass > 0:
+            _require_agreement(parameters, from_triple, path)
+    if parameters.mass > 0 and np.linalg.norm(parameters.com) > _FARTHEST:
+        raise PayloadError(
+            f"payload file {path} puts the centre of mass {np.linalg.norm(parameters.com):.3g} m from the frame: "
+            "expected metres; is it in millimetres?"
+        )
+    return parameters
+
+
+def _require_agreement(phi: InertialParameters, triple: InertialParameters, path: Path) -> None:
+    for key, tolerance in _AGREE.items():
+        if triple.mass <= 0 or np.any(np.abs(getattr(phi, key) - getattr(triple, key)) > tolerance):
+            raise PayloadError(
+                f"payload file {path} says two things: its {key} differs from that of its phi; correct one of them, or "
+                "remove phi"
+            )
+
+
+def _numbers(value: Any, shape: tuple[int, ...], key: str, path: Path) -> NDArray[np.float64]:
+    expected = {(): "a number", (3,): "3 numbers", (10,): "10 numbers", (3, 3): "3 rows of 3 numbers"}[shape]
+    leaves = _leaves(value)
+    if any(leaf is None for leaf in leaves) and len(leaves) == 10 and shape == (10,):
+        names = ", ".join(n for n, leaf in zip(NAMES, leaves, strict=True) if leaf is None)
+        raise PayloadError(f"payload file {path} leaves {names} undetermined: a payload needs all ten parameters")
+    try:
+        if any(isinstance(leaf, bool) or not isinstance(leaf, int | float) for leaf in leaves):
+            raise ValueError
+        numbers = np.asarray(value, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        numbers = np.full(1, np.nan)
+    if numbers.shape != shape or not np.all(np.isfinite(numbers)):
+        shown = json.dumps(value)
+        shown = shown if len(shown) <= 80 else shown[:77] + "..."
+        raise PayloadError(f"payload file {path}: {key} is {shown}, expected {expected}, finite, in SI units")
+    return numbers
+
+
+def _leaves(value: Any) -> list[Any]:
+    if not isinstance(value, list):
+        return [value]
+    return [leaf for item in value for leaf in (item if isinstance(item, list) else [item])]
+
+
+def _text(content: dict[str, Any], key: str, path: Path) -> str | None:
+    value = content.get(key)
+    if value is not None and not isinstance(value, str):
+        raise PayloadError(f"payload file {path}: {key} is {json.dumps(value)[:80]}, expected text")
+    return value
+
+
+def _boxes(content: dict[str, Any], path: Path) -> tuple[Box, ...]:
+    boxes = content.get("boxes") or []
+    try:
+        return tuple(Box(tuple(b["size"]), tuple(b["centre"]), b["mass"]) for b in boxes)
+    except (TypeError, KeyError, PayloadError):
+        raise PayloadError(
+            f"payload file {path}: boxes are not a list of objects with size, centre and mass (3, 3 and 1 numbers)"
+        ) from None

@@ -1,0 +1,33 @@
+"""The Franka Hand, the payload of the paper's benchmark."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from armload.inertia import InertialParameters
+from armload.payloads.payload import Payload
+
+# Franka's published URDF of the hand: in the axes of panda_hand, inertia about the centre of mass.
+MASS = 0.73  # [kg]
+COM = (-0.01, 0.0, 0.03)  # [m]
+INERTIA_COM = (1e-3, 2.5e-3, 1.7e-3)  # [kg·m²] diagonal
+TURN = -np.pi / 4  # [rad] panda_hand about the z axis of panda_link8
+
+
+def franka_hand() -> Payload:
+    """The Franka Hand about the flange `panda_link8`, in the flange's axes.
+
+    The figures 0.73 kg, CoM (−0.01, 0, 0.03) m, inertia diag(1, 2.5, 1.7)·10⁻³ kg·m² about the CoM are those of the
+    frame `panda_hand`, which shares the flange's origin and is turned −45° about its z axis. In `panda_link8` the CoM
+    is therefore (−0.00707, +0.00707, 0.03) m and Ixy is not zero. Sources that give the same numbers "in the flange
+    frame" differ from this by that turn.
+
+    >>> franka_hand().parameters.com.round(5).tolist()
+    [-0.00707, 0.00707, 0.03]
+
+    Source: Franka's public robot descriptions (franka_description, hand; mounted with rpy = (0, 0, −π/4)).
+    """
+    in_hand = InertialParameters.from_com(MASS, COM, np.diag(INERTIA_COM), "panda_hand")
+    c, s = np.cos(TURN), np.sin(TURN)
+    rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return Payload("Franka Hand", in_hand.moved(rotation, np.zeros(3), "panda_link8"))
