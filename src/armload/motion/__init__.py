@@ -1,6 +1,7 @@
 """Motions: the Fourier excitation, its design and checks, and the files other people's robots read."""
 
 from armload.motion.check import MotionCheck, check_motion, rated_load
+from armload.motion.export import export_motion
 from armload.motion.files import load_motion, save_motion, taie2024
 from armload.motion.fingerprint import MotionFingerprint
 from armload.motion.fourier import FourierMotion, start_and_stop_at_rest
@@ -13,6 +14,7 @@ __all__ = [
     "MotionCheck",
     "MotionFingerprint",
     "check_motion",
+    "export_motion",
     "load_motion",
     "random_motion",
     "rated_load",

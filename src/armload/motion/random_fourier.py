@@ -64,10 +64,11 @@ def random_motion(
                 break
             trial = motion.scaled(factor)
             clear = model.clearance(trial(np.linspace(0.0, duration, 100))[0], floor)
-            if clear.floor.min() >= _FLOOR and clear.self.min() >= _SELF:
-                if check_motion(arm, trial, load, floor=floor).ok:
-                    best = factor, trial
-                    break
+            if clear.floor.min() < _FLOOR or clear.self.min() < _SELF:
+                continue
+            if check_motion(arm, trial, load, floor=floor).ok:
+                best = factor, trial
+                break
         if best is not None and best[0] >= _ENOUGH:
             break
     if best is None:
