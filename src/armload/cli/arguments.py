@@ -10,6 +10,7 @@ from armload.errors import UsageError
 if TYPE_CHECKING:
     from armload.arms import Arm
     from armload.inertia import InertialParameters
+    from armload.motion import Motion
 
 # options whose value may begin with a minus sign: argparse would take "-1,0,-9.7" for an option
 _SIGNED = ("--gravity",)
@@ -113,3 +114,17 @@ def payload_of(name: str | None) -> InertialParameters | None:
     from armload.payloads import franka_hand, read_payload
 
     return franka_hand().parameters if name == "franka-hand" else read_payload(name).parameters
+
+
+def motion_of(name: str, arm: Arm) -> Motion:
+    """A motion by name (`taie2024`), from a JSON file, or drawn for the arm (`random:SEED`)."""
+    from armload.motion import load_motion, random_motion, taie2024
+
+    if name == "taie2024":
+        return taie2024()
+    if name.startswith("random:"):
+        seed = name.removeprefix("random:")
+        if not seed.isdecimal():
+            raise UsageError(f"motion {name!r} has no seed: expected random: and a whole number, such as random:3")
+        return random_motion(arm, int(seed))
+    return load_motion(name)

@@ -40,11 +40,12 @@ def working(what: str) -> Iterator[Callable[[str], None]]:
 def table(title: str, *columns: str, left: int = 1) -> Table:
     """A plain table: the first `left` columns left-aligned, the others right."""
     from rich import box
+    from rich.markup import escape
     from rich.table import Table
 
-    made = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+    made = Table(title=escape(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
     for k, name in enumerate(columns):
-        made.add_column(name, justify="left" if k < left else "right", no_wrap=True)
+        made.add_column(escape(name), justify="left" if k < left else "right", no_wrap=True)
     return made
 
 
@@ -57,13 +58,11 @@ def console() -> Console:
 
 def print_identification(result: Identification) -> None:
     """The ten parameters with their intervals, the body they make, and why this method was taken."""
-    from rich.markup import escape
-
     from armload.inertia import NAMES, UNITS
 
     out = console()
     rows = table(
-        escape(f"{result.robot}: payload about {result.frame}, relative to the {result.relative_to}"),
+        f"{result.robot}: payload about {result.frame}, relative to the {result.relative_to}",
         "parameter",
         "unit",
         "value",
@@ -78,7 +77,7 @@ def print_identification(result: Identification) -> None:
         rows.add_row(name, unit, f"{value:+.5f}", f"{low:+.5f}", f"{high:+.5f}", "" if known else "undetermined")
     out.print(rows)
     com = ", ".join(f"{1000 * x:+.1f}" for x in result.com)
-    moments = ", ".join(f"{result.inertia_com[k][k]:.5f}" for k in range(3))
+    moments = ", ".join(f"{result.inertia_com[k][k]:.6f}" for k in range(3))
     lines = [f"mass {result.mass:.4f} kg, centre of mass ({com}) mm"]
     lines.append(f"inertia about the centre of mass (Ixx, Iyy, Izz) = ({moments}) kg·m²")
     if not result.consistent:

@@ -1,0 +1,137 @@
+"""`armload motion`: excitation motions shown, checked against an arm, exported for a robot, or drawn at random."""
+
+from __future__ import annotations
+
+import argparse
+
+from armload.cli.arguments import Parser, add_arm_arguments, arm_of, at_least, motion_of, payload_of
+from armload.cli.printing import console, print_note, table, working
+
+NOT_ALLOWED = 3  # exit code of a check that says no
+
+_EXAMPLES = """\
+examples:
+  armload motion show taie2024
+  armload motion check mine.json --robot panda --payload tool.json
+  armload motion random --robot ur10e --seed 3 --out excite.json
+  armload motion export excite.json --format ur --out excite.script
+  armload motion export taie2024 --format ros2 --robot panda --out excite.yaml
+
+MOTION is taie2024, a JSON file, or random:SEED. `check` exits with 3 if the arm must not run the motion.
+"""
+
+
+def parser() -> Parser:
+    """The arguments of `armload motion`."""
+    parser = Parser(
+        prog="armload motion", description="Show, check, export or draw an excitation motion.", epilog=_EXAMPLES
+    )
+    actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
+
+    show = actions.add_parser("show", help="what each joint does", description="Show what each joint does.")
+    show.add_argument("motion", metavar="MOTION", help="taie2024, a JSON file, or random:SEED")
+    add_arm_arguments(show, required=False)
+
+    check = actions.add_parser(
+        "check",
+        help="limits, torque with a payload, the floor, the arm itself",
+        description="Check a motion against the arm's limits, the torque with a payload, the floor and the arm itself.",
+    )
+    check.add_argument("motion", metavar="MOTION", help="taie2024, a JSON file, or random:SEED")
+    add_arm_arguments(check)
+    check.add_argument(
+        "--payload",
+        metavar="FILE",
+        default="rated",
+        help="what the arm carries: a JSON file, franka-hand, none, or rated (default: the maker's rated payload)",
+    )
+
+    export = actions.add_parser(
+        "export",
+        help="a table (csv), a ROS 2 trajectory (ros2) or a program for UR robots (ur)",
+        description="Write a motion as a file that a robot's own tools read. Check it first, and run it slowly first.",
+    )
+    export.add_argument("motion", metavar="MOTION", help="taie2024, a JSON file, or random:SEED")
+    add_arm_arguments(export, required=False)
+    export.add_argument("--format", required=True, choices=("csv", "ros2", "ur"))
+    export.add_argument("--rate", type=at_least(1e-3, float), metavar="HZ", help="samples per second")
+    export.add_argument("--out", required=True, metavar="FILE")
+
+    random = actions.add_parser(
+        "random",
+        help="draw a motion the arm may run, from rest to rest",
+        description="Draw a random motion, from rest to rest, that the arm may run with its rated payload.",
+    )
+    add_arm_arguments(random)
+    random.add_argument("--seed", type=at_least(0), default=0, metavar="N", help="same seed, same motion (default: 0)")
+    random.add_argument(
+        "--duration", type=at_least(0.1, float), default=6.0, metavar="S", help="in seconds (default: 6)"
+    )
+    random.add_argument("--harmonics", type=at_least(2), default=5, metavar="K", help="(default: 5)")
+    random.add_argument("--out", required=True, metavar="FILE", help="JSON file to write")
+    return parser
+
+
+def run(options: argparse.Namespace) -> int:
+    """Do the action."""
+    return {"show": _show, "check": _check, "export": _export, "random": _random}[options.action](options)
+
+
+def _show(options: argparse.Namespace) -> int:
+    import numpy as np
+
+    motion = motion_of(options.motion, arm_of(options))
+    q, dq, ddq = motion(np.linspace(0.0, motion.duration, 1001))
+    rows = table(
+        f"{motion.name}: {motion.n} joints, {motion.duration:g} s",
+        "joint",
+        "from [rad]",
+        "to [rad]",
+        "fastest [rad/s]",
+        "hardest [rad/s²]",
+    )
+    peaks = zip(q.min(axis=0), q.max(axis=0), abs(dq).max(axis=0), abs(ddq).max(axis=0), strict=True)
+    for k, values in enumerate(peaks, start=1):
+        rows.add_row(str(k), *(f"{value:.3f}" for value in values))
+    console().print(rows)
+    if note := getattr(motion, "note", ""):
+        print(note)
+    return 0
+
+
+def _check(options: argparse.Namespace) -> int:
+    from armload.motion import check_motion, rated_load
+
+    arm = arm_of(options)
+    motion = motion_of(options.motion, arm)
+    if options.payload == "rated":
+        payload = rated_load(arm)
+        carried = "the rated payload" if payload is not None else "nothing (its rated payload is not known)"
+    else:
+        payload = None if options.payload == "none" else arm.in_frame(payload_of(options.payload))
+        carried = "nothing" if payload is None else options.payload
+    with working("checking"):
+        result = check_motion(arm, motion, payload)
+    print(f"{result}\ntorque with {carried}")
+    return 0 if result.ok else NOT_ALLOWED
+
+
+def _export(options: argparse.Namespace) -> int:
+    from armload.motion import export_motion
+
+    arm = arm_of(options)
+    motion = motion_of(options.motion, arm)
+    export_motion(motion, options.out, options.format, options.rate, joint_names=arm.joint_names)
+    print_note(f"wrote {options.out}; check the motion before a robot runs it (armload motion check)")
+    return 0
+
+
+def _random(options: argparse.Namespace) -> int:
+    from armload.motion import random_motion, save_motion
+
+    arm = arm_of(options)
+    with working("looking for a motion"):
+        motion = random_motion(arm, options.seed, duration=options.duration, harmonics=options.harmonics)
+    save_motion(options.out, motion)
+    print_note(f"wrote {motion.name} to {options.out}")
+    return 0
