@@ -25,6 +25,7 @@ from armload.arms.filtered import Lag, filtered_regressor
 from armload.identifier import Estimate, Identifier
 from armload.least_squares.autocorrelation import BlockMeans
 from armload.least_squares.correction import FRICTION_WIDTH, Correction, effort_scale
+from armload.least_squares.prior import GaussianPrior, payload_prior_std
 from armload.recording import Recording, Sample
 
 REGRESSOR_RATE = 200.0  # [Hz] W and Z are computed no more often: they hold nothing above a few hertz
@@ -40,15 +41,6 @@ _NOVELTY = 10.0
 # Coulomb friction above this fraction of the effort limit: the torque is the motor's, not the link's
 _MOTOR_SIDE = 0.01
 _GAIN_STD = {"link": 0.005, "motor": 0.02}  # torque calibration, 1 sigma; motor constants are known to a few per cent
-
-
-def payload_prior_std(arm: Arm) -> NDArray[np.float64]:
-    """Standard deviation (10,) of the weak payload prior: half the rated payload, 15 cm from the flange.
-
-    Where no rated payload is known, 0.4 × the mass of the arm's moving links is taken (that of a strong arm).
-    """
-    rated = arm.rated_payload or 0.4 * float(arm.link_parameters[:, 0].sum())
-    return 0.5 * rated * np.array([1.0] + [0.15] * 3 + [0.15**2] * 6)
 
 
 class RegressionData:
@@ -133,16 +125,23 @@ class Posterior:
     torque: str
 
 
-def solve(runs: list[RegressionData], prior_std: ArrayLike, iterations: int = 12) -> Posterior:
+def solve(
+    runs: list[RegressionData], prior_std: ArrayLike, prior: GaussianPrior | None = None, iterations: int = 12
+) -> Posterior:
     """Posterior of the payload of the last run; runs before it are tares.
 
-    Unknowns z = [phi_1, phi_2 − phi_1, …, eta]: run k carries the sum of the first k of them.
+    Unknowns z = [phi_1, phi_2 − phi_1, …, eta]: run k carries the sum of the first k of them. Each payload is near
+    zero within `prior_std` (10,), the last one follows `prior` where that is given.
     """
     correction, count = runs[0].correction, len(runs)
     p, prior_std = correction.size, np.asarray(prior_std)
     size = 10 * count + p
     variance0 = np.concatenate([np.tile(prior_std, count), correction.prior_std]) ** 2
     variance = variance0.copy()
+    at = slice(10 * (count - 1), 10 * count)
+    mean, payload_root = np.zeros(size), None
+    if prior is not None:
+        mean[at], payload_root = prior.mean, prior.root
     adaptive = 10 * count + np.flatnonzero(correction.adaptive)
     selections = []
     for k in range(count):
@@ -158,14 +157,15 @@ def solve(runs: list[RegressionData], prior_std: ArrayLike, iterations: int = 12
     for _ in range(iterations):
         A = sum(np.einsum("jab,j->ab", A, 1 / s) for (A, _), s in zip(parts, S, strict=True))
         b = sum(np.einsum("ja,j->a", b, 1 / s) for (_, b), s in zip(parts, S, strict=True))
-        root = np.sqrt(variance)
-        P = np.linalg.inv(A * np.outer(root, root) + np.eye(size)) * np.outer(root, root)
+        root = np.diag(np.sqrt(variance))
+        if payload_root is not None:
+            root[at, at] = payload_root
+        P = root @ np.linalg.inv(root.T @ A @ root + np.eye(size)) @ root.T
         P = 0.5 * (P + P.T)
-        z = P @ b
+        z = mean + P @ (b - A @ mean)
         S = [run.residual_variance(E @ z, prior_residual) for run, E in zip(runs, selections, strict=True)]
         # EM for the prior's scale, with one pseudo-observation at the stated value
         variance[adaptive] = 0.5 * (variance0[adaptive] + z[adaptive] ** 2 + np.diag(P)[adaptive])
-    at = slice(10 * (count - 1), 10 * count)
     eta = z[10 * count :]
     torque = "motor" if np.median(np.abs(correction.coulomb(eta)) / correction.effort) > _MOTOR_SIDE else "link"
     total = np.sum(z[: 10 * count].reshape(count, 10), axis=0) if count == 1 else z[at]
@@ -191,12 +191,20 @@ class PosteriorLeastSquares(Identifier):
             relative to it.
         gain: λ of the lag [1/s].
         refresh: the posterior is solved anew at most this often [s] while streaming; `run` solves at the end only.
+        prior: what is known about the payload before; None: the weak prior of `payload_prior_std`.
     """
 
     name = "map"
 
-    def __init__(self, arm: Arm, tare: Recording | None = None, gain: float = 20.0, refresh: float = 0.02) -> None:
-        self.arm, self.gain, self.refresh = arm, gain, refresh
+    def __init__(
+        self,
+        arm: Arm,
+        tare: Recording | None = None,
+        gain: float = 20.0,
+        refresh: float = 0.02,
+        prior: GaussianPrior | None = None,
+    ) -> None:
+        self.arm, self.gain, self.refresh, self.prior = arm, gain, refresh, prior
         self._correction: Correction | None = None
         self._tare: RegressionData | None = None
         if tare is not None:
@@ -216,6 +224,20 @@ class PosteriorLeastSquares(Identifier):
         if self._posterior is None or sample.t - self._solved_at >= self.refresh:
             self._solve(sample.t)
         return self._estimate(sample.t)
+
+    def trace(self, recording: Recording, every: int = 1) -> list[Estimate]:
+        """The estimates along a recording, each of them solved when its last sample is in (whatever `refresh` is)."""
+        self._check(recording)
+        self.reset()
+        stops = [*range(1, len(recording), every), len(recording)]
+        out = []
+        for start, stop in zip([0, *stops], stops, strict=False):
+            for k in range(start, stop, 4096):
+                part = slice(k, min(k + 4096, stop))
+                self._add(recording.t[part], recording.q[part], recording.dq[part], recording.tau[part])
+            self._solve(float(recording.t[stop - 1]))
+            out.append(self._estimate(float(recording.t[stop - 1])))
+        return out
 
     def run(self, recording: Recording) -> Estimate:
         """The estimate after the whole recording, all samples at once."""
@@ -245,7 +267,7 @@ class PosteriorLeastSquares(Identifier):
     def _solve(self, t: float) -> None:
         assert self._run is not None
         runs = [self._run] if self._tare is None else [self._tare, self._run]
-        self._posterior, self._solved_at = solve(runs, _WIDE * payload_prior_std(self.arm)), t
+        self._posterior, self._solved_at = solve(runs, _WIDE * payload_prior_std(self.arm), self.prior), t
 
     def _estimate(self, t: float) -> Estimate:
         return Estimate(float(t), self.posterior.phi, self.posterior.covariance, self._count, str(self.arm.frame))

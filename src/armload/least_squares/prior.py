@@ -1,0 +1,93 @@
+"""What is known about a payload before the first sample: a Gaussian over the ten parameters, phi ~ N(mean, covariance).
+
+Whoever trains on a family of payloads puts such knowledge into the model. Least squares may be told the same, and only
+then does a comparison of the two say something about the methods.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armload.arms import Arm
+from armload.errors import IdentificationError
+from armload.inertia import InertialParameters
+
+_SHRINK = 0.05  # share of the diagonal in the covariance: few payloads say little about correlations
+_FLOOR = np.array([5e-3] + [5e-4] * 3 + [5e-5] * 6)  # [kg, kg·m, kg·m²] no family is known better than this
+
+
+def payload_prior_std(arm: Arm) -> NDArray[np.float64]:
+    """Standard deviation (10,) of the weak payload prior: half the rated payload, 15 cm from the flange.
+
+    Where no rated payload is known, 0.4 × the mass of the arm's moving links is taken (that of a strong arm).
+    """
+    rated = arm.rated_payload or 0.4 * float(arm.link_parameters[:, 0].sum())
+    return 0.5 * rated * np.array([1.0] + [0.15] * 3 + [0.15**2] * 6)
+
+
+@dataclass(frozen=True, eq=False)
+class GaussianPrior:
+    """phi ~ N(mean, covariance), about the payload frame.
+
+    >>> prior = GaussianPrior.of([InertialParameters([m] + [0.0] * 9) for m in (1.0, 2.0, 3.0)])
+    >>> float(prior.mean[0]), round(float(prior.std[0]), 3)
+    (2.0, 1.0)
+
+    Args:
+        mean: (10,).
+        covariance: (10, 10), positive definite.
+        source: where the knowledge comes from, for tables.
+
+    Raises:
+        IdentificationError: wrong shapes, or a covariance that is not positive definite.
+    """
+
+    mean: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    source: str = "given"
+
+    def __post_init__(self) -> None:
+        for name, shape in (("mean", (10,)), ("covariance", (10, 10))):
+            value = np.array(getattr(self, name), dtype=float)
+            if value.shape != shape or not np.all(np.isfinite(value)):
+                raise IdentificationError(f"the prior's {name} has shape {value.shape}: expected finite {shape}")
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+        scale = np.sqrt(np.maximum(np.diag(self.covariance), np.finfo(float).tiny))
+        if np.linalg.eigvalsh(self.covariance / np.outer(scale, scale))[0] <= 1e-12:
+            raise IdentificationError("the prior's covariance is singular: expected one that is positive definite")
+
+    @classmethod
+    def of(cls, payloads: Iterable[InertialParameters] | ArrayLike, source: str | None = None) -> GaussianPrior:
+        """Mean and covariance of a family of payloads, one each (phi rows (K, 10) or `InertialParameters`).
+
+        The sample covariance S is shrunk to 0.95·S + 0.05·diag(S) and widened by a few grams, so that a direction in
+        which the family does not vary is known well, but not perfectly. Source of the shrinkage: Ledoit & Wolf 2004.
+        """
+        rows = [p.phi if isinstance(p, InertialParameters) else p for p in payloads]  # type: ignore[union-attr]
+        phi = np.asarray(rows, dtype=float)
+        if phi.ndim != 2 or phi.shape[1] != 10 or len(phi) < 2:
+            raise IdentificationError(f"a prior needs at least 2 payloads of 10 numbers: found shape {phi.shape}")
+        S = np.cov(phi.T)
+        S = (1.0 - _SHRINK) * S + _SHRINK * np.diag(np.diag(S)) + np.diag(_FLOOR**2)
+        return cls(phi.mean(axis=0), S, source or f"{len(phi)} training payloads")
+
+    @classmethod
+    def weak(cls, arm: Arm) -> GaussianPrior:
+        """What is known where nothing was trained: no payload, within half the rated one (`payload_prior_std`)."""
+        return cls(np.zeros(10), np.diag(payload_prior_std(arm) ** 2), "no training payloads, only the rated payload")
+
+    @property
+    def std(self) -> NDArray[np.float64]:
+        """Standard deviation of each parameter (10,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def root(self) -> NDArray[np.float64]:
+        """L (10, 10) with L·Lᵀ = covariance."""
+        scale = self.std  # the units differ by orders of magnitude
+        return scale[:, None] * np.linalg.cholesky(self.covariance / np.outer(scale, scale))
