@@ -16,14 +16,16 @@ payload frame, whatever its name (`frame` is None).
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Sequence
 from functools import cache
 from importlib import resources
 
 import numpy as np
 
 from armload.errors import PayloadError
+from armload.inertia import InertialParameters
 from armload.payloads.payload import Box, Payload
+from armload.payloads.solids import compose
 
 EMPTY_MASS = 0.790  # [kg] paper
 WEIGHT_MASS = 0.2746  # [kg] (2.163 − 0.790)/5, paper
@@ -81,15 +83,16 @@ def test_payload() -> Payload:
     """A payload outside the 77, in the role of the paper's Table I (whose numbers are not public): ours.
 
     The container with three odd weights, 0.360 kg, 0.200 kg and 0.130 kg, at heights between bottom and top and pushed
-    5 mm sideways. 1.480 kg lies about halfway between two masses of the data set; every parameter lies within the range
-    the 77 span, except I_xy, which is 0 in all of them and small here.
+    5 mm sideways. 1.480 kg lies about halfway between two masses of the data set and its centre of mass 5 mm from the
+    nearest of the 77; every parameter lies within the range they span, except I_xy, which is 0 in all of them and small
+    here.
 
     >>> test_payload().parameters.com.round(4).tolist()
-    [0.0116, -0.0087, 0.0442]
+    [0.0116, -0.0087, 0.0486]
     """
     weights = [
-        Box((0.030, 0.030, 0.051), (0.070, 0.005, 0.060), 0.360),
-        Box((0.030, 0.030, 0.028), (0.005, -0.070, 0.030), 0.200),
+        Box((0.030, 0.030, 0.051), (0.070, 0.005, 0.070), 0.360),
+        Box((0.030, 0.030, 0.028), (0.005, -0.070, 0.045), 0.200),
         Box((0.030, 0.030, 0.018), (-0.070, -0.005, 0.070), 0.130),
     ]
     return _filled("test payload", weights)
@@ -114,8 +117,14 @@ def _empty() -> tuple[Box, ...]:
     return tuple(Box.of_density(size, centre, density) for size, centre in parts)
 
 
-def _filled(name: str, weights: Iterable[Box]) -> Payload:
-    return Payload.from_boxes(name, (*_empty(), *weights))
+@cache
+def _empty_parameters() -> InertialParameters:
+    return compose(part.parameters for part in _empty())
+
+
+def _filled(name: str, weights: Sequence[Box]) -> Payload:
+    parameters = compose((_empty_parameters(), *(weight.parameters for weight in weights)))
+    return Payload(name, parameters, (*_empty(), *weights))
 
 
 def _name(taken: list[str]) -> str:

@@ -1,0 +1,114 @@
+"""Payload files: what is written reads back, and what cannot be used says in one sentence what is wrong."""
+
+import json
+
+import numpy as np
+import pytest
+
+from armload.errors import PayloadError
+from armload.inertia import InertialParameters
+from armload.payloads import (
+    Payload,
+    container_loadings,
+    franka_hand,
+    random_payload,
+    read_payload,
+    write_payload,
+)
+
+HAND = franka_hand().parameters
+
+
+@pytest.mark.parametrize("payload", [franka_hand(), random_payload(4), container_loadings()[40]], ids=lambda p: p.name)
+def test_a_written_payload_reads_back_to_the_last_bit(tmp_path, payload):
+    write_payload(tmp_path / "p.json", payload)
+    back = read_payload(tmp_path / "p.json")
+    assert np.array_equal(back.parameters.phi, payload.parameters.phi)
+    assert (back.name, back.parameters.frame, back.boxes) == (payload.name, payload.parameters.frame, payload.boxes)
+
+
+def test_nothing_is_a_payload_that_reads_back(tmp_path):
+    write_payload(tmp_path / "p.json", Payload("nothing", InertialParameters.zero("tool0")))
+    assert not read_payload(tmp_path / "p.json").parameters.phi.any()
+
+
+def write(tmp_path, content):
+    path = tmp_path / "p.json"
+    path.write_text(content if isinstance(content, str) else json.dumps(content), encoding="utf-8")
+    return path
+
+
+def test_the_result_of_an_identification_reads_as_the_payload_it_found(tmp_path):
+    result = {
+        "method": "least squares",
+        "frame": "panda_link8",
+        "phi": HAND.phi.tolist(),
+        "mass": round(HAND.mass, 4),
+        "com": HAND.com.round(5).tolist(),
+        "inertia_com": HAND.inertia_com.round(6).tolist(),
+        "intervals": [[0, 1]] * 10,
+        "warnings": [],
+    }
+    read = read_payload(write(tmp_path, result))
+    assert np.array_equal(read.parameters.phi, HAND.phi)
+    assert (read.name, read.parameters.frame) == ("p", "panda_link8")
+    del result["phi"]
+    np.testing.assert_allclose(read_payload(write(tmp_path, result)).parameters.phi, HAND.phi, atol=2e-5)
+
+
+TRIPLE = {"mass": 1.0, "com": [0, 0, 0.1], "inertia_com": [[1e-3, 0, 0], [0, 1e-3, 0], [0, 0, 1e-3]]}
+PHI = InertialParameters.from_com(1.0, TRIPLE["com"], TRIPLE["inertia_com"]).phi.tolist()
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        ("", "is empty"),
+        ("{", "is not JSON.*line 1"),
+        ("mass: 1", "is not JSON"),
+        ("[" * 100_000, "cannot be read as JSON"),
+        ("[1, 2]", "holds a JSON list"),
+        ({}, "lacks mass and com and inertia_com.*no keys at all"),
+        ({"mass": 1, "com": [0, 0, 0]}, "lacks inertia_com.*found: mass, com"),
+        ({"phi": [1, 2, 3]}, r"phi is \[1, 2, 3\], expected 10 numbers"),
+        ({"phi": "heavy"}, "expected 10 numbers"),
+        ({"phi": [*PHI[:9], "x"]}, "expected 10 numbers"),
+        ({"phi": [*PHI[:9], True]}, "expected 10 numbers"),
+        ({"phi": [*PHI[:9], float("nan")]}, "expected 10 numbers, finite"),
+        ({"phi": [*PHI[:9], 10**400]}, "expected 10 numbers, finite"),
+        ({"phi": [[1, 2], 3]}, "expected 10 numbers"),
+        ({"phi": [*PHI[:8], None, None]}, "leaves Iyz, Izz undetermined"),
+        ({**TRIPLE, "mass": "1 kg"}, 'mass is "1 kg", expected a number'),
+        ({**TRIPLE, "mass": -1}, "mass of -1 kg"),
+        ({**TRIPLE, "mass": 0}, "mass of 0 kg"),
+        ({**TRIPLE, "com": [0, 0]}, "com is .*expected 3 numbers"),
+        ({**TRIPLE, "com": [0, 0, 100]}, "100 m from the frame.*millimetres"),
+        ({**TRIPLE, "inertia_com": [1, 2, 3]}, "inertia_com is .*expected 3 rows of 3 numbers"),
+        ({**TRIPLE, "inertia_com": [[1, 2, 0], [0, 1, 0], [0, 0, 1]]}, r"p\.json: inertia_com is not symmetric"),
+        ({**TRIPLE, "inertia_com": [[1, 0, 0], [0, 1, 0], [0, 0, 3]]}, "cannot exist.*1, 1, 3"),
+        ({**TRIPLE, "phi": [2 * x for x in PHI]}, "says two things: its mass"),
+        ({**TRIPLE, "com": [0, 0, 0.2], "phi": PHI}, "says two things: its com"),
+        ({**TRIPLE, "frame": 8}, "frame is 8, expected text"),
+        ({**TRIPLE, "boxes": [{"size": [1, 2]}]}, "boxes are not a list"),
+        ({**TRIPLE, "boxes": 7}, "boxes are not a list"),
+    ],
+)
+def test_a_payload_file_that_cannot_be_used_says_why_in_one_sentence(tmp_path, content, says):
+    with pytest.raises(PayloadError, match=says) as caught:
+        read_payload(write(tmp_path, content))
+    message = str(caught.value)
+    assert "p.json" in message
+    assert "\n" not in message
+    assert len(message) < 500
+
+
+def test_a_payload_file_that_is_not_there_or_not_text_says_so(tmp_path):
+    with pytest.raises(PayloadError, match="does not exist"):
+        read_payload(tmp_path / "none.json")
+    with pytest.raises(PayloadError, match="is a folder"):
+        read_payload(tmp_path)
+    (tmp_path / "b.json").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(PayloadError, match="is not text"):
+        read_payload(tmp_path / "b.json")
+    with pytest.raises(PayloadError, match="cannot be written"):
+        write_payload(tmp_path / "no" / "p.json", franka_hand())
