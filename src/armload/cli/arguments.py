@@ -22,6 +22,10 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, **settings) -> None:
         super().__init__(allow_abbrev=False, formatter_class=_Help, **settings)
 
+    def print_help(self, file=None) -> None:
+        """Print the help; unlike argparse, do not hide that it cannot be written."""
+        print(self.format_help(), end="", file=file)
+
     def error(self, message: str) -> NoReturn:
         """Raise UsageError."""
         raise UsageError(f"{message.replace('argument ', '', 1)}; see '{self.prog} --help'")

@@ -60,26 +60,35 @@ def main(argv: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="replace")  # a terminal that cannot show "m²" still gets the answer
     with warnings.catch_warnings():
         warnings.showwarning = _show_warning
+        code = _guarded(arguments, show_traceback)
+    try:
+        sys.stdout.flush()
+    except OSError:  # said already; the interpreter flushes once more when it ends: let that go nowhere
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return code
+
+
+def _guarded(arguments: list[str], show_traceback: bool) -> int:
+    """Run the command and say what went wrong, if anything did."""
+    try:
         try:
             code = _run(arguments)
-            sys.stdout.flush()
-            return code
         except SystemExit as stop:  # argparse ends `--help` and `--version` so
-            return stop.code if isinstance(stop.code, int) else 0
-        except KeyboardInterrupt:
-            return _fail("interrupted", 130, show_traceback)
-        except BrokenPipeError:
-            # the interpreter flushes stdout once more when it ends: let that go nowhere
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            return 141
-        except ArmloadError as error:
-            return _fail(str(error), 2, show_traceback)
-        except OSError as error:
-            where = f"{error.filename}: " if error.filename else ""
-            return _fail(f"{where}{error.strerror or error}", 2, show_traceback)
-        except Exception as error:
-            hint = "" if show_traceback else "; this is a bug: set ARMLOAD_TRACEBACK=1 (or --traceback) to see where"
-            return _fail(f"{type(error).__name__}: {str(error) or 'no message'}{hint}", 1, show_traceback)
+            code = stop.code if isinstance(stop.code, int) else 0
+        sys.stdout.flush()
+        return code
+    except KeyboardInterrupt:
+        return _fail("interrupted", 130, show_traceback)
+    except BrokenPipeError:
+        return 141
+    except ArmloadError as error:
+        return _fail(str(error), 2, show_traceback)
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        return _fail(f"{where}{error.strerror or error}", 2, show_traceback)
+    except Exception as error:
+        hint = "" if show_traceback else "; this is a bug: set ARMLOAD_TRACEBACK=1 (or --traceback) to see where"
+        return _fail(f"{type(error).__name__}: {str(error) or 'no message'}{hint}", 1, show_traceback)
 
 
 def _run(arguments: list[str]) -> int:
