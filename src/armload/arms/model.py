@@ -50,7 +50,7 @@ class Arm:
     >>> panda.n, panda.frame
     (7, 'panda_link8')
     >>> panda.torque([0, 0, 0, -1.5, 0, 1.5, 0])[1].round(2)  # joint 2 holds the forearm up [N·m]
-    np.float64(-14.09)
+    np.float64(-24.87)
 
     Args:
         name: what the arm is called, in a log's header and in a model's artefact.

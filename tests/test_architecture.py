@@ -1,0 +1,148 @@
+"""The house rules, read from the source: which room may import which, who owns what is heavy, nothing pickled."""
+
+import ast
+import importlib
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+SOURCE = ROOT / "src" / "armload"
+MODULES = sorted(SOURCE.rglob("*.py"))
+ROW = re.compile(r"^\| `([a-z_]+)(?:/|\.py)` \|.*\| ([^|]*) \|$", re.MULTILINE)
+
+# Which rooms may import what is slow to load or speaks to the outside. Everything else is free.
+OWNERS = {
+    "pinocchio": {"arms"},
+    "clarabel": {"inertia", "least_squares"},
+    "trimesh": {"payloads"},
+    "rosbags": {"recording"},
+    "pyarrow": {"recording", "dataset"},
+    "mujoco": {"simulate"},
+    "jax": {"learners"},
+    "sklearn": {"learners"},
+    "safetensors": {"learners"},
+    "matplotlib": {"report"},
+    "jinja2": {"report"},
+    "tyro": {"cli"},
+}
+FORBIDDEN = {"torch", "pickle", "cPickle", "cloudpickle", "dill", "shelve", "marshal"}
+
+
+def table_of_rooms():
+    """Rooms and their main names, in the order of docs/architecture.md: the page is the rule."""
+    return {room: names for room, names in ROW.findall((ROOT / "docs" / "architecture.md").read_text(encoding="utf-8"))}
+
+
+ROOMS = table_of_rooms()
+ORDER = list(ROOMS)
+
+
+def room_of(path):
+    return path.relative_to(SOURCE).parts[0].removesuffix(".py")
+
+
+def imports(path):
+    """(module, line) of every import in a file, the lazy ones inside functions and TYPE_CHECKING included."""
+    found = []
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found += [(alias.name, node.lineno) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            if node.level:
+                package = ["armload", *path.relative_to(SOURCE).parent.parts]
+                base = ".".join(package[: len(package) - node.level + 1])
+                module = f"{base}.{node.module}" if node.module else base
+            else:
+                module = node.module
+            # `from armload import arms` names a room as well as `import armload.arms` does
+            found += [(f"{module}.{a.name}" if module == "armload" else module, node.lineno) for a in node.names]
+    return found
+
+
+def test_the_page_lists_every_room_and_no_other():
+    there = {room_of(path) for path in MODULES} - {"__init__", "__main__"}
+    assert there == set(ORDER)
+    assert len(ORDER) >= 14
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda p: str(p.relative_to(SOURCE)))
+def test_imports_go_one_way(path):
+    room = room_of(path)
+    if room in ("__init__", "__main__"):
+        return  # the front door opens on every room
+    above = ORDER[: ORDER.index(room) + 1]
+    for module, line in imports(path):
+        parts = module.split(".")
+        if parts[0] == "armload" and module != "armload.__version__":
+            if len(parts) == 1:
+                assert room == "cli", f"{path}:{line} imports the front door: import from the room itself"
+                continue
+            assert parts[1] in above, f"{path}:{line} imports armload.{parts[1]}, which is below {room}"
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda p: str(p.relative_to(SOURCE)))
+def test_heavy_packages_stay_in_their_rooms_and_nothing_is_pickled(path):
+    for module, line in imports(path):
+        package = module.split(".")[0]
+        assert package not in FORBIDDEN, f"{path}:{line} imports {package}"
+        owners = OWNERS.get(package)
+        assert owners is None or room_of(path) in owners, f"{path}:{line} imports {package}, owned by {owners}"
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            call = ast.unparse(node.func)
+            assert call not in ("joblib.dump", "joblib.load"), f"{path}:{node.lineno} calls {call}: a pickle"
+            allowed = [k for k in node.keywords if k.arg == "allow_pickle" and ast.unparse(k.value) != "False"]
+            assert not allowed, f"{path}:{node.lineno} allows pickle"
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda p: str(p.relative_to(SOURCE)))
+def test_modules_are_named_after_a_concept(path):
+    words = set(path.stem.strip("_").split("_")) | set(path.parent.relative_to(SOURCE).parts)
+    assert not words & {"utils", "util", "helpers", "helper", "core", "common", "misc", "base", "shared"}
+
+
+@pytest.mark.parametrize("room", ORDER)
+def test_each_room_has_the_names_the_page_promises(room):
+    names = re.findall(r"`(\w+)`", ROOMS[room])
+    assert names, f"the page names nothing of {room}"
+    module = importlib.import_module(f"armload.{room}")
+    missing = [name for name in names if not hasattr(module, name)]
+    assert not missing, f"armload.{room} has no {missing}"
+
+
+@pytest.mark.parametrize(
+    ("statement", "absent"),
+    [
+        ("import armload", ["pinocchio", "numba", "scipy", *OWNERS]),
+        ("import armload.cli", [name for name in OWNERS if name not in ("pinocchio", "tyro")]),
+        (
+            "from armload.arms import arm; from armload.least_squares import RecursiveLeastSquares; "
+            "from armload.recording import read_recording; from armload.payloads import from_mesh",
+            [name for name in OWNERS if name != "pinocchio"],
+        ),
+    ],
+    ids=["armload", "armload.cli", "identification"],
+)
+def test_what_is_heavy_loads_only_when_used(statement, absent):
+    code = f"import sys; {statement}; print([m for m in {absent!r} if m in sys.modules])"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert loaded.strip() == "[]"
+
+
+def test_every_exception_has_the_one_base():
+    tree = ast.parse((SOURCE / "errors.py").read_text(encoding="utf-8"))
+    own = {node.name for node in tree.body if isinstance(node, ast.ClassDef)}
+    errors = importlib.import_module("armload.errors")
+    assert own
+    for name in own:
+        assert issubclass(getattr(errors, name), errors.ArmloadError)
+    for path in MODULES:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ClassDef) and path.name != "errors.py":
+                bases = [ast.unparse(base) for base in node.bases]
+                stray = [b for b in bases if b.endswith(("Error", "Exception")) and b not in own]
+                assert not stray, f"{path}:{node.lineno} {node.name} derives from {stray}: put it into errors.py"
