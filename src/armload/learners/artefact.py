@@ -118,9 +118,11 @@ class LearnedModel:
             )
         if self.motions and not any(motion.matches(recording) for motion in self.motions):
             away = min(motion.distance(recording) for motion in self.motions)
+            known = ", ".join(f"{motion.name}, {motion.duration:.2f} s" for motion in self.motions[:3])
             raise ModelError(
-                f"{recording.source} does not follow a motion {model} was trained on (rms distance {away:.3g} rad): "
-                "run such a motion from its start, or use least squares, which takes any"
+                f"{recording.source} ({recording.duration:.2f} s) does not follow a motion {model} was trained on "
+                f"({known}; rms distance {away:.3g} rad): run "
+                "such a motion from its start, or use least squares, which takes any"
             )
 
     def __str__(self) -> str:

@@ -305,7 +305,7 @@ class _State:
     @classmethod
     def load(cls, path: Path, key: str) -> _State:
         try:
-            with np.load(path, allow_pickle=False) as file:
+            with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
                 a = dict(file)
             same = str(a["key"]) == key
             w, first, second, best = (
