@@ -25,7 +25,7 @@ _PANDA_STIFFNESS = (3000.0, 3000.0, 3000.0, 2500.0, 2500.0, 2000.0, 2000.0)  # [
 _FULL_LOAD_SAG = 0.02
 # Critical damping of the bare links alone would leave the smallest wrists too loose against friction, as their motors'
 # inertia is not modelled: a displaced joint needs at least this long to come back. (franka_ros' joint impedance example
-# is slower still: its kd/kp lie between 0.03 and 0.2 s.)
+# is slower still: its kd/kp is 0.03 s and more.)
 _SHORTEST_RETURN = 0.01  # [s]
 _FEED_FORWARD_KNOTS = 2e-3  # [s] the feed-forward is computed at these instants and interpolated by a cubic spline
 

@@ -10,7 +10,7 @@ The integrator is `implicitfast`, a semi-implicit Euler step. With actuators of 
     M(q_j)·(v_{j+1} − v_j)/h + c(q_j, v_j) + g(q_j) = ctrl_j − kp·q_j − kd·v_{j+1},      q_{j+1} = q_j + h·v_{j+1}
 
 because the actuators' damping is implicit. This is a leapfrog: (v_{j+1} − v_j)/h is the central second difference of q
-at q_j, and v lives half a step before its q. `simulate.runs` logs accordingly.
+at q_j, and v lives half a step before its q. `simulate.rollout` logs accordingly.
 
 Source: MuJoCo's documentation, chapter Computation, "Numerical integration"; the equation is tested.
 """
