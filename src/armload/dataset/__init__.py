@@ -1,4 +1,4 @@
-"""Data sets: many simulated runs in one table with the paper's columns, where it came from, and fair ways to split it."""
+"""Data sets: many simulated runs in one table with the paper's columns, their provenance, and fair ways to split."""
 
 from armload.dataset.build import build_dataset
 from armload.dataset.splits import Split, split_motions, split_payloads, split_rows, split_worlds

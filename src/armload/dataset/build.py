@@ -8,7 +8,7 @@ Each file appears whole or not at all, so that a build may be stopped at any mom
 from __future__ import annotations
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 ROWS_PER_RUN = 3244  # the paper's 249 788 rows are 77 payloads × 3244
-_BATCH = 8  # runs per part: what an interruption can lose
+_BATCH = 16  # runs per part: what an interruption can lose
 _PARTS = "parts"
 _REQUEST = b"armload.dataset"
 
@@ -207,15 +207,20 @@ def _finish(folder: Path, provenance: dict[str, Any], batches: list[range]) -> N
     from pyarrow import parquet
 
     parts = [_part(folder, batch) for batch in batches]
-    schema = read_table(parts[0]).schema.remove_metadata()
+    schema = parquet.read_schema(parts[0]).remove_metadata()
     with (
         replacing(folder / TABLE_FILE) as temporary,
         parquet.ParquetWriter(temporary, schema, compression="zstd", write_page_checksum=True) as writer,
     ):
-        for part in parts:
-            writer.write_table(read_table(part).replace_schema_metadata(None))
-    provenance["sha256"] = content_hash(provenance, (read_table(part) for part in parts))
-    write_provenance(folder, provenance)
+
+        def written() -> Iterator[pa.Table]:
+            for part in parts:
+                table = read_table(part).replace_schema_metadata(None)
+                writer.write_table(table)
+                yield table
+
+        sha256 = content_hash(provenance, written())
+    write_provenance(folder, {**provenance, "sha256": sha256})
     shutil.rmtree(folder / _PARTS)
 
 
