@@ -86,7 +86,7 @@ def test_a_usage_error_is_one_sentence_that_names_the_place(capsys, argv, named)
     assert named in refused(capsys, argv)
 
 
-def test_interruption_is_one_line_and_130(capsys, monkeypatch, tmp_path):
+def test_interruption_is_one_line_and_130(capsys, monkeypatch):
     def interrupt(*_, **__):
         raise KeyboardInterrupt
 
