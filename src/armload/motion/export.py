@@ -25,6 +25,7 @@ def export_motion(
     format: str = "csv",
     rate: float | None = None,
     joint_names: Sequence[str] | None = None,
+    lead: float = 5.0,
 ) -> None:
     """Write a motion as a file that a robot's own tools read, complete or not at all.
 
@@ -41,22 +42,26 @@ def export_motion(
             for a CB3 controller).
         joint_names: the joints in the order of q, as the robot's driver calls them (`arm.joint_names`); needed by
             "ros2".
+        lead: time for getting to the start in a "ros2" trajectory [s]: its first point comes so late, and the
+            controller interpolates from wherever the arm is. That way is not checked; be near the start.
 
     Raises:
-        MotionError: an unknown format, a rate that is not positive, joint names missing or too few, a "ur" motion that
-            has not 6 joints, or a file that cannot be written.
+        MotionError: an unknown format, a rate or lead that is not positive, joint names missing or too few, a "ur"
+            motion that has not 6 joints, or a file that cannot be written.
     """
     if format not in RATES:
         raise MotionError(f"unknown motion format {format!r}: expected one of {', '.join(RATES)}")
     rate = RATES[format] if rate is None else float(rate)
     if not (np.isfinite(rate) and rate > 0):
         raise MotionError(f"rate of the export is {rate} Hz: expected a positive number")
+    if not (np.isfinite(lead) and lead > 0):
+        raise MotionError(f"lead of the export is {lead} s: expected a positive time for getting to the start")
     steps = max(1, round(motion.duration * rate))
     t = np.linspace(0.0, motion.duration, steps + 1)
     if format == "csv":
         text = _csv(motion, t)
     elif format == "ros2":
-        text = _ros2(motion, t, joint_names)
+        text = _ros2(motion, t, joint_names, lead)
     else:
         text = _ur(motion, t)
     write_whole(path, text)
@@ -69,7 +74,7 @@ def _csv(motion: Motion, t: NDArray[np.float64]) -> str:
     return "\n".join([",".join(["t", *names]), *rows]) + "\n"
 
 
-def _ros2(motion: Motion, t: NDArray[np.float64], joint_names: Sequence[str] | None) -> str:
+def _ros2(motion: Motion, t: NDArray[np.float64], joint_names: Sequence[str] | None, lead: float) -> str:
     if joint_names is None:
         raise MotionError("a ROS 2 trajectory names its joints: give joint_names, such as those of the arm")
     joint_names = list(joint_names)
@@ -82,7 +87,7 @@ def _ros2(motion: Motion, t: NDArray[np.float64], joint_names: Sequence[str] | N
         f"joint_names: [{', '.join(_quoted(name) for name in joint_names)}]",
         "points:",
     ]
-    nanoseconds = np.round(t * 1e9).astype(np.int64)
+    nanoseconds = np.round((t + lead) * 1e9).astype(np.int64)
     for k, rows in enumerate(zip(*motion(t), strict=True)):
         position, velocity, acceleration = ("[" + ", ".join(_number(x) for x in row) + "]" for row in rows)
         seconds, rest = divmod(int(nanoseconds[k]), 10**9)

@@ -114,5 +114,6 @@ def _from_text(text: str, where: str) -> FourierMotion:
         raise MotionError(f"{where}: {error}") from None
     except (TypeError, ValueError):
         raise MotionError(
-            f"{where} is not a motion: offset must be n numbers, sine and cosine n rows of K numbers each"
+            f"{where} is not a motion: period must be a number of seconds, offset n numbers, sine and cosine n rows of "
+            "K numbers each"
         ) from None

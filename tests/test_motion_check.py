@@ -1,0 +1,226 @@
+"""Capsules against brute force, poses against Pinocchio, and checks against motions made to break one thing."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from armload.arms import arm
+from armload.errors import MotionError
+from armload.inertia import InertialParameters
+from armload.motion import FourierMotion, check_motion, random_motion, rated_load, taie2024
+from armload.motion.collision import capsule_arm, segment_distance
+
+point = arrays(float, 3, elements=st.floats(-1, 1, allow_subnormal=False).map(lambda x: round(x, 3)))
+
+
+def brute_force(a, b, c, d, steps=401):
+    s = np.linspace(0, 1, steps)
+    p, q = a + np.outer(s, b - a), c + np.outer(s, d - c)
+    return np.linalg.norm(p[:, None] - q[None], axis=2).min()
+
+
+@given(point, point, point, point)
+@settings(max_examples=60, deadline=None)
+def test_segment_distance_is_the_smallest_over_all_pairs_of_points(a, b, c, d):
+    sampled = brute_force(a, b, c, d)
+    exact = float(segment_distance(a, b, c, d))
+    spacing = (np.linalg.norm(b - a) + np.linalg.norm(d - c)) / 400
+    assert sampled - spacing <= exact <= sampled + 1e-9
+
+
+@given(point, point, point)
+@settings(max_examples=30, deadline=None)
+def test_parallel_and_degenerate_segments_have_their_distance_too(a, b, offset):
+    assert float(segment_distance(a, b, a + offset, b + offset)) <= np.linalg.norm(offset) + 1e-9
+    assert float(segment_distance(a, a, b, b)) == pytest.approx(np.linalg.norm(b - a), abs=1e-12)
+    assert float(segment_distance(a, b, b, a)) == pytest.approx(0.0, abs=1e-9)
+    sampled = brute_force(a, b, a + offset, b + offset)
+    assert float(segment_distance(a, b, a + offset, b + offset)) <= sampled + 1e-9
+
+
+def test_segment_distance_takes_many_pairs_at_once():
+    a, b, c, d = np.random.default_rng(3).normal(size=(4, 5, 6, 3))
+    together = segment_distance(a, b, c, d)
+    assert together.shape == (5, 6)
+    assert together[2, 4] == segment_distance(a[2, 4], b[2, 4], c[2, 4], d[2, 4])
+
+
+def test_capsules_ride_on_their_links_as_pinocchio_places_them(any_arm):
+    model = pin.buildModelFromXML(any_arm.urdf)
+    data = model.createData()
+    capsules = capsule_arm(any_arm)
+    q = np.random.default_rng(0).uniform(-2, 2, size=(5, any_arm.n))
+    starts, ends = capsules.axes(q)
+    for k in range(5):
+        pin.forwardKinematics(model, data, q[k])
+        for c, link in enumerate(capsules.link):
+            placement = data.oMi[int(link)]
+            np.testing.assert_allclose(starts[k, c], placement.act(capsules.start[c]), atol=1e-12)
+            np.testing.assert_allclose(ends[k, c], placement.act(capsules.end[c]), atol=1e-12)
+
+
+def test_automatic_capsules_run_from_joint_to_joint_and_end_at_the_flange():
+    ur = arm("ur10e")
+    capsules = capsule_arm(ur, payload_radius=0.0)
+    starts, ends = capsules.axes(np.random.default_rng(1).uniform(-2, 2, size=(4, 6)))
+    np.testing.assert_allclose(ends[:, :-1], starts[:, 1:], atol=1e-12)
+    q = np.zeros((1, 6))
+    np.testing.assert_allclose(capsules.axes(q)[1][0, -1], ur.frame_pose(q)[1][0], atol=1e-12)
+
+
+def test_the_payload_ball_sits_a_tenth_of_a_metre_beyond_the_flange(any_arm):
+    q = np.random.default_rng(2).uniform(-1, 1, size=(3, any_arm.n))
+    R, p = any_arm.frame_pose(q)
+    start, end = capsule_arm(any_arm, payload_radius=0.12).axes(q)
+    np.testing.assert_allclose(start[:, -1], p + 0.1 * R[:, :, 2], atol=1e-12)
+    np.testing.assert_array_equal(start[:, -1], end[:, -1])
+
+
+def test_a_panda_is_recognised_by_its_joints_under_any_name(tmp_path, panda):
+    path = tmp_path / "lab_robot.urdf"
+    path.write_text(panda.urdf)
+    other = arm(path, frame="panda_link8")
+    assert other.name == "lab_robot"
+    np.testing.assert_array_equal(capsule_arm(other).radius, capsule_arm(panda).radius)
+
+
+def test_poses_that_touch_are_told_from_poses_that_do_not(panda):
+    ready, folded, low = [0, -0.5, 0, -2.0, 0, 1.6, 0.8], [0, -0.5, 0, -3.0, 0, 0.2, 0], [0, 1.7, 0, -0.3, 0, 1.6, 0]
+    clear = capsule_arm(panda).clearance([ready, folded, low])
+    assert clear.self[0] > 0.03
+    assert clear.floor[0] > 0.1
+    assert clear.self[1] < 0  # the flange, and the payload with it, against the forearm
+    assert clear.floor[2] < 0
+    assert np.isinf(capsule_arm(panda).clearance([low], floor=None).floor[0])
+    higher = capsule_arm(panda).clearance([low], floor=-1.0)
+    assert higher.floor[0] == pytest.approx(clear.floor[2] + 1.0)
+
+
+def one_joint_moves(joint, amplitude, period=6.0, ready=(0, -0.5, 0, -2.0, 0, 1.6, 0.8)):
+    """q_joint moves by amplitude·(sin x − sin(2x)/2): smooth at both ends."""
+    sine = np.zeros((7, 2))
+    sine[joint] = amplitude, -amplitude / 2
+    return FourierMotion(ready, sine, np.zeros((7, 2)), period, "one joint")
+
+
+def test_margins_are_the_closed_form_of_a_motion_of_one_joint(panda):
+    amplitude, omega = 0.4, 2 * np.pi / 6
+    check = check_motion(panda, one_joint_moves(0, amplitude), rate=2000)
+    # sin x − sin(2x)/2: peak 3·sqrt(3)/4 at 2·pi/3; its derivative cos x − cos 2x has its peak −2 at pi
+    assert check.ok
+    assert check.margin["position"][0] == pytest.approx(2.8973 - amplitude * 0.75 * np.sqrt(3), abs=1e-6)
+    assert check.margin["velocity"][0] == pytest.approx(2.175 - 2 * amplitude * omega, abs=1e-6)
+    assert check.used("velocity")[0] == pytest.approx(2 * amplitude * omega / 2.175, abs=1e-6)
+    # the acceleration −sin x + 2·sin 2x has its extremes where its derivative −cos x + 4·cos 2x vanishes
+    x = np.arccos((1 + np.array([1, -1]) * np.sqrt(129)) / 16)
+    extreme = np.abs(2 * np.sin(2 * x) - np.sin(x)).max()
+    assert check.peak["acceleration"][0] == pytest.approx(amplitude * omega**2 * extreme, abs=1e-5)
+    # the jerk −cos x + 4·cos 2x is largest in size at pi: 5
+    assert check.peak["jerk"][0] == pytest.approx(5 * amplitude * omega**3, abs=1e-6)
+    np.testing.assert_array_equal(check.peak["velocity"][1:], 0.0)
+
+
+@pytest.mark.parametrize(
+    ("joint", "amplitude", "period", "says"),
+    [
+        (5, 2.0, 60.0, "panda_joint6 passes its position limit"),
+        (6, 1.0, 3.0, "panda_joint7 passes its velocity limit"),
+        (1, 0.4, 1.4, "panda_joint2 passes its acceleration limit"),
+        (0, 0.1, 0.12, "panda_joint1 passes its jerk limit"),
+        (1, 0.4, 1.4, "panda_joint2 passes its torque limit"),
+    ],
+)
+def test_each_passed_limit_is_named_with_joint_and_time(panda, joint, amplitude, period, says):
+    load = InertialParameters.from_com(30.0, (0, 0, 0.1), 0.03 * np.eye(3)) if "torque" in says else None
+    check = check_motion(panda, one_joint_moves(joint, amplitude, period), load)
+    assert not check.ok
+    (sentence,) = [p for p in check.problems if p.startswith(says)]
+    assert " at t = " in sentence
+    assert sentence in str(check)
+
+
+def test_the_torque_margin_is_that_of_the_arm_with_its_payload(panda):
+    load = InertialParameters.from_com(2.0, (0.02, 0, 0.05), 0.01 * np.eye(3))
+    t = np.linspace(0, 6, 1201)
+    peak = np.abs(panda.with_payload(load).torque(*taie2024()(t))).max(axis=0)
+    check = check_motion(panda, taie2024(), load)
+    np.testing.assert_allclose(check.margin["torque"], panda.limits.effort - peak, atol=1e-12)
+    assert check.margin["torque"][3] < check_motion(panda, taie2024()).margin["torque"][3]
+
+
+def test_a_motion_that_does_not_start_at_rest_is_a_problem(panda):
+    ready = (0, -0.5, 0, -2.0, 0, 1.6, 0.8)
+    jump = FourierMotion(ready, np.full((7, 2), 0.02), np.zeros((7, 2)), 6.0)
+    assert any("velocity" in p and "at rest" in p for p in check_motion(panda, jump).problems)
+    shove = FourierMotion(ready, np.zeros((7, 2)), np.full((7, 2), 0.02), 6.0)
+    assert any("acceleration" in p and "at rest" in p for p in check_motion(panda, shove).problems)
+    assert check_motion(panda, jump.smooth()).ok
+
+
+def test_hitting_the_floor_or_itself_is_a_problem_with_place_and_time(panda):
+    low = one_joint_moves(1, 0.3, ready=(0, 1.3, 0, -0.5, 0, 1.6, 0.8))
+    (sentence,) = check_motion(panda, low).problems
+    assert sentence.startswith("the arm hits the floor: the payload at t = ")
+    assert check_motion(panda, low, floor=None).ok
+    folded = one_joint_moves(5, 0.6, ready=(0, -0.5, 0, -2.0, 0, 0.9, 0.8))
+    assert any(p.startswith("the arm hits itself: the link of panda_joint5 and the payload") for p in
+               check_motion(panda, folded).problems)  # fmt: skip
+    assert check_motion(panda, folded, payload_radius=0.0).ok
+
+
+def test_a_motion_of_another_arm_is_refused():
+    with pytest.raises(MotionError, match="7 joints: ur10e has 6"):
+        check_motion(arm("ur10e"), taie2024())
+
+
+def test_an_arm_without_acceleration_limits_shows_none():
+    ur = arm("ur10e")
+    check = check_motion(ur, random_motion(ur, 3))
+    assert np.all(np.isinf(check.margin["acceleration"]))
+    assert np.all(check.used("acceleration") == 0)
+    assert "no limit" in str(check)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_motions_pass_the_check_and_move_every_joint(any_arm, seed):
+    motion = random_motion(any_arm, seed)
+    check = check_motion(any_arm, motion, rated_load(any_arm), rate=500, collision_rate=200)
+    assert check.problems == []
+    q, dq, _ = motion(np.linspace(0, motion.duration, 300))
+    assert np.all(np.ptp(q, axis=0) > 0.15)
+    assert np.all(np.abs(dq).max(axis=0) > 0.1)
+    assert (motion.duration, motion.harmonics) == (6.0, 5)
+
+
+def test_random_motions_depend_on_the_seed_and_on_nothing_else(panda):
+    first, again, other = random_motion(panda, 5), random_motion(arm("panda"), 5), random_motion(panda, 6)
+    np.testing.assert_array_equal(first.sine, again.sine)
+    np.testing.assert_array_equal(first.offset, again.offset)
+    assert np.abs(first.offset - other.offset).max() > 0.1
+
+
+def test_random_motions_have_the_duration_and_harmonics_asked_for(panda):
+    motion = random_motion(panda, 1, duration=4.0, harmonics=3)
+    assert (motion.duration, motion.harmonics) == (4.0, 3)
+    with pytest.raises(MotionError, match="at least 2"):
+        random_motion(panda, 1, harmonics=1)
+    with pytest.raises(MotionError, match="positive"):
+        random_motion(panda, 1, duration=0.0)
+
+
+def test_a_urdf_without_effort_or_velocity_limits_gets_a_random_motion(tmp_path):
+    path = tmp_path / "scara.urdf"
+    joint = """<joint name="j{0}" type="{1}"><parent link="l{2}"/><child link="l{0}"/><origin xyz="{3}"/>
+      <axis xyz="0 0 1"/></joint><link name="l{0}"><inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01"
+      ixy="0" ixz="0" iyz="0"/></inertial></link>"""
+    chain = (1, "continuous", 0, "0 0 0.4"), (2, "continuous", 1, "0.4 0 0.1"), (3, "fixed", 2, "0.3 0 0")
+    path.write_text('<robot name="scara"><link name="l0"/>' + "".join(joint.format(*row) for row in chain) + "</robot>")
+    scara = arm(path)
+    motion = random_motion(scara, 0)
+    check = check_motion(scara, motion)
+    assert check.ok
+    assert np.all(check.peak["velocity"] <= 1.5)
+    assert np.all(np.isinf(check.margin["torque"]))

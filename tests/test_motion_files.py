@@ -1,0 +1,165 @@
+"""Exports read back by other programs' rules, and the fingerprint that ties a model to its motion."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+from ruamel.yaml import YAML
+
+from armload.arms import arm
+from armload.errors import MotionError
+from armload.motion import FourierMotion, MotionFingerprint, export_motion, random_motion, taie2024
+from armload.recording import Recording
+
+
+@pytest.fixture(scope="module")
+def ur_motion():
+    return random_motion(arm("ur10e"), 1)
+
+
+def test_the_csv_holds_the_motion_at_every_sample(tmp_path):
+    export_motion(taie2024(), tmp_path / "m.csv", rate=250)
+    header, *_ = (tmp_path / "m.csv").read_text().splitlines()
+    assert header.split(",")[:3] == ["t", "q1", "q2"]
+    assert header.split(",")[8::7] == ["dq1", "ddq1"]
+    table = np.loadtxt(tmp_path / "m.csv", delimiter=",", skiprows=1)
+    np.testing.assert_allclose(table[:, 0], np.arange(1501) / 250, atol=1e-9)
+    np.testing.assert_allclose(table[:, 1:], np.hstack(taie2024()(table[:, 0])), atol=1e-8)
+
+
+def test_the_ros2_trajectory_has_the_fields_of_the_message_and_the_arms_joints(tmp_path, panda):
+    path = tmp_path / "m.yaml"
+    export_motion(taie2024(), path, "ros2", joint_names=panda.joint_names)
+    message = YAML(typ="safe").load(path.read_text())
+    assert set(message) == {"header", "joint_names", "points"}
+    assert message["header"] == {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
+    assert message["joint_names"] == list(panda.joint_names)
+    points = message["points"]
+    assert len(points) == 601
+    assert set(points[0]) == {"positions", "velocities", "accelerations", "time_from_start"}
+    t = np.array([p["time_from_start"]["sec"] + 1e-9 * p["time_from_start"]["nanosec"] for p in points])
+    assert all(0 <= p["time_from_start"]["nanosec"] < 10**9 for p in points)
+    np.testing.assert_allclose(t, 5.0 + np.arange(601) / 100, atol=2e-9)  # 5 s to get to the start
+    for key, value in zip(("positions", "velocities", "accelerations"), taie2024()(t - 5.0), strict=True):
+        np.testing.assert_allclose([p[key] for p in points], value, atol=1e-7)
+
+
+def test_joint_names_survive_yaml_whatever_they_are(tmp_path):
+    motion = FourierMotion(np.zeros(3), np.zeros((3, 2)), np.zeros((3, 2)), 1.0)
+    names = ["on", "it's", "a: [b]"]
+    export_motion(motion, tmp_path / "m.yaml", "ros2", joint_names=names)
+    assert YAML(typ="safe").load((tmp_path / "m.yaml").read_text())["joint_names"] == names
+
+
+def test_the_ur_program_moves_to_the_start_and_then_through_the_table(tmp_path, ur_motion):
+    path = tmp_path / "m.script"
+    export_motion(ur_motion, path, "ur", rate=125)
+    lines = [line.strip() for line in path.read_text().splitlines()]
+    assert lines[0] == "def armload_motion():"
+    assert lines[-1] == "armload_motion()"
+    assert sum(line.startswith("def ") for line in lines) == lines.count("end")
+    go = [line for line in lines if line.startswith("go(")]
+    table = np.array([json.loads(re.fullmatch(r"go\((.*)\)", line)[1]) for line in go])
+    np.testing.assert_allclose(table, ur_motion(np.arange(751) / 125)[0], atol=1e-8)
+    (movej,) = [line for line in lines if line.startswith("movej(")]
+    assert json.loads(movej[len("movej(") :].split("]")[0] + "]") == table[0].tolist()
+    assert lines.index(movej) < lines.index(go[0])
+    assert "servoj(q, t=0.008, " in "\n".join(lines)
+
+
+def test_a_motions_name_cannot_break_out_of_its_comment(tmp_path, ur_motion):
+    evil = FourierMotion(ur_motion.offset, ur_motion.sine, ur_motion.cosine, 6.0, "x\n  set_digital_out(0, True)")
+    export_motion(evil, tmp_path / "m.script", "ur")
+    lines = (tmp_path / "m.script").read_text().splitlines()
+    assert [line for line in lines if "set_digital_out" in line] == [lines[1]]
+    assert lines[1].lstrip().startswith("#")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ({"format": "xml"}, "csv, ros2, ur"),
+        ({"rate": 0.0}, "positive"),
+        ({"rate": float("nan")}, "positive"),
+        ({"format": "ros2"}, "joint_names"),
+        ({"format": "ros2", "joint_names": ["a"]}, "1 joint names for a motion of 7"),
+        ({"format": "ros2", "joint_names": list("abcdefg"), "lead": 0.0}, "lead"),
+        ({"format": "ur"}, "a UR robot has 6"),
+    ],
+)
+def test_a_wrong_export_is_one_sentence_and_no_file(tmp_path, arguments, says):
+    with pytest.raises(MotionError, match=says):
+        export_motion(taie2024(), tmp_path / "out", **arguments)
+    assert not list(tmp_path.iterdir())
+
+
+def log_of(motion, rate=500.0, start=0.0, duration=None, noise=0.0, clock=0.0):
+    duration = motion.duration - start if duration is None else duration
+    t = np.arange(int(duration * rate) + 1) / rate
+    q, dq, _ = motion(t + start)
+    q = q + noise * np.random.default_rng(0).normal(size=q.shape)
+    return Recording(t + clock, q, dq, np.zeros_like(q))
+
+
+def test_a_log_of_the_motion_matches_on_any_clock_and_of_any_shorter_length():
+    mark = MotionFingerprint.of(taie2024())
+    assert mark.distance(log_of(taie2024())) < 2e-3  # linear interpolation at 50 Hz
+    assert mark.matches(log_of(taie2024(), clock=1.7e9))
+    assert mark.matches(log_of(taie2024(), duration=0.2))
+    assert mark.matches(log_of(taie2024(), duration=6.5))  # it waits at the end
+    assert mark.matches(log_of(taie2024(), noise=0.02))
+
+
+def test_the_distance_is_the_rms_of_a_known_deviation():
+    mark, log = MotionFingerprint.of(taie2024()), log_of(taie2024())
+    moved = Recording(log.t, log.q + np.array([0.3, 0, 0, 0, 0, 0, 0.4]), log.dq, log.tau)
+    assert mark.distance(moved) == pytest.approx(np.sqrt((0.09 + 0.16) / 7), abs=1e-3)
+    assert not mark.matches(moved)
+    assert mark.matches(moved, tolerance=0.2)
+
+
+def test_other_motions_lengths_starts_and_arms_do_not_match(panda, ur_motion):
+    mark = MotionFingerprint.of(taie2024())
+    assert not mark.matches(log_of(random_motion(panda, 0)))
+    assert not mark.matches(log_of(taie2024(), duration=0.04))
+    assert not mark.matches(log_of(taie2024(), duration=6.7))
+    assert not mark.matches(log_of(taie2024(), start=2.0))
+    assert not mark.matches(log_of(taie2024().scaled(0.5)))
+    assert mark.distance(log_of(ur_motion)) == np.inf
+    assert not mark.matches(log_of(ur_motion))
+
+
+def test_the_unloaded_panda_log_is_not_our_excitation(real_data):
+    table = np.loadtxt(real_data / "panda_unloaded_1khz.csv", delimiter=",", skiprows=1, max_rows=6000)
+    log = Recording(table[:, 0], table[:, 1:8], table[:, 8:15], table[:, 15:22])
+    mark = MotionFingerprint.of(taie2024())
+    assert 0.1 < mark.distance(log) < np.inf
+    assert not mark.matches(log)
+
+
+def test_the_fingerprint_survives_json_and_notices_damage():
+    mark = MotionFingerprint.of(taie2024())
+    content = json.loads(json.dumps(mark.to_dict()))
+    back = MotionFingerprint.from_dict(content)
+    assert back == mark
+    assert hash(back) == hash(mark)
+    assert (back.name, back.sha256) == (mark.name, mark.sha256)
+    content["q"][7][2] += 1e-4
+    with pytest.raises(MotionError, match="does not match its SHA-256"):
+        MotionFingerprint.from_dict(content)
+    for key in ("name", "duration", "sha256", "q"):
+        with pytest.raises(MotionError, match=f"'{key}' is missing"):
+            MotionFingerprint.from_dict({k: v for k, v in mark.to_dict().items() if k != key})
+    for bad in ([[1, 2], [3]], "text", [[None]], [[1.0]]):
+        with pytest.raises(MotionError):
+            MotionFingerprint.from_dict({**mark.to_dict(), "q": bad})
+
+
+def test_the_fingerprint_tells_motions_apart_and_ignores_their_names():
+    mark = MotionFingerprint.of(taie2024())
+    renamed = FourierMotion(taie2024().offset, taie2024().sine, taie2024().cosine, 6.0, "other")
+    assert MotionFingerprint.of(renamed) == mark
+    assert MotionFingerprint.of(taie2024().scaled(0.999)) != mark
+    slower = FourierMotion(taie2024().offset, taie2024().sine, taie2024().cosine, 6.001)
+    assert MotionFingerprint.of(slower) != mark
