@@ -191,7 +191,7 @@ def test_friction_and_residual_converge_to_the_motion_that_comes_out(any_arm, mo
     gains, clock, motion = Gains.of(any_arm), rollout.Clock.at(500.0, 3000), motion_of(any_arm)
     world = World.real_like(any_arm, seed=1)
     command = Command.along(any_arm, motion, clock.step, clock.steps)
-    prepared = runs._prepare(any_arm, gains, Run(motion, PAYLOAD, world), world, command, clock)
+    prepared = runs._prepare(world.arm(any_arm), gains, Run(motion, PAYLOAD, world), world, command, clock)
     left = {}
     for passes in (1, 2, 4):
         monkeypatch.setattr(rollout, "PASSES", passes)

@@ -114,12 +114,16 @@ def simulate_many(
 def _batch(arm: Arm, gains: Gains, runs: list[Run], clock: Clock, workers: int) -> list[Recording]:
     """Simulate runs of equal length together."""
     nominal = World.nominal(arm)
-    commands: dict[int, Command] = {}
+    commands: dict[int, Command] = {}  # what runs share is made once
+    actual: dict[int, Arm] = {}
     prepared = []
     for run in runs:
+        world = run.world or nominal
         if id(run.motion) not in commands:
             commands[id(run.motion)] = Command.along(arm, run.motion, clock.step, clock.steps)
-        prepared.append(_prepare(arm, gains, run, run.world or nominal, commands[id(run.motion)], clock))
+        if id(world) not in actual:
+            actual[id(world)] = world.arm(arm)
+        prepared.append(_prepare(actual[id(world)], gains, run, world, commands[id(run.motion)], clock))
     logs = []
     for run, (q, dq, tau) in zip(runs, roll_out(prepared, gains, clock, workers), strict=True):
         if not np.all(np.isfinite(tau)):
@@ -133,10 +137,8 @@ def _batch(arm: Arm, gains: Gains, runs: list[Run], clock: Clock, workers: int) 
     return logs
 
 
-def _prepare(arm: Arm, gains: Gains, run: Run, world: World, command: Command, clock: Clock) -> Prepared:
-    if world.links.shape[0] != arm.n:
-        raise ArmError(f"the world {world.name!r} has {world.links.shape[0]} links: {arm.name} has {arm.n}")
-    actual = arm.with_links(world.links)
+def _prepare(actual: Arm, gains: Gains, run: Run, world: World, command: Command, clock: Clock) -> Prepared:
+    """A run ready to go, with `actual` the world's arm."""
     payload = _parameters(run.payload)
     model = build_model(actual if payload is None else actual.with_payload(payload), gains, clock.step)
     q, dq, ddq = (x[0] for x in run.motion([0.0]))

@@ -130,6 +130,16 @@ class World:
             SmoothTorque.drawn(residual, rng),
         )
 
+    def arm(self, nominal: Arm) -> Arm:
+        """The arm with this world's links, and what is attached to the nominal one.
+
+        Raises:
+            ArmError: the world was made for an arm with another number of joints.
+        """
+        if len(self.links) != nominal.n:
+            raise ArmError(f"the world {self.name!r} has {len(self.links)} links: {nominal.name} has {nominal.n}")
+        return nominal.with_links(self.links)
+
     @property
     def disturbed(self) -> bool:
         """Whether anything but rigid-body torque acts in the joints."""
