@@ -39,3 +39,7 @@ class IdentificationError(ArmloadError, ValueError):
 
 class UsageError(ArmloadError):
     """A command line that cannot be understood."""
+
+
+class ReportError(ArmloadError, ValueError):
+    """A report that cannot be written."""
