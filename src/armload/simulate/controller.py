@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from armload.arms import Arm
 from armload.motion import Motion
@@ -71,6 +70,8 @@ class Command:
     @classmethod
     def along(cls, arm: Arm, motion: Motion, step: float, steps: int) -> Command:
         """The command for `steps` steps of a motion, with the inverse dynamics of `arm`, the controller's model."""
+        from scipy.interpolate import CubicSpline
+
         t = step * np.arange(steps)
         knots = np.linspace(0.0, max(t[-1], step), max(4, int(np.ceil(t[-1] / _FEED_FORWARD_KNOTS)) + 1))
         feed_forward = CubicSpline(knots, arm.torque(*motion(knots)))(t)

@@ -23,7 +23,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from armload.simulate.controller import Command, Gains
 from armload.simulate.worlds import World
@@ -174,6 +173,8 @@ def _knots(clock: Clock, steps: int) -> NDArray[np.intp]:
 
 def _between(knots: NDArray[np.intp], values: NDArray[np.float64], steps: int) -> NDArray[np.float64]:
     """Values at every step (steps, n) from values at the knots, by a cubic spline; NaN if one of them is (diverged)."""
+    from scipy.interpolate import CubicSpline
+
     if not np.all(np.isfinite(values)):
         return np.full((steps, values.shape[1]), np.nan)
     if len(knots) == steps:

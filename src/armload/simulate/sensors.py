@@ -14,7 +14,6 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from armload.arms import Arm
 from armload.errors import ArmError
@@ -142,6 +141,8 @@ class Sensors:
 
 def _late(t: NDArray, signal: NDArray, delay: float) -> NDArray[np.float64]:
     """The signal `delay` seconds ago; before the log it stood as at its start."""
+    from scipy.interpolate import CubicSpline
+
     return signal if delay == 0 else CubicSpline(t, signal)(np.maximum(t - delay, t[0]))
 
 
