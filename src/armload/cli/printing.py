@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
+    from rich.table import Table as RichTable
 
+    from armload.evaluate import Table
     from armload.identify import Identification
 
 
@@ -37,15 +38,15 @@ def working(what: str) -> Iterator[Callable[[str], None]]:
         yield lambda text: status.update(text)
 
 
-def table(title: str, *columns: str, left: int = 1) -> Table:
+def table(title: str, *columns: str, left: int = 1) -> RichTable:
     """A plain table: the first `left` columns left-aligned, the others right."""
     from rich import box
     from rich.markup import escape
-    from rich.table import Table
+    from rich.table import Table as RichTable
 
-    made = Table(title=escape(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+    made = RichTable(title=escape(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
     for k, name in enumerate(columns):
-        made.add_column(escape(name), justify="left" if k < left else "right", no_wrap=True)
+        made.add_column(escape(name.replace(" [", "\n[")), justify="left" if k < left else "right")
     return made
 
 
@@ -54,6 +55,16 @@ def console() -> Console:
     from rich.console import Console
 
     return Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 140)
+
+
+def print_table(result: Table) -> None:
+    """A table of the evaluation, baselines set apart, and below it what it rests on."""
+    rows = table(result.title, *result.columns)
+    for k, cells in enumerate(result.rows):
+        rows.add_row(*cells, end_section=k + 1 in result.baselines and k not in result.baselines)
+    out = console()
+    out.print(rows)
+    out.print(result.note, markup=False)
 
 
 def print_identification(result: Identification) -> None:

@@ -1,0 +1,291 @@
+"""The main job from end to end, in minutes: simulate, train, identify a payload nobody has seen, compare, report.
+
+One Panda that differs from its model as real ones do (`World.real_like`) runs the excitation with the container's
+loadings; small ensembles learn from it, by payload: some loadings are held out to stop the networks. Then the same arm
+runs once with nothing (the tare) and once with the test payload, which is outside the family, and every method gets the
+same two logs.
+
+This shows the way, not the paper's figures: ten times fewer rows, fewer epochs, one arm, one test payload.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from armload.arms import Arm, arm
+from armload.dataset import Dataset, Split, build_dataset, split_payloads
+from armload.errors import DatasetError
+from armload.evaluate import Comparison, EvaluationRun, Table, compare
+from armload.identifier import Identifier
+from armload.identify import Identification, identify
+from armload.inertia import InertialParameters
+from armload.least_squares import FilteredRecursiveLeastSquares, PosteriorLeastSquares, RecursiveLeastSquares
+from armload.motion import Motion, taie2024
+from armload.payloads import container_loadings, test_payload
+from armload.recording import Recording, write_recording
+from armload.simulate import Sensors, World, simulate
+
+if TYPE_CHECKING:
+    from armload.learners import BaggingEnsemble, TwoStage
+
+HELD_OUT = 0.15  # of the loadings, for validation
+
+
+class Size(NamedTuple):
+    """How much is done: every n-th loading, rows per run, members, hidden units, epochs, rate of the logs [Hz]."""
+
+    every: int
+    rows: int
+    members: int
+    hidden: int
+    epochs: int
+    rate: float
+
+
+FULL = Size(every=1, rows=300, members=5, hidden=500, epochs=60, rate=1000.0)
+QUICK = Size(every=7, rows=100, members=2, hidden=64, epochs=8, rate=200.0)
+
+
+@dataclass(frozen=True, eq=False)
+class DemoResult:
+    """What the demo found; everything is also in `folder`.
+
+    table: the one table: truth, methods, baselines. comparison: the numbers behind it.
+    identification: what `armload identify` says of the run (method map, with the tare).
+    report: the HTML file. seconds: what each part took.
+    """
+
+    table: Table
+    comparison: Comparison
+    identification: Identification
+    folder: Path
+    report: Path
+    seconds: dict[str, float]
+
+
+def run_demo(
+    out: str | Path = "out/demo",
+    *,
+    quick: bool = False,
+    seed: int = 2024,
+    progress: bool = False,
+    say: Callable[[str], None] = lambda _: None,
+) -> DemoResult:
+    """Do the main job from end to end.
+
+    Args:
+        out: folder for the data set, the logs, the models, the identified payload (JSON) and the report; files of an
+            earlier demo are replaced.
+        quick: seconds instead of minutes; the ensembles are then too small to judge.
+        seed: of the world, the sensors' noise, the split and the training; the same seed gives the same numbers.
+        progress: bars on stderr.
+        say: told what is being done.
+
+    Raises:
+        ArmloadError: a file cannot be written.
+    """
+    size = QUICK if quick else FULL
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    robot, motion = arm("panda"), taie2024()
+    world, sensors = World.real_like(robot, seed), Sensors.panda(robot)
+    clock = _Clock(say)
+
+    loadings = container_loadings()[:: size.every]
+    clock.start("simulating", f"{len(loadings)} loadings on {motion.name} and a real-like {robot.name} (seed {seed})")
+    dataset = _dataset(folder / "dataset", robot, motion, loadings, world, sensors, size.rows, seed, progress)
+    run = _log(folder / "run.csv", robot, motion, test_payload().parameters, world, sensors, size.rate, seed + 1)
+    tare = _log(folder / "tare.csv", robot, motion, None, world, sensors, size.rate, seed + 2)
+
+    split = split_payloads(dataset, seed, (1.0 - HELD_OUT, HELD_OUT, 0.0))
+    learned = _train(folder / "models", dataset, split, robot, motion, size, seed, progress, clock)
+
+    clock.start("identifying", f"{test_payload().name} ({test_payload().parameters.mass:.3f} kg), outside the loadings")
+    answer = identify(run, robot, tare=tare)
+    (folder / "identified.json").write_text(json.dumps(answer.to_dict(), indent=1, allow_nan=False) + "\n")
+    truth = InertialParameters(test_payload().parameters.phi, robot.frame)
+    runs = [EvaluationRun(run, truth, test_payload().name, tare, seed + 1)]
+    training = [dataset.truth(k) for k in np.unique(dataset.run[split.train])]
+    validation = len(np.unique(dataset.run[split.validation]))
+    comparison = compare(
+        _least_squares(robot) | learned,
+        runs,
+        training=training,
+        split=f"by payload: {len(training)} loadings for training, {validation} for validation, the test payload is in "
+        f"neither; one world (seed {seed}) for all",
+    )
+
+    clock.start("reporting", "tables and figures")
+    table = _table(comparison)
+    report = _report(folder / "report.html", comparison, runs, robot, table)
+    (folder / "comparison.json").write_text(json.dumps(comparison.to_dict(), allow_nan=False) + "\n")
+    clock.stop()
+    return DemoResult(table, comparison, answer, folder, report, clock.seconds)
+
+
+def _dataset(
+    path: Path,
+    robot: Arm,
+    motion: Motion,
+    loadings: list,
+    world: World,
+    sensors: Sensors,
+    rows: int,
+    seed: int,
+    progress: bool,
+) -> Dataset:
+    """The data set; one that an earlier demo left is used again if it is the same, and replaced if it is not."""
+
+    def build() -> Dataset:
+        return build_dataset(
+            path,
+            robot,
+            [motion],
+            loadings,
+            worlds=[world],
+            sensors=sensors,
+            rows_per_run=rows,
+            seed=seed,
+            progress=progress,
+        )
+
+    try:
+        return build()
+    except DatasetError:
+        if not (path / "provenance.json").exists():
+            raise
+        shutil.rmtree(path)
+        return build()
+
+
+def _log(
+    path: Path,
+    robot: Arm,
+    motion: Motion,
+    payload: InertialParameters | None,
+    world: World,
+    sensors: Sensors,
+    rate: float,
+    seed: int,
+) -> Recording:
+    log = simulate(robot, motion, payload, world=world, sensors=sensors, rate=rate, seed=seed)
+    write_recording(path, log)
+    return log
+
+
+def _train(
+    folder: Path,
+    dataset: Dataset,
+    split: Split,
+    robot: Arm,
+    motion: Motion,
+    size: Size,
+    seed: int,
+    progress: bool,
+    clock: _Clock,
+) -> dict[str, Identifier]:
+    """One ensemble of each kind, single-stage and two-stage, saved and read back as a stream identifier."""
+    from armload.learners import BaggingEnsemble, LearnedIdentifier, NetworkLearner, TwoStage, save_model
+
+    network = NetworkLearner(hidden=size.hidden, max_epochs=size.epochs)
+    ensembles: dict[str, BaggingEnsemble | TwoStage] = {
+        "trees": BaggingEnsemble("tree", size.members, seed),
+        "trees, two stages": TwoStage("tree", size.members, seed),
+        "networks": BaggingEnsemble(network, size.members, seed),
+        "networks, two stages": TwoStage(network, size.members, seed),
+    }
+    data = [part[rows] for rows in (split.train, split.validation) for part in (dataset.X, dataset.y)]
+    out: dict[str, Identifier] = {}
+    for name, ensemble in ensembles.items():
+        clock.start(f"training {name}", f"{size.members} members on {len(split.train)} rows")
+        ensemble.fit(*data, progress=progress)
+        path = folder / f"{name.replace(', ', '-').replace(' ', '-')}.safetensors"
+        model = save_model(path, ensemble, arm=robot, motion=motion, dataset_hash=dataset.hash)
+        out[name] = LearnedIdentifier(model, robot)
+    return out
+
+
+def _least_squares(robot: Arm) -> dict[str, Identifier | Callable[[Recording | None], Identifier]]:
+    """The physical methods; those without a tare are told of none."""
+    return {
+        "RLS": lambda _: RecursiveLeastSquares(robot),
+        "filtered RLS": lambda _: FilteredRecursiveLeastSquares(robot),
+        "filtered RLS, virtual calibration": FilteredRecursiveLeastSquares(robot),
+        "map, with tare": lambda tare: PosteriorLeastSquares(robot, tare),
+    }
+
+
+def _table(c: Comparison) -> Table:
+    """Truth, estimates and errors of the one run at its end, a row for each method."""
+    truth = InertialParameters(c.truth[0], c.frame)
+    rows = [("truth", f"{truth.mass:.3f}", _millimetres(truth.com), "", "", "", "")]
+    for m, name in enumerate(c.methods):
+        phi = c.phi[m, 0, -1]
+        com = phi[1:4] / phi[0]
+        error = np.abs(phi - truth.phi)
+        rows.append(
+            (
+                name,
+                f"{phi[0]:.3f}",
+                _millimetres(com),
+                f"{1e3 * error[0]:.1f}",
+                f"{1e3 * np.linalg.norm(com - truth.com):.1f}",
+                f"{1e3 * error[4:].mean():.2f}",
+                f"{1e6 * c.per_sample[m]:.0f}",
+            )
+        )
+    columns = (
+        "method",
+        "mass [kg]",
+        "centre of mass [mm]",
+        "mass error [g]",
+        "CoM error [mm]",
+        "inertia error [10⁻³ kg·m²]",
+        "time per sample [µs]",
+    )
+    note = f"Inertia error: mean of six, about the origin of {c.frame}. {c.conditions}"
+    baselines = tuple(1 + c.methods.index(name) for name in c.baselines)
+    return Table("An unseen payload, identified after one motion", columns, tuple(rows), note, baselines)
+
+
+def _millimetres(vector: np.ndarray) -> str:
+    return ", ".join(f"{1e3 * x:+.1f}" for x in vector)
+
+
+def _report(path: Path, comparison: Comparison, runs: list[EvaluationRun], robot: Arm, table: Table) -> Path:
+    from dataclasses import replace
+
+    from armload.report import default_report, write_report
+
+    introduction = (
+        f"A simulated {robot.name} that differs from its model as real ones do ran one excitation with a payload that "
+        "no ensemble was trained on. Every method got the same log, and the same earlier log without payload if it "
+        "can use one."
+    )
+    first, *others = default_report(comparison, runs, robot, introduction=introduction)
+    return write_report(path, [replace(first, tables=(table, *first.tables[1:])), *others], "armload demo")
+
+
+class _Clock:
+    """Says what is being done and keeps how long it took."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self.seconds: dict[str, float] = {}
+        self._say, self._name, self._since = say, "", 0.0
+
+    def start(self, name: str, what: str) -> None:
+        self.stop()
+        self._name, self._since = name, time.perf_counter()
+        self._say(f"{name}: {what}")
+
+    def stop(self) -> None:
+        if self._name:
+            self.seconds[self._name] = time.perf_counter() - self._since
