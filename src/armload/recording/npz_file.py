@@ -19,7 +19,8 @@ _LABELS = ("channel", "joint_names")
 def read_npz(path: Path, where: str, arm: Arm | None = None) -> Recording:
     """Read an NPZ log; see `read_recording` for what it raises."""
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        # opened here, because numpy leaves a file open that it cannot read
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             if not isinstance(archive, np.lib.npyio.NpzFile):
                 raise RecordingError(f"{where} holds one bare array: expected an archive with t, q, dq and tau")
             _check_names(archive.files, where)

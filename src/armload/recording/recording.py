@@ -56,7 +56,7 @@ class Recording:
 
     def __post_init__(self) -> None:
         for name in ("t", "q", "dq", "tau"):
-            value = np.ascontiguousarray(getattr(self, name), dtype=float)
+            value = np.array(getattr(self, name), dtype=float, order="C")  # its own copy: the caller's stays writable
             value.setflags(write=False)
             object.__setattr__(self, name, value)
         if self.channel not in CHANNELS:

@@ -83,16 +83,31 @@ def _readers(path: Path, where: str, stack: ExitStack) -> list[Any]:
 
     if path.suffix.lower() == ".bag" and path.is_file():
         return [Reader1(path)]
-    if path.is_file():
-        return [Reader2(_plain_name(path, stack))]
+    parts = [path] if path.is_file() else sorted(p for p in path.iterdir() if p.suffix in (".db3", ".mcap"))
+    for part in parts:
+        if part.suffix.lower() == ".db3":
+            _check_length(part)
     if (path / "metadata.yaml").is_file():
         return [Reader2(_plain_name(path, stack))]
-    parts = sorted(part for part in path.iterdir() if part.suffix in (".db3", ".mcap"))
     if not parts:
         raise RecordingError(
             f"{where} is a folder without metadata.yaml, .db3 or .mcap: expected a log file or a ROS 2 bag folder"
         )
     return [Reader2(_plain_name(part, stack)) for part in parts]
+
+
+def _check_length(path: Path) -> None:
+    """Refuse a SQLite file shorter than its header says: SQLite itself would read it up to the first missing page."""
+    with path.open("rb") as file:
+        head = file.read(100)
+    page = int.from_bytes(head[16:18], "big")
+    pages = int.from_bytes(head[28:32], "big") if head[24:28] == head[92:96] else 0  # else an old writer left it unset
+    expected = (65536 if page == 1 else page) * pages
+    if path.stat().st_size < expected:
+        raise RecordingError(
+            f"{path} is not a bag that can be read: it has {path.stat().st_size} bytes of the {expected} its header "
+            "names; copy it again"
+        )
 
 
 def _plain_name(path: Path, stack: ExitStack) -> Path:
