@@ -64,7 +64,8 @@ def compare(
         identifiers: methods by name, in the order of the rows.
         runs: the recordings with their truths.
         times: (T,) since the start of each recording [s] at which estimates are compared; what counts is the
-            nearest estimate, at most half the finest step away. Default: 49 even ones up to the shortest duration.
+            nearest estimate, at most half the finest step (or 1/16 s) away. Default: 49 even ones up to
+            the shortest duration.
         training: the payloads that the learned methods were trained on, or the prior made of them; None, where
             nothing was trained: nothing held, within half the rated payload.
         split: what was held out from training, in words; stands in every table.
@@ -180,7 +181,8 @@ def _at(identifier: Identifier, recording: Recording, times: NDArray) -> list[Es
     """The estimate nearest to each time, from one pass over the recording."""
     steps = np.diff(np.unique([0.0, *times]))
     even = len(steps) > 0 and np.allclose(steps, steps[0])
-    every = max(1, round((steps[0] if even else min([*steps, _STEP])) * recording.rate))
+    rate = (len(recording) - 1) / recording.duration
+    every = max(1, round((steps[0] if even else min([*steps, _STEP])) * rate))
     estimates = identifier.trace(recording, every)
     last = len(recording) - 1
     rows = [*range(0, last, every), last]

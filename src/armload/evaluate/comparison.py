@@ -108,8 +108,8 @@ class Comparison:
         units = [SHOWN_UNITS[group][0] for group in GROUPS.values()]
         heads = [f"{name} [{unit}]" for name, unit in zip(GROUPS, units, strict=True)]
         note = (
-            f"Mean absolute error at the end, mean over the group; settled: the mass stays within {SETTLED:.0%}. "
-            + self.conditions
+            "Mean absolute error at the end, averaged over the parameters of a group; settled: from then on the mass "
+            f"stays within {SETTLED:.0%} of the true mass of its last value (mean over runs). " + self.conditions
         )
         columns = ("method", *heads, "settled [s]", "per sample [µs]")
         return self._table("Error at the end", columns, rows, note)
@@ -151,7 +151,7 @@ class Comparison:
         rows = [
             (
                 name,
-                *(f"{c:.0%} ± {short(SHOWN_SCALE * w)}" for c, w in zip(share[m], width[m], strict=True)),
+                *(f"{c:.0%} ± {short(SHOWN_SCALE * w, 2)}" for c, w in zip(share[m], width[m], strict=True)),
             )
             for m, name in enumerate(self.methods)
         ]
@@ -207,7 +207,7 @@ class Comparison:
 
 def _cell(value: float, spread: float | None) -> str:
     shown = short(SHOWN_SCALE * float(value))
-    return shown if spread is None else f"{shown} ± {short(SHOWN_SCALE * float(spread))}"
+    return shown if spread is None else f"{shown} ± {short(SHOWN_SCALE * float(spread), 2)}"
 
 
 def _listed(value: NDArray) -> Any:

@@ -9,9 +9,9 @@ import numpy as np
 
 from armload.inertia import NAMES
 
-# Errors are shown in grams, gram metres and 10⁻³ kg·m²: SI × 1000, so that no column is full of zeros.
+# Errors are shown in g, g·m and g·m² (= 10⁻³ kg·m²): SI × 1000, so that no column is full of zeros.
 SHOWN_SCALE = 1e3
-SHOWN_UNITS = ("g", *["g·m"] * 3, *["10⁻³ kg·m²"] * 6)
+SHOWN_UNITS = ("g", *["g·m"] * 3, *["g·m²"] * 6)
 GROUPS = {"mass": slice(0, 1), "first moment": slice(1, 4), "inertia": slice(4, 10)}
 
 
@@ -20,8 +20,8 @@ def parameter_columns() -> tuple[str, ...]:
     return tuple(f"{name} [{unit}]" for name, unit in zip(NAMES, SHOWN_UNITS, strict=True))
 
 
-def short(value: float) -> str:
-    """Three significant digits, without an exponent where it can be avoided.
+def short(value: float, digits: int = 3) -> str:
+    """Three significant digits (or as many as asked for), without an exponent where it can be avoided.
 
     >>> [short(x) for x in (12345.6, 12.345, 0.01234, float("inf"))]
     ['12346', '12.3', '0.0123', '∞']
@@ -30,7 +30,7 @@ def short(value: float) -> str:
         return "–" if np.isnan(value) else "∞" if value > 0 else "-∞"
     if value == 0.0:
         return "0"
-    return f"{value:.0f}" if abs(value) >= 999.5 else f"{value:.3g}"
+    return f"{value:.0f}" if abs(value) >= 10**digits - 0.5 else f"{value:.{digits}g}"
 
 
 @dataclass(frozen=True)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from armload.evaluate import Comparison, half_width
+from armload.evaluate.table import GROUPS, SHOWN_SCALE, SHOWN_UNITS
 from armload.inertia import NAMES
 from armload.report.style import TRUTH, look, method_styles, new_figure
 
@@ -14,9 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_SCALE = 1e3  # shown in g, g·m and 10⁻³ kg·m², as in the tables
-_UNITS = ("g", "g·m", "10⁻³ kg·m²")
-_SLICES = (slice(0, 1), slice(1, 4), slice(4, 10))
 _TITLES = ("mass", "first moment", "inertia about the frame's origin")
 _LOG_FROM = 30.0  # ratio of largest to smallest error from which an axis becomes logarithmic
 
@@ -24,10 +23,10 @@ _LOG_FROM = 30.0  # ratio of largest to smallest error from which an axis become
 def error_bars(comparison: Comparison, at: int = -1) -> Figure:
     """Mean absolute error of every method and parameter at times[at], as in Fig. 4-7 of Taie et al. 2024."""
     styles = method_styles(comparison)
-    mae, spread = _SCALE * comparison.mae[:, at], _SCALE * comparison.spread[:, at]
+    mae, spread = SHOWN_SCALE * comparison.mae[:, at], SHOWN_SCALE * comparison.spread[:, at]
     with look():
         figure, axes = _three_axes()
-        for ax, part, unit, title in zip(axes, _SLICES, _UNITS, _TITLES, strict=True):
+        for ax, part, unit, title in _groups(axes):
             values = mae[:, part]
             positive = values[(values > 0) & np.isfinite(values)]
             log = positive.size > 0 and positive.max() > _LOG_FROM * positive.min()
@@ -67,13 +66,13 @@ def estimates(comparison: Comparison, run: int = 0, level: float = 0.95) -> Figu
     with look():
         figure, axes = _three_axes()
         count = len(comparison.methods)
-        for ax, part, unit, title in zip(axes, _SLICES, _UNITS, _TITLES, strict=True):
-            truth = _SCALE * comparison.truth[run, part]
+        for ax, part, unit, title in _groups(axes):
+            truth = SHOWN_SCALE * comparison.truth[run, part]
             places = np.arange(len(truth))
             ax.hlines(truth, places - 0.45, places + 0.45, color=TRUTH, linewidth=1.6, label="truth", zorder=3)
             for m, name in enumerate(comparison.methods):
-                phi = _SCALE * comparison.phi[m, run, -1, part]
-                half = _SCALE * half_width(comparison.std[m, run, -1, part], level)
+                phi = SHOWN_SCALE * comparison.phi[m, run, -1, part]
+                half = SHOWN_SCALE * half_width(comparison.std[m, run, -1, part], level)
                 ax.errorbar(
                     places + (m - 0.5 * (count - 1)) * 0.8 / count,
                     phi,
@@ -84,8 +83,8 @@ def estimates(comparison: Comparison, run: int = 0, level: float = 0.95) -> Figu
                     color=styles[name]["color"],
                     label=name,
                 )
-            shown = _SCALE * comparison.phi[:, run, -1, part]
-            _limit(ax, np.concatenate([shown, truth[None]]), truth)
+            _limit(ax, SHOWN_SCALE * comparison.phi[:, run, -1, part], truth)
+            _mark_cut_off(ax, comparison, run, part, styles)
             ax.set_xticks(places, NAMES[part])
             ax.grid(axis="x", visible=False)
             ax.set_title(title)
@@ -96,8 +95,8 @@ def estimates(comparison: Comparison, run: int = 0, level: float = 0.95) -> Figu
 
 def error_over_time(comparison: Comparison, parameter: int = 0) -> Figure:
     """Mean absolute error of one parameter over time; bands are ± one standard deviation over the runs."""
-    styles, unit = method_styles(comparison), _unit(parameter)
-    mae, spread = _SCALE * comparison.mae[:, :, parameter], _SCALE * comparison.spread[:, :, parameter]
+    styles, unit = method_styles(comparison), SHOWN_UNITS[parameter]
+    mae, spread = SHOWN_SCALE * comparison.mae[:, :, parameter], SHOWN_SCALE * comparison.spread[:, :, parameter]
     with look():
         figure = new_figure(3.6)
         ax = figure.add_subplot()
@@ -109,8 +108,7 @@ def error_over_time(comparison: Comparison, parameter: int = 0) -> Figure:
                 ax.fill_between(comparison.times, low, high, color=styles[name]["color"], alpha=0.12, linewidth=0)
         if np.isfinite(floor):
             ax.set_yscale("log")
-        ax.set_xlim(comparison.times[0], comparison.times[-1])
-        ax.set_xlabel("time since the start of the motion [s]")
+        _time_axis(ax, comparison)
         ax.set_ylabel(f"mean absolute error of {NAMES[parameter]} [{unit}]")
         _legend(figure, ax)
     return figure
@@ -122,16 +120,20 @@ def parameter_over_time(comparison: Comparison, run: int = 0, parameter: int = 9
     For a learned method the line is the cumulative average; dots are the mean prediction between two points of time,
     recovered from that average: (n₂·x̄₂ − n₁·x̄₁)/(n₂ − n₁).
     """
-    styles, unit = method_styles(comparison), _unit(parameter)
+    styles, unit = method_styles(comparison), SHOWN_UNITS[parameter]
     with look():
         figure = new_figure(3.8)
         ax = figure.add_subplot()
-        truth = _SCALE * comparison.truth[run, parameter]
+        truth = SHOWN_SCALE * comparison.truth[run, parameter]
         ax.axhline(truth, color=TRUTH, linewidth=1.2, label="truth")
-        values = _SCALE * comparison.phi[:, run, :, parameter]
+        values = SHOWN_SCALE * comparison.phi[:, run, :, parameter]
+        _limit(ax, values[:, len(comparison.times) // 3 :], np.array([truth]))
+        low, high = ax.get_ylim()
         for m, name in enumerate(comparison.methods):
             averaged = name in comparison.averaged
             label = f"{name}, cumulative average" if averaged else name
+            late = values[m, len(comparison.times) // 2 :]
+            label += " (off scale)" if not np.any((late > low) & (late < high)) else ""
             ax.plot(comparison.times, values[m], label=label, **styles[name])
             if averaged:
                 n = comparison.samples[m, run]
@@ -139,9 +141,7 @@ def parameter_over_time(comparison: Comparison, run: int = 0, parameter: int = 9
                 single = np.diff(n * values[m])[new] / np.diff(n)[new]
                 middle = 0.5 * (comparison.times[1:] + comparison.times[:-1])[new]
                 ax.plot(middle, single, ".", markersize=4, color=styles[name]["color"], alpha=0.6)
-        _limit(ax, values[:, len(comparison.times) // 10 :], np.array([truth]))
-        ax.set_xlim(comparison.times[0], comparison.times[-1])
-        ax.set_xlabel("time since the start of the motion [s]")
+        _time_axis(ax, comparison)
         ax.set_ylabel(f"{NAMES[parameter]} [{unit}]")
         _legend(figure, ax)
     return figure
@@ -154,6 +154,12 @@ def _three_axes() -> tuple[Figure, list[Axes]]:
     return figure, [figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, :])]
 
 
+def _groups(axes: list[Axes]) -> Iterator[tuple[Axes, slice, str, str]]:
+    """Axes, parameters, unit and title of the three groups."""
+    for ax, part, title in zip(axes, GROUPS.values(), _TITLES, strict=True):
+        yield ax, part, SHOWN_UNITS[part][0], title
+
+
 def _limit(ax: Axes, values: np.ndarray, truth: np.ndarray) -> None:
     """Limits that show the truth and most methods: one that is far off must not flatten the rest."""
     far = np.nanmax(np.abs(values - truth[0] if truth.size == 1 else values - truth), axis=-1).ravel()
@@ -162,10 +168,31 @@ def _limit(ax: Axes, values: np.ndarray, truth: np.ndarray) -> None:
     ax.set_ylim(float(truth.min()) - half, float(truth.max()) + half)
 
 
+def _mark_cut_off(ax: Axes, comparison: Comparison, run: int, part: slice, styles: dict[str, dict]) -> None:
+    """A triangle at the edge for every estimate beyond it."""
+    low, high = ax.get_ylim()
+    for m, name in enumerate(comparison.methods):
+        phi = SHOWN_SCALE * comparison.phi[m, run, -1, part]
+        x = np.arange(len(phi)) + (m - 0.5 * (len(comparison.methods) - 1)) * 0.8 / len(comparison.methods)
+        for edge, beyond, marker in ((low, phi < low, "v"), (high, phi > high, "^")):
+            for place in x[beyond]:
+                ax.plot(place, edge, marker, color=styles[name]["color"], markersize=6, clip_on=False)
+
+
+def _time_axis(ax: Axes, comparison: Comparison) -> None:
+    if len(comparison.times) > 1:
+        ax.set_xlim(comparison.times[0], comparison.times[-1])
+    else:  # a line of one point would not be seen
+        for line in ax.lines:
+            line.set_marker("o")
+    ax.set_xlabel("time since the start of the motion [s]")
+
+
 def _legend(figure: Figure, ax: Axes) -> None:
     handles, labels = ax.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=min(4, len(labels)))
-
-
-def _unit(parameter: int) -> str:
-    return _UNITS[0 if parameter == 0 else 1 if parameter < 4 else 2]
+    room = 105  # characters of legend text that fit beside each other, 7 of them for each line and gap
+    ncols = len(labels)
+    while ncols > 1 and ncols * (7 + max(map(len, labels))) > room and sum(len(x) + 7 for x in labels) > room:
+        ncols -= 1
+    ncols = -(-len(labels) // -(-len(labels) // ncols))  # rows of equal length
+    figure.legend(handles, labels, loc="outside upper center", ncols=ncols)

@@ -11,17 +11,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armload.errors import ArmloadError
+from armload.errors import ReportError
 from armload.evaluate import Table
 from armload.recording.atomic import replacing
 from armload.report.style import look
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-
-class ReportError(ArmloadError, ValueError):
-    """A report that cannot be written."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +71,7 @@ def render(sections: Sequence[Section], title: str = "armload report") -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters.update(paragraphs=_paragraphs, picture=_picture, anchor=_anchor)
+    environment.filters.update(paragraphs=_paragraphs, picture=_picture, anchor=_anchor, head=_head)
     return environment.get_template("report.html.j2").render(title=title, sections=sections)
 
 
@@ -87,6 +83,12 @@ def _paragraphs(text: str) -> str:
         escaped = re.sub(r"`([^`]+)`", r"<code>\1</code>", escaped)
         out.append("<p>" + re.sub(r"\*\*(.+?)\*\*", r"<strong>\1</strong>", escaped) + "</p>")
     return "\n".join(out) if text.strip() else ""
+
+
+def _head(column: str) -> str:
+    """A column head with its unit on a line of its own."""
+    name, bracket, unit = html.escape(column, quote=False).partition(" [")
+    return f"{name}<br><span>[{unit}</span>" if bracket else name
 
 
 def _picture(figure: Figure) -> str:

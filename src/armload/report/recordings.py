@@ -13,13 +13,14 @@ from armload.report.style import COLOURS, look, new_figure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_POINTS = 1200  # drawn at most: more than the page has pixels
+_POINTS = 600  # drawn at most: a curve is half a page wide
+_RATE = 200.0  # [Hz] at which torques are lagged before they are drawn
 _GAIN = 50.0  # [1/s] of the lag behind which torques are drawn
 
 
 def motion(recording: Recording) -> Figure:
     """Joint position and velocity over time."""
-    log = _thinned(recording)
+    log = recording.select(slice(None, None, -(-len(recording) // _POINTS)))
     t = log.t - log.t[0]
     with look():
         figure = new_figure(4.8)
@@ -46,14 +47,11 @@ def torques(recording: Recording, arm: Arm) -> Figure:
     with look():
         columns = 2
         rows = -(-recording.n // columns)
-        figure = new_figure(0.6 + 1.55 * rows)
+        figure = new_figure(0.6 + 1.7 * rows)
         axes = figure.subplots(rows, columns, sharex=True, squeeze=False)
-        for j, ax in enumerate(axes.ravel()):
-            if j >= recording.n:
-                ax.set_visible(False)
-                axes[-2, j % columns].tick_params(labelbottom=True)
-                axes[-2, j % columns].set_xlabel("time [s]")
-                continue
+        for ax in axes.ravel()[recording.n :]:
+            ax.set_visible(False)
+        for j, ax in enumerate(axes.ravel()[: recording.n]):
             ax.fill_between(t, measured[:, j], bare[:, j], color="#56B4E9", alpha=0.3, linewidth=0)
             ax.plot(t, measured[:, j], color=COLOURS[0], linewidth=1.2, label="measured")
             ax.plot(t, bare[:, j], color=COLOURS[3], linewidth=1.2, linestyle=(0, (4, 1.5)), label="bare-arm model")
@@ -61,7 +59,8 @@ def torques(recording: Recording, arm: Arm) -> Figure:
             ax.set_xlim(t[0], t[-1])
             if j % columns == 0:
                 ax.set_ylabel("torque [N·m]")
-            if j // columns == rows - 1:
+            ax.tick_params(labelbottom=True)
+            if j + columns >= recording.n:
                 ax.set_xlabel("time [s]")
         figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
     return figure
@@ -69,15 +68,12 @@ def torques(recording: Recording, arm: Arm) -> Figure:
 
 def lagged_torques(recording: Recording, arm: Arm) -> tuple[NDArray, NDArray, NDArray]:
     """Time (K,) since the start, F[tau] and F[tau_bare] (K, n), from where the lag has forgotten its start."""
-    log = _thinned(recording)
+    log = recording.select(slice(None, None, max(1, int(recording.rate / _RATE))))
     r, _ = FilteredRegression(arm, _GAIN)(log.t, log.q, log.dq, log.tau)
     measured = first_order_lag(log.t, log.tau, _GAIN)
     t = log.t - log.t[0]
     keep = t >= 5.0 / _GAIN
     if keep.sum() < 2:  # a very short log: show it, transient and all
         keep = t >= 0.0
-    return t[keep], measured[keep], (measured - r)[keep]
-
-
-def _thinned(recording: Recording) -> Recording:
-    return recording.select(slice(None, None, max(1, len(recording) // _POINTS)))
+    every = -(-int(keep.sum()) // _POINTS)
+    return t[keep][::every], measured[keep][::every], (measured - r)[keep][::every]

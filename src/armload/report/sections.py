@@ -36,7 +36,7 @@ def default_report(
         Section("Summary", "\n\n".join(filter(None, [introduction, _verdict(c)])), (c.summary(), c.estimates(0))),
         Section(
             "Errors at the end",
-            "Mean absolute error over the runs, each method on the same recordings.",
+            "Mean absolute error over the runs, each method on the same recordings. 1 g·m² is 10⁻³ kg·m².",
             (c.table(),),
             (
                 (figures.error_bars(c), f"Mean absolute error after {c.times[-1]:.2f} s. {c.conditions}"),
@@ -64,7 +64,7 @@ def default_report(
             "Intervals",
             "A method that states an interval can be wrong about its own error. A 95 % interval that holds the truth "
             "in far fewer than 95 % of the runs is too narrow; one that always holds it may be too wide. The share "
-            f"rests on {len(c.labels)} run(s) only.",
+            f"rests on {_count(c.labels, 'run')} only.",
             (c.intervals(),),
         ),
     ]
@@ -98,8 +98,13 @@ def _verdict(c: Comparison) -> str:
         e = group_error[name]
         best = min(own, key=lambda m: e[m])
         value, unit = short(SHOWN_SCALE * float(e[best])), SHOWN_UNITS[part][0]
-        lines.append(f"**{name}**: {c.methods[best]} has the smallest error, {value} {unit}")
-    text = f"{len(own)} methods on {len(c.labels)} run(s). " + "; ".join(lines) + "."
+        lines.append(f"**{name}** {c.methods[best]}, {value} {unit}")
+    text = (
+        f"{_count(own, 'method')} on {_count(c.labels, 'run')}. "
+        + "Smallest mean error at the end: "
+        + "; ".join(lines)
+        + "."
+    )
     behind = []
     for m in own:
         lost = [name for name, e in group_error.items() if e[m] >= min(e[b] for b in base)]
@@ -110,6 +115,10 @@ def _verdict(c: Comparison) -> str:
     return text + f"\n\nThe baselines know: {c.prior}. Held out: {c.split}."
 
 
+def _count(things: Sequence, word: str) -> str:
+    return f"{len(things)} {word}" + ("" if len(things) == 1 else "s")
+
+
 def _averages(c: Comparison) -> str:
     if not c.averaged:
         return ""
@@ -118,7 +127,7 @@ def _averages(c: Comparison) -> str:
 
 def _limits(c: Comparison) -> str:
     text = (
-        f"The errors hold for the {len(c.labels)} run(s) shown: payloads of {c.truth[:, 0].min():.2f} to "
+        f"The errors hold for the {_count(c.labels, 'run')} shown: payloads of {c.truth[:, 0].min():.2f} to "
         f"{c.truth[:, 0].max():.2f} kg on these motions of {c.robot}. "
     )
     if len(np.unique(c.truth, axis=0)) == 1:
