@@ -29,7 +29,7 @@ from armload.motion.collision import capsule_arm
 from armload.motion.files import save_motion
 from armload.motion.fourier import FourierMotion
 
-SEED, STEPS = 2024, 20_000
+SEED, STEPS = 2024, 60_000
 HARMONICS, PERIOD = 8, 6.0  # the paper's: eight sinusoids; T = 6 s
 READY = (0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8)  # [rad] flange in front of the arm, facing down
 LENGTH = 0.1  # L [m], the size of the payloads of interest
