@@ -105,6 +105,15 @@ def test_predictions_carry_the_units_of_y(fitted):
     np.testing.assert_allclose(grams.predict(X) / 1024, fitted.predict(X), rtol=1e-9, atol=1e-12)
 
 
+def test_an_output_that_never_changed_is_given_back(fitted):
+    """The container's Ixy is the same in all 77 loadings: no ensemble may wander from it, whatever the features say."""
+    X, y = rows(0)
+    y[:, 5] = 0.0123
+    X[:, 3] = -7.7
+    ensemble = clone(fitted).fit(X, y, X, y)
+    np.testing.assert_allclose(ensemble.predict(rows(2, 50)[0])[:, 5], 0.0123, rtol=1e-12)
+
+
 def test_an_unfinished_pair_of_validation_rows_is_refused(fitted):
     with pytest.raises(ModelError, match="X_val and y_val go together"):
         clone(fitted).fit(*rows(0), rows(1, 60)[0])

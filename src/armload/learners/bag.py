@@ -23,7 +23,10 @@ BOOTSTRAP, BOOTSTRAP_VALIDATION, HOLD_OUT, INITIAL_WEIGHTS, SHUFFLE, TIES = rang
 
 
 class Scaling(NamedTuple):
-    """Centre and scale of features (d,) and outputs (k,), taken from the training rows."""
+    """Centre and scale of features (d,) and outputs (k,), taken from the training rows.
+
+    A constant column has the scale 0 and is 0 when scaled: a feature that says nothing, an output that is its mean.
+    """
 
     x_mean: NDArray[np.float64]
     x_scale: NDArray[np.float64]
@@ -32,7 +35,7 @@ class Scaling(NamedTuple):
 
     @classmethod
     def of(cls, X: NDArray, y: NDArray, scale: str) -> Scaling:
-        """Mean and standard deviation ("standard"), or nothing ("none"); a constant column keeps the scale 1."""
+        """Mean and standard deviation ("standard"), or 0 and 1 ("none")."""
         if scale not in SCALES:
             raise ModelError(f"unknown scale {scale!r}: expected one of {', '.join(SCALES)}")
         parts = []
@@ -42,8 +45,25 @@ class Scaling(NamedTuple):
                 continue
             mean, std = a.mean(axis=0), a.std(axis=0)
             constant = std <= 1e-12 * np.abs(a).max(axis=0)  # what rounding leaves of a constant column is no scale
-            parts += [mean, np.where(constant, 1.0, std)]
+            parts += [mean, np.where(constant, 0.0, std)]
         return cls(*parts)
+
+    def features(self, X: NDArray) -> NDArray[np.float64]:
+        """X (N, d) scaled."""
+        return (X - self.x_mean) * self.per_x
+
+    def outputs(self, y: NDArray) -> NDArray[np.float64]:
+        """y (N, k) scaled; back again: y_mean + y_scale·scaled."""
+        return (y - self.y_mean) * _inverse(self.y_scale)
+
+    @property
+    def per_x(self) -> NDArray[np.float64]:
+        """1 / x_scale (d,), 0 where that is 0."""
+        return _inverse(self.x_scale)
+
+
+def _inverse(scale: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0)
 
 
 @dataclass(frozen=True, eq=False)

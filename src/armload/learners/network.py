@@ -229,7 +229,7 @@ def _functions() -> tuple[Any, Any]:
 def _fold(weights: Weights, s: Scaling) -> CompiledNetworks:
     """Networks of the raw features and outputs, from networks of the scaled ones."""
     W1, b1, W2, b2 = (np.asarray(w, dtype=float) for w in weights)
-    W1 = W1 / s.x_scale[:, None]
+    W1 = W1 * s.per_x[:, None]
     return CompiledNetworks(W1, b1 - s.x_mean @ W1, W2 * s.y_scale, b2 * s.y_scale + s.y_mean)
 
 
@@ -249,7 +249,7 @@ class _Rows(NamedTuple):
         s = bag.scaling
 
         def scaled(X: NDArray, y: NDArray) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-            return ((X - s.x_mean) / s.x_scale).astype(np.float32), ((y - s.y_mean) / s.y_scale).astype(np.float32)
+            return s.features(X).astype(np.float32), s.outputs(y).astype(np.float32)
 
         X_val, y_val = scaled(bag.X_val, bag.y_val)
         n = len(X_val)

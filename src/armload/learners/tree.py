@@ -50,7 +50,7 @@ class TreeLearner(Learner):
         from sklearn.tree import DecisionTreeRegressor
 
         X = np.ascontiguousarray(bag.X, dtype=np.float32)  # what the tree would convert to, once instead of M times
-        y = (bag.y - bag.scaling.y_mean) / bag.scaling.y_scale
+        y = bag.scaling.outputs(bag.y)
 
         def grow(m: int) -> Any:
             tree = DecisionTreeRegressor(
