@@ -14,7 +14,8 @@ import json
 import shutil
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -34,7 +35,8 @@ from armload.recording import Recording, write_recording
 from armload.simulate import Sensors, World, simulate
 
 if TYPE_CHECKING:
-    from armload.learners import BaggingEnsemble, TwoStage
+    from armload.evaluate.compare import Method
+    from armload.learners import BaggingEnsemble, LearnedModel, TwoStage
 
 HELD_OUT = 0.15  # of the loadings, for validation
 
@@ -191,9 +193,9 @@ def _train(
     seed: int,
     progress: bool,
     clock: _Clock,
-) -> dict[str, Identifier]:
+) -> dict[str, Method]:
     """One ensemble of each kind, single-stage and two-stage, saved and read back as a stream identifier."""
-    from armload.learners import BaggingEnsemble, LearnedIdentifier, NetworkLearner, TwoStage, save_model
+    from armload.learners import BaggingEnsemble, NetworkLearner, TwoStage, save_model
 
     network = NetworkLearner(hidden=size.hidden, max_epochs=size.epochs)
     ensembles: dict[str, BaggingEnsemble | TwoStage] = {
@@ -203,18 +205,25 @@ def _train(
         "networks, two stages": TwoStage(network, size.members, seed),
     }
     data = [part[rows] for rows in (split.train, split.validation) for part in (dataset.X, dataset.y)]
-    out: dict[str, Identifier] = {}
+    out: dict[str, Method] = {}
     for name, ensemble in ensembles.items():
         clock.start(f"training {name}", f"{size.members} members on {len(split.train)} rows")
         ensemble.fit(*data, progress=progress)
         path = folder / f"{name.replace(', ', '-').replace(' ', '-')}.safetensors"
         model = save_model(path, ensemble, arm=robot, motion=motion, dataset_hash=dataset.hash)
-        out[name] = LearnedIdentifier(model, robot)
+        out[name] = partial(_learned, model, robot)
     return out
 
 
-def _least_squares(robot: Arm) -> dict[str, Identifier | Callable[[Recording | None], Identifier]]:
-    """The physical methods; those without a tare are told of none."""
+def _learned(model: LearnedModel, robot: Arm, _: Recording | None) -> Identifier:
+    """A learned method knows the arm as it is from training: it needs no tare, and an empty arm is strange to it."""
+    from armload.learners import LearnedIdentifier
+
+    return LearnedIdentifier(model, robot)
+
+
+def _least_squares(robot: Arm) -> dict[str, Method]:
+    """The physical methods; those given as functions of the tare do not use it, or in their own way."""
     return {
         "RLS": lambda _: RecursiveLeastSquares(robot),
         "filtered RLS": lambda _: FilteredRecursiveLeastSquares(robot),
@@ -261,8 +270,6 @@ def _millimetres(vector: np.ndarray) -> str:
 
 
 def _report(path: Path, comparison: Comparison, runs: list[EvaluationRun], robot: Arm, table: Table) -> Path:
-    from dataclasses import replace
-
     from armload.report import default_report, write_report
 
     introduction = (

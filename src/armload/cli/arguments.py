@@ -111,13 +111,12 @@ def arm_of(options: argparse.Namespace) -> Arm:
     return arm(options.robot, options.frame, **settings)
 
 
-def payload_of(name: str | None) -> InertialParameters | None:
-    """The parameters of a payload file, or of a built-in one by name; None for None."""
-    if name is None:
-        return None
-    from armload.payloads import franka_hand, read_payload
+def payload_of(name: str) -> InertialParameters:
+    """The parameters of a payload file, or of a built-in one by name."""
+    from armload.payloads import franka_hand, read_payload, test_payload
 
-    return franka_hand().parameters if name == "franka-hand" else read_payload(name).parameters
+    built_in = {"franka-hand": franka_hand, "test": test_payload}
+    return (built_in[name]() if name in built_in else read_payload(name)).parameters
 
 
 def motion_of(name: str, arm: Arm) -> Motion:
@@ -127,8 +126,17 @@ def motion_of(name: str, arm: Arm) -> Motion:
     if name == "taie2024":
         return taie2024()
     if name.startswith("random:"):
-        seed = name.removeprefix("random:")
-        if not seed.isdecimal():
-            raise UsageError(f"motion {name!r} has no seed: expected random: and a whole number, such as random:3")
-        return random_motion(arm, int(seed))
+        return random_motion(arm, whole_number(name, "motion"))
     return load_motion(name)
+
+
+def whole_number(text: str, what: str) -> int:
+    """The number behind the colon of `random:3`.
+
+    >>> whole_number("random:3", "motion")
+    3
+    """
+    kind, _, number = text.partition(":")
+    if not number.isdecimal():
+        raise UsageError(f"{what} {text!r} has no whole number behind the colon: expected one, such as {kind}:3")
+    return int(number)

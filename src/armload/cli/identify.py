@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> None:
 
     with working("reading") as say:
         arm = arm_of(options)
-        tool = payload_of(options.tool)
+        tool = None if options.tool is None else payload_of(options.tool)
         log = read_recording(options.log, arm, topic=options.topic)
         tare = None if options.tare is None else read_recording(options.tare, arm, topic=options.topic)
         result = identify(log, arm, tare=tare, tool=tool, method=options.method, progress=say)

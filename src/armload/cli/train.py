@@ -1,0 +1,159 @@
+"""`armload train`: an ensemble learnt from a data set, with errors that say how far to trust it."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import TYPE_CHECKING
+
+from armload.cli.arguments import Parser, at_least, motion_of
+from armload.cli.printing import print_note, print_table
+from armload.errors import DatasetError, UsageError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from armload.arms import Arm
+    from armload.dataset import Dataset
+    from armload.evaluate import Table
+    from armload.learners import BaggingEnsemble, MixedEnsemble, TwoStage
+    from armload.learners.bagging import Ensemble
+    from armload.motion import Motion
+
+_EXAMPLES = """\
+examples:
+  armload train --dataset data/paper --out trees.safetensors
+  armload train --dataset data/paper --kind network --stages 2 --epochs 200 --out networks.safetensors
+  armload identify run.csv --robot panda --method trees.safetensors     (the log must show the same motion)
+
+Errors are printed for two splits: by payload (whole payloads held out: what to expect of a new one) and by row (as in
+the paper: neighbours of every test row are in training, so it measures memory). The model written learnt from the
+training part of --split.
+"""
+
+
+def parser() -> Parser:
+    """The arguments of `armload train`."""
+    parser = Parser(
+        prog="armload train",
+        description="Train a bag of trees or networks on a data set and save it.",
+        epilog=_EXAMPLES,
+    )
+    parser.add_argument("--dataset", required=True, metavar="DIR", help="folder written by armload dataset")
+    parser.add_argument("--out", required=True, metavar="FILE", help="model to write (.safetensors)")
+    parser.add_argument("--kind", choices=("tree", "network", "mixed"), default="tree", help="(default: tree)")
+    parser.add_argument(
+        "--stages",
+        type=int,
+        choices=(1, 2),
+        default=1,
+        help="2: mass and first moments apart from inertia (default: 1)",
+    )
+    parser.add_argument("--members", type=at_least(1), default=5, metavar="M", help="(default: 5)")
+    parser.add_argument("--epochs", type=at_least(1), default=1000, metavar="N", help="of networks, at most")
+    parser.add_argument("--split", choices=("payload", "row"), default="payload", help="(default: payload)")
+    parser.add_argument("--seed", type=at_least(0), default=0, metavar="N", help="of split and training (default: 0)")
+    parser.add_argument("--robot", metavar="FILE.urdf", help="the data set's arm, where it is not a built-in one")
+    parser.add_argument(
+        "--motion",
+        nargs="+",
+        default=[],
+        metavar="M",
+        help="the data set's motions, where it has others than taie2024 and random:SEED",
+    )
+    return parser
+
+
+def run(options: argparse.Namespace) -> None:
+    """Train on both splits, print the errors on what was held out, save the model of the chosen split."""
+    from armload.dataset import open_dataset, split_payloads, split_rows
+    from armload.learners import save_model
+
+    if options.kind == "mixed" and options.stages == 2:
+        raise UsageError("--kind mixed has one stage: leave out --stages 2, or choose tree or network")
+    dataset = open_dataset(options.dataset)
+    arm, motions = _arm(dataset, options), _motions(dataset, options)
+    splits = {"payload": split_payloads, "row": split_rows}
+    rows = []
+    for name in sorted(splits, key=lambda name: name == options.split):  # the one to save last
+        split = splits[name](dataset, options.seed)
+        model = _untrained(options)
+        print_note(f"training on {len(split.train)} rows, split by {name}")
+        (X, y), (Xv, yv) = ((dataset.X[part], dataset.y[part]) for part in (split.train, split.validation))
+        model.fit(X, y, Xv, yv, progress=sys.stderr.isatty())
+        rows += _errors(name, model, y.mean(axis=0), dataset.X[split.test], dataset.y[split.test])
+    saved = save_model(
+        options.out, model, arm=arm, motion=motions, dataset_hash=dataset.hash, notes=f"split by {options.split}"
+    )
+    print_table(_table(saved.kind, rows, options))
+    print(f"wrote {options.out}: {saved.compiled.n_members} members, split by {options.split}, about {saved.frame}")
+
+
+def _untrained(options: argparse.Namespace) -> BaggingEnsemble | TwoStage | MixedEnsemble:
+    from armload.learners import BaggingEnsemble, MixedEnsemble, NetworkLearner, TwoStage
+
+    network = NetworkLearner(max_epochs=options.epochs)
+    if options.kind == "mixed":
+        return MixedEnsemble(("tree", network), options.members, options.seed)
+    kind = network if options.kind == "network" else "tree"
+    return (BaggingEnsemble, TwoStage)[options.stages - 1](kind, options.members, options.seed)
+
+
+def _arm(dataset: Dataset, options: argparse.Namespace) -> Arm:
+    """The arm the data set was made with."""
+    from armload.arms import arm
+
+    about = dataset.provenance["arm"]
+    made_with = arm(options.robot or about["name"], about["frame"], tuple(about["gravity"]))
+    if made_with.fingerprint != about["fingerprint"]:
+        raise DatasetError(f"{options.dataset} was made with another {about['name']}: name its URDF with --robot")
+    return made_with
+
+
+def _motions(dataset: Dataset, options: argparse.Namespace) -> list[Motion]:
+    """The motions of the data set, known again by their fingerprints."""
+    from armload.motion import MotionFingerprint
+
+    arm = _arm(dataset, options)
+    known = {}
+    for about in dataset.provenance["motions"]:
+        name = about["name"]
+        drawn = name.removeprefix(f"random-{arm.name}-")
+        if name == "taie2024":
+            options.motion.append(name)
+        elif drawn != name and drawn.isdecimal():
+            options.motion.append(f"random:{drawn}")
+    for name in options.motion:
+        motion = motion_of(name, arm)
+        known[MotionFingerprint.of(motion).sha256] = motion
+    missing = [about["name"] for about in dataset.provenance["motions"] if about["fingerprint"] not in known]
+    if missing:
+        raise UsageError(
+            f"the data set has the motion {missing[0]!r}, which is not at hand: name its file with --motion"
+        )
+    return [known[about["fingerprint"]] for about in dataset.provenance["motions"]]
+
+
+def _errors(split: str, model: Ensemble, mean: NDArray, X: NDArray, y: NDArray) -> list[tuple[str, ...]]:
+    """Rows of the table: the model and the training mean, on rows held out by this split."""
+    from armload.evaluate import mean_absolute_error
+    from armload.evaluate.table import SHOWN_SCALE, short
+
+    guesses = {f"{model.kind_name}, by {split}": model.predict(X), f"training mean, by {split}": mean}
+    return [
+        (name, *(short(SHOWN_SCALE * float(error)) for error in mean_absolute_error(guess, y)))
+        for name, guess in guesses.items()
+    ]
+
+
+def _table(kind: str, rows: list[tuple[str, ...]], options: argparse.Namespace) -> Table:
+    from armload.evaluate import Table
+    from armload.evaluate.table import parameter_columns
+
+    note = (
+        f"Mean absolute error of single samples held out for testing (15 %); seed {options.seed}. By payload is what "
+        "to expect of a payload like these that is new; by row measures memory; other families can be far worse."
+    )
+    rows = sorted(rows, key=lambda row: row[0].startswith("training mean"))
+    baselines = tuple(k for k, row in enumerate(rows) if row[0].startswith("training mean"))
+    return Table(f"{kind}: errors on held-out data", ("method", *parameter_columns()), tuple(rows), note, baselines)
