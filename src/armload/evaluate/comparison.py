@@ -81,8 +81,8 @@ class Comparison:
 
     @property
     def per_sample(self) -> NDArray[np.float64]:
-        """Computing time per sample (M,) [s], mean over runs."""
-        return (self.wall / self.lengths).mean(axis=1)
+        """Computing time per sample (M,) [s], median over runs."""
+        return np.median(self.wall / self.lengths, axis=1)
 
     # ------------------------------------------------------------------ tables
 
@@ -151,11 +151,11 @@ class Comparison:
         rows = [
             (
                 name,
-                *(f"{c:.0%} ± {short(SHOWN_SCALE * w, 2)}" for c, w in zip(share[m], width[m], strict=True)),
+                *(f"{c:.0%} (±{short(SHOWN_SCALE * w, 2)})" for c, w in zip(share[m], width[m], strict=True)),
             )
             for m, name in enumerate(self.methods)
         ]
-        note = f"Share of runs whose {level:.0%} interval holds the truth, ± its mean half-width. " + self.conditions
+        note = f"Share of runs whose {level:.0%} interval holds the truth (± its mean half-width). " + self.conditions
         return self._table(f"{level:.0%} intervals at the end", ("method", *parameter_columns()), rows, note)
 
     def _table(self, title: str, columns: tuple[str, ...], rows: list, note: str, skipped: int = 0) -> Table:

@@ -21,15 +21,17 @@ def parameter_columns() -> tuple[str, ...]:
 
 
 def short(value: float, digits: int = 3) -> str:
-    """Three significant digits (or as many as asked for), without an exponent where it can be avoided.
+    """Three significant digits (or as many as asked for), but no exponent and nothing below a thousandth.
 
-    >>> [short(x) for x in (12345.6, 12.345, 0.01234, float("inf"))]
-    ['12346', '12.3', '0.0123', '∞']
+    >>> [short(x) for x in (12345.6, 12.345, 0.01234, 2.8e-5, float("inf"))]
+    ['12346', '12.3', '0.0123', '0.000', '∞']
     """
     if not np.isfinite(value):
         return "–" if np.isnan(value) else "∞" if value > 0 else "-∞"
     if value == 0.0:
         return "0"
+    if abs(value) < 1e-3:
+        return f"{value:.3f}"
     return f"{value:.0f}" if abs(value) >= 10**digits - 0.5 else f"{value:.{digits}g}"
 
 

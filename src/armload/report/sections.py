@@ -39,11 +39,11 @@ def default_report(
             "Mean absolute error over the runs, each method on the same recordings. 1 g·m² is 10⁻³ kg·m².",
             (c.table(),),
             (
-                (figures.error_bars(c), f"Mean absolute error after {c.times[-1]:.2f} s. {c.conditions}"),
+                (figures.error_bars(c), f"Mean absolute error after {c.times[-1]:.2f} s{_bars(c)}."),
                 (
                     figures.estimates(c),
                     f"Estimates of {c.labels[0]} with each method's own 95 % interval; black lines are the truth. "
-                    "Estimates far outside are cut off.",
+                    "Triangles mark estimates beyond the axis.",
                 ),
             ),
         ),
@@ -53,7 +53,7 @@ def default_report(
             "least-squares method that gathers information both improve while the motion goes on.",
             (c.over_time(0), c.over_time(_IZZ)),
             (
-                (figures.error_over_time(c, 0), "Mean absolute error of the mass over time. " + c.conditions),
+                (figures.error_over_time(c, 0), f"Mean absolute error of the mass over time{_bars(c)}."),
                 (
                     figures.parameter_over_time(c, 0, _IZZ),
                     f"Izz of {c.labels[0]} over time. " + _averages(c) + "Curves far outside are cut off.",
@@ -117,6 +117,10 @@ def _verdict(c: Comparison) -> str:
 
 def _count(things: Sequence, word: str) -> str:
     return f"{len(things)} {word}" + ("" if len(things) == 1 else "s")
+
+
+def _bars(c: Comparison) -> str:
+    return "" if len(c.labels) == 1 else f", ± one standard deviation over {_count(c.labels, 'run')}"
 
 
 def _averages(c: Comparison) -> str:
