@@ -16,13 +16,15 @@ Sources: information form and EM: Bishop 2006, ch. 3 and 9; arm and load togethe
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from threadpoolctl import ThreadpoolController
 
 from armload.arms import Arm, momentum_regressor
 from armload.arms.filtered import Lag, filtered_regressor
-from armload.identifier import Estimate, Identifier
+from armload.identifier import BatchIdentifier, Estimate
 from armload.least_squares.autocorrelation import BlockMeans
 from armload.least_squares.correction import FRICTION_WIDTH, Correction, effort_scale
 from armload.least_squares.prior import GaussianPrior, payload_prior_std
@@ -30,10 +32,12 @@ from armload.recording import Recording, Sample
 
 REGRESSOR_RATE = 200.0  # [Hz] W and Z are computed no more often: they hold nothing above a few hertz
 GAP = 0.1  # [s] a longer pause between samples restarts the lags
-_PRESLIDING = (
-    10.0  # variance of a joint's residual grows up to 1 + this where it stands still: friction is unknown there
-)
+# variance of a joint's residual grows up to 1 + this where the joint stands still: friction is unknown there
+_PRESLIDING = 10.0
 _WIDE = 4.0  # the solution's prior is so much wider than the stated one: it must not pull a determined payload
+# standard deviation of first moments and inertia per kilogram: bodies within about 20 cm of the frame's origin
+_REACH = np.array([0.2] * 3 + [0.2**2] * 6)  # [m, m²]
+_LIGHTEST = 0.02  # [kg]
 _PRIOR_COUNT = 4.0  # weight of the prior long-run variance, in blocks
 _PRIOR_RESIDUAL = 4e-3  # prior standard deviation of the unexplained torque, as a fraction of the effort limit
 # [s] the mismatch is a function of the configuration: more time on similar motions does not average it away
@@ -125,13 +129,19 @@ class Posterior:
     torque: str
 
 
+@cache
+def _threads() -> ThreadpoolController:
+    return ThreadpoolController()
+
+
 def solve(
     runs: list[RegressionData], prior_std: ArrayLike, prior: GaussianPrior | None = None, iterations: int = 12
 ) -> Posterior:
     """Posterior of the payload of the last run; runs before it are tares.
 
     Unknowns z = [phi_1, phi_2 − phi_1, …, eta]: run k carries the sum of the first k of them. Each payload is near
-    zero within `prior_std` (10,), the last one follows `prior` where that is given.
+    zero within `prior_std` (10,), a tare's moments also within `_REACH` of its mass; the last one follows `prior` where
+    that is given.
     """
     correction, count = runs[0].correction, len(runs)
     p, prior_std = correction.size, np.asarray(prior_std)
@@ -166,19 +176,23 @@ def solve(
         S = [run.residual_variance(E @ z, prior_residual) for run, E in zip(runs, selections, strict=True)]
         # EM for the prior's scale, with one pseudo-observation at the stated value
         variance[adaptive] = 0.5 * (variance0[adaptive] + z[adaptive] ** 2 + np.diag(P)[adaptive])
+        # a light body has small moments: what was mounted at a tare seldom weighs much, and its moments follow its mass
+        for k in range(count - 1):
+            heaviest = max(abs(z[10 * k]) + 2.0 * np.sqrt(P[10 * k, 10 * k]), _LIGHTEST)
+            moments = slice(10 * k + 1, 10 * k + 10)
+            variance[moments] = np.minimum(variance0[moments], (heaviest * _REACH) ** 2)
     eta = z[10 * count :]
     torque = "motor" if np.median(np.abs(correction.coulomb(eta)) / correction.effort) > _MOTOR_SIDE else "link"
-    total = np.sum(z[: 10 * count].reshape(count, 10), axis=0) if count == 1 else z[at]
     return Posterior(
         phi=z[at],
-        covariance=P[at, at] + _GAIN_STD[torque] ** 2 * np.outer(total, total),
+        covariance=P[at, at] + _GAIN_STD[torque] ** 2 * np.outer(z[at], z[at]),
         eta=eta,
         residual=np.sqrt(S[-1]),
         torque=torque,
     )
 
 
-class PosteriorLeastSquares(Identifier):
+class PosteriorLeastSquares(BatchIdentifier):
     """MAP least squares with the arm's mismatch as an unknown: the method for a log of any motion of any arm.
 
     >>> from armload.arms import arm
@@ -220,34 +234,10 @@ class PosteriorLeastSquares(Identifier):
 
     def update(self, sample: Sample) -> Estimate:
         """Take one sample (t, q, dq, tau) and return the estimate so far, at most `refresh` old."""
-        self._add(np.array([sample.t]), sample.q[None], sample.dq[None], sample.tau[None])
         if self._posterior is None or sample.t - self._solved_at >= self.refresh:
-            self._solve(sample.t)
-        return self._estimate(sample.t)
-
-    def trace(self, recording: Recording, every: int = 1) -> list[Estimate]:
-        """The estimates along a recording, each of them solved when its last sample is in (whatever `refresh` is)."""
-        self._check(recording)
-        self.reset()
-        stops = [*range(1, len(recording), every), len(recording)]
-        out = []
-        for start, stop in zip([0, *stops], stops, strict=False):
-            for k in range(start, stop, 4096):
-                part = slice(k, min(k + 4096, stop))
-                self._add(recording.t[part], recording.q[part], recording.dq[part], recording.tau[part])
-            self._solve(float(recording.t[stop - 1]))
-            out.append(self._estimate(float(recording.t[stop - 1])))
-        return out
-
-    def run(self, recording: Recording) -> Estimate:
-        """The estimate after the whole recording, all samples at once."""
-        self._check(recording)
-        self.reset()
-        for start in range(0, len(recording), 4096):
-            part = slice(start, start + 4096)
-            self._add(recording.t[part], recording.q[part], recording.dq[part], recording.tau[part])
-        self._solve(recording.t[-1])
-        return self._estimate(recording.t[-1])
+            return super().update(sample)
+        self._take(np.array([sample.t]), sample.q[None], sample.dq[None], sample.tau[None])
+        return self._last(sample.t)
 
     @property
     def posterior(self) -> Posterior:
@@ -256,7 +246,7 @@ class PosteriorLeastSquares(Identifier):
             raise RuntimeError("no sample has been seen: call update or run first")
         return self._posterior
 
-    def _add(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
+    def _take(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
         if self._run is None:
             if self._correction is None:
                 self._correction = Correction(self.arm, effort_scale(self.arm, tau))
@@ -264,10 +254,13 @@ class PosteriorLeastSquares(Identifier):
         self._run.add(t, q, dq, tau)
         self._count += len(t)
 
-    def _solve(self, t: float) -> None:
+    def _estimate(self, t: float) -> Estimate:
         assert self._run is not None
         runs = [self._run] if self._tare is None else [self._tare, self._run]
-        self._posterior, self._solved_at = solve(runs, _WIDE * payload_prior_std(self.arm), self.prior), t
+        with _threads().limit(limits=1):  # matrices of a hundred rows: BLAS threads cost up to 100 × on a busy machine
+            self._posterior = solve(runs, _WIDE * payload_prior_std(self.arm), self.prior)
+        self._solved_at = t
+        return self._last(t)
 
-    def _estimate(self, t: float) -> Estimate:
+    def _last(self, t: float) -> Estimate:
         return Estimate(float(t), self.posterior.phi, self.posterior.covariance, self._count, str(self.arm.frame))

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm, payload_regressor
 from armload.arms.filtered import Lag
-from armload.identifier import Estimate, Identifier
+from armload.identifier import BatchIdentifier, Estimate
 from armload.inertia import InertialParameters
 from armload.least_squares.autocorrelation import BlockMeans
-from armload.recording import Recording, Sample
+from armload.recording import Recording
 
 # Initial P: standard deviations of 10 kg, 1 kg·m and 0.3 kg·m², so that the columns' units do not mix.
 _AT_REST = 0.01  # [rad/s]
@@ -29,7 +29,7 @@ _TRANSIENT = 5.0  # time constants after which an observer started in motion has
 _INITIAL_STD = np.array([10.0] + [1.0] * 3 + [0.3] * 6)
 
 
-class _Recursive(Identifier):
+class _Recursive(BatchIdentifier):
     """The recursion and its uncertainty; a subclass says what y and Y are.
 
     The covariance is A⁻¹·(Σ_j S_j·A_j)·A⁻¹, where A_j is joint j's part of the information A = Σ YᵀY and S_j the
@@ -57,24 +57,6 @@ class _Recursive(Identifier):
         self._residual = BlockMeans(n)
         self._count, self._last_t = 0, None
         self._restart()
-
-    def update(self, sample: Sample) -> Estimate:
-        """Take one sample (t, q, dq, tau) and return the estimate so far."""
-        self._take(np.array([sample.t]), sample.q[None], sample.dq[None], sample.tau[None])
-        return self._estimate(sample.t)
-
-    def trace(self, recording: Recording, every: int = 1) -> list[Estimate]:
-        """The estimates along a recording, as `update` gives them, computed many samples at a time."""
-        self._check(recording)
-        self.reset()
-        stops = [*range(1, len(recording), every), len(recording)]
-        out = []
-        for start, stop in zip([0, *stops], stops, strict=False):
-            for k in range(start, stop, 4096):
-                part = slice(k, min(k + 4096, stop))
-                self._take(recording.t[part], recording.q[part], recording.dq[part], recording.tau[part])
-            out.append(self._estimate(float(recording.t[stop - 1])))
-        return out
 
     def calibrate(self, unloaded: Recording) -> InertialParameters:
         """Virtual calibration [Kurdas 2022]: what an unloaded run is identified as, mean over its second half.
