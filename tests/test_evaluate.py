@@ -233,8 +233,10 @@ def test_table_cells_are_the_errors_in_grams(comparison):
     first = comparison.table().rows[0]
     assert first[0] == "good"
     for cell, mean, deviation in zip(first[1:], comparison.mae[0, -1], comparison.spread[0, -1], strict=True):
-        shown = [float(x) for x in cell.split(" ± ")]
-        assert shown == pytest.approx([1e3 * mean, 1e3 * deviation], rel=0.05, abs=1e-6)
+        value, spread_shown = cell.split(" ± ")
+        last_digit = 10.0 ** -len(value.partition(".")[2])
+        assert float(value) == pytest.approx(1e3 * mean, rel=0.005, abs=1e-3)
+        assert float(spread_shown) == pytest.approx(1e3 * deviation, abs=0.5001 * last_digit)
 
 
 def test_infinite_intervals_hold_everything_and_say_so(comparison):

@@ -206,8 +206,13 @@ class Comparison:
 
 
 def _cell(value: float, spread: float | None) -> str:
+    """The value in shown units, and the spread to the same decimal."""
     shown = short(SHOWN_SCALE * float(value))
-    return shown if spread is None else f"{shown} ± {short(SHOWN_SCALE * float(spread), 2)}"
+    if spread is None:
+        return shown
+    decimals = len(shown.partition(".")[2])
+    scaled = SHOWN_SCALE * float(spread)
+    return f"{shown} ± {scaled:.{decimals}f}" if np.isfinite(scaled) else f"{shown} ± {short(scaled)}"
 
 
 def _listed(value: NDArray) -> Any:

@@ -190,7 +190,7 @@ def _time_axis(ax: Axes, comparison: Comparison) -> None:
 
 def _legend(figure: Figure, ax: Axes) -> None:
     handles, labels = ax.get_legend_handles_labels()
-    room = 125  # characters of legend text that fit beside each other, 7 of them for each line and gap
+    room = 120  # characters of legend text that fit beside each other, 7 of them for each line and gap
     ncols = len(labels)
     while ncols > 1 and ncols * (7 + max(map(len, labels))) > room and sum(len(x) + 7 for x in labels) > room:
         ncols -= 1
