@@ -263,20 +263,22 @@ def test_folded_numpy_networks_equal_the_trained_jax_networks():
         np.testing.assert_allclose(compiled.members(X)[m], expected, rtol=2e-5, atol=2e-5 * s.y_scale.max())
 
 
-def test_one_epoch_equals_adam_written_out_by_hand():
-    """The batched JAX epoch against a plain numpy Adam on one member, with a last batch that is not full."""
+def test_two_epochs_equal_adam_written_out_by_hand():
+    """Batched JAX epochs against a plain numpy Adam; the last batch is not full, each epoch has its own order."""
     X, y = rows(0, 50, 4)
-    learner = NetworkLearner(hidden=6, batch=16, max_epochs=1, learning_rate=0.01)
+    learner = NetworkLearner(hidden=6, batch=16, max_epochs=2, learning_rate=0.01)
     ensemble = BaggingEnsemble(learner, members=2, seed=5, scale="none").fit(X / 10, y, X / 10, y)
+    assert (np.diff(ensemble.losses_, axis=0) < 0).all()  # so the weights kept are those after the second epoch
     bag = draw_bag(X / 10, y, (X / 10, y), members=2, seed=5, bootstrap=True, scale="none", hold_out=0.15)
     for m in range(2):
         rng = np.random.default_rng([5, m, INITIAL_WEIGHTS])
         a, b = np.sqrt(6 / 10), np.sqrt(6 / 16)
         w = [rng.uniform(-a, a, (4, 6)), np.zeros(6), rng.uniform(-b, b, (6, 10)), np.zeros(10)]
         first, second = [np.zeros_like(p) for p in w], [np.zeros_like(p) for p in w]
-        order = np.random.default_rng([5, m, SHUFFLE, 0]).permutation(bag.rows[m])
-        for step, start in enumerate(range(0, 50, 16), start=1):
-            x, target = X[order[start : start + 16]] / 10, y[order[start : start + 16]]
+        orders = [np.random.default_rng([5, m, SHUFFLE, e]).permutation(bag.rows[m]) for e in (0, 1)]
+        batches = [order[start : start + 16] for order in orders for start in range(0, 50, 16)]
+        for step, chosen in enumerate(batches, start=1):
+            x, target = X[chosen] / 10, y[chosen]
             z = x @ w[0] + w[1]
             h = np.maximum(z, 0)
             e = 2 * (h @ w[2] + w[3] - target) / target.size
@@ -414,3 +416,12 @@ def test_progress_counts_every_tree_and_epoch():
         *(("trees", k, 2) for k in (1, 2)),
         *(("networks", k, 4) for k in (1, 2, 3, 4)),
     ]
+
+
+def test_the_progress_bar_leaves_the_standard_output_alone(capsys):
+    X, y = rows(0, 60)
+    bar = MixedEnsemble(("tree", SMALL), members=2).fit(X, y, progress=True)
+    assert capsys.readouterr().out == ""
+    quiet = MixedEnsemble(("tree", SMALL), members=2).fit(X, y)
+    assert capsys.readouterr() == ("", "")
+    np.testing.assert_array_equal(bar.predict(X), quiet.predict(X))

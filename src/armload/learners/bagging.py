@@ -91,7 +91,8 @@ class BaggingEnsemble(Ensemble):
         scale: "standard" brings every feature and output to mean 0 and standard deviation 1 for training; "none" trains
             on SI units. Standard is the default because the squared error of kg and of kg·m² cannot be added: in SI
             units the mass is nearly the whole loss, of networks and of the trees' splits alike, and a network's inertia
-            ends up further off than the training mean. The paper does not say what it did; that training the inertia apart (two stages) gained it up to 99 % suggests "none".
+            ends up further off than the training mean. The paper does not say what it did; that training the inertia
+            apart (two stages) gained it up to 99 % suggests "none".
         hold_out: share of the training rows taken for validation where none are given (networks only).
 
     Attributes:

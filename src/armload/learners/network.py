@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 import os
 import time
 import zipfile
@@ -185,6 +186,8 @@ def plateaued(losses: NDArray[np.float64], patience: int, tolerance: float) -> b
 @cache
 def _functions() -> tuple[Any, Any]:
     """The two compiled computations: an epoch of Adam steps, and the validation loss. JAX is imported here."""
+    # JAX remarks on every GPU it sees and was not built for; these networks are small enough for a processor.
+    logging.getLogger("jax._src.xla_bridge").setLevel(logging.ERROR)
     import jax
     import jax.numpy as jnp
 
