@@ -9,6 +9,7 @@ from armload.errors import UsageError
 
 if TYPE_CHECKING:
     from armload.arms import Arm
+    from armload.dataset import Dataset
     from armload.inertia import InertialParameters
     from armload.motion import Motion
 
@@ -82,15 +83,14 @@ def at_least(least: float, kind: type = int):
     return read
 
 
-def add_arm_arguments(parser: argparse.ArgumentParser, required: bool = True) -> None:
-    """`--robot`, `--frame` and `--gravity`."""
-    default = "" if required else " (default: panda)"
+def add_arm_arguments(parser: argparse.ArgumentParser, default: str | None = None, required: bool = True) -> None:
+    """`--robot`, `--frame` and `--gravity`; with a default, `--robot` is not required."""
     parser.add_argument(
         "--robot",
-        required=required,
-        default=None if required else "panda",
+        required=required and default is None,
+        default=default,
         metavar="NAME|FILE.urdf",
-        help=f"panda, ur10e, or the path of a URDF file{default}",
+        help="panda, ur10e, or the path of a URDF file" + (f" (default: {default})" if default else ""),
     )
     parser.add_argument(
         "--frame", metavar="F", help="link whose frame the payload is about (default: the flange; a URDF's last link)"
@@ -109,6 +109,17 @@ def arm_of(options: argparse.Namespace) -> Arm:
 
     settings = {} if options.gravity is None else {"gravity": options.gravity}
     return arm(options.robot, options.frame, **settings)
+
+
+def arm_of_dataset(dataset: Dataset, robot: str | None) -> Arm:
+    """The arm a data set was made with; `robot` names it where it is not a built-in one."""
+    from armload.arms import arm
+
+    about = dataset.provenance["arm"]
+    made_with = arm(robot or about["name"], about["frame"], tuple(about["gravity"]))
+    if made_with.fingerprint != about["fingerprint"]:
+        raise UsageError(f"{dataset.path} was made with another {about['name']}: name its URDF with --robot")
+    return made_with
 
 
 def payload_of(name: str) -> InertialParameters:

@@ -27,7 +27,7 @@ def parser() -> Parser:
         epilog=_EXAMPLES,
     )
     parser.add_argument("--out", required=True, metavar="DIR", help="folder of the data set")
-    add_arm_arguments(parser, required=False)
+    add_arm_arguments(parser, default="panda")
     parser.add_argument(
         "--motion",
         nargs="+",

@@ -30,7 +30,7 @@ def parser() -> Parser:
 
     show = actions.add_parser("show", help="what each joint does", description="Show what each joint does.")
     show.add_argument("motion", metavar="MOTION", help="taie2024, a JSON file, or random:SEED")
-    add_arm_arguments(show, required=False)
+    add_arm_arguments(show, default="panda")
 
     check = actions.add_parser(
         "check",
@@ -52,7 +52,7 @@ def parser() -> Parser:
         description="Write a motion as a file that a robot's own tools read. Check it first, and run it slowly first.",
     )
     export.add_argument("motion", metavar="MOTION", help="taie2024, a JSON file, or random:SEED")
-    add_arm_arguments(export, required=False)
+    add_arm_arguments(export, default="panda")
     export.add_argument("--format", required=True, choices=("csv", "ros2", "ur"))
     export.add_argument("--rate", type=at_least(1e-3, float), metavar="HZ", help="samples per second")
     export.add_argument("--out", required=True, metavar="FILE")

@@ -54,7 +54,7 @@ def console() -> Console:
     """Where answers go; wide enough for any table if it is not a terminal."""
     from rich.console import Console
 
-    return Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 140)
+    return Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 180)
 
 
 def print_table(result: Table) -> None:

@@ -6,9 +6,9 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
-from armload.cli.arguments import Parser, at_least, motion_of
+from armload.cli.arguments import Parser, arm_of_dataset, at_least, motion_of
 from armload.cli.printing import print_note, print_table
-from armload.errors import DatasetError, UsageError
+from armload.errors import UsageError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -72,7 +72,8 @@ def run(options: argparse.Namespace) -> None:
     if options.kind == "mixed" and options.stages == 2:
         raise UsageError("--kind mixed has one stage: leave out --stages 2, or choose tree or network")
     dataset = open_dataset(options.dataset)
-    arm, motions = _arm(dataset, options), _motions(dataset, options)
+    arm = arm_of_dataset(dataset, options.robot)
+    motions = _motions(dataset, arm, options.motion)
     splits = {"payload": split_payloads, "row": split_rows}
     rows = []
     for name in sorted(splits, key=lambda name: name == options.split):  # the one to save last
@@ -99,31 +100,19 @@ def _untrained(options: argparse.Namespace) -> BaggingEnsemble | TwoStage | Mixe
     return (BaggingEnsemble, TwoStage)[options.stages - 1](kind, options.members, options.seed)
 
 
-def _arm(dataset: Dataset, options: argparse.Namespace) -> Arm:
-    """The arm the data set was made with."""
-    from armload.arms import arm
-
-    about = dataset.provenance["arm"]
-    made_with = arm(options.robot or about["name"], about["frame"], tuple(about["gravity"]))
-    if made_with.fingerprint != about["fingerprint"]:
-        raise DatasetError(f"{options.dataset} was made with another {about['name']}: name its URDF with --robot")
-    return made_with
-
-
-def _motions(dataset: Dataset, options: argparse.Namespace) -> list[Motion]:
+def _motions(dataset: Dataset, arm: Arm, names: list[str]) -> list[Motion]:
     """The motions of the data set, known again by their fingerprints."""
     from armload.motion import MotionFingerprint
 
-    arm = _arm(dataset, options)
-    known = {}
+    names, known = list(names), {}
     for about in dataset.provenance["motions"]:
         name = about["name"]
         drawn = name.removeprefix(f"random-{arm.name}-")
         if name == "taie2024":
-            options.motion.append(name)
+            names.append(name)
         elif drawn != name and drawn.isdecimal():
-            options.motion.append(f"random:{drawn}")
-    for name in options.motion:
+            names.append(f"random:{drawn}")
+    for name in names:
         motion = motion_of(name, arm)
         known[MotionFingerprint.of(motion).sha256] = motion
     missing = [about["name"] for about in dataset.provenance["motions"] if about["fingerprint"] not in known]
