@@ -99,7 +99,7 @@ def _read_fast(data: bytes, names: list[str]) -> NDArray[np.float64] | None:
 
     try:
         table = arrow_csv.read_csv(
-            pa.BufferReader(data),
+            pa.BufferReader(data.rstrip()),  # blank lines at the end are no reason to read slowly
             # parallel blocks cost more than they gain below some 10 MB, and one thread is one order of events
             read_options=arrow_csv.ReadOptions(column_names=names, skip_rows=1, use_threads=len(data) > 10_000_000),
             parse_options=arrow_csv.ParseOptions(ignore_empty_lines=False),
