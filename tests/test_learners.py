@@ -9,7 +9,8 @@ from sklearn.utils.estimator_checks import check_estimator, estimator_checks_gen
 from armload.errors import ModelError
 from armload.learners import BaggingEnsemble, MixedEnsemble, NetworkLearner, TreeLearner, TwoStage
 from armload.learners.bag import INITIAL_WEIGHTS, SHUFFLE, Scaling, draw_bag
-from armload.learners.network import Weights, _fold, plateaued
+from armload.learners.checkpoint import Weights
+from armload.learners.network import _fold, plateaued
 from armload.learners.tree import compile_trees
 
 UNITS = np.array([1.0, 0.1, 0.1, 0.1] + [1e-3] * 6)  # the sizes of kg, kg·m and kg·m² in a payload
@@ -161,6 +162,8 @@ def test_unknown_settings_are_named():
         BaggingEnsemble("tree", scale="log").fit(X, y)
     with pytest.raises(ModelError, match="members is 0"):
         BaggingEnsemble("tree", members=0).fit(X, y)
+    with pytest.raises(ModelError, match="max_epochs is 0"):
+        BaggingEnsemble(NetworkLearner(max_epochs=0)).fit(X, y)
     with pytest.raises(ModelError, match="expects the ten of phi"):
         TwoStage("tree").fit(X, y[:, :4])
 

@@ -153,7 +153,7 @@ def test_a_changed_byte_is_one_sentence(tree, tmp_path):
     for at in map(int, places):
         changed = bytes([whole[at] ^ 0x04 if at >= 8 else whole[at] ^ 0xFF])
         path.write_bytes(whole[:at] + changed + whole[at + 1 :])
-        with pytest.raises(ModelError, match="model.safetensors") as caught:
+        with pytest.raises(ModelError, match=r"model\.safetensors") as caught:
             load_model(path)
         assert "\n" not in str(caught.value)
         assert at < header_end or "altered" in str(caught.value)

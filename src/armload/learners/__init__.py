@@ -9,9 +9,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from armload.learners.artefact import LearnedModel, load_model, save_model
+    from armload.learners.artefact import load_model, save_model
     from armload.learners.bagging import BaggingEnsemble
     from armload.learners.compiled import Compiled
+    from armload.learners.model import LearnedModel
     from armload.learners.network import NetworkLearner
     from armload.learners.online import LearnedIdentifier
     from armload.learners.progress import Progress
@@ -36,7 +37,7 @@ _HOME = {
     "BaggingEnsemble": "bagging",
     "Compiled": "compiled",
     "LearnedIdentifier": "online",
-    "LearnedModel": "artefact",
+    "LearnedModel": "model",
     "MixedEnsemble": "stages",
     "NetworkLearner": "network",
     "Progress": "progress",

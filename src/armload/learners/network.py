@@ -5,10 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
-import os
 import time
-import zipfile
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,23 +15,12 @@ from numpy.typing import NDArray
 
 from armload.errors import ModelError
 from armload.learners.bag import INITIAL_WEIGHTS, SHUFFLE, Bag, Fitted, Learner, Scaling
+from armload.learners.checkpoint import Training, TrainingState, Weights
 from armload.learners.compiled import CompiledNetworks
 from armload.learners.progress import Progress, Report
 
 _CHUNK = 2000  # validation rows evaluated at once: bounds the memory of the hidden layers
 _SAVE_EVERY = 10.0  # [s] between checkpoints
-
-
-class Weights(NamedTuple):
-    """y = relu(x·W1 + b1)·W2 + b2 of M members: W1 (M, d, h), b1 (M, h), W2 (M, h, k), b2 (M, k)."""
-
-    W1: Any
-    b1: Any
-    W2: Any
-    b2: Any
-
-
-_Training = tuple[Weights, Weights, Weights, Any]  # weights, Adam's two moments, step count
 
 
 class NetworkLearner(Learner):
@@ -76,11 +62,15 @@ class NetworkLearner(Learner):
         """Train one network per member of the bag, from the checkpoint on if there is one.
 
         Raises:
-            ModelError: the checkpoint belongs to another training or cannot be read, or a loss was never finite.
+            ModelError: a setting out of range, a checkpoint that belongs to another training or cannot be read, or a
+                training that diverged.
         """
+        for name in ("hidden", "batch", "max_epochs", "patience"):
+            if getattr(self, name) < 1:
+                raise ModelError(f"{name} is {getattr(self, name)}: expected a whole number of at least 1")
         data = _Rows.of(bag)
         key = self._key(bag) if checkpoint else ""
-        state = _State.load(checkpoint, key) if checkpoint and checkpoint.exists() else self._start(data)
+        state = TrainingState.load(checkpoint, key) if checkpoint and checkpoint.exists() else self._start(data)
         epoch_function, loss_function = _functions()
         saved = time.monotonic()
         try:
@@ -109,7 +99,7 @@ class NetworkLearner(Learner):
 
     # ------------------------------------------------------------------ one epoch
 
-    def _start(self, data: _Rows) -> _State:
+    def _start(self, data: _Rows) -> TrainingState:
         members, d, k, h = len(data.rows), data.X.shape[1], data.y.shape[1], self.hidden
         drawn = []
         for m in range(members):  # Glorot & Bengio 2010: uniform, bound √(6 / (fan in + fan out))
@@ -118,7 +108,7 @@ class NetworkLearner(Learner):
             drawn.append((rng.uniform(-a, a, (d, h)), np.zeros(h), rng.uniform(-b, b, (h, k)), np.zeros(k)))
         weights = Weights(*(np.array(part, dtype=np.float32) for part in zip(*drawn, strict=True)))
         zeros = Weights(*(np.zeros_like(w) for w in weights))
-        return _State(
+        return TrainingState(
             0,
             np.arange(members),
             (weights, zeros, zeros, np.float32(0)),
@@ -128,7 +118,7 @@ class NetworkLearner(Learner):
             [],
         )
 
-    def _batches(self, data: _Rows, state: _State, seed: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    def _batches(self, data: _Rows, state: TrainingState, seed: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
         """Rows (steps, M, batch) of one epoch, in each member's order; weights (steps, batch) that blank padding."""
         n = data.rows.shape[1]
         batch = min(self.batch, n)
@@ -139,7 +129,7 @@ class NetworkLearner(Learner):
         weight = (np.arange(steps * batch) < n).astype(np.float32)
         return np.ascontiguousarray(rows.reshape(-1, steps, batch).swapaxes(0, 1)), weight.reshape(steps, batch)
 
-    def _after_epoch(self, state: _State, training: _Training, loss: NDArray[np.float64]) -> _State:
+    def _after_epoch(self, state: TrainingState, training: Training, loss: NDArray[np.float64]) -> TrainingState:
         """The next state: losses of the active members noted, best weights kept, members that are done dropped.
 
         A new object, so that an interrupt at any point leaves the old state whole.
@@ -158,7 +148,7 @@ class NetworkLearner(Learner):
         if len(going) < len(active):
             weights, first, second = (Weights(*(np.asarray(a)[going] for a in w)) for w in training[:3])
             training, active = (weights, first, second, training[3]), active[going]
-        return _State(state.epoch + 1, active, training, best, best_loss, epochs, losses)
+        return TrainingState(state.epoch + 1, active, training, best, best_loss, epochs, losses)
 
     def _key(self, bag: Bag) -> str:
         """SHA-256 of everything the training depends on."""
@@ -270,59 +260,3 @@ class _Rows(NamedTuple):
 
     def validation(self, active: NDArray[np.int64]) -> tuple[NDArray, NDArray, NDArray]:
         return self.X_val, self.y_val, self.share[:, :, active].astype(np.float32)
-
-
-@dataclass(frozen=True, eq=False)
-class _State:
-    """A training between two epochs: all that is needed to go on exactly as if never interrupted."""
-
-    epoch: int
-    active: NDArray[np.int64]  # members still training
-    training: _Training  # of the active members
-    best: Weights  # of all members
-    best_loss: NDArray[np.float64]
-    epochs: NDArray[np.int64]
-    losses: list[NDArray[np.float64]]
-
-    def save(self, path: Path, key: str) -> None:
-        """Write to a file beside it, then rename: the file is always whole."""
-        weights, first, second, count = self.training
-        groups = {"weights": weights, "first": first, "second": second, "best": self.best}
-        arrays = {f"{g}_{name}": np.asarray(a) for g, w in groups.items() for name, a in w._asdict().items()}
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_name(path.name + ".part")
-        with part.open("wb") as file:
-            np.savez(
-                file,
-                key=np.array(key),
-                epoch=np.array(self.epoch),
-                active=self.active,
-                count=np.asarray(count),
-                best_loss=self.best_loss,
-                epochs=self.epochs,
-                losses=np.array(self.losses).reshape(-1, len(self.epochs)),
-                **arrays,  # type: ignore[arg-type]
-            )
-        os.replace(part, path)
-
-    @classmethod
-    def load(cls, path: Path, key: str) -> _State:
-        try:
-            with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
-                a = dict(file)
-            same = str(a["key"]) == key
-            w, first, second, best = (
-                Weights(*(a[f"{group}_{name}"] for name in Weights._fields))
-                for group in ("weights", "first", "second", "best")
-            )
-            training = (w, first, second, np.float32(a["count"]))
-            losses = list(a["losses"])
-            state = cls(int(a["epoch"]), a["active"], training, best, a["best_loss"], a["epochs"], losses)
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-            raise ModelError(f"{path} is not a training checkpoint ({error}): delete it to start anew") from None
-        if not same:
-            raise ModelError(
-                f"the checkpoint {path} belongs to another training: expected the same data, settings and seed; "
-                "delete it or name another file"
-            )
-        return state

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.identifier import Estimate, Identifier
-from armload.learners.artefact import LearnedModel
 from armload.learners.compiled import member_spread
+from armload.learners.model import LearnedModel
 from armload.recording import Recording, Sample
 
 
