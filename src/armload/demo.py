@@ -1,9 +1,9 @@
 """The main job from end to end, in minutes: simulate, train, identify a payload nobody has seen, compare, report.
 
-One Panda that differs from its model as real ones do (`World.real_like`) runs the excitation with the container's
-loadings; small ensembles learn from it, by payload: some loadings are held out to stop the networks. Then the same arm
-runs once with nothing (the tare) and once with the test payload, which is outside the family, and every method gets the
-same two logs.
+A nominal Panda runs the excitation with the container's loadings, with sensors as on real Pandas; small ensembles
+learn from it, by payload: some loadings are held out to stop the networks. Then another Panda, one that differs from
+its model as real ones do (`World.real_like`), runs the same excitation with the test payload, which is outside the
+family, and, for the methods that can use it, another motion with nothing (the tare).
 
 This shows the way, not the paper's figures: ten times fewer rows, fewer epochs, one arm, one test payload.
 """
@@ -29,7 +29,7 @@ from armload.identifier import Identifier
 from armload.identify import Identification, identify
 from armload.inertia import InertialParameters
 from armload.least_squares import FilteredRecursiveLeastSquares, PosteriorLeastSquares, RecursiveLeastSquares
-from armload.motion import Motion, taie2024
+from armload.motion import Motion, random_motion, taie2024
 from armload.payloads import container_loadings, test_payload
 from armload.recording import Recording, write_recording
 from armload.simulate import Sensors, World, simulate
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from armload.learners import BaggingEnsemble, LearnedModel, TwoStage
 
 HELD_OUT = 0.15  # of the loadings, for validation
+TARE_DURATION, TARE_HARMONICS = 20.0, 10  # [s]
 
 
 class Size(NamedTuple):
@@ -98,14 +99,16 @@ def run_demo(
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     robot, motion = arm("panda"), taie2024()
-    world, sensors = World.real_like(robot, seed), Sensors.panda(robot)
+    nominal, real, sensors = World.nominal(robot), World.real_like(robot, seed), Sensors.panda(robot)
     clock = _Clock(say)
 
     loadings = container_loadings()[:: size.every]
-    clock.start("simulating", f"{len(loadings)} loadings on {motion.name} and a real-like {robot.name} (seed {seed})")
-    dataset = _dataset(folder / "dataset", robot, motion, loadings, world, sensors, size.rows, seed, progress)
-    run = _log(folder / "run.csv", robot, motion, test_payload().parameters, world, sensors, size.rate, seed + 1)
-    tare = _log(folder / "tare.csv", robot, motion, None, world, sensors, size.rate, seed + 2)
+    clock.start("simulating", f"{len(loadings)} loadings on {motion.name} and a nominal {robot.name}")
+    dataset = _dataset(folder / "dataset", robot, motion, loadings, nominal, sensors, size.rows, seed, progress)
+    clock.start("recording", f"a real-like {robot.name} (seed {seed}): a tare on another motion, then the payload")
+    run = _log(folder / "run.csv", robot, motion, test_payload().parameters, real, sensors, size.rate, seed + 1)
+    other = random_motion(robot, seed, duration=TARE_DURATION, harmonics=TARE_HARMONICS)
+    tare = _log(folder / "tare.csv", robot, other, None, real, sensors, size.rate, seed + 2)
 
     split = split_payloads(dataset, seed, (1.0 - HELD_OUT, HELD_OUT, 0.0))
     learned = _train(folder / "models", dataset, split, robot, motion, size, seed, progress, clock)
@@ -122,7 +125,7 @@ def run_demo(
         runs,
         training=training,
         split=f"by payload: {len(training)} loadings for training, {validation} for validation, the test payload is in "
-        f"neither; one world (seed {seed}) for all",
+        f"neither; trained on the nominal arm, tested on a real-like one (seed {seed}); tare on another motion",
     )
 
     clock.start("reporting", "tables and figures")
@@ -216,7 +219,7 @@ def _train(
 
 
 def _learned(model: LearnedModel, robot: Arm, _: Recording | None) -> Identifier:
-    """A learned method knows the arm as it is from training: it needs no tare, and an empty arm is strange to it."""
+    """A learned method gets no tare: an empty arm, on another motion, is strange to it."""
     from armload.learners import LearnedIdentifier
 
     return LearnedIdentifier(model, robot)
@@ -228,6 +231,7 @@ def _least_squares(robot: Arm) -> dict[str, Method]:
         "RLS": lambda _: RecursiveLeastSquares(robot),
         "filtered RLS": lambda _: FilteredRecursiveLeastSquares(robot),
         "filtered RLS, virtual calibration": FilteredRecursiveLeastSquares(robot),
+        "map": lambda _: PosteriorLeastSquares(robot),
         "map, with tare": lambda tare: PosteriorLeastSquares(robot, tare),
     }
 
@@ -274,8 +278,9 @@ def _report(path: Path, comparison: Comparison, runs: list[EvaluationRun], robot
 
     introduction = (
         f"A simulated {robot.name} that differs from its model as real ones do ran one excitation with a payload that "
-        "no ensemble was trained on. Every method got the same log, and the same earlier log without payload if it "
-        "can use one."
+        "no ensemble was trained on; the ensembles learned from the nominal arm on that same excitation. Every method "
+        "got the same log, and the methods that can use one (the same-prior least squares among them) a tare: an "
+        "earlier log of the empty arm on another motion."
     )
     first, *others = default_report(comparison, runs, robot, introduction=introduction)
     return write_report(path, [replace(first, tables=(table, *first.tables[1:])), *others], "armload demo")
