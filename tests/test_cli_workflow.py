@@ -44,6 +44,7 @@ def test_demo_compares_every_kind_on_a_payload_nobody_trained_on(demo):
         "RLS",
         "filtered RLS",
         "filtered RLS, virtual calibration",
+        "map",
         "map, with tare",
         "trees",
         "trees, two stages",
