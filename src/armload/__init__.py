@@ -23,12 +23,16 @@ if TYPE_CHECKING:
     from armload.identifier import Estimate, Identifier
     from armload.identify import METHODS, Identification
     from armload.inertia import InertialParameters
+    from armload.learners import LearnedIdentifier, load_model, save_model
     from armload.least_squares import (
         FilteredRecursiveLeastSquares,
         PosteriorLeastSquares,
         RecursiveLeastSquares,
     )
+    from armload.motion import FourierMotion, Motion, check_motion, taie2024
+    from armload.payloads import Payload, read_payload, write_payload
     from armload.recording import Recording, Sample, read_recording, write_recording
+    from armload.simulate import Sensors, World
 
 _ROOMS = {
     "ARMS": "arms",
@@ -40,13 +44,25 @@ _ROOMS = {
     "METHODS": "identify",
     "Identification": "identify",
     "InertialParameters": "inertia",
+    "LearnedIdentifier": "learners",
+    "load_model": "learners",
+    "save_model": "learners",
     "FilteredRecursiveLeastSquares": "least_squares",
     "PosteriorLeastSquares": "least_squares",
     "RecursiveLeastSquares": "least_squares",
+    "FourierMotion": "motion",
+    "Motion": "motion",
+    "check_motion": "motion",
+    "taie2024": "motion",
+    "Payload": "payloads",
+    "read_payload": "payloads",
+    "write_payload": "payloads",
     "Recording": "recording",
     "Sample": "recording",
     "read_recording": "recording",
     "write_recording": "recording",
+    "Sensors": "simulate",
+    "World": "simulate",
 }
 
 __all__ = [
@@ -56,16 +72,28 @@ __all__ = [
     "ArmloadError",
     "Estimate",
     "FilteredRecursiveLeastSquares",
+    "FourierMotion",
     "Identification",
     "Identifier",
     "InertialParameters",
+    "LearnedIdentifier",
+    "Motion",
+    "Payload",
     "PosteriorLeastSquares",
     "Recording",
     "RecursiveLeastSquares",
     "Sample",
+    "Sensors",
+    "World",
     "__version__",
     "arm",
+    "check_motion",
+    "load_model",
+    "read_payload",
     "read_recording",
+    "save_model",
+    "taie2024",
+    "write_payload",
     "write_recording",
 ]
 

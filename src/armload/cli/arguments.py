@@ -67,6 +67,13 @@ def gravity(text: str) -> tuple[float, float, float]:
     return x, y, z
 
 
+def file_name(text: str) -> str:
+    """The name of a file; an empty one would be the current folder."""
+    if not text.strip():
+        raise argparse.ArgumentTypeError("the name is empty: expected a file")
+    return text
+
+
 def at_least(least: float, kind: type = int):
     """An argument type: a number of at least `least`."""
 

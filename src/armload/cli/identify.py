@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from armload.cli.arguments import Parser, add_arm_arguments, arm_of, payload_of
+from armload.cli.arguments import Parser, add_arm_arguments, arm_of, file_name, payload_of
 from armload.cli.printing import print_identification, print_json, print_note, working
 
 _EXAMPLES = """\
@@ -27,10 +27,11 @@ def parser() -> Parser:
         description="Identify what the robot holds: mass, centre of mass and inertia, with 95 % intervals.",
         epilog=_EXAMPLES,
     )
-    parser.add_argument("log", metavar="LOG", help="log of a motion with the payload")
+    parser.add_argument("log", type=file_name, metavar="LOG", help="log of a motion with the payload")
     add_arm_arguments(parser)
     parser.add_argument(
         "--tare",
+        type=file_name,
         metavar="LOG0",
         help="an earlier log of the same arm, on any motion; the answer is what was added since",
     )

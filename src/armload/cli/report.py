@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armload.cli.arguments import Parser, add_arm_arguments, arm_of, arm_of_dataset, at_least, payload_of
+from armload.cli.arguments import Parser, add_arm_arguments, arm_of, arm_of_dataset, at_least, file_name, payload_of
 from armload.cli.printing import print_note, print_table, working
 from armload.errors import UsageError
 
@@ -41,9 +41,11 @@ def parser() -> Parser:
         description="Write an HTML report: motion and torques of a log, and every method's estimate over time.",
         epilog=_EXAMPLES,
     )
-    parser.add_argument("log", nargs="?", metavar="LOG", help="log of a motion with the payload")
+    parser.add_argument("log", nargs="?", type=file_name, metavar="LOG", help="log of a motion with the payload")
     add_arm_arguments(parser, required=False)
-    parser.add_argument("--tare", metavar="LOG0", help="an earlier log of the same arm; the payload is what was added")
+    parser.add_argument(
+        "--tare", type=file_name, metavar="LOG0", help="an earlier log of the arm; the payload is what was added"
+    )
     parser.add_argument("--truth", metavar="FILE", help="the payload, where it is known (JSON, franka-hand or test)")
     parser.add_argument("--dataset", metavar="DIR", help="take runs of a data set instead of LOG")
     parser.add_argument("--runs", type=at_least(1), default=8, metavar="N", help="of the data set (default: 8)")
