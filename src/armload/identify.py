@@ -168,11 +168,14 @@ def _run(
         )
     from armload.learners import LearnedIdentifier, load_model
 
+    if tare is not None:
+        raise IdentificationError(
+            f"the trained model {method} cannot use a tare, an empty arm lies outside its training: leave the tare out, "
+            "or use the method map"
+        )
     model = load_model(method)
     model.check(arm, recording)
-    if tare is not None:
-        model.check(arm, tare)
-    estimate = _minus_tare(LearnedIdentifier(model, arm), recording, tare)
+    estimate = LearnedIdentifier(model, arm).run(recording)
     return estimate, model.phi_std, True, model.kind, f"asked for; {method} was trained on this arm and motion"
 
 
@@ -208,7 +211,12 @@ def _answer(
     removed = determined[0] and phi[0] < -half[0]
     notes = []
     if removed:
-        notes.append("something was taken off since: the added mass is negative, so no body has these parameters")
+        notes.append(
+            "something was taken off since the tare: the added mass is negative, so no body has these parameters"
+            if relative_to == "tare"
+            else "the mass is negative: less is mounted than the model of the arm and its tool assume, or the torque's "
+            "sign is turned"
+        )
     elif not is_consistent(phi):
         # the nearest parameters that a body can have, in the metric of what is known
         phi = nearest_consistent(phi, np.linalg.inv(estimate.covariance), margin=1e-5)

@@ -1,0 +1,98 @@
+"""What the methods say of real logs, where those are at hand.
+
+    ARMLOAD_REAL_DATA=FOLDER python benchmarks/real_logs.py
+
+Writes benchmarks/results/real_logs.json. The logs are test input: nothing in armload is fitted on them. Three
+questions: the UR10e pair (2.805 kg bolted on between two runs of one motion), what an unloaded Panda seems to carry,
+and the semi-real Panda: the torque of a known payload added to the unloaded log, its first 10 s as the tare, windows of
+the rest as runs.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+from armload import PosteriorLeastSquares, Recording, __version__, arm, read_recording
+from armload.arms import payload_regressor
+from armload.identify import identify
+from armload.payloads import test_payload
+
+HERE = Path(__file__).resolve().parent
+METHODS = ("map", "rls", "rls-filter")
+WINDOWS = (10.0, 12.0, 14.0)  # [s] since the start of the log
+
+
+def data() -> Path:
+    """The folder of real logs."""
+    folder = Path(os.environ.get("ARMLOAD_REAL_DATA", HERE.parents[1] / "shared" / "data"))
+    if not folder.is_dir():
+        raise SystemExit(f"real logs not found in {folder}: set ARMLOAD_REAL_DATA to their folder")
+    return folder
+
+
+def ur10e(folder: Path) -> dict:
+    """The load bolted to a UR10e, relative to the tare."""
+    robot = arm(folder / "ur10e.urdf", "tool0")
+    loaded, tare = (read_recording(folder / f"ur10e_{x}.csv", robot) for x in ("loaded_2805g", "unloaded"))
+    out = {}
+    for method in METHODS:
+        answer = identify(loaded, robot, tare=tare, method=method)
+        half = 0.5 * (answer.phi_high[0] - answer.phi_low[0])
+        out[method] = {"mass_kg": round(answer.mass, 4), "half_width_kg": round(half, 4), "truth_kg": 2.805}
+    return out
+
+
+def phantom(folder: Path) -> dict:
+    """What an unloaded Panda seems to carry, without a tare."""
+    robot = arm("panda")
+    log = read_recording(folder / "panda_unloaded_1khz.csv", robot)
+    out = {}
+    for method in METHODS:
+        answer = identify(log, robot, method=method)
+        out[method] = {"mass_kg": round(answer.mass, 4), "held": answer.held}
+    return out
+
+
+def semi_real(folder: Path) -> dict:
+    """Errors of a known payload added to the real unloaded log, mean over the windows."""
+    robot, truth = arm("panda"), test_payload().parameters.phi
+    log = read_recording(folder / "panda_unloaded_1khz.csv", robot)
+    ddq = savgol_filter(log.dq, 101, 3, deriv=1, delta=1 / log.rate, axis=0)
+    added = payload_regressor(robot.frame_motion(log.q), log.dq, ddq) @ truth
+    loaded = Recording(log.t, log.q, log.dq, log.tau + added, source="semi-real")
+    start = log.t[0]
+    tare = log.between(start, start + 10.0)
+    out = {}
+    for seconds in (1.0, 6.0):
+        windows = [loaded.between(start + w, start + w + seconds) for w in WINDOWS]
+        error = np.abs([PosteriorLeastSquares(robot, tare).run(w).phi - truth for w in windows]).mean(axis=0)
+        out[f"map, with tare, {seconds:g} s"] = {
+            "mass_g": round(1e3 * float(error[0]), 2),
+            "first_moment_g_m": np.round(1e3 * error[1:4], 2).tolist(),
+            "inertia_g_m2": np.round(1e3 * error[4:], 2).tolist(),
+            "windows": len(windows),
+        }
+    return out
+
+
+def main() -> None:
+    folder = data()
+    result = {
+        "command": "ARMLOAD_REAL_DATA=FOLDER python benchmarks/real_logs.py",
+        "version": __version__,
+        "ur10e_pair": ur10e(folder),
+        "panda_unloaded_phantom": phantom(folder),
+        "panda_semi_real": semi_real(folder),
+    }
+    text = json.dumps(result, indent=1)
+    (HERE / "results" / "real_logs.json").write_text(text + "\n")
+    print(text)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,30 @@
+"""Numbers in the README come from committed results, to the digit."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+RESULTS = ROOT / "benchmarks" / "results"
+
+
+def test_the_readme_s_table_is_that_of_the_committed_benchmark():
+    result = json.loads((RESULTS / "real_like_arms.json").read_text())
+    end, second = result["times"].index(6.0), result["times"].index(1.0)
+    for method, mae in result["mae"].items():
+        error, spread = 1e3 * np.array(mae), 1e3 * np.array(result["spread"][method])
+        row = (
+            f"| {method} | {error[end, 0]:.0f} ± {spread[end, 0]:.0f} | {error[end, 1:4].mean():.1f} "
+            f"| {error[end, 4:].mean():.1f} | {error[second, 0]:.0f} ± {spread[second, 0]:.0f} |"
+        )
+        assert row in README
+
+
+def test_the_readme_s_real_logs_are_those_of_the_committed_benchmark():
+    result = json.loads((RESULTS / "real_logs.json").read_text())
+    pair, semi = result["ur10e_pair"]["map"], result["panda_semi_real"]["map, with tare, 6 s"]
+    assert f"{pair['mass_kg']:.2f} ± {pair['half_width_kg']:.2f} kg" in README
+    assert f"{result['panda_unloaded_phantom']['map']['mass_kg']:.2f} kg" in README
+    assert f"{semi['mass_g']:.1f} g and {np.mean(semi['first_moment_g_m']):.1f} g·m" in README
