@@ -9,7 +9,7 @@ from pathlib import Path
 from armload import ArmloadError, arm
 from armload.dataset import build_dataset, split_payloads
 from armload.identify import identify
-from armload.learners import BaggingEnsemble, save_model
+from armload.learners import BaggingEnsemble, held_out_error, save_model
 from armload.motion import random_motion, taie2024
 from armload.payloads import container_loadings
 from armload.simulate import Sensors, World, simulate
@@ -25,7 +25,8 @@ dataset = build_dataset(
 split = split_payloads(dataset, seed=1)
 ensemble = BaggingEnsemble("tree", members=5, seed=1).fit(dataset.X[split.train], dataset.y[split.train])
 path = folder / "trees.safetensors"
-save_model(path, ensemble, arm=panda, motion=motion, dataset_hash=dataset.hash)
+error = held_out_error(ensemble, dataset, split.test)  # what its error bars rest on
+save_model(path, ensemble, arm=panda, motion=motion, dataset_hash=dataset.hash, error_std=error)
 
 # a loading that was held out, on the motion of the training
 unseen = loadings[dataset.payload[split.test[0]]]

@@ -341,3 +341,40 @@ def test_the_stream_refuses_another_arm_at_once_and_another_motion_on_a_recordin
         LearnedIdentifier(model, panda).run(elsewhere)
     anyway = LearnedIdentifier(model, panda, any_motion=True).run(elsewhere)
     assert anyway.n_samples == len(elsewhere)
+
+
+# ---------------------------------------------------------------------------- error bars
+
+
+def test_error_bars_rest_on_held_out_payloads_and_not_on_the_members_agreement(panda, tmp_path):
+    """Trees that agree to the gram may be wrong together: the interval must know."""
+    from armload.dataset import build_dataset, split_payloads
+    from armload.identify import identify
+    from armload.learners import held_out_error
+    from armload.motion import taie2024
+    from armload.payloads import container_loadings
+    from armload.simulate import simulate
+
+    motion, loadings = taie2024(), container_loadings()[::8]
+    dataset = build_dataset(tmp_path / "data", panda, [motion], loadings, rows_per_run=60, progress=False)
+    split = split_payloads(dataset, 0, (0.7, 0.0, 0.3))
+    bag = BaggingEnsemble("tree", members=3, seed=0).fit(dataset.X[split.train], dataset.y[split.train])
+    error = held_out_error(bag, dataset, split.test)
+
+    by_hand = []
+    for run in np.unique(dataset.run[split.test]):
+        rows = np.flatnonzero(dataset.run == run)
+        by_hand.append(bag.predict(dataset.X[rows]).mean(axis=0) - dataset.truth(run).phi)
+    assert error == pytest.approx(np.sqrt(np.mean(np.square(by_hand), axis=0)))
+
+    where = {"arm": panda, "motion": motion, "dataset_hash": dataset.hash}
+    known = save_model(tmp_path / "known.safetensors", bag, **where, error_std=error)
+    save_model(tmp_path / "unknown.safetensors", bag, **where)
+    assert np.array_equal(load_model(tmp_path / "known.safetensors").error_std, error)
+
+    log = simulate(panda, motion, dataset.truth(int(dataset.run[split.test][0])), rate=100.0)
+    answer = identify(log, panda, method=tmp_path / "known.safetensors")
+    half = 0.5 * (np.array(answer.phi_high) - answer.phi_low)[np.array(answer.determined)]
+    assert np.all(half >= 1.95 * error[np.array(answer.determined)])
+    assert np.all(LearnedIdentifier(known, panda).run(log).std >= error)
+    assert not any(identify(log, panda, method=tmp_path / "unknown.safetensors").determined)

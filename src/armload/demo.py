@@ -198,7 +198,7 @@ def _train(
     clock: _Clock,
 ) -> dict[str, Method]:
     """One ensemble of each kind, single-stage and two-stage, saved and read back as a stream identifier."""
-    from armload.learners import BaggingEnsemble, NetworkLearner, TwoStage, save_model
+    from armload.learners import BaggingEnsemble, NetworkLearner, TwoStage, held_out_error, save_model
 
     network = NetworkLearner(hidden=size.hidden, max_epochs=size.epochs)
     ensembles: dict[str, BaggingEnsemble | TwoStage] = {
@@ -213,7 +213,8 @@ def _train(
         clock.start(f"training {name}", f"{size.members} members on {len(split.train)} rows")
         ensemble.fit(*data, progress=progress)
         path = folder / f"{name.replace(', ', '-').replace(' ', '-')}.safetensors"
-        model = save_model(path, ensemble, arm=robot, motion=motion, dataset_hash=dataset.hash)
+        error = held_out_error(ensemble, dataset, split.validation)
+        model = save_model(path, ensemble, arm=robot, motion=motion, dataset_hash=dataset.hash, error_std=error)
         out[name] = partial(_learned, model, robot)
     return out
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -170,13 +170,16 @@ def _run(
 
     if tare is not None:
         raise IdentificationError(
-            f"the trained model {method} cannot use a tare, an empty arm lies outside its training: leave the tare out, "
-            "or use the method map"
+            f"the trained model {method} cannot use a tare (an empty arm lies outside its training): leave the tare "
+            "out, or use the method map"
         )
     model = load_model(method)
     model.check(arm, recording)
     estimate = LearnedIdentifier(model, arm).run(recording)
-    return estimate, model.phi_std, True, model.kind, f"asked for; {method} was trained on this arm and motion"
+    family = np.maximum(model.phi_std, _SMALL / Z95)  # what did not vary in training is not known exactly for that
+    if model.error_std is None:  # how far the members disagree is no error bar
+        estimate = replace(estimate, covariance=np.diag(family**2))
+    return estimate, family, True, model.kind, f"asked for; {method} was trained on this arm and motion"
 
 
 def _minus_tare(identifier: Identifier, recording: Recording, tare: Recording | None) -> Estimate:

@@ -67,7 +67,7 @@ def parser() -> Parser:
 def run(options: argparse.Namespace) -> None:
     """Train on both splits, print the errors on what was held out, save the model of the chosen split."""
     from armload.dataset import open_dataset, split_payloads, split_rows
-    from armload.learners import save_model
+    from armload.learners import held_out_error, save_model
 
     if options.kind == "mixed" and options.stages == 2:
         raise UsageError("--kind mixed has one stage: leave out --stages 2, or choose tree or network")
@@ -75,16 +75,24 @@ def run(options: argparse.Namespace) -> None:
     arm = arm_of_dataset(dataset, options.robot)
     motions = _motions(dataset, arm, options.motion)
     splits = {"payload": split_payloads, "row": split_rows}
-    rows = []
+    rows, error_std = [], None
     for name in sorted(splits, key=lambda name: name == options.split):  # the one to save last
         split = splits[name](dataset, options.seed)
         model = _untrained(options)
         print_note(f"training on {len(split.train)} rows, split by {name}")
         (X, y), (Xv, yv) = ((dataset.X[part], dataset.y[part]) for part in (split.train, split.validation))
         model.fit(X, y, Xv, yv, progress=sys.stderr.isatty())
+        if name == "payload":
+            error_std = held_out_error(model, dataset, split.test)
         rows += _errors(name, model, y.mean(axis=0), dataset.X[split.test], dataset.y[split.test])
     saved = save_model(
-        options.out, model, arm=arm, motion=motions, dataset_hash=dataset.hash, notes=f"split by {options.split}"
+        options.out,
+        model,
+        arm=arm,
+        motion=motions,
+        dataset_hash=dataset.hash,
+        error_std=error_std,
+        notes=f"split by {options.split}",
     )
     print_table(_table(saved.kind, rows, options))
     print(f"wrote {options.out}: {saved.compiled.n_members} members, split by {options.split}, about {saved.frame}")

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from armload.learners.artefact import load_model, save_model
     from armload.learners.bagging import BaggingEnsemble
     from armload.learners.compiled import Compiled
+    from armload.learners.held_out import held_out_error
     from armload.learners.model import LearnedModel
     from armload.learners.network import NetworkLearner
     from armload.learners.online import LearnedIdentifier
@@ -29,6 +30,7 @@ __all__ = [
     "Progress",
     "TreeLearner",
     "TwoStage",
+    "held_out_error",
     "load_model",
     "save_model",
 ]
@@ -43,6 +45,7 @@ _HOME = {
     "Progress": "progress",
     "TreeLearner": "tree",
     "TwoStage": "stages",
+    "held_out_error": "held_out",
     "load_model": "artefact",
     "save_model": "artefact",
 }

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
 from armload.errors import ArmloadError, ModelError
@@ -43,6 +43,7 @@ def save_model(
     motion: Motion | MotionFingerprint | Sequence[Motion | MotionFingerprint] | None,
     dataset_hash: str,
     frame: str | None = None,
+    error_std: ArrayLike | None = None,
     notes: str = "",
 ) -> LearnedModel:
     """Write a fitted ensemble to one .safetensors file and return it as loaded from there.
@@ -55,6 +56,8 @@ def save_model(
             motion, and no recording is refused for its motion.
         dataset_hash: `Dataset.hash` of the training data.
         frame: the payload frame; must be the arm's. Default: the arm's.
+        error_std: (10,) root-mean-square error on payloads held out from training (`held_out_error`). None: unknown;
+            the model then gives no interval but that of its training payloads.
         notes: anything worth remembering.
 
     Raises:
@@ -83,6 +86,7 @@ def save_model(
         "features": feature_names(arm.n),
         "phi_mean": model.y_mean_.tolist(),
         "phi_std": model.y_std_.tolist(),
+        "error_std": None if error_std is None else np.asarray(error_std, dtype=float).tolist(),
         "settings": {k: v for k, v in model.get_params().items() if isinstance(v, str | int | float | bool | None)}
         | {"members": compiled.n_members},
         "epochs": None if model.epochs_ is None else model.epochs_.tolist(),
@@ -147,6 +151,7 @@ def load_model(path: str | PathLike[str]) -> LearnedModel:
             dataset_hash=header["dataset_hash"],
             phi_mean=np.array(header["phi_mean"], dtype=float),
             phi_std=np.array(header["phi_std"], dtype=float),
+            error_std=None if header["error_std"] is None else np.array(header["error_std"], dtype=float),
             settings=header["settings"],
             epochs=header["epochs"],
             versions=header["versions"],
@@ -155,7 +160,8 @@ def load_model(path: str | PathLike[str]) -> LearnedModel:
         )
         if header["features"] != model.features or compiled.n_features != len(model.features):
             raise ValueError(f"{compiled.n_features} features, named {', '.join(map(str, header['features']))}")
-        if not compiled.n_outputs == len(model.phi_mean) == len(model.phi_std) == len(NAMES):
+        sizes = {len(x) for x in (model.phi_mean, model.phi_std, model.error_std) if x is not None}
+        if sizes | {compiled.n_outputs} != {len(NAMES)}:
             raise ValueError(f"{compiled.n_outputs} outputs")
     except ModelError:
         raise

@@ -29,6 +29,7 @@ class LearnedModel:
     arm_name, arm_fingerprint, joint_names, frame: the arm it was trained on, and what phi is about.
     motions: fingerprints of the motions it was trained on; empty if it is not tied to any.
     dataset_hash: of the training data. phi_mean, phi_std: (10,) of the training payloads, by rows.
+    error_std: (10,) root-mean-square error of a whole run's estimate on payloads held out from training; None: unknown.
     settings, epochs, versions, notes: how it was trained. source: the file.
     """
 
@@ -42,6 +43,7 @@ class LearnedModel:
     dataset_hash: str
     phi_mean: NDArray[np.float64]
     phi_std: NDArray[np.float64]
+    error_std: NDArray[np.float64] | None
     settings: dict[str, Any]
     epochs: list[int] | None
     versions: dict[str, str]

@@ -17,9 +17,10 @@ class LearnedIdentifier(Identifier):
 
     phī(k) = Σ_{j ≤ k} K(x_j) / k,  x_j = (t_j − t_1, q_j, dq_j, tau_j),  K the mean over the members (eq. 8).
 
-    The covariance is diagonal: the variance of the members' own averages. It says how far the members disagree, not how
-    far they are from the truth; five members cannot tell correlations. It is infinite for a model of one member and
-    before the first sample, when phi is the training mean.
+    The covariance is diagonal: the variance of the members' own averages, plus the square of the model's error on
+    payloads held out from training where that is known (`LearnedModel.error_std`). The members' disagreement alone
+    says nothing of how far they are from the truth together. It is infinite before the first sample, when phi is the
+    training mean, and for a model of one member whose error is unknown.
 
     The model knows a motion from its start, so the first sample must be that start. A stream cannot know whether a
     motion will be followed, so `update` never refuses a sample; `trace` and `run` check the whole recording first
@@ -79,4 +80,6 @@ class LearnedIdentifier(Identifier):
             phi, spread = self.model.phi_mean, np.full(10, np.inf)
         else:
             phi, spread = self._averages.mean(axis=0), member_spread(self._averages)
+            if self.model.error_std is not None:
+                spread = np.hypot(np.where(np.isfinite(spread), spread, 0.0), self.model.error_std)
         return Estimate(self._t, phi, np.diag(spread**2), self._count, self.model.frame)
