@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -128,9 +128,20 @@ def identify(
     if tool is not None:
         arm = arm.with_payload(arm.in_frame(tool))
     say("identifying")
-    estimate, prior_std, shrinks, name, why = _run(recording, arm, tare, method)
+    found = _run(recording, arm, tare, method)
     relative_to = "tare" if tare is not None else "tool" if tool is not None else "arm"
-    return _answer(estimate, prior_std, shrinks, name, why, arm, recording, relative_to)
+    return _answer(found, arm, recording, relative_to)
+
+
+class _Found(NamedTuple):
+    """What a method found, and what was known before: mean and standard deviation (10,), used as a prior or not."""
+
+    estimate: Estimate
+    before: NDArray[np.float64]
+    before_std: NDArray[np.float64]
+    prior: bool
+    method: str
+    why: str
 
 
 def _check(log: Recording, arm: Arm) -> None:
@@ -145,11 +156,8 @@ def _check(log: Recording, arm: Arm) -> None:
         )
 
 
-def _run(
-    recording: Recording, arm: Arm, tare: Recording | None, method: str | Path | None
-) -> tuple[Estimate, NDArray, bool, str, str]:
-    """The estimate, the standard deviation of what was known before, whether that was used as a prior, method, why."""
-    weak = payload_prior_std(arm)
+def _run(recording: Recording, arm: Arm, tare: Recording | None, method: str | Path | None) -> _Found:
+    nothing, weak = np.zeros(10), payload_prior_std(arm)
     if method is None or method == "map":
         why = (
             "map holds for any motion and payload; a trained model is taken only when named"
@@ -158,10 +166,10 @@ def _run(
         )
         if tare is None:
             why += "; without a tare the error bars allow for the model's errors"
-        return PosteriorLeastSquares(arm, tare).run(recording), weak, True, "map", why
+        return _Found(PosteriorLeastSquares(arm, tare).run(recording), nothing, weak, True, "map", why)
     if method in ("rls", "rls-filter"):
         identifier = RecursiveLeastSquares(arm) if method == "rls" else FilteredRecursiveLeastSquares(arm)
-        return _minus_tare(identifier, recording, tare), weak, False, str(method), "asked for"
+        return _Found(_minus_tare(identifier, recording, tare), nothing, weak, False, str(method), "asked for")
     if not Path(method).exists():
         raise IdentificationError(
             f"unknown method {str(method)!r}: expected one of {', '.join(METHODS)}, or the path of a trained model"
@@ -179,7 +187,8 @@ def _run(
     family = np.maximum(model.phi_std, _SMALL / Z95)  # what did not vary in training is not known exactly for that
     if model.error_std is None:  # how far the members disagree is no error bar
         estimate = replace(estimate, covariance=np.diag(family**2))
-    return estimate, family, True, model.kind, f"asked for; {method} was trained on this arm and motion"
+    why = f"asked for; {method} was trained on this arm and motion"
+    return _Found(estimate, model.phi_mean, family, True, model.kind, why)
 
 
 def _minus_tare(identifier: Identifier, recording: Recording, tare: Recording | None) -> Estimate:
@@ -197,20 +206,13 @@ def _minus_tare(identifier: Identifier, recording: Recording, tare: Recording | 
     )
 
 
-def _answer(
-    estimate: Estimate,
-    prior_std: NDArray,
-    shrinks: bool,
-    name: str,
-    why: str,
-    arm: Arm,
-    recording: Recording,
-    relative_to: str,
-) -> Identification:
-    phi, half, before = estimate.phi.copy(), Z95 * estimate.std, Z95 * prior_std
-    determined = half <= (before / _SHRINK if shrinks else _SMALL)
+def _answer(found: _Found, arm: Arm, recording: Recording, relative_to: str) -> Identification:
+    estimate, before = found.estimate, found.before
+    phi, half, half_before = estimate.phi.copy(), Z95 * estimate.std, Z95 * found.before_std
+    determined = half <= (half_before / _SHRINK if found.prior else _SMALL)
     held = bool(determined[0] and phi[0] > _HELD * estimate.std[0])
-    low, high = np.where(determined, phi - half, -before), np.where(determined, phi + half, before)
+    low = np.where(determined, phi - half, before - half_before)
+    high = np.where(determined, phi + half, before + half_before)
     removed = determined[0] and phi[0] < -half[0]
     notes = []
     if removed:
@@ -229,7 +231,7 @@ def _answer(
         notes.append(f"this motion does not determine {missing}: what was known before is reported for them")
     mass, com, inertia_com = phi_to_com(phi)
     return Identification(
-        method=name,
+        method=found.method,
         robot=arm.name,
         frame=str(arm.frame),
         relative_to=relative_to,
@@ -245,6 +247,6 @@ def _answer(
         inertia_com=inertia_com.tolist(),
         consistent=is_consistent(phi),
         held=held,
-        why=why,
+        why=found.why,
         notes=tuple(notes),
     )

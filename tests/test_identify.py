@@ -1,0 +1,115 @@
+"""One log in, one answer out: intervals, what is determined, tare, tool, frames, and bodies that can exist."""
+
+import numpy as np
+import pytest
+
+from armload.arms import arm
+from armload.errors import IdentificationError
+from armload.identify import METHODS, Z95, identify
+from armload.inertia import InertialParameters, is_consistent
+from armload.least_squares import PosteriorLeastSquares, payload_prior_std
+from armload.motion import random_motion, taie2024
+from armload.recording import Recording
+from armload.simulate import Sensors, World, simulate
+
+BOX = InertialParameters.from_com(1.2, (0.02, -0.03, 0.07), np.diag([4e-3, 3e-3, 2e-3]))
+TOOL = InertialParameters.from_com(0.8, (0.0, 0.01, 0.04), np.diag([1e-3, 1e-3, 5e-4]))
+
+
+@pytest.fixture(scope="module")
+def real_like():
+    """A Panda that differs from its model, and its sensors."""
+    panda = arm("panda")
+    return panda, {"world": World.real_like(panda, 5), "sensors": Sensors.panda(panda), "rate": 500.0}
+
+
+@pytest.fixture(scope="module")
+def loaded(real_like):
+    panda, how = real_like
+    return simulate(panda, taie2024(), BOX, seed=1, **how)
+
+
+def test_the_answer_is_the_method_s_estimate_moved_to_the_nearest_body(loaded, real_like):
+    panda, _ = real_like
+    answer, estimate = identify(loaded, panda), PosteriorLeastSquares(panda).run(loaded)
+    assert answer.consistent
+    assert is_consistent(answer.phi)
+    known = np.array(answer.determined)
+    away = np.abs(np.array(answer.phi) - estimate.phi)
+    assert np.all(away[known] <= Z95 * estimate.std[known])
+    assert answer.parameters.mass == answer.mass
+    again = InertialParameters.from_com(answer.mass, answer.com, answer.inertia_com)
+    assert again.phi == pytest.approx(np.array(answer.phi), abs=1e-12)
+
+
+@pytest.mark.parametrize("method", [None, *METHODS])
+def test_every_interval_is_finite_and_holds_the_point(loaded, real_like, method):
+    panda, _ = real_like
+    answer = identify(loaded, panda, method=method)
+    phi, low, high = (np.array(x) for x in (answer.phi, answer.phi_low, answer.phi_high))
+    assert np.isfinite([phi, low, high]).all()
+    assert np.all(low <= phi)
+    assert np.all(phi <= high)
+    assert answer.interval == "approximate"
+
+
+def test_undetermined_parameters_carry_the_interval_of_what_was_known_before(panda):
+    pose = np.tile([0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8], (400, 1))
+    still = Recording(np.arange(400) * 0.01, pose, 0 * pose, panda.with_payload(BOX).torque(pose))
+    answer = identify(still, panda)
+    assert answer.determined[0]
+    assert answer.phi[0] == pytest.approx(BOX.mass, abs=0.1)
+    assert not any(answer.determined[4:])
+    before = Z95 * payload_prior_std(panda)
+    assert np.array(answer.phi_high)[4:] == pytest.approx(before[4:])
+    assert "Izz" in answer.notes[0]
+
+
+def test_a_tare_with_a_tool_leaves_what_was_added_and_a_known_tool_what_it_carries(real_like):
+    panda, how = real_like
+    both = simulate(panda, taie2024(), TOOL + BOX, seed=3, **how)
+    tare = simulate(panda, random_motion(panda, 8, duration=15.0, harmonics=8), TOOL, seed=4, **how)
+    by_tare, by_tool = identify(both, panda, tare=tare), identify(both, panda, tool=TOOL)
+    assert (by_tare.relative_to, by_tool.relative_to) == ("tare", "tool")
+    for answer in (by_tare, by_tool):
+        assert answer.phi_low[0] < BOX.mass < answer.phi_high[0]
+        assert answer.com == pytest.approx(BOX.com, abs=0.025)
+    assert identify(both, panda).mass > BOX.mass + 0.6 * TOOL.mass
+
+
+def test_what_was_taken_off_since_the_tare_is_negative_and_said_so(real_like):
+    panda, how = real_like
+    tare = simulate(panda, taie2024(), TOOL + BOX, seed=3, **how)
+    now = simulate(panda, taie2024(), TOOL, seed=4, **how)
+    answer = identify(now, panda, tare=tare)
+    assert answer.mass == pytest.approx(-BOX.mass, abs=0.05)
+    assert (answer.held, answer.consistent) == (False, False)
+    assert "taken off" in answer.notes[0]
+
+
+def test_an_empty_arm_holds_nothing_and_a_light_payload_is_held_with_a_tare(real_like):
+    panda, how = real_like
+    light = InertialParameters.from_com(0.25, (0, 0, 0.05), np.diag([2e-4] * 3))
+    empty = simulate(panda, taie2024(), None, seed=5, **how)
+    tare = simulate(panda, random_motion(panda, 9, duration=15.0, harmonics=8), None, seed=6, **how)
+    assert not identify(empty, panda).held
+    assert not identify(empty, panda, tare=tare).held
+    assert identify(simulate(panda, taie2024(), light, seed=7, **how), panda, tare=tare).held
+
+
+def test_another_frame_moves_the_same_body(loaded):
+    flange, wrist = arm("panda"), arm("panda", "panda_link7")
+    here, there = identify(loaded, flange), identify(loaded, wrist)
+    assert there.mass == pytest.approx(here.mass, abs=0.01)
+    # panda_link8 sits 0.107 m along z of panda_link7, axes parallel
+    assert np.array(there.com) - here.com == pytest.approx([0, 0, 0.107], abs=0.01)
+
+
+def test_only_measured_torque_at_a_useful_rate_is_taken(panda, analytic_log):
+    log = analytic_log(panda, BOX)
+    with pytest.raises(IdentificationError, match="external torque"):
+        identify(Recording(log.t, log.q, log.dq, log.tau, channel="external"), panda)
+    with pytest.raises(IdentificationError, match="10 Hz"):
+        identify(log.select(slice(None, None, 20)), panda)
+    with pytest.raises(IdentificationError, match="unknown method 'magic'"):
+        identify(log, panda, method="magic")
