@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal, overload
+from typing import Any, Literal, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +13,7 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from armload.errors import ModelError
-from armload.learners.bag import Bag, Learner, draw_bag
+from armload.learners.bag import Learner, draw_bag
 from armload.learners.network import NetworkLearner
 from armload.learners.progress import Report, reporter
 from armload.learners.tree import TreeLearner
@@ -20,10 +21,50 @@ from armload.learners.tree import TreeLearner
 KINDS: dict[str, type[Learner]] = {"tree": TreeLearner, "network": NetworkLearner}
 
 
-class Ensemble(RegressorMixin, BaseEstimator):
-    """What every ensemble shares: checked input, prediction through its compiled members."""
+Rows = tuple[NDArray[np.float64], NDArray[np.float64]]  # X (N, d) and y (N, k)
 
-    # A fitted ensemble has `compiled_`: a `Compiled`, the members without the libraries that trained them.
+
+class Ensemble(RegressorMixin, BaseEstimator, ABC):
+    """What every ensemble shares: checked input, prediction through its compiled members.
+
+    Subclasses implement `_train`, which sets `compiled_`: a `Compiled`, the members without the libraries that trained
+    them.
+    """
+
+    def fit(
+        self,
+        X: ArrayLike,
+        y: ArrayLike,
+        X_val: ArrayLike | None = None,
+        y_val: ArrayLike | None = None,
+        *,
+        progress: bool | Report | None = None,
+        checkpoint: str | PathLike[str] | None = None,
+    ) -> Self:
+        """Train the members.
+
+        Args:
+            X: (N, d) features; for a payload model, rows of (t, q, dq, tau).
+            y: (N, k) or (N,) outputs; for a payload model, phi.
+            X_val, y_val: validation rows; they stop the networks' training. Trees do not use them.
+            progress: True for a bar, or a function called with a `Progress`.
+            checkpoint: a file (.npz) to which network training is saved every few seconds and when interrupted, and
+                from which the same call goes on exactly. It stays when training ends; trees do not use it. An ensemble
+                made of several writes one for each: training.npz → training.stage1.npz, …
+
+        Raises:
+            ModelError: unknown kind or scale, fewer than one member, a checkpoint of another training, or for two-stage
+                training a y that does not have the ten columns of phi.
+        """
+        rows, validation = self._checked(X, y, X_val, y_val)
+        self._train(rows, validation, progress, Path(checkpoint) if checkpoint else None)
+        return self
+
+    @abstractmethod
+    def _train(
+        self, rows: Rows, validation: Rows | None, progress: bool | Report | None, checkpoint: Path | None
+    ) -> None:
+        """Train on rows that are checked."""
 
     @overload
     def predict(self, X: ArrayLike, return_std: Literal[False] = False) -> NDArray[np.float64]: ...
@@ -48,8 +89,8 @@ class Ensemble(RegressorMixin, BaseEstimator):
 
     def _checked(
         self, X: ArrayLike, y: ArrayLike, X_val: ArrayLike | None, y_val: ArrayLike | None
-    ) -> tuple[NDArray, NDArray, tuple[NDArray, NDArray] | None]:
-        """Float arrays X (N, d), y (N, k) and the validation rows; notes the features and what y is like."""
+    ) -> tuple[Rows, Rows | None]:
+        """Training and validation rows as float arrays; notes the features and what y is like."""
         checks: dict[str, Any] = {"dtype": np.float64, "multi_output": True, "y_numeric": True}
         check: Any = validate_data  # its stubs know strings only
         rows, outputs = check(self, X, y, **checks)
@@ -59,12 +100,12 @@ class Ensemble(RegressorMixin, BaseEstimator):
         if (X_val is None) != (y_val is None):
             raise ModelError("X_val and y_val go together: give both or neither")
         if X_val is None:
-            return rows, outputs, None
+            return (rows, outputs), None
         rows_val, outputs_val = check(self, X_val, y_val, reset=False, **checks)
         outputs_val = np.asarray(outputs_val, dtype=float).reshape(len(rows_val), -1)
         if outputs_val.shape[1] != outputs.shape[1]:
             raise ModelError(f"y_val has {outputs_val.shape[1]} columns: expected {outputs.shape[1]}, as y")
-        return rows, outputs, (rows_val, outputs_val)
+        return (rows, outputs), (rows_val, outputs_val)
 
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()
@@ -72,7 +113,27 @@ class Ensemble(RegressorMixin, BaseEstimator):
         return tags
 
 
-class BaggingEnsemble(Ensemble):
+class OneKind(Ensemble):
+    """The settings of an ensemble whose learners are all of one kind; see `BaggingEnsemble`."""
+
+    def __init__(
+        self,
+        kind: str | Learner = "tree",
+        members: int = 5,
+        seed: int = 0,
+        bootstrap: bool = True,
+        scale: str = "standard",
+        hold_out: float = 0.15,
+    ) -> None:
+        self.kind = kind
+        self.members = members
+        self.seed = seed
+        self.bootstrap = bootstrap
+        self.scale = scale
+        self.hold_out = hold_out
+
+
+class BaggingEnsemble(OneKind):
     """A bag of trees or networks, as Fig. 3 of Taie et al., RA-L 2024.
 
     Every member sees its own N of the N training rows, drawn with replacement, and likewise of the validation rows.
@@ -102,51 +163,15 @@ class BaggingEnsemble(Ensemble):
         losses_: (epochs, M) validation losses in scaled units, NaN once a member stopped; None for trees.
     """
 
-    def __init__(
-        self,
-        kind: str | Learner = "tree",
-        members: int = 5,
-        seed: int = 0,
-        bootstrap: bool = True,
-        scale: str = "standard",
-        hold_out: float = 0.15,
+    def _train(
+        self, rows: Rows, validation: Rows | None, progress: bool | Report | None, checkpoint: Path | None
     ) -> None:
-        self.kind = kind
-        self.members = members
-        self.seed = seed
-        self.bootstrap = bootstrap
-        self.scale = scale
-        self.hold_out = hold_out
-
-    def fit(
-        self,
-        X: ArrayLike,
-        y: ArrayLike,
-        X_val: ArrayLike | None = None,
-        y_val: ArrayLike | None = None,
-        *,
-        progress: bool | Report | None = None,
-        checkpoint: str | PathLike[str] | None = None,
-    ) -> BaggingEnsemble:
-        """Train the members.
-
-        Args:
-            X: (N, d) features; for a payload model, rows of (t, q, dq, tau).
-            y: (N, k) or (N,) outputs; for a payload model, phi.
-            X_val, y_val: validation rows; they stop the networks' training. Trees do not use them.
-            progress: True for a bar, or a function called with a `Progress`.
-            checkpoint: a file (.npz) to which network training is saved every few seconds and when interrupted, and
-                from which the same call goes on exactly. It stays when training ends; trees do not use it.
-
-        Raises:
-            ModelError: unknown kind or scale, fewer than one member, or a checkpoint of another training.
-        """
-        X, y, validation = self._checked(X, y, X_val, y_val)
         learner = as_learner(self.kind)
         for name, least in (("members", 1), ("seed", 0)):
             if getattr(self, name) < least:
                 raise ModelError(f"{name} is {getattr(self, name)}: expected a whole number of at least {least}")
-        bag: Bag = draw_bag(
+        X, y = rows
+        bag = draw_bag(
             X,
             y,
             validation if learner.validates else (X[:1], y[:1]),
@@ -157,9 +182,7 @@ class BaggingEnsemble(Ensemble):
             hold_out=self.hold_out,
         )
         with reporter(progress) as report:
-            fitted = learner.fit_bag(bag, report, Path(checkpoint) if checkpoint else None)
-        self.compiled_, self.epochs_, self.losses_ = fitted
-        return self
+            self.compiled_, self.epochs_, self.losses_ = learner.fit_bag(bag, report, checkpoint)
 
     @property
     def kind_name(self) -> str:

@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from os import PathLike
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from armload.errors import ModelError
 from armload.learners.bag import Learner
-from armload.learners.bagging import BaggingEnsemble, Ensemble, as_learner
+from armload.learners.bagging import BaggingEnsemble, Ensemble, OneKind, Rows, as_learner
 from armload.learners.compiled import Beside, Together
 from armload.learners.progress import Report
 
 STAGES = (slice(0, 4), slice(4, 10))  # (m, m·r) and the inertia
 
 
-class TwoStage(Ensemble):
+class TwoStage(OneKind):
     """Two ensembles, one for (m, m·r) and one for the inertia: "two-stage training" of Taie et al. 2024, Section IV.
 
     Both stages draw the same rows: the model equals a `BaggingEnsemble` with the same seed on each group of columns.
@@ -31,54 +29,25 @@ class TwoStage(Ensemble):
         compiled_: their members side by side, member i of one beside member i of the other.
     """
 
-    def __init__(
-        self,
-        kind: str | Learner = "tree",
-        members: int = 5,
-        seed: int = 0,
-        bootstrap: bool = True,
-        scale: str = "standard",
-        hold_out: float = 0.15,
+    def _train(
+        self, rows: Rows, validation: Rows | None, progress: bool | Report | None, checkpoint: Path | None
     ) -> None:
-        self.kind = kind
-        self.members = members
-        self.seed = seed
-        self.bootstrap = bootstrap
-        self.scale = scale
-        self.hold_out = hold_out
-
-    def fit(
-        self,
-        X: ArrayLike,
-        y: ArrayLike,
-        X_val: ArrayLike | None = None,
-        y_val: ArrayLike | None = None,
-        *,
-        progress: bool | Report | None = None,
-        checkpoint: str | PathLike[str] | None = None,
-    ) -> TwoStage:
-        """Train both ensembles on y (N, 10); arguments as in `BaggingEnsemble.fit`.
-
-        Raises:
-            ModelError: y does not have the ten columns of phi, and as in `BaggingEnsemble.fit`.
-        """
-        X, y, validation = self._checked(X, y, X_val, y_val)
+        X, y = rows
         if y.shape[1] != 10:
             raise ModelError(f"y has {y.shape[1]} column(s): two-stage training expects the ten of phi")
-        Xv, yv = validation or (None, None)
+        X_val, y_val = validation or (None, None)
         self.stages_ = [
             BaggingEnsemble(self.kind, self.members, self.seed, self.bootstrap, self.scale, self.hold_out).fit(
                 X,
                 y[:, columns],
-                Xv,
-                None if yv is None else yv[:, columns],
+                X_val,
+                None if y_val is None else y_val[:, columns],
                 progress=progress,
                 checkpoint=_beside(checkpoint, f"stage{k}"),
             )
             for k, columns in enumerate(STAGES, start=1)
         ]
         self.compiled_ = Beside([stage.compiled_ for stage in self.stages_])
-        return self
 
     @property
     def epochs_(self) -> np.ndarray | None:
@@ -97,6 +66,10 @@ class MixedEnsemble(Ensemble):
     Args:
         kinds: the kinds of learners; `members` of each.
         members, seed, bootstrap, scale, hold_out: see `BaggingEnsemble`.
+
+    Attributes:
+        parts_: the fitted ensemble of each kind.
+        compiled_: all their members.
     """
 
     def __init__(
@@ -115,32 +88,21 @@ class MixedEnsemble(Ensemble):
         self.scale = scale
         self.hold_out = hold_out
 
-    def fit(
-        self,
-        X: ArrayLike,
-        y: ArrayLike,
-        X_val: ArrayLike | None = None,
-        y_val: ArrayLike | None = None,
-        *,
-        progress: bool | Report | None = None,
-        checkpoint: str | PathLike[str] | None = None,
-    ) -> MixedEnsemble:
-        """Train the ensemble of each kind; arguments as in `BaggingEnsemble.fit`."""
-        X, y, validation = self._checked(X, y, X_val, y_val)
-        Xv, yv = validation or (None, None)
-        self.stages_ = [
+    def _train(
+        self, rows: Rows, validation: Rows | None, progress: bool | Report | None, checkpoint: Path | None
+    ) -> None:
+        self.parts_ = [
             BaggingEnsemble(kind, self.members, self.seed, self.bootstrap, self.scale, self.hold_out).fit(
-                X, y, Xv, yv, progress=progress, checkpoint=_beside(checkpoint, f"part{k}")
+                *rows, *(validation or ()), progress=progress, checkpoint=_beside(checkpoint, f"part{k}")
             )
             for k, kind in enumerate(self.kinds, start=1)
         ]
-        self.compiled_ = Together([part.compiled_ for part in self.stages_])
-        return self
+        self.compiled_ = Together([part.compiled_ for part in self.parts_])
 
     @property
     def epochs_(self) -> np.ndarray | None:
         """Epochs of the networks among the members; None without networks."""
-        return _epochs(self.stages_)
+        return _epochs(self.parts_)
 
     @property
     def kind_name(self) -> str:
@@ -153,9 +115,6 @@ def _epochs(parts: Sequence[BaggingEnsemble]) -> np.ndarray | None:
     return np.concatenate(found) if found else None
 
 
-def _beside(checkpoint: str | PathLike[str] | None, part: str) -> Path | None:
+def _beside(checkpoint: Path | None, part: str) -> Path | None:
     """The checkpoint of one part: training.npz → training.stage1.npz."""
-    if checkpoint is None:
-        return None
-    path = Path(checkpoint)
-    return path.with_name(f"{path.stem}.{part}{path.suffix}")
+    return None if checkpoint is None else checkpoint.with_name(f"{checkpoint.stem}.{part}{checkpoint.suffix}")
