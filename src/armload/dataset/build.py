@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armload.arms import Arm
+from armload.atomic import replacing
 from armload.dataset.provenance import (
     PROVENANCE_FILE,
     TABLE_FILE,
@@ -28,7 +29,7 @@ from armload.dataset.table import IDENTITIES, Dataset, content_hash, open_datase
 from armload.errors import DatasetError
 from armload.motion import Motion
 from armload.payloads import Payload
-from armload.recording import Recording, replacing
+from armload.recording import Recording
 from armload.simulate import Run, Sensors, World, simulate_many
 
 if TYPE_CHECKING:

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from armload.arms import Arm
+from armload.atomic import replacing
 from armload.errors import DatasetError
 from armload.motion import Motion, MotionFingerprint
 from armload.payloads import Payload
-from armload.recording import replacing
 from armload.simulate import Sensors, World
 
 FORMAT = "armload data set 1"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from armload.atomic import replacing
 from armload.errors import ModelError
 
 
@@ -39,13 +39,12 @@ class TrainingState:
     losses: list[NDArray[np.float64]]
 
     def save(self, path: Path, key: str) -> None:
-        """Write to a file beside it, then rename: the file is always whole."""
+        """Write the state, whole or not at all; `key` says which training it is of."""
         weights, first, second, count = self.training
         groups = {"weights": weights, "first": first, "second": second, "best": self.best}
         arrays = {f"{g}_{name}": np.asarray(a) for g, w in groups.items() for name, a in w._asdict().items()}
         path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_name(path.name + ".part")
-        with part.open("wb") as file:
+        with replacing(path) as temporary, temporary.open("wb") as file:
             np.savez(
                 file,
                 key=np.array(key),
@@ -57,10 +56,14 @@ class TrainingState:
                 losses=np.array(self.losses).reshape(-1, len(self.epochs)),
                 **arrays,  # type: ignore[arg-type]
             )
-        os.replace(part, path)
 
     @classmethod
     def load(cls, path: Path, key: str) -> TrainingState:
+        """The state that `save` wrote.
+
+        Raises:
+            ModelError: not a checkpoint, a damaged one, or one of another training.
+        """
         try:
             with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
                 a = dict(file)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from armload.atomic import replacing
 from armload.errors import MotionError
 from armload.motion.fourier import FourierMotion
 from armload.motion.motion import Motion
@@ -73,23 +72,12 @@ def motion_to_json(motion: Motion) -> str:
 
 
 def write_whole(path: str | Path, text: str) -> None:
-    """Write a text file under another name and move it into place, so that nobody ever sees half of it."""
-    path = Path(path)
+    """Write a text file, complete or not at all; MotionError if it cannot be written."""
     try:
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        with replacing(path) as temporary:
+            temporary.write_text(text, encoding="utf-8", newline="\n")
     except OSError as error:
         raise MotionError(f"{path} cannot be written: {error.strerror}") from None
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(temporary, 0o666 & ~mask)  # mkstemp makes files for the owner only
-        os.replace(temporary, path)
-    except OSError as error:
-        raise MotionError(f"{path} cannot be written: {error.strerror}") from None
-    finally:
-        Path(temporary).unlink(missing_ok=True)
 
 
 def _from_text(text: str, where: str) -> FourierMotion:

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armload.atomic import replacing
 from armload.errors import ArmloadError, PayloadError
 from armload.inertia import NAMES, InertialParameters
 from armload.payloads.payload import Box, Payload, require_consistent
@@ -50,7 +51,7 @@ def read_payload(path: str | Path) -> Payload:
 
 
 def write_payload(path: str | Path, payload: Payload) -> None:
-    """Write a payload as JSON; `read_payload` gives back the same phi to the last bit.
+    """Write a payload as JSON, complete or not at all; `read_payload` gives back the same phi to the last bit.
 
     Raises:
         PayloadError: the file cannot be written.
@@ -68,7 +69,8 @@ def write_payload(path: str | Path, payload: Payload) -> None:
     if payload.boxes:
         content["boxes"] = [{"size": b.size, "centre": b.centre, "mass": b.mass} for b in payload.boxes]
     try:
-        Path(path).write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+        with replacing(path) as temporary:
+            temporary.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
     except OSError as error:
         raise PayloadError(f"payload file {path} cannot be written: {error.strerror or error}") from None
 

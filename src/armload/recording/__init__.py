@@ -1,8 +1,7 @@
 """Recordings: what a robot's joints did, the files they come in, and whether they can be believed."""
 
-from armload.recording.atomic import replacing
 from armload.recording.files import read_recording, write_recording
 from armload.recording.plausibility import check_plausible
 from armload.recording.recording import CHANNELS, Recording, Sample
 
-__all__ = ["CHANNELS", "Recording", "Sample", "check_plausible", "read_recording", "replacing", "write_recording"]
+__all__ = ["CHANNELS", "Recording", "Sample", "check_plausible", "read_recording", "write_recording"]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from armload.arms import Arm
+from armload.atomic import replacing
 from armload.errors import RecordingError
-from armload.recording.atomic import replacing
 from armload.recording.csv_file import read_csv, write_csv
 from armload.recording.npz_file import read_npz, write_npz
 from armload.recording.parquet_file import read_parquet, write_parquet

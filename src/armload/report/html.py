@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from armload.atomic import replacing
 from armload.errors import ReportError
 from armload.evaluate import Table
-from armload.recording.atomic import replacing
 from armload.report.style import look
 
 if TYPE_CHECKING:
