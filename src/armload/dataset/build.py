@@ -8,8 +8,8 @@ Each file appears whole or not at all, so that a build may be stopped at any mom
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator, Sequence
-from contextlib import nullcontext
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -229,25 +229,16 @@ def _part(folder: Path, batch: range) -> Path:
     return folder / _PARTS / f"runs-{batch[0]:06d}-{batch[-1]:06d}.parquet"
 
 
-def _bar(show: bool, total: int, label: str) -> Any:
-    """A context that gives a function to call with the number of runs done since the last call."""
+@contextmanager
+def _bar(show: bool, total: int, label: str) -> Iterator[Callable[[int], None]]:
+    """A function to call with the number of runs done since the last call; it draws on stderr."""
     if not show:
-        return nullcontext(lambda _: None)
-    return _RichBar(total, label)
+        yield lambda _: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-
-class _RichBar:
-    def __init__(self, total: int, label: str) -> None:
-        from rich.console import Console
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("runs"))
-        self._progress = Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True))
-        self._task = self._progress.add_task(label, total=total)
-
-    def __enter__(self) -> Any:
-        self._progress.start()
-        return lambda done: self._progress.advance(self._task, done)
-
-    def __exit__(self, *_: object) -> None:
-        self._progress.stop()
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("runs"))
+    with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True)) as bar:
+        task = bar.add_task(label, total=total)
+        yield lambda done: bar.advance(task, done)

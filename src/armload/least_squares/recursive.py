@@ -23,9 +23,9 @@ from armload.inertia import InertialParameters
 from armload.least_squares.autocorrelation import BlockMeans
 from armload.recording import Recording
 
-# Initial P: standard deviations of 10 kg, 1 kg·m and 0.3 kg·m², so that the columns' units do not mix.
 _AT_REST = 0.01  # [rad/s]
 _TRANSIENT = 5.0  # time constants after which an observer started in motion has settled
+# Initial P: standard deviations of 10 kg, 1 kg·m and 0.3 kg·m², so that the columns' units do not mix.
 _INITIAL_STD = np.array([10.0] + [1.0] * 3 + [0.3] * 6)
 
 

@@ -3,7 +3,7 @@
 A seeded random search (one parent, one mutated child, the better one stays) over offsets and coefficients of equations
 (5) and (6). It maximises the D-criterion of the payload's ten parameters,
 
-    log det (1/N)·sum_t (S·Y_tᵀ·Sigma⁻²·Y_t·S),   S = diag(1, 1/L·(3 times), 1/L²·(6 times))⁻¹,   L = 0.1 m,
+    log det (1/N)·sum_t (S·Y_tᵀ·Sigma⁻²·Y_t·S),   S = diag(1, L (3 times), L² (6 times)),   L = 0.1 m,
 
 which makes the volume of their confidence ellipsoid small in scaled units: without S, kilograms and kg·m² would be
 compared. Sigma weighs the joints by the torque that a calibrated Panda model leaves unexplained. Motions that use more

@@ -4,27 +4,18 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armload.errors import MotionError
 from armload.motion.motion import Motion
+from armload.recording import Recording
 
 _RATE = 50.0  # [Hz] of the table
 _SHORTEST = 0.05  # [s] a shorter log says nothing about its motion
 _LONGEST = 1.10  # a log may last this much of the motion: waiting a moment at the end is the same motion
-
-
-class _Log(Protocol):
-    """What of a `Recording` is looked at: t (N,) [s] and q (N, n) [rad]."""
-
-    @property
-    def t(self) -> NDArray[np.float64]: ...
-
-    @property
-    def q(self) -> NDArray[np.float64]: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +73,7 @@ class MotionFingerprint:
     def __hash__(self) -> int:
         return hash(self.sha256)
 
-    def distance(self, recording: _Log) -> float:
+    def distance(self, recording: Recording) -> float:
         """Root mean square deviation of the log's joints from the motion [rad], over the time both last.
 
         The log's time is counted from its first sample. Infinite if it has another number of joints.
@@ -95,7 +86,7 @@ class MotionFingerprint:
         expected = np.stack([np.interp(t[inside], times, column) for column in self.q.T], axis=1)
         return float(np.sqrt(np.mean((recording.q[inside] - expected) ** 2)))
 
-    def matches(self, recording: _Log, tolerance: float = 0.1) -> bool:
+    def matches(self, recording: Recording, tolerance: float = 0.1) -> bool:
         """Whether the log shows this motion from its start: `distance` within `tolerance` [rad], and no longer than it.
 
         A log of less than 50 ms, or more than 10 % longer than the motion, never matches.

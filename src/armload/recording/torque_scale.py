@@ -33,13 +33,11 @@ _LEVER = 0.15  # [m] of the payload's centre of mass and radius of gyration
 
 
 class TorqueScale(NamedTuple):
-    """scale: s; std: its standard deviation; misfit: rms of what s = 1 leaves, in units of a plausible model error;
-    unexplained: the share of the torque's variance that s = 1 leaves."""
+    """scale: s; std: its standard deviation; misfit: rms of what s = 1 leaves, in units of a plausible model error."""
 
     scale: float
     std: float
     misfit: float
-    unexplained: float
 
 
 def torque_scale(recording: Recording, arm: Arm) -> TorqueScale | None:
@@ -73,7 +71,7 @@ def torque_scale(recording: Recording, arm: Arm) -> TorqueScale | None:
     rest = (y - b) - A @ (inner @ (A.T @ (y - b)))  # what s = 1 leaves
     misfit = float(np.sqrt(np.mean(rest**2)))
     std = 2.0 * max(1.0, misfit) / np.sqrt(information)
-    return TorqueScale(scale, std, misfit, float(rest @ rest / max(y @ y, 1e-12)))
+    return TorqueScale(scale, std, misfit)
 
 
 def _averages(recording: Recording, arm: Arm, parts: Windows) -> tuple[NDArray, NDArray, NDArray, NDArray]:

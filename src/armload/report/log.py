@@ -52,8 +52,7 @@ def log_report(
                 (recordings.motion(recording), f"Joint position and velocity: {recording.rate:.0f} Hz."),
                 (
                     recordings.torques(recording, arm),
-                    "Measured joint torque and what the bare-arm model needs for the same motion, both behind the same "
-                    "lag (50 1/s). The shaded difference is the payload, friction and the model's error.",
+                    recordings.TORQUES_CAPTION,
                 ),
             ),
         ),

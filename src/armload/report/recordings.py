@@ -16,6 +16,10 @@ if TYPE_CHECKING:
 _POINTS = 600  # drawn at most: a curve is half a page wide
 _RATE = 200.0  # [Hz] at which torques are lagged before they are drawn
 _GAIN = 50.0  # [1/s] of the lag behind which torques are drawn
+TORQUES_CAPTION = (
+    "Measured joint torque and what the bare-arm model needs for the same motion, both behind the same lag "
+    f"({_GAIN:.0f} 1/s). The shaded difference is the payload, friction and the model's error."
+)
 
 
 def motion(recording: Recording) -> Figure:
@@ -41,7 +45,7 @@ def motion(recording: Recording) -> Figure:
 def torques(recording: Recording, arm: Arm) -> Figure:
     """Measured joint torque and the bare arm's torque on the same motion: the payload (and friction) is between them.
 
-    Both are drawn behind the lag F = λ/(s + λ), λ = 50 1/s, so that no acceleration is needed (`arms.filtered`).
+    Both are drawn behind the lag F = λ/(s + λ), λ = `_GAIN`, so that no acceleration is needed (`arms.filtered`).
     """
     t, measured, bare = lagged_torques(recording, arm)
     with look():

@@ -80,8 +80,7 @@ def default_report(
             shown.append(
                 (
                     recordings.torques(log, arm),
-                    "Measured joint torque and what the bare-arm model needs for the same motion, both behind the same "
-                    "lag (50 1/s). The shaded difference is the payload, friction and the model's error.",
+                    recordings.TORQUES_CAPTION,
                 )
             )
         sections.append(Section("The recording", f"Source: {log.source}.", figures=tuple(shown)))

@@ -152,9 +152,9 @@ def _prepare(actual: Arm, gains: Gains, run: Run, world: World, command: Command
 
 def _parameters(payload: Any) -> InertialParameters | None:
     parameters = getattr(payload, "parameters", payload)
-    if parameters is None or not isinstance(parameters, InertialParameters):
-        if parameters is None:
-            return None
+    if parameters is None:
+        return None
+    if not isinstance(parameters, InertialParameters):
         raise PayloadError(f"the payload is a {type(payload).__name__}: expected InertialParameters or a Payload")
     # whatever the frame is called: a payload's frame is understood as the arm's payload frame
     return InertialParameters(parameters.phi) if np.any(parameters.phi) else None
