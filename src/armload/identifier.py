@@ -1,14 +1,16 @@
 """The stream contract: every way of identifying a payload, learned or not, is an `Identifier`.
 
-identifier.reset()
-for sample in recording:
-    estimate = identifier.update(sample)
+    identifier.reset()
+    for sample in recording:
+        estimate = identifier.update(sample)
+
+`BatchIdentifier` is for methods that take many samples at once as well as one, `Tared` for what was added since a tare.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,3 +125,35 @@ class BatchIdentifier(Identifier):
     @abstractmethod
     def _estimate(self, t: float) -> Estimate:
         """The estimate from all samples so far, the last of them at t."""
+
+
+class Tared(Identifier):
+    """Any method relative to its own estimate of a tare: phi(run) − phi(tare), the covariances add.
+
+    The plainest virtual calibration [Kurdas et al. 2022]; a method that uses the tare's log itself does better.
+
+    Args:
+        identifier: the method; it identifies the tare at once.
+        tare: an earlier log of the same arm, on any motion, with whatever was mounted then.
+    """
+
+    def __init__(self, identifier: Identifier, tare: Recording) -> None:
+        self.name, self.arm = identifier.name, identifier.arm
+        self._identifier, self._before = identifier, identifier.run(tare)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the run (not the tare); the next sample is the first."""
+        self._identifier.reset()
+
+    def update(self, sample: Sample) -> Estimate:
+        """Take one sample (t, q, dq, tau) and return the estimate so far, relative to the tare."""
+        return self._relative(self._identifier.update(sample))
+
+    def trace(self, recording: Recording, every: int = 1) -> list[Estimate]:
+        """The estimates along a recording, relative to the tare: one per `every` samples, and always the last."""
+        return [self._relative(estimate) for estimate in self._identifier.trace(recording, every)]
+
+    def _relative(self, estimate: Estimate) -> Estimate:
+        before = self._before
+        return replace(estimate, phi=estimate.phi - before.phi, covariance=estimate.covariance + before.covariance)

@@ -134,8 +134,8 @@ def _methods(arm: Arm, log: Recording, models: list[str]) -> dict[str, Callable[
 
     methods: dict[str, Callable[[Recording | None], Identifier]] = {
         "map": partial(PosteriorLeastSquares, arm),
-        "rls": partial(_calibrated, RecursiveLeastSquares, arm),
-        "rls-filter": partial(_calibrated, FilteredRecursiveLeastSquares, arm),
+        "rls": partial(_tared, RecursiveLeastSquares, arm),
+        "rls-filter": partial(_tared, FilteredRecursiveLeastSquares, arm),
     }
     for path in models:
         model = load_model(path)
@@ -144,8 +144,10 @@ def _methods(arm: Arm, log: Recording, models: list[str]) -> dict[str, Callable[
     return methods
 
 
-def _calibrated(kind: Callable[..., Identifier], arm: Arm, tare: Recording | None) -> Identifier:
-    return kind(arm, calibration=None if tare is None else kind(arm).run(tare).parameters)
+def _tared(kind: Callable[..., Identifier], arm: Arm, tare: Recording | None) -> Identifier:
+    from armload.identifier import Tared
+
+    return kind(arm) if tare is None else Tared(kind(arm), tare)
 
 
 def _learned(model: LearnedModel, arm: Arm, _: Recording | None) -> Identifier:

@@ -13,7 +13,7 @@ from armload.arms import Arm
 from armload.errors import IdentificationError
 from armload.evaluate.baselines import PriorLeastSquares, TrainingMean
 from armload.evaluate.comparison import Comparison
-from armload.identifier import Estimate, Identifier
+from armload.identifier import Estimate, Identifier, Tared
 from armload.inertia import InertialParameters
 from armload.least_squares import GaussianPrior
 from armload.recording import Recording
@@ -58,7 +58,7 @@ def compare(
 
     A run's tare reaches a method that is given as a function (recording or None → identifier), such as
     `lambda tare: PosteriorLeastSquares(arm, tare)`. For a method given as an identifier, its own estimate of the tare
-    is subtracted (virtual calibration) and the covariances add.
+    is subtracted (`Tared`) and the covariances add.
 
     Args:
         identifiers: methods by name, in the order of the rows.
@@ -100,14 +100,13 @@ def compare(
         for r, run in enumerate(runs):
             if progress is not None:
                 progress(f"{name}: {run.label}")
-            identifier, correct = _prepare(method, run.tare)
-            if _is_average(identifier):
+            identifier = _prepare(method, run.tare)
+            if _is_average(method if isinstance(method, Identifier) else identifier):
                 averaged.add(name)
             _warm_up(identifier, run.recording)
             started = time.perf_counter()
             estimates = _at(identifier, run.recording, times)
             wall[m, r] = time.perf_counter() - started
-            estimates = [correct(e) for e in estimates]
             phi[m, r] = [e.phi for e in estimates]
             std[m, r] = [e.std for e in estimates]
             samples[m, r] = [e.n_samples for e in estimates]
@@ -168,14 +167,11 @@ def _with_baselines(
     return methods, tuple(baselines)
 
 
-def _prepare(method: Method, tare: Recording | None) -> tuple[Identifier, Callable[[Estimate], Estimate]]:
-    """The identifier for a run, and what is done to its estimates because of the tare."""
+def _prepare(method: Method, tare: Recording | None) -> Identifier:
+    """The identifier for a run, made to take account of the run's tare."""
     if not isinstance(method, Identifier):
-        return method(tare), lambda e: e
-    if tare is None or isinstance(method, TrainingMean):
-        return method, lambda e: e
-    before = method.run(tare)
-    return method, lambda e: Estimate(e.t, e.phi - before.phi, e.covariance + before.covariance, e.n_samples, e.frame)
+        return method(tare)
+    return method if tare is None or isinstance(method, TrainingMean) else Tared(method, tare)
 
 
 def _warm_up(identifier: Identifier, recording: Recording) -> None:

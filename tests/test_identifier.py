@@ -1,0 +1,147 @@
+"""The stream contract: one list of checks over every identifier there is, learned or not."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+from armload.arms import arm
+from armload.errors import ArmloadError
+from armload.evaluate import GaussianPrior, PriorLeastSquares, TrainingMean
+from armload.identifier import BatchIdentifier, Identifier, Tared
+from armload.inertia import InertialParameters
+from armload.learners import BaggingEnsemble, LearnedIdentifier, save_model
+from armload.least_squares import FilteredRecursiveLeastSquares, PosteriorLeastSquares, RecursiveLeastSquares
+from armload.motion import taie2024
+from armload.recording import Recording
+from armload.simulate import simulate
+
+BODY = InertialParameters.from_com(1.2, (0.02, -0.01, 0.06), np.diag([4e-3, 5e-3, 3e-3]))
+PRIOR = GaussianPrior.of([BODY.phi, 1.4 * BODY.phi, 0.7 * BODY.phi])
+RATE = 50.0  # [Hz]
+
+
+@pytest.fixture(scope="module")
+def panda():
+    return arm("panda")
+
+
+@pytest.fixture(scope="module")
+def log(panda):
+    return simulate(panda, taie2024(), BODY, rate=RATE)
+
+
+@pytest.fixture(scope="module")
+def empty(panda):
+    return simulate(panda, taie2024(), rate=RATE)
+
+
+@pytest.fixture(scope="module")
+def model(panda, log, tmp_path_factory):
+    X = np.column_stack([log.t - log.t[0], log.q, log.dq, log.tau])
+    ensemble = BaggingEnsemble("tree", members=3).fit(X, np.tile(BODY.phi, (len(X), 1)) + 1e-3 * X[:, :10])
+    path = tmp_path_factory.mktemp("model") / "tree.safetensors"
+    return save_model(path, ensemble, arm=panda, motion=taie2024(), dataset_hash="none")
+
+
+MAKE = {
+    "rls": lambda arm, *_: RecursiveLeastSquares(arm),
+    "rls-filter": lambda arm, *_: FilteredRecursiveLeastSquares(arm),
+    "map": lambda arm, *_: PosteriorLeastSquares(arm),
+    "map, with tare": lambda arm, empty, _: PosteriorLeastSquares(arm, empty),
+    "rls, tared": lambda arm, empty, _: Tared(RecursiveLeastSquares(arm), empty),
+    "trees": lambda arm, _, model: LearnedIdentifier(model, arm),
+    "trees, single": lambda arm, _, model: LearnedIdentifier(model, arm, single=True),
+    "training mean": lambda arm, *_: TrainingMean(arm, PRIOR.mean, PRIOR.covariance),
+    "same-prior least squares": lambda arm, *_: PriorLeastSquares(arm, PRIOR.mean, PRIOR.covariance),
+}
+
+
+@pytest.fixture(params=MAKE)
+def make(request, panda, empty, model):
+    return lambda: MAKE[request.param](panda, empty, model)
+
+
+def test_no_identifier_escapes_the_list(panda, empty, model):
+    def shipped(kind):
+        own = [kind] if kind.__module__.startswith("armload.") and not kind.__abstractmethods__ else []
+        return own + [k for child in kind.__subclasses__() for k in shipped(child)]
+
+    listed = {type(make(panda, empty, model)) for make in MAKE.values()}
+    assert set(shipped(Identifier)) == listed
+    assert BatchIdentifier not in listed
+
+
+def test_the_stream_and_the_whole_recording_agree(make, log):
+    identifier, whole = make(), make().run(log)
+    for sample in log:
+        streamed = identifier.update(sample)
+    assert streamed.n_samples == whole.n_samples == len(log)
+    assert streamed.t == whole.t == log.t[-1]
+    # at 50 Hz every sample is a solution of its own, for map too
+    np.testing.assert_allclose(streamed.phi, whole.phi, rtol=0, atol=1e-9)
+
+
+def test_a_trace_has_every_nth_estimate_and_the_last(make, log):
+    trace = make().trace(log, every=70)
+    assert [e.t for e in trace] == [log.t[k] for k in (0, 70, 140, 210, 280, 299)]
+    assert [e.n_samples for e in trace] == [1, 71, 141, 211, 281, 300]
+
+
+def test_reset_forgets_the_run(make, log):
+    identifier = make()
+    first = identifier.run(log)
+    identifier.run(log.between(0.0, 2.0))
+    again = identifier.run(log)
+    np.testing.assert_array_equal(first.phi, again.phi)
+    np.testing.assert_array_equal(first.covariance, again.covariance)
+
+
+def test_estimates_are_ten_numbers_about_the_payload_frame_with_a_symmetric_covariance(make, log, panda):
+    for estimate in make().trace(log, every=100):
+        assert estimate.phi.shape == (10,)
+        assert np.all(np.isfinite(estimate.phi))
+        assert estimate.frame == panda.frame
+        known = np.isfinite(np.diag(estimate.covariance))
+        assert np.all(estimate.std[known] >= 0)
+        C = estimate.covariance[np.ix_(known, known)]
+        np.testing.assert_allclose(C, C.T, rtol=0, atol=1e-9 * max(1.0, np.abs(C).max(initial=0)))
+
+
+def test_an_estimate_is_not_changed_by_later_samples(make, log):
+    identifier, samples = make(), list(log)
+    for sample in samples[:100]:
+        early = identifier.update(sample)
+    phi, covariance = early.phi.copy(), early.covariance.copy()
+    for sample in samples[100:]:
+        identifier.update(sample)
+    np.testing.assert_array_equal(early.phi, phi)
+    np.testing.assert_array_equal(early.covariance, covariance)
+
+
+def test_memory_does_not_grow(make, log):
+    def size(identifier):
+        return len(pickle.dumps({k: v for k, v in vars(identifier).items() if k not in ("arm", "model")}))
+
+    identifier, sizes = make(), []
+    for k in range(4):
+        for sample in log:
+            identifier.update(sample._replace(t=sample.t + k * (log.t[-1] + 0.02)))
+        sizes.append(size(identifier))
+    assert sizes[-1] <= sizes[0] + 256
+
+
+def test_a_recording_of_another_arm_is_refused(make):
+    other = arm("ur10e")
+    t = np.arange(20) / RATE
+    log = Recording(t, np.zeros((20, other.n)), np.zeros((20, other.n)), np.zeros((20, other.n)))
+    with pytest.raises(ArmloadError, match="6 joints"):
+        make().run(log)
+
+
+def test_a_tare_leaves_what_was_added(panda, log, empty):
+    tared, plain = Tared(RecursiveLeastSquares(panda), empty), RecursiveLeastSquares(panda)
+    after, before = plain.run(log), RecursiveLeastSquares(panda).run(empty)
+    estimate = tared.run(log)
+    np.testing.assert_allclose(estimate.phi, after.phi - before.phi, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(estimate.covariance, after.covariance + before.covariance, rtol=1e-12)
