@@ -11,6 +11,7 @@ from armload.arms import FilteredRegression, arm, full_arm_regressor
 from armload.arms.filtered import Lag, filtered_regressor, first_order_lag
 from armload.errors import ArmError, MotionError, PayloadError
 from armload.inertia import InertialParameters, is_consistent
+from armload.least_squares import PosteriorLeastSquares
 from armload.motion import FourierMotion, taie2024
 from armload.simulate import Command, Gains, Run, SmoothTorque, World, build_model, rollout, runs, simulate
 from armload.simulate import simulate_many as many
@@ -113,6 +114,13 @@ def test_least_squares_recovers_the_payload_without_noise(any_arm, rate):
     assert phi[0] == pytest.approx(PAYLOAD.mass, rel=1e-3)
     np.testing.assert_allclose(phi[1:4], PAYLOAD.first_moment, rtol=0, atol=1e-3)
     np.testing.assert_allclose(phi[4:], PAYLOAD.phi[4:], rtol=0, atol=1e-3)
+
+
+def test_the_default_method_recovers_the_payload_without_noise(any_arm):
+    # though it allows for a mismatch of the arm that is not there
+    phi = PosteriorLeastSquares(any_arm).run(simulate(any_arm, motion_of(any_arm), PAYLOAD)).phi
+    assert phi[0] == pytest.approx(PAYLOAD.mass, rel=1e-3)
+    np.testing.assert_allclose(phi[1:4], PAYLOAD.first_moment, rtol=0, atol=1e-3)
 
 
 def test_controller_tracks_without_payload_and_sags_with_it(panda):
