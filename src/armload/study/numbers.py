@@ -1,0 +1,137 @@
+"""Numbers out of finished cells: which cells answer a question, and the errors they hold.
+
+Cells are plain dictionaries, as `load_cells` reads them. An error array is (R, 10): one row per run or per seed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Cell = Mapping[str, Any]
+Cells = Mapping[str, Cell]
+
+PAPER_EPOCHS = 1000  # the paper's "at most"; a network cell with fewer is called capped
+EXACT = 1e-9  # [SI] errors below are rounding: a parameter that is the same in every payload is learned exactly
+AVERAGED = ("rls", "rls-filter", "rls-filter-calibrated")  # judged by their mean over the second half, as in [7]
+
+
+class Ensemble(NamedTuple):
+    """Which ensemble: kind "tree", "network" or "mixed"; scale "raw" or "standard"; sensors of its training data."""
+
+    kind: str
+    stages: int = 1
+    split: str = "row"
+    scale: str = "raw"
+    sensors: str = "ideal"
+
+
+class Match(NamedTuple):
+    """Cells of several ensembles that may be compared: trained with the same cap on epochs, seed by seed.
+
+    cap: None where no networks take part. seeds: (S,). cells: for each ensemble one cell per seed.
+    """
+
+    cap: int | None
+    seeds: tuple[int, ...]
+    cells: tuple[tuple[Cell, ...], ...]
+
+
+def cap(cell: Cell) -> int | None:
+    """The most epochs a cell's networks may train; None for what has no epochs."""
+    return cell["spec"].get("max_epochs") if cell["spec"]["kind"] in ("network", "mixed") else None
+
+
+def matched(cells: Cells, *ensembles: Ensemble) -> list[Match]:
+    """Every way to compare these ensembles, the largest cap on epochs first; empty where a cell is missing."""
+    found = [_by_cap_and_seed(cells, ensemble) for ensemble in ensembles]
+    caps = {c for by_cap in found for c in by_cap} - {None} or {None}
+    out = []
+    for most in sorted(caps, key=lambda c: c or 0, reverse=True):
+        per_seed = [by_cap.get(None) or by_cap.get(most, {}) for by_cap in found]
+        seeds = sorted(set.intersection(*(set(s) for s in per_seed)))
+        if seeds:
+            out.append(Match(most, tuple(seeds), tuple(tuple(s[seed] for seed in seeds) for s in per_seed)))
+    return out
+
+
+def _by_cap_and_seed(cells: Cells, ensemble: Ensemble) -> dict[int | None, dict[int, Cell]]:
+    out: dict[int | None, dict[int, Cell]] = {}
+    for cell in cells.values():
+        spec = cell["spec"]
+        if spec["kind"] != ensemble.kind or spec.get("ablation") not in (None, "scale"):
+            continue
+        this = (spec["kind"], spec["stages"], spec["split"], spec["scale"], spec["sensors"])
+        if this == ensemble:
+            out.setdefault(cap(cell), {})[spec["seed"]] = cell
+    return out
+
+
+def benchmark(cells: Cells, method: str, split: str | None = None) -> dict[int, Cell]:
+    """The cells of a least-squares method or a baseline by seed."""
+    stem = f"benchmark-{method}{f'-{split}' if split else ''}-s"
+    seeds = {name.removeprefix(stem): cell for name, cell in cells.items() if name.startswith(stem)}
+    return {int(seed): cell for seed, cell in sorted(seeds.items()) if seed.isdigit()}
+
+
+def held_out(group: Sequence[Cell]) -> NDArray[np.float64] | None:
+    """Mean absolute error of single samples on each cell's own test rows, (S, 10)."""
+    rows = [cell["protocols"].get("held_out") for cell in group]
+    return np.array([row["single"] for row in rows if row], dtype=float) if rows and all(rows) else None
+
+
+def at_end(group: Sequence[Cell], protocol: str) -> NDArray[np.float64] | None:
+    """|error| of the answer to each run of a protocol, (R, 10), averaged over the cells' seeds.
+
+    For an ensemble the answer is its running mean at the end; for `AVERAGED` methods the mean over the second half.
+    """
+    if not group or any(protocol not in cell["protocols"] for cell in group):
+        return None
+    return np.mean([_answers(cell, cell["protocols"][protocol]) for cell in group], axis=0)
+
+
+def _answers(cell: Cell, measured: Mapping[str, Any]) -> NDArray[np.float64]:
+    averaged = method(cell) in AVERAGED and "second_half" in measured
+    return np.array(measured["second_half" if averaged else "running"], dtype=float)
+
+
+def method(cell: Cell) -> str:
+    """Name of a benchmark's method with its split; empty for an ensemble."""
+    return cell["name"].removeprefix("benchmark-").rpartition("-s")[0] if cell["spec"]["kind"] == "benchmark" else ""
+
+
+def mean_ratio(a: ArrayLike, b: ArrayLike) -> float:
+    """Geometric mean of a/b over the parameters that neither of the two knows exactly; units drop out.
+
+    >>> mean_ratio([1.0, 4.0, 0.0], [2.0, 2.0, 3.0])
+    1.0
+    """
+    a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
+    keep = (a > EXACT) & (b > EXACT)
+    return float(np.exp(np.mean(np.log(a[keep] / b[keep])))) if keep.any() else 1.0
+
+
+def improvement(better: float, worse: float) -> float:
+    """By how many percent `better` lowers the error `worse`: 100·(1 − better/worse); two exact answers are equal.
+
+    >>> improvement(1.0, 4.0), improvement(4.0, 1.0), improvement(0.0, 0.0)
+    (75.0, -300.0, 0.0)
+    """
+    return 100.0 * (1.0 - max(better, EXACT) / max(worse, EXACT))
+
+
+def spread(statistic: Callable[..., float], *arrays: NDArray[np.float64]) -> float | None:
+    """Standard deviation over units (axis 0) of a statistic of several arrays; None for a single unit.
+
+    A ratio of means has no value for one unit, so the jackknife's take its place: θ_i = n·θ − (n − 1)·θ_(without i).
+    For a mean they are the units' own values (Tukey 1958).
+    """
+    n = len(arrays[0])
+    if n < 2 or any(len(a) != n for a in arrays):
+        return None
+    whole = statistic(*arrays)
+    without = [statistic(*(np.delete(a, i, axis=0) for a in arrays)) for i in range(n)]
+    return float(np.std(n * whole - (n - 1) * np.array(without), ddof=1))

@@ -1,0 +1,244 @@
+"""The paper's claims without a number: what each is taken to mean, and how it is measured.
+
+The paper defines none of "accurate", "flat", "close": each rule says in `criterion` what has to hold, and a stricter
+reader finds the measured number beside the verdict.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.study.numbers import (
+    Cell,
+    Cells,
+    Ensemble,
+    at_end,
+    benchmark,
+    held_out,
+    improvement,
+    matched,
+    mean_ratio,
+    spread,
+)
+
+REAL, NOMINAL = "test_payload_real_like", "test_payload_nominal"
+FLAT_AFTER, SECOND_HALF = 2.85, 3.0  # [s] the paper's
+FLAT = 5.0  # [% of the truth] that a flat line may move, ours
+CLOSE = 2.0  # ratio of errors that still counts as close, ours
+
+
+class Measured(NamedTuple):
+    """A claim under one split: the number, its spread, whether the claim holds; cap on epochs and seeds behind it."""
+
+    value: float
+    spread: float | None
+    holds: bool
+    cap: int | None = None
+    seeds: tuple[int, ...] = ()
+    exact: bool = False  # one of the two errors is rounding only
+
+
+class Rule(NamedTuple):
+    """How a statement is judged: `measure(cells, learner, split)` gives a number in `unit`; None: a cell is missing."""
+
+    measure: Callable[[Cells, str | None, str], Measured | None]
+    unit: str
+    criterion: str
+
+
+def _both_stages(cells: Cells, kind: str | None, split: str, protocol: str) -> tuple[NDArray, int | None, tuple] | None:
+    """Errors (R, 10) of an ensemble at the end of runs: mass and first moments from one stage, inertia from two."""
+    found = matched(cells, Ensemble(str(kind), 1, split), Ensemble(str(kind), 2, split))
+    if not found:
+        return None
+    one, two = (at_end(group, protocol) for group in found[0].cells)
+    if one is None or two is None:
+        return None
+    return np.concatenate([one[:, :4], two[:, 4:]], axis=1), found[0].cap, found[0].seeds
+
+
+def izz(cell: Cell, protocol: str = REAL) -> dict[str, NDArray[np.float64]] | None:
+    """Izz of one run over time: t, single, running (T,), and their signed errors `single_error`, `running_error`."""
+    curve = cell.get("izz", {}).get(protocol)
+    if not curve:
+        return None
+    out = {name: np.array(curve[name], dtype=float) for name in ("t", "single", "running", "truth")}
+    return out | {f"{name}_error": out[name] - out["truth"] for name in ("single", "running")}
+
+
+def _curves(cells: Cells, kind: str | None, split: str) -> tuple[list[dict[str, NDArray]], int | None, tuple] | None:
+    found = matched(cells, Ensemble(str(kind), 2, split))  # the inertia comes from two stages
+    curves = [izz(cell) for cell in found[0].cells[0]] if found else []
+    kept = [curve for curve in curves if curve is not None]
+    return (kept, found[0].cap, found[0].seeds) if kept else None
+
+
+def _first_step(cells: Cells, learner: str | None, split: str) -> Measured | None:
+    own = _curves(cells, learner, split)
+    means = [c for c in map(izz, benchmark(cells, "training-mean", split).values()) if c is not None]
+    if own is None or not means:
+        return None
+    first = np.array([[abs(curve["single_error"][0])] for curve in own[0]])
+    blind = float(np.mean([abs(curve["single_error"][0]) for curve in means]))
+    value = improvement(float(first.mean()), blind)
+    return Measured(value, spread(lambda e: improvement(float(e.mean()), blind), first), value > 0.0, *own[1:])
+
+
+def _flat(cells: Cells, learner: str | None, split: str) -> Measured | None:
+    own = _curves(cells, learner, split)
+    if own is None:
+        return None
+    moved = []
+    for curve in own[0]:
+        late = curve["running"][curve["t"] >= FLAT_AFTER]
+        moved.append([100.0 * float(np.max(np.abs(late - late[-1]), initial=0.0) / abs(curve["truth"]))])
+    values = np.array(moved)
+    return Measured(float(values.mean()), spread(_mean, values), float(values.mean()) <= FLAT, *own[1:])
+
+
+def _overshoot(cells: Cells, _learner: str | None, _split: str) -> Measured | None:
+    curves = [c for c in map(izz, benchmark(cells, "rls").values()) if c is not None]
+    if not curves:
+        return None
+    early, late = [], []
+    for curve in curves:
+        share = 100.0 * np.abs(curve["running_error"]) / abs(float(curve["truth"]))
+        before = curve["t"] < SECOND_HALF
+        early.append([float(np.max(share[before], initial=0.0))])
+        late.append([float(np.max(share[~before], initial=0.0))])
+    peak = float(np.mean(early))
+    return Measured(peak, spread(_mean, np.array(early)), peak > max(100.0, float(np.mean(late))))
+
+
+def _close(cells: Cells, learner: str | None, split: str) -> Measured | None:
+    found = _real_and_nominal(cells, learner, split)
+    if found is None:
+        return None
+    real, nominal, cap, seeds = found
+    value = mean_ratio(real.mean(axis=0), nominal)
+    return Measured(value, spread(lambda e: mean_ratio(e.mean(axis=0), nominal), real), value <= CLOSE, cap, seeds)
+
+
+def _better_on_real(cells: Cells, learner: str | None, split: str) -> Measured | None:
+    found = _real_and_nominal(cells, learner, split)
+    if found is None:
+        return None
+    real, nominal, cap, seeds = found
+
+    def percent(errors: NDArray) -> float:
+        return 100.0 * (1.0 - mean_ratio(errors.mean(axis=0)[:4], nominal[:4]))
+
+    return Measured(percent(real), spread(percent, real), percent(real) > 0.0, cap, seeds)
+
+
+def _real_and_nominal(
+    cells: Cells, learner: str | None, split: str
+) -> tuple[NDArray, NDArray, int | None, tuple[int, ...]] | None:
+    real, nominal = (_both_stages(cells, learner, split, protocol) for protocol in (REAL, NOMINAL))
+    return None if real is None or nominal is None else (real[0], nominal[0].mean(axis=0), *real[1:])
+
+
+def _no_filter(cells: Cells, learner: str | None, split: str) -> Measured | None:
+    own = _both_stages(cells, learner, split, REAL)
+    other = at_end(list(benchmark(cells, "rls-filter-calibrated").values()), REAL)
+    if own is None or other is None:
+        return None
+    value = _percent_of_means(own[0], other)
+    return Measured(value, spread(_percent_of_means, own[0], other), value > 0.0, *own[1:])
+
+
+def _trees_better(cells: Cells, _learner: str | None, split: str) -> Measured | None:
+    wanted = [Ensemble(kind, stages, split) for kind in ("tree", "network") for stages in (1, 2)]
+    return _held_out_comparison(cells, wanted, lambda e: np.concatenate(e[:2], 1), lambda e: np.concatenate(e[2:], 1))
+
+
+def _mixed_better(cells: Cells, _learner: str | None, split: str) -> Measured | None:
+    wanted = [Ensemble(kind, 1, split) for kind in ("mixed", "tree", "network")]
+
+    def better_of_the_two(errors: list[NDArray]) -> NDArray:
+        tree, network = errors[1:]
+        return tree if mean_ratio(tree.mean(axis=0), network.mean(axis=0)) < 1.0 else network
+
+    return _held_out_comparison(cells, wanted, lambda e: e[0], better_of_the_two)
+
+
+def _held_out_comparison(
+    cells: Cells,
+    wanted: list[Ensemble],
+    ours: Callable[[list[NDArray]], NDArray],
+    theirs: Callable[[list[NDArray]], NDArray],
+) -> Measured | None:
+    """Improvement over all parameters on held-out single samples; spread over seeds at the cap that has most."""
+    pairs = []
+    for match in matched(cells, *wanted):
+        errors = [held_out(group) for group in match.cells]
+        there = [e for e in errors if e is not None]
+        if len(there) == len(wanted):
+            pairs.append((match, ours(there), theirs(there)))
+    if not pairs:
+        return None
+    match, a, b = pairs[0]
+    value = _percent_of_means(a, b)
+    many = max(pairs, key=lambda pair: len(pair[0].seeds))
+    return Measured(value, spread(_percent_of_means, *many[1:]), value > 0.0, match.cap, match.seeds)
+
+
+def _percent_of_means(a: NDArray, b: NDArray) -> float:
+    return 100.0 * (1.0 - mean_ratio(a.mean(axis=0), b.mean(axis=0)))
+
+
+def _mean(values: NDArray) -> float:
+    return float(values.mean())
+
+
+RULES = {
+    "first-step": Rule(
+        _first_step,
+        "% less error than the training mean",
+        "on a real-like arm the first estimate of Izz is nearer to the truth than the mean of the training payloads, "
+        "which looks at no measurement: the least that accurate can mean",
+    ),
+    "flat": Rule(
+        _flat,
+        "% of the truth",
+        f"on a real-like arm the running mean of Izz stays within {FLAT:g} % of the truth of its last value "
+        f"after {FLAT_AFTER:g} s",
+    ),
+    "overshoot": Rule(
+        _overshoot,
+        "% of the truth, peak error",
+        f"on a real-like arm the error of RLS peaks before {SECOND_HALF:g} s, above that of the answer 0 (100 %)",
+    ),
+    "close": Rule(
+        _close,
+        "× the simulated error",
+        f"errors on real-like arms are at most {CLOSE:g} times those on the nominal arm (geometric mean over the "
+        "parameters)",
+    ),
+    "better-on-real": Rule(
+        _better_on_real,
+        "% less error than simulated",
+        "errors of mass and first moments are smaller on real-like arms than on the nominal arm (geometric mean)",
+    ),
+    "no-filter": Rule(
+        _no_filter,
+        "% less error than filtered, calibrated RLS",
+        "on real-like arms the ensemble, fed raw signals, errs less than RLS with filter and virtual calibration "
+        "(geometric mean over the parameters)",
+    ),
+    "trees-better": Rule(
+        _trees_better,
+        "% less error than networks",
+        "on held-out rows of the simulated data set (geometric mean over parameters and both trainings)",
+    ),
+    "mixed-better": Rule(
+        _mixed_better,
+        "% less error than the better of trees and networks",
+        "on held-out rows of the simulated data set, one stage, the same cap on epochs (geometric mean over the "
+        "parameters)",
+    ),
+}
