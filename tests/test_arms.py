@@ -503,6 +503,12 @@ def test_mujoco_agrees_on_a_description_with_turned_inertials():
         np.testing.assert_allclose(gripper.torque(q, dq, ddq), data.qfrc_inverse, atol=1e-9)
 
 
+def test_fixed_joints_may_have_no_axis():
+    # as some exporters write them
+    bolted = ONE_LINK.replace("</robot>", link("b", 2.0) + joint("k", "fixed", "a", "b", axis="0 0 0") + "</robot>")
+    np.testing.assert_allclose(Arm("x", bolted).link_parameters[:, 0], 3.0)
+
+
 def test_a_prismatic_joint_lifts_the_weight():
     lift = Arm("lift", robot(link("base"), joint("z", "prismatic", "base", "load", axis="0 0 1"), link("load", 3.0)))
     assert lift.torque([0.1], [0.0], [2.0])[0] == pytest.approx(3.0 * (9.81 + 2.0))
@@ -575,7 +581,31 @@ ONE_LINK = robot(link("base"), joint("j", "revolute", "base", "a"), link("a", 1.
         ),
         (
             lambda: Arm("x", ONE_LINK.replace('value="1.0"', 'value="heavy"')),
-            "x: <mass> of link 'a' has value = 'heavy', expected numbers",
+            "x: <mass> of link 'a' has value = 'heavy', expected finite numbers",
+        ),
+        (
+            lambda: Arm("x", ONE_LINK.replace('value="1.0"', 'value="nan"')),
+            "x: <mass> of link 'a' has value = 'nan', expected finite numbers",
+        ),
+        (
+            lambda: Arm("x", ONE_LINK.replace('ixx="0.01"', 'ixx="inf"')),
+            "x: <inertia> of link 'a' has ixx = 'inf', expected finite numbers",
+        ),
+        (
+            lambda: Arm("x", ONE_LINK.replace('value="1.0"', 'value="-1.0"')),
+            "x: <mass> of link 'a' has value = '-1.0', expected a mass of at least 0",
+        ),
+        (
+            lambda: Arm("x", ONE_LINK.replace('xyz="0 1 0"', 'xyz="0 0 0"')),
+            "x: <axis> of joint 'j' has xyz = '0 0 0', expected a direction",
+        ),
+        (
+            lambda: Arm("x", ONE_LINK.replace('type="revolute"', 'type="revolte"')),
+            "joint 'j' of x has the type 'revolte': expected one of revolute, continuous",
+        ),
+        (
+            lambda: Arm("x", ONE_LINK.replace("</robot>", '<m:include xmlns:m="http://ros.org/wiki/xacro"/></robot>')),
+            "x holds <xacro:include>: expected a plain URDF; expand it first",
         ),
         (lambda: Arm("x", ONE_LINK.replace('type="revolute"', 'type="floating"')), "no joint of x moves"),
         (lambda: Arm("x", ONE_LINK.replace('value="1.0"', 'value="0.0"')), "no link of x has a mass"),

@@ -79,6 +79,9 @@ def test_version_is_the_packages(capsys):
         (["motion", "check", "no_such.json", "--robot", "panda"], "no_such.json"),
         (["motion", "export", "taie2024", "--format", "gif", "--out", "x"], "gif"),
         (["motion", "random", "--robot", "panda", "--seed", "-1", "--out", "x"], "-1"),
+        (["motion", "random", "--robot", "panda", "--duration", "1e9", "--out", "x"], "from 0.1 to 3600"),
+        (["motion", "export", "taie2024", "--format", "csv", "--rate", "1e9", "--out", "x"], "from 0.001 to 10000"),
+        (["motion", "export", "taie2024", "--format", "csv", "--out", ""], "--out: the name is empty"),
         (["motion", "show", "taie2024", "--robot", "nobody"], "nobody"),
     ],
 )

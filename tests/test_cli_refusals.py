@@ -157,7 +157,8 @@ def test_a_file_that_is_no_log_is_refused(refused, tmp_path, suffix, content):
 
 def test_an_empty_name_is_refused(refused):
     assert "LOG" in refused("", *ROBOT)
-    assert "--tare" in refused("log.csv", *ROBOT, "--tare", "")
+    for option in ("--tare", "--tool", "--method"):
+        assert f"{option}: the name is empty" in refused("log.csv", *ROBOT, option, "")
 
 
 def test_what_is_not_there_or_not_a_log_is_refused(refused, tmp_path, log_text):

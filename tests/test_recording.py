@@ -166,6 +166,9 @@ def cell(line, column, value):
         (lambda s: s.replace("dq2", "dq1"), r"has the column 'dq1' more than once"),
         (lambda s: s.replace("\n", ",0\n").replace(",0\n", ",ddq1\n", 1), r"has the unexpected column 'ddq1'"),
         (lambda s: s[s.index("\n") + 1 :], r", line 1 holds numbers: expected the header"),
+        (lambda s: "# " + s, r", line 1 begins with '#': expected the header"),
+        (lambda s: "# made on Monday\n" + s, r", line 1 begins with '#': expected the header"),
+        (lambda s: s.replace("q1", "q0").replace("q2", "q1"), r"counts its joints from 0 \(column 'q0'\)"),
         (lambda s: "\n" + s, r", line 1 is blank: expected the header"),
         (lambda s: s.replace(",", ";"), r", line 1: the columns are separated by semicolons: expected commas"),
         (lambda s: s.replace(",", "\t"), r", line 1: the columns are separated by tabs: expected commas"),
@@ -195,7 +198,9 @@ def test_bytes_that_are_no_text_are_refused_by_line(tmp_path):
 def test_a_log_of_another_number_of_joints_is_refused(tmp_path, panda, suffix):
     path = tmp_path / f"log{suffix}"
     write_recording(path, log(n=6))
-    with pytest.raises(RecordingError, match=r"log has 6 joints \(q1\.\.q6\), panda has 7"):
+    with pytest.raises(
+        RecordingError, match=r"log has 6 joints \(q1\.\.q6\), panda has 7 up to its frame 'panda_link8'"
+    ):
         read_recording(path, panda)
     write_recording(path, log(n=7))
     assert read_recording(path, panda).joint_names == panda.joint_names

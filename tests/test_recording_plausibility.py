@@ -1,5 +1,6 @@
 """Sound logs pass, whatever they carry; logs in wrong units, of wrong columns or of wrong arms do not."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -113,6 +114,33 @@ def test_an_arm_that_never_moves_passes(name):
     check_plausible(Recording(t, np.tile(q, (500, 1)), np.zeros((500, robot.n)), np.tile(tau, (500, 1))), robot)
 
 
+def unrated(robot):
+    """The arm from a description without effort limits, as many exporters write it."""
+    return replace(robot, urdf=re.sub('effort="[^"]*"', 'effort="0"', robot.urdf))
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e", "ur10e loaded", "ur10"])
+def test_real_logs_pass_where_the_description_has_no_effort_limits(real, name):
+    robot, log = real[name]
+    assert np.all(np.isinf(unrated(robot).limits.effort))
+    check_plausible(log, unrated(robot))
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e"])
+def test_simulated_logs_pass_where_the_description_has_no_effort_limits(sound, name):
+    robot, logs = sound[name]
+    for log in logs:
+        check_plausible(log, unrated(robot))
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e"])
+def test_the_wrong_arm_is_refused_where_the_description_has_no_effort_limits(real, name):
+    robot, log = real[name]
+    for wrong in (replace(robot, gravity=(9.81, 0.0, 0.0)), robot.with_links(2.5 * robot.link_parameters)):
+        with pytest.raises(RecordingError, match=r"check the robot, .*--gravity"):
+            check_plausible(log, unrated(wrong))
+
+
 def swapped(x):
     return x[:, [1, 0, *range(2, x.shape[1])]]
 
@@ -187,6 +215,18 @@ def test_the_wrong_arm_or_base_is_refused(real, name):
 def test_the_external_channel_need_not_hold_the_arms_weight(real):
     robot, log = real["panda"]
     check_plausible(replace(log, tau=log.tau - robot.torque(log.q), channel="external"), robot)
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e"])
+@pytest.mark.parametrize("at", ["its last value", "zero"])
+def test_torque_that_stands_still_while_the_arm_moves_is_refused_by_row(real, name, at):
+    robot, log = real[name]
+    middle = int(np.argmax(np.abs(log.dq).sum(axis=1)))
+    stop = middle + int(2.0 * log.rate)
+    tau = log.tau.copy()
+    tau[middle:stop] = tau[middle] if at == "its last value" else 0.0
+    with pytest.raises(RecordingError, match=rf"tau stays exactly the same in all joints from row {middle} "):
+        check_plausible(replace(log, tau=tau), robot)
 
 
 def test_positions_outside_the_limits_are_refused_by_joint_and_row(sound, panda):

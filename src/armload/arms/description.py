@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
+from math import isfinite
 
 from armload.errors import ArmError
 
 _MOVING = ("revolute", "continuous", "prismatic")
+_TYPES = (*_MOVING, "fixed", "floating", "planar")
 _ENDLESS = "1e4"  # [rad] limit given to a continuous joint, so that both engines treat it as one angle
 _NUMBERS = {
     "origin": ("xyz", "rpy"),
@@ -39,7 +41,7 @@ def read_chain(xml: str, frame: str | None, where: str) -> Chain:
         where: how to name the description in an error.
 
     Raises:
-        ArmError: not a URDF, no moving joint, or an unknown frame.
+        ArmError: not a URDF, no moving joint, an unknown frame, or numbers that no body or joint can have.
     """
     try:
         root = ET.fromstring(xml)
@@ -47,12 +49,18 @@ def read_chain(xml: str, frame: str | None, where: str) -> Chain:
         raise ArmError(f"{where} is not a URDF (XML error: {error})") from None
     if root.tag != "robot":
         raise ArmError(f"{where} is not a URDF: its root element is <{root.tag}>, expected <robot>")
+    _check_expanded(root, where)
     _strip(root)
     _check_numbers(root, where)
     links = [str(link.get("name")) for link in root.findall("link")]
     joints: dict[str, ET.Element] = {}  # by the link they carry
     parents: dict[str, str] = {}  # link -> the link that carries it
     for joint in root.findall("joint"):
+        if joint.get("type") not in _TYPES:
+            raise ArmError(
+                f"joint {joint.get('name')!r} of {where} has the type {joint.get('type')!r}: expected one of "
+                f"{', '.join(_TYPES)}"
+            )
         ends = []
         for end in ("parent", "child"):
             element = joint.find(end)
@@ -108,6 +116,16 @@ def read_chain(xml: str, frame: str | None, where: str) -> Chain:
     )
 
 
+def _check_expanded(root: ET.Element, where: str) -> None:
+    """Refuse a xacro file: what its macros would add is missing from it."""
+    for element in root.iter():
+        space, _, tag = element.tag.rpartition("}")
+        if "xacro" in space:
+            raise ArmError(
+                f"{where} holds <xacro:{tag}>: expected a plain URDF; expand it first, with `xacro FILE > arm.urdf`"
+            )
+
+
 def _strip(root: ET.Element) -> None:
     """Remove what dynamics does not need: meshes, materials, transmissions, simulator settings, mimic and damping."""
     for child in list(root):
@@ -120,15 +138,29 @@ def _strip(root: ET.Element) -> None:
 
 
 def _check_numbers(root: ET.Element, where: str) -> None:
-    """Refuse what is no number: Pinocchio's reader drops such an element and goes on without it."""
+    """Refuse what is no finite number, a negative mass and an axis without direction: Pinocchio's reader takes them."""
     for part in root:
         for element in part.iter():
             for key in _NUMBERS.get(element.tag, ()):
-                for word in (element.get(key) or "").split():
-                    try:
-                        float(word)
-                    except ValueError:
-                        raise ArmError(
-                            f"{where}: <{element.tag}> of {part.tag} {part.get('name')!r} has {key} = "
-                            f"{element.get(key)!r}, expected numbers"
-                        ) from None
+                numbers = _numbers(element.get(key) or "")
+                if numbers is None:
+                    expected = "finite numbers"
+                elif element.tag == "mass" and any(number < 0 for number in numbers):
+                    expected = "a mass of at least 0"
+                elif element.tag == "axis" and part.get("type") in _MOVING and numbers and not any(numbers):
+                    expected = "a direction"
+                else:
+                    continue
+                raise ArmError(
+                    f"{where}: <{element.tag}> of {part.tag} {part.get('name')!r} has {key} = {element.get(key)!r}, "
+                    f"expected {expected}"
+                )
+
+
+def _numbers(text: str) -> list[float] | None:
+    """The numbers of an attribute; None if a word of it is no finite number."""
+    try:
+        numbers = [float(word) for word in text.split()]
+    except ValueError:
+        return None
+    return numbers if all(map(isfinite, numbers)) else None

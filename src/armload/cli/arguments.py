@@ -74,8 +74,8 @@ def file_name(text: str) -> str:
     return text
 
 
-def at_least(least: float, kind: type = int):
-    """An argument type: a number of at least `least`."""
+def at_least(least: float, kind: type = int, most: float = float("inf")):
+    """An argument type: a number of at least `least`, and at most `most` where memory or time would run out."""
 
     def read(text: str) -> float:
         what = "a whole number" if kind is int else "a number"
@@ -83,8 +83,9 @@ def at_least(least: float, kind: type = int):
             value = kind(text)
         except ValueError:
             value = None
-        if value is None or not least <= value < float("inf"):
-            raise argparse.ArgumentTypeError(f"{text!r} is not possible: expected {what} of at least {least}")
+        if value is None or not least <= value <= most or value == float("inf"):
+            bounds = f"of at least {least}" if most == float("inf") else f"from {least:g} to {most:g}"
+            raise argparse.ArgumentTypeError(f"{text!r} is not possible: expected {what} {bounds}")
         return value
 
     return read

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from armload.cli.arguments import Parser, add_arm_arguments, arm_of, at_least, motion_of, whole_number
+from armload.cli.arguments import Parser, add_arm_arguments, arm_of, at_least, file_name, motion_of, whole_number
 from armload.errors import UsageError
 
 _EXAMPLES = """\
@@ -26,7 +26,7 @@ def parser() -> Parser:
         description="Simulate every payload on every motion in every world; write one table with its provenance.",
         epilog=_EXAMPLES,
     )
-    parser.add_argument("--out", required=True, metavar="DIR", help="folder of the data set")
+    parser.add_argument("--out", required=True, type=file_name, metavar="DIR", help="folder of the data set")
     add_arm_arguments(parser, default="panda")
     parser.add_argument(
         "--motion",

@@ -37,11 +37,13 @@ def parser() -> Parser:
     )
     parser.add_argument(
         "--tool",
+        type=file_name,
         metavar="FILE",
         help="a mounted tool that is known (JSON, or franka-hand); the answer is what it carries",
     )
     parser.add_argument(
         "--method",
+        type=file_name,
         metavar="M",
         help="map, rls, rls-filter, or the path of a trained model (default: the most trustworthy for this log)",
     )

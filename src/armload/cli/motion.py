@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from armload.cli.arguments import Parser, add_arm_arguments, arm_of, at_least, motion_of, payload_of
+from armload.cli.arguments import Parser, add_arm_arguments, arm_of, at_least, file_name, motion_of, payload_of
 from armload.cli.printing import console, print_note, table, working
 
 NOT_ALLOWED = 3  # exit code of a check that says no
@@ -54,8 +54,8 @@ def parser() -> Parser:
     export.add_argument("motion", metavar="MOTION", help="taie2024, a JSON file, or random:SEED")
     add_arm_arguments(export, default="panda")
     export.add_argument("--format", required=True, choices=("csv", "ros2", "ur"))
-    export.add_argument("--rate", type=at_least(1e-3, float), metavar="HZ", help="samples per second")
-    export.add_argument("--out", required=True, metavar="FILE")
+    export.add_argument("--rate", type=at_least(1e-3, float, 1e4), metavar="HZ", help="samples per second")
+    export.add_argument("--out", required=True, type=file_name, metavar="FILE")
 
     random = actions.add_parser(
         "random",
@@ -65,10 +65,10 @@ def parser() -> Parser:
     add_arm_arguments(random)
     random.add_argument("--seed", type=at_least(0), default=0, metavar="N", help="same seed, same motion (default: 0)")
     random.add_argument(
-        "--duration", type=at_least(0.1, float), default=6.0, metavar="S", help="in seconds (default: 6)"
+        "--duration", type=at_least(0.1, float, 3600), default=6.0, metavar="S", help="in seconds (default: 6)"
     )
     random.add_argument("--harmonics", type=at_least(2), default=5, metavar="K", help="(default: 5)")
-    random.add_argument("--out", required=True, metavar="FILE", help="JSON file to write")
+    random.add_argument("--out", required=True, type=file_name, metavar="FILE", help="JSON file to write")
     return parser
 
 

@@ -52,7 +52,7 @@ def parser() -> Parser:
     parser.add_argument("--seed", type=at_least(0), default=0, metavar="N", help="of the data set's split (default: 0)")
     parser.add_argument("--model", nargs="+", default=[], metavar="FILE", help="trained models to show too")
     parser.add_argument("--topic", metavar="T", help="JointState topic of a bag, where it has several")
-    parser.add_argument("--out", required=True, metavar="FILE.html", help="file to write")
+    parser.add_argument("--out", required=True, type=file_name, metavar="FILE.html", help="file to write")
     return parser
 
 

@@ -35,6 +35,8 @@ def joint_count(names: Sequence[str], where: str, arm: Arm | None = None) -> int
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise RecordingError(f"{where} has the column {twice[0]!r} more than once: expected {_header(arm)}")
+    if "q0" in names:
+        raise RecordingError(f"{where} counts its joints from 0 (column 'q0'): expected {_header(arm)}; rename them")
     n = max((int(m[2]) for m in map(_JOINT.fullmatch, names) if m), default=0)
     if n == 0:
         found = ", ".join(names[:6]) + (", …" if len(names) > 6 else "")
@@ -56,7 +58,10 @@ def check_joint_count(n: int, where: str, arm: Arm) -> None:
     """Raise RecordingError if the log's n joints are not the arm's."""
     if n != arm.n:
         has = "1 joint (q1)" if n == 1 else f"{n} joints (q1..q{n})"
-        raise RecordingError(f"{where}: log has {has}, {arm.name} has {arm.n}: name the robot that made the log")
+        raise RecordingError(
+            f"{where}: log has {has}, {arm.name} has {arm.n} up to its frame {arm.frame!r}: name the robot that made "
+            "the log, or its flange with --frame"
+        )
 
 
 def checked_recording(

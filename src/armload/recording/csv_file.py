@@ -85,6 +85,11 @@ def _header(text: str, where: str) -> list[str]:
         raise RecordingError(
             f"{where}, line 1 holds numbers: expected the header t,q1..qn,dq1..dqn,tau1..taun before the data"
         )
+    if names[0].startswith("#"):
+        raise RecordingError(
+            f"{where}, line 1 begins with '#': expected the header t,q1..qn,dq1..dqn,tau1..taun; remove the '#', or "
+            "the line if it is a comment"
+        )
     if len(names) == 1:
         for separator, called in ((";", "semicolons"), ("\t", "tabs"), (" ", "spaces")):
             if separator in names[0]:

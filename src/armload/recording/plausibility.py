@@ -27,6 +27,7 @@ _NOT_DERIVATIVE = 0.5  # relative rms difference between ∫dq dt and the change
 # A payload of twice the rated mass, far off the flange, asks up to 2.4 times the rated torque of the wrist
 _EFFORT, _EFFORT_SHARE = 3.0, 0.01  # times the effort limit, in more than this share of the samples
 _NO_TORQUE = 1e-3  # [N·m]
+_FROZEN_TIME, _FROZEN_MOTION = 0.25, 0.1  # [s], [rad] without any change of torque: no sound sensor is so calm
 _SCALE_LOW, _SCALE_HIGH, _SURE = 0.6, 1.7, 2.0  # of the arm's own torque; standard deviations
 _MISFIT = 2.5  # plausible model errors
 
@@ -37,8 +38,8 @@ def check_plausible(recording: Recording, arm: Arm) -> None:
     Raises:
         RecordingError: another number or other names of joints; degrees; positions outside the limits; positions that
             jump; dq that is not the derivative of q (unit, sign, swapped columns, time in milliseconds); too fast;
-            torque missing, too large, or not that of this arm (wrong arm, unit, sign, base orientation, or a channel
-            without gravity). One sentence that names the place.
+            torque missing, frozen, too large, or not that of this arm (wrong arm, unit, sign, base orientation, or a
+            channel without gravity). One sentence that names the place.
     """
     _check_joints(recording, arm)
     _check_radians(recording, arm)
@@ -48,6 +49,7 @@ def check_plausible(recording: Recording, arm: Arm) -> None:
     _check_speed(recording, arm)
     _check_effort(recording, arm)
     if recording.channel == "measured":  # the others need not hold the arm's own weight
+        _check_torque_goes_on(recording)
         _check_torque_is_the_arms(recording, arm)
 
 
@@ -186,6 +188,19 @@ def _check_effort(recording: Recording, arm: Arm) -> None:
             f"{size[k, j] / arm.limits.effort[j]:.3g} times the limit of {arm.joint_names[j]} "
             f"({arm.limits.effort[j]:g} N·m): expected joint torque in N·m of {arm.name}"
         )
+
+
+def _check_torque_goes_on(recording: Recording) -> None:
+    """Refuse torque that repeats itself exactly in all joints while the arm moves: its sensor or logger stood still."""
+    same = np.r_[False, np.all(recording.tau[1:] == recording.tau[:-1], axis=1), False]
+    edges = np.diff(same.astype(int))
+    for first, last in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
+        time = recording.t[last] - recording.t[first]
+        if time > _FROZEN_TIME and np.any(np.ptp(recording.q[first : last + 1], axis=0) > _FROZEN_MOTION):
+            raise RecordingError(
+                f"{recording.source}: tau stays exactly the same in all joints from {_row(recording, first)} for "
+                f"{time:.2f} s although the arm moves: expected the torque of every moment; remove the rows"
+            )
 
 
 def _check_torque_is_the_arms(recording: Recording, arm: Arm) -> None:

@@ -28,6 +28,7 @@ _FRICTION_WIDTH = 0.05  # [rad/s]
 _MODEL_ERROR = 0.03  # of the rated torque, rms
 _OFFSET = 0.05  # of the rated torque
 _FRICTION = 0.2  # of the rated torque: gear friction as motor currents show it
+_WEAKEST = 0.4  # rating of an unrated wrist, as a share of the largest torque the model asks: 0.3 to 0.4 on real arms
 _UNRATED = 5.0  # [kg] payload assumed where the maker's rating is not known
 _LEVER = 0.15  # [m] of the payload's centre of mass and radius of gyration
 
@@ -100,6 +101,11 @@ def _some(parts: Windows) -> Windows:
 
 
 def _rated_torque(arm: Arm, own: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The torque each joint is made for (n,): its effort limit, or else what the log asks of the model."""
-    asked = np.maximum(2.0 * np.abs(own).max(axis=0), 0.1 * np.abs(own).max() + 1.0)
+    """The torque each joint is made for (n,): its effort limit, or else a guess from what the log asks of the model.
+
+    A joint is at least as strong as those it carries, and the weakest of an arm about a fifth of the strongest.
+    """
+    most = np.abs(own).max(axis=0)
+    carried = np.maximum.accumulate(most[::-1])[::-1]
+    asked = np.maximum(2.0 * carried, _WEAKEST * most.max() + 1.0)
     return np.where(np.isfinite(arm.limits.effort), arm.limits.effort, asked)
