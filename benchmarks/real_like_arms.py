@@ -55,9 +55,9 @@ def run(count: int) -> Comparison:
     )
     return compare(
         {
-            "RLS": lambda _: RecursiveLeastSquares(robot),
-            "filtered RLS": lambda _: FilteredRecursiveLeastSquares(robot),
-            "filtered RLS, virtual calibration": FilteredRecursiveLeastSquares(robot),
+            "rls": lambda _: RecursiveLeastSquares(robot),
+            "rls-filter": lambda _: FilteredRecursiveLeastSquares(robot),
+            "rls-filter, with tare": FilteredRecursiveLeastSquares(robot),
             "map": lambda _: PosteriorLeastSquares(robot),
             "map, with tare": lambda tare: PosteriorLeastSquares(robot, tare),
         },

@@ -41,9 +41,9 @@ def test_demo_compares_every_kind_on_a_payload_nobody_trained_on(demo):
     names = [row[0] for row in demo.table]
     assert names == [
         "truth",
-        "RLS",
-        "filtered RLS",
-        "filtered RLS, virtual calibration",
+        "rls",
+        "rls-filter",
+        "rls-filter, with tare",
         "map",
         "map, with tare",
         "trees",

@@ -229,9 +229,9 @@ def _learned(model: LearnedModel, robot: Arm, _: Recording | None) -> Identifier
 def _least_squares(robot: Arm) -> dict[str, Method]:
     """The physical methods; those given as functions of the tare do not use it, or in their own way."""
     return {
-        "RLS": lambda _: RecursiveLeastSquares(robot),
-        "filtered RLS": lambda _: FilteredRecursiveLeastSquares(robot),
-        "filtered RLS, virtual calibration": FilteredRecursiveLeastSquares(robot),
+        "rls": lambda _: RecursiveLeastSquares(robot),
+        "rls-filter": lambda _: FilteredRecursiveLeastSquares(robot),
+        "rls-filter, with tare": FilteredRecursiveLeastSquares(robot),
         "map": lambda _: PosteriorLeastSquares(robot),
         "map, with tare": lambda tare: PosteriorLeastSquares(robot, tare),
     }

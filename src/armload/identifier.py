@@ -128,18 +128,25 @@ class BatchIdentifier(Identifier):
 
 
 class Tared(Identifier):
-    """Any method relative to its own estimate of a tare: phi(run) − phi(tare), the covariances add.
+    """Any method relative to what it says of a tare, its virtual calibration object: phi(run) − phi(tare).
 
-    The plainest virtual calibration [Kurdas et al. 2022]; a method that uses the tare's log itself does better.
+    The tare counts as the mean of the estimates along its second half, as in Kurdas et al., ICRA 2022; the covariances
+    add. A method that uses the tare's log itself does better (`PosteriorLeastSquares`).
 
     Args:
         identifier: the method; it identifies the tare at once.
         tare: an earlier log of the same arm, on any motion, with whatever was mounted then.
+
+    Attributes:
+        before: the virtual calibration object.
     """
 
     def __init__(self, identifier: Identifier, tare: Recording) -> None:
         self.name, self.arm = identifier.name, identifier.arm
-        self._identifier, self._before = identifier, identifier.run(tare)
+        estimates = identifier.trace(tare, every=max(1, len(tare) // 100))
+        second_half = [estimate.phi for estimate in estimates[len(estimates) // 2 :]]
+        self.before = replace(estimates[-1], phi=np.mean(second_half, axis=0))
+        self._identifier = identifier
         self.reset()
 
     def reset(self) -> None:
@@ -155,5 +162,5 @@ class Tared(Identifier):
         return [self._relative(estimate) for estimate in self._identifier.trace(recording, every)]
 
     def _relative(self, estimate: Estimate) -> Estimate:
-        before = self._before
+        before = self.before
         return replace(estimate, phi=estimate.phi - before.phi, covariance=estimate.covariance + before.covariance)

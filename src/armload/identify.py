@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.errors import IdentificationError
-from armload.identifier import Estimate, Identifier
+from armload.identifier import Estimate, Identifier, Tared
 from armload.inertia import NAMES, UNITS, InertialParameters, is_consistent, nearest_consistent, phi_to_com
 from armload.least_squares import (
     FilteredRecursiveLeastSquares,
@@ -168,8 +168,10 @@ def _run(recording: Recording, arm: Arm, tare: Recording | None, method: str | P
             why += "; without a tare the error bars allow for the model's errors"
         return _Found(PosteriorLeastSquares(arm, tare).run(recording), nothing, weak, True, "map", why)
     if method in ("rls", "rls-filter"):
-        identifier = RecursiveLeastSquares(arm) if method == "rls" else FilteredRecursiveLeastSquares(arm)
-        return _Found(_minus_tare(identifier, recording, tare), nothing, weak, False, str(method), "asked for")
+        identifier: Identifier = RecursiveLeastSquares(arm) if method == "rls" else FilteredRecursiveLeastSquares(arm)
+        if tare is not None:
+            identifier = Tared(identifier, tare)
+        return _Found(identifier.run(recording), nothing, weak, False, str(method), "asked for")
     if not Path(method).exists():
         raise IdentificationError(
             f"unknown method {str(method)!r}: expected one of {', '.join(METHODS)}, or the path of a trained model"
@@ -189,21 +191,6 @@ def _run(recording: Recording, arm: Arm, tare: Recording | None, method: str | P
         estimate = replace(estimate, covariance=np.diag(family**2))
     why = f"asked for; {method} was trained on this arm and motion"
     return _Found(estimate, model.phi_mean, family, True, model.kind, why)
-
-
-def _minus_tare(identifier: Identifier, recording: Recording, tare: Recording | None) -> Estimate:
-    """Virtual calibration: the same method's estimate of the tare is subtracted, the covariances add."""
-    estimate = identifier.run(recording)
-    if tare is None:
-        return estimate
-    before = identifier.run(tare)
-    return Estimate(
-        estimate.t,
-        estimate.phi - before.phi,
-        estimate.covariance + before.covariance,
-        estimate.n_samples,
-        estimate.frame,
-    )
 
 
 def _answer(found: _Found, arm: Arm, recording: Recording, relative_to: str) -> Identification:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Sequence
 from dataclasses import fields
 from importlib.metadata import PackageNotFoundError, version
@@ -20,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
+from armload.atomic import replacing
 from armload.errors import ArmloadError, ModelError
 from armload.inertia import NAMES
 from armload.learners.compiled import Beside, Compiled, CompiledNetworks, CompiledTrees, Together
@@ -98,11 +98,10 @@ def save_model(
 
     header["sha256"] = _digest(header, tensors)
     path = Path(path)
-    part = path.with_name(path.name + ".part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        part.write_bytes(save(tensors, {_HEADER: json.dumps(header)}))
-        os.replace(part, path)
+        with replacing(path) as part:
+            part.write_bytes(save(tensors, {_HEADER: json.dumps(header)}))
     except OSError as error:
         raise ModelError(f"the model cannot be written to {path}: {error.strerror}") from None
     return load_model(path)

@@ -5,7 +5,8 @@ Both fit y = Y·phi sample by sample,
     K = P·Yᵀ·(μ·1 + Y·P·Yᵀ)⁻¹,   phi ← phi + K·(y − Y·phi),   P ← (P − K·Y·P)/μ,
 
 with forgetting factor μ. They differ in what y and Y are. Sources: Atkeson, An, Hollerbach, IJRR 1986 (least squares);
-Kurdas et al., ICRA 2022, doi 10.1109/ICRA46639.2022.9811691 (observer, matched filter, virtual calibration).
+Kurdas et al., ICRA 2022, doi 10.1109/ICRA46639.2022.9811691 (observer, matched filter; their virtual calibration is
+`armload.identifier.Tared`).
 """
 
 from __future__ import annotations
@@ -19,9 +20,7 @@ from numpy.typing import NDArray
 from armload.arms import Arm, payload_regressor
 from armload.arms.filtered import Lag
 from armload.identifier import BatchIdentifier, Estimate
-from armload.inertia import InertialParameters
 from armload.least_squares.autocorrelation import BlockMeans
-from armload.recording import Recording
 
 _AT_REST = 0.01  # [rad/s]
 _TRANSIENT = 5.0  # time constants after which an observer started in motion has settled
@@ -36,17 +35,15 @@ class _Recursive(BatchIdentifier):
     long-run variance of its residual (batch means): naive least squares would take residuals for independent.
     """
 
-    def __init__(self, arm: Arm, forgetting: float = 1.0, calibration: InertialParameters | None = None) -> None:
+    def __init__(self, arm: Arm, forgetting: float = 1.0) -> None:
         """
         Args:
             arm: the bare arm.
             forgetting: μ in (0, 1]; 1 remembers everything.
-            calibration: virtual calibration object, subtracted from every estimate: what an unloaded run was
-                identified as (see `calibrate`).
         """
         if not 0.0 < forgetting <= 1.0:
             raise ValueError(f"forgetting is {forgetting}: expected a factor above 0 and at most 1")
-        self.arm, self.forgetting, self.calibration = arm, forgetting, calibration
+        self.arm, self.forgetting = arm, forgetting
         self.reset()
 
     def reset(self) -> None:
@@ -57,19 +54,6 @@ class _Recursive(BatchIdentifier):
         self._residual = BlockMeans(n)
         self._count, self._last_t = 0, None
         self._restart()
-
-    def calibrate(self, unloaded: Recording) -> InertialParameters:
-        """Virtual calibration [Kurdas 2022]: what an unloaded run is identified as, mean over its second half.
-
-        The result becomes `calibration`; the next runs are relative to it.
-        """
-        self.calibration = None
-        estimates = self.trace(unloaded)
-        self.calibration = InertialParameters(
-            np.mean([e.phi for e in estimates[len(estimates) // 2 :]], axis=0), self.arm.frame
-        )
-        self.reset()
-        return self.calibration
 
     @abstractmethod
     def _equations(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> tuple[NDArray, NDArray]:
@@ -89,8 +73,7 @@ class _Recursive(BatchIdentifier):
         self._last_t, self._count = t[-1], self._count + len(t)
 
     def _estimate(self, t: float) -> Estimate:
-        offset = 0.0 if self.calibration is None else self.calibration.phi
-        return Estimate(float(t), self._phi - offset, self._covariance(), self._count, str(self.arm.frame))
+        return Estimate(float(t), self._phi.copy(), self._covariance(), self._count, str(self.arm.frame))
 
     def _covariance(self) -> NDArray[np.float64]:
         if not self._residual.ready:
@@ -156,7 +139,7 @@ class FilteredRecursiveLeastSquares(_Recursive):
     Args:
         arm: the bare arm.
         gain: λ of the observer and of the filter [1/s].
-        forgetting, calibration: as in `RecursiveLeastSquares`.
+        forgetting: as in `RecursiveLeastSquares`.
     """
 
     name = "rls-filter"
@@ -166,10 +149,9 @@ class FilteredRecursiveLeastSquares(_Recursive):
         arm: Arm,
         gain: float = 20.0,
         forgetting: float = 1.0,
-        calibration: InertialParameters | None = None,
     ) -> None:
         self.gain = gain
-        super().__init__(arm, forgetting, calibration)
+        super().__init__(arm, forgetting)
 
     def _restart(self) -> None:
         self._observer, self._filter = Lag(self.gain), Lag(self.gain)
