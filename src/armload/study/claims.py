@@ -37,11 +37,13 @@ VERDICTS = (CONFIRMED, NOT_CONFIRMED, DEPENDS, NOT_MEASURED)
 SPLITS = ("row", "payload")  # the paper's, and the one that keeps whole payloads from the training
 REAL = "test_payload_real_like"  # the stand-in for the real robot
 SEMI_REAL = "test_payload_semi_real"
+LEAST = 1.0  # [%] an improvement below this is none
 
 RULE = (
     "A claim is confirmed if its direction (or, without a number, its criterion) holds under the paper's own protocol, "
     "rows split at random, and also with whole payloads held out; not confirmed if under neither; depends on the split "
-    "if under one of them only. The size of an improvement does not enter the verdict: it stands beside it."
+    f"if under one of them only. An improvement below {LEAST:g} % counts as none. "
+    "Beyond that, the size of an improvement does not enter the verdict: it stands beside it."
 )
 
 
@@ -155,7 +157,7 @@ def _percentage(claim: dict[str, Any], cells: Cells, split: str) -> Measured | N
     return Measured(
         value,
         spread(_improvement, *units),
-        value > 0.0,
+        value >= LEAST,
         match.cap,
         match.seeds,
         exact=bool(min(pair.better.mean(), pair.worse.mean()) < EXACT),
