@@ -2,8 +2,6 @@
 
 import json
 import re
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,8 +15,6 @@ from armload.study.figures import figures
 from armload.study.page import html_report, markdown, sections, summary_json, write_page
 from armload.study.summary import paragraphs
 from armload.study.tables import COMMAND, PROTOCOLS, claims_table, main_tables
-
-sys.path.insert(0, str(Path(__file__).parent))
 from test_study_claims import UNIT, cell, study
 
 
