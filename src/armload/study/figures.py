@@ -15,7 +15,7 @@ from armload.study.numbers import Cells
 from armload.study.tables import Row
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from armload.report.style import Figure  # matplotlib belongs to report
 
 _LOG_FROM = 30.0  # ratio of largest to smallest error from which an axis becomes logarithmic
 _BASELINE = "#8A8A8A"

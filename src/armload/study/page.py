@@ -19,7 +19,7 @@ from armload.study.statements import RULES
 from armload.study.tables import COMMAND, PROTOCOLS, claims_table, main_tables, parameter_table
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from armload.report.style import Figure  # matplotlib belongs to report
 
 TITLE = "The study of Taie et al. 2024, measured again"
 _CAPTIONS = {
@@ -60,7 +60,7 @@ def sections(cells: Cells, claims: Sequence[dict[str, Any]], figures: dict[int, 
         Section("Figures 4 to 8", _FIGURES, _figure_tables(cells), shown(4, 5, 6, 7, 8)),
         Section("What drives the result", _ABLATIONS, (*_ablations(cells), single_or_mean_table(cells))),
         Section("Claim by claim", _claims_text(), _claims_tables(claims)),
-        Section("Where the paper contradicts itself", _notes(claims)),
+        Section("Notes on single claims, contradictions of the paper among them", _notes(claims)),
     ]
 
 
