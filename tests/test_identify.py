@@ -113,3 +113,38 @@ def test_only_measured_torque_at_a_useful_rate_is_taken(panda, analytic_log):
         identify(log.select(slice(None, None, 20)), panda)
     with pytest.raises(IdentificationError, match="unknown method 'magic'"):
         identify(log, panda, method="magic")
+
+
+def test_a_tool_mounted_after_the_tare_is_taken_off_the_answer(real_like):
+    panda, how = real_like
+    both = simulate(panda, taie2024(), TOOL + BOX, seed=3, **how)
+    for mounted, seed, relative_to, said in ((None, 4, "tool", "after the tare"), (TOOL, 5, "tare", "already")):
+        tare = simulate(panda, random_motion(panda, 8, duration=15.0, harmonics=8), mounted, seed=seed, **how)
+        answer = identify(both, panda, tare=tare, tool=TOOL)
+        assert answer.relative_to == relative_to
+        assert answer.phi_low[0] < BOX.mass < answer.phi_high[0]
+        assert any(said in note for note in answer.notes)
+
+
+def test_a_tool_in_grams_is_refused(panda, analytic_log):
+    with pytest.raises(IdentificationError, match="730 kg"):
+        identify(analytic_log(panda, BOX), panda, tool=InertialParameters(1e3 * np.array([0.73] + [0.0] * 9)))
+
+
+def test_a_log_that_no_body_explains_is_said_to_be_so(real_like):
+    panda, how = real_like
+    fine = simulate(panda, taie2024(), BOX, seed=3, **how)
+    tau = fine.tau.copy()
+    tau[:, 3] *= -1.0  # one sensor's sign turned
+    turned = Recording(fine.t, fine.q, fine.dq, tau)
+    assert not any("no body fits" in note for note in identify(fine, panda).notes)
+    assert any("no body fits" in note for note in identify(turned, panda).notes)
+
+
+def test_an_undetermined_interval_of_a_method_without_a_prior_holds_its_own(real_like):
+    panda, how = real_like
+    heavy = InertialParameters.from_com(5.0, (0.0, 0.0, 0.06), np.diag([1e-2, 1e-2, 1e-2]))
+    log = simulate(panda, taie2024(), heavy, seed=3, **how).between(0.0, 1.0)
+    answer = identify(log, panda, method="rls")
+    assert not answer.determined[0]
+    assert answer.phi_high[0] >= answer.phi[0] > Z95 * payload_prior_std(panda)[0]

@@ -32,6 +32,7 @@ Z95 = 1.959963984540054  # half-width of a normal 95 % interval, in standard dev
 # "determined" for a method without a prior: 95 % half-width below 50 g, 5 g·m, 5e-3 kg·m²
 _SMALL = np.array([0.05] + [0.005] * 3 + [0.005] * 6)
 _SHRINK = 3.0  # "determined" for a method with a prior: its half-width shrinks at least so much
+_MISFIT = 5.0  # standard deviations between the estimate and the nearest body, beyond which something is wrong
 _HELD = 3.0  # standard deviations of mass above zero before something counts as held
 
 
@@ -114,7 +115,8 @@ def identify(
         arm: the bare arm, with the frame and gravity wanted.
         tare: an earlier log of the same arm, on any motion, with whatever was mounted then; the answer is what was
             added since.
-        tool: a mounted tool whose parameters are known; the answer is what it carries.
+        tool: a tool mounted in the recording whose parameters are known; the answer is what it carries. Whether it was
+            mounted at the tare too is found from the tare.
         method: a name in `METHODS`, or the path of a trained model; None: the most trustworthy for any log, "map".
         progress: told in a few words what is being done.
 
@@ -125,12 +127,37 @@ def identify(
     for log in (recording, tare):
         if log is not None:
             _check(log, arm)
-    if tool is not None:
-        arm = arm.with_payload(arm.in_frame(tool))
     say("identifying")
-    found = _run(recording, arm, tare, method)
-    relative_to = "tare" if tare is not None else "tool" if tool is not None else "arm"
-    return _answer(found, arm, recording, relative_to)
+    if tool is None:
+        return _answer(_run(recording, arm, tare, method), arm, recording, "arm" if tare is None else "tare")
+    tool = _plausible_tool(arm.in_frame(tool), arm)
+    if tare is None or _carries(tare, arm, tool):
+        arm = arm.with_payload(tool)
+        found, relative_to = _run(recording, arm, tare, method), "tool" if tare is None else "tare"
+        note = () if tare is None else ("the tool was mounted at the tare already",)
+    else:
+        found, relative_to = _run(recording, arm, tare, method), "tool"
+        found = found._replace(estimate=replace(found.estimate, phi=found.estimate.phi - tool.phi))
+        note = ("the tool was mounted after the tare: the answer is what was added since, less the tool",)
+    return _answer(found, arm, recording, relative_to, note)
+
+
+def _plausible_tool(tool: InertialParameters, arm: Arm) -> InertialParameters:
+    most = 6.0 * float(payload_prior_std(arm)[0])  # three times the rated payload
+    if not abs(tool.mass) <= most:
+        raise IdentificationError(
+            f"the tool weighs {tool.mass:.4g} kg: expected at most {most:.3g} kg, three times what {arm.name} is rated "
+            "for; give kilograms and metres"
+        )
+    return tool
+
+
+def _carries(log: Recording, arm: Arm, tool: InertialParameters) -> bool:
+    """Whether a log fits the arm with the tool better than the bare arm, in the metric of what the log tells."""
+    seen = PosteriorLeastSquares(arm).run(log)
+    information = np.linalg.inv(seen.covariance)
+    with_tool = seen.phi - tool.phi
+    return bool(with_tool @ information @ with_tool < seen.phi @ information @ seen.phi)
 
 
 class _Found(NamedTuple):
@@ -172,18 +199,18 @@ def _run(recording: Recording, arm: Arm, tare: Recording | None, method: str | P
         if tare is not None:
             identifier = Tared(identifier, tare)
         return _Found(identifier.run(recording), nothing, weak, False, str(method), "asked for")
-    if not Path(method).exists():
+    if not Path(method).is_file():
         raise IdentificationError(
             f"unknown method {str(method)!r}: expected one of {', '.join(METHODS)}, or the path of a trained model"
         )
     from armload.learners import LearnedIdentifier, load_model
 
+    model = load_model(method)
     if tare is not None:
         raise IdentificationError(
             f"the trained model {method} cannot use a tare (an empty arm lies outside its training): leave the tare "
             "out, or use the method map"
         )
-    model = load_model(method)
     model.check(arm, recording)
     estimate = LearnedIdentifier(model, arm).run(recording)
     family = np.maximum(model.phi_std, _SMALL / Z95)  # what did not vary in training is not known exactly for that
@@ -193,17 +220,22 @@ def _run(recording: Recording, arm: Arm, tare: Recording | None, method: str | P
     return _Found(estimate, model.phi_mean, family, True, model.kind, why)
 
 
-def _answer(found: _Found, arm: Arm, recording: Recording, relative_to: str) -> Identification:
+def _answer(
+    found: _Found, arm: Arm, recording: Recording, relative_to: str, notes: tuple[str, ...] = ()
+) -> Identification:
     estimate, before = found.estimate, found.before
     phi, half, half_before = estimate.phi.copy(), Z95 * estimate.std, Z95 * found.before_std
     determined = half <= (half_before / _SHRINK if found.prior else _SMALL)
     held = bool(determined[0] and phi[0] > _HELD * estimate.std[0])
-    low = np.where(determined, phi - half, before - half_before)
-    high = np.where(determined, phi + half, before + half_before)
+    low_before, high_before = before - half_before, before + half_before
+    if not found.prior:  # the method knew nothing of what was known before: its own interval counts too
+        low_before, high_before = np.minimum(low_before, phi - half), np.maximum(high_before, phi + half)
+    low = np.where(determined, phi - half, low_before)
+    high = np.where(determined, phi + half, high_before)
     removed = determined[0] and phi[0] < -half[0]
-    notes = []
+    said = list(notes)
     if removed:
-        notes.append(
+        said.append(
             "something was taken off since the tare: the added mass is negative, so no body has these parameters"
             if relative_to == "tare"
             else "the mass is negative: less is mounted than the model of the arm and its tool assume, or the torque's "
@@ -211,11 +243,18 @@ def _answer(found: _Found, arm: Arm, recording: Recording, relative_to: str) -> 
         )
     elif not is_consistent(phi):
         # the nearest parameters that a body can have, in the metric of what is known
-        phi = nearest_consistent(phi, np.linalg.inv(estimate.covariance), margin=1e-5)
+        information = np.linalg.inv(estimate.covariance)
+        phi = nearest_consistent(phi, information, margin=1e-5)
+        away = phi - estimate.phi
+        if away @ information @ away > _MISFIT**2:
+            said.append(
+                "no body fits within the error bars: check the robot, the base (--gravity), what is mounted and the "
+                "torques' signs"
+            )
     low, high = np.minimum(low, phi), np.maximum(high, phi)
     if not determined.all():
         missing = ", ".join(n for n, known in zip(NAMES, determined, strict=True) if not known)
-        notes.append(f"this motion does not determine {missing}: what was known before is reported for them")
+        said.append(f"this motion does not determine {missing}: what was known before is reported for them")
     mass, com, inertia_com = phi_to_com(phi)
     return Identification(
         method=found.method,
@@ -235,5 +274,5 @@ def _answer(found: _Found, arm: Arm, recording: Recording, relative_to: str) -> 
         consistent=is_consistent(phi),
         held=held,
         why=found.why,
-        notes=tuple(notes),
+        notes=tuple(said),
     )

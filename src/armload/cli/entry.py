@@ -31,6 +31,7 @@ COMMANDS = {
     "train": "train an ensemble of trees or networks on a data set",
     "identify": "tell from a log what the robot holds: mass, centre of mass, inertia, with 95 % intervals",
     "report": "write an HTML report: figures of the log and of every method's estimate over time",
+    "reproduce": "run the paper's study again and put a verdict beside each of its claims",
     "motion": "show, check, export or draw an excitation motion",
 }
 _EXAMPLES = """\

@@ -71,6 +71,8 @@ def run(options: argparse.Namespace) -> None:
 
     if options.kind == "mixed" and options.stages == 2:
         raise UsageError("--kind mixed has one stage: leave out --stages 2, or choose tree or network")
+    if not options.out.endswith(".safetensors"):
+        raise UsageError(f"--out is {options.out!r}: expected a name that ends in .safetensors")
     dataset = open_dataset(options.dataset)
     arm = arm_of_dataset(dataset, options.robot)
     motions = _motions(dataset, arm, options.motion)

@@ -1,0 +1,157 @@
+"""Running the study: every cell of the plan that is not finished yet, each kept as soon as it is done."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from armload.dataset import Split, split_payloads, split_rows
+from armload.evaluate import EvaluationRun, PriorLeastSquares, mean_absolute_error
+from armload.identifier import Identifier, Tared
+from armload.least_squares import (
+    FilteredRecursiveLeastSquares,
+    GaussianPrior,
+    PosteriorLeastSquares,
+    RecursiveLeastSquares,
+)
+from armload.study.basis import Basis
+from armload.study.cells import Spec, load_cells, save_cell
+from armload.study.plan import plan
+from armload.study.protocols import measure_learned, measure_stream
+
+if TYPE_CHECKING:
+    from armload.learners import BaggingEnsemble, MixedEnsemble, TwoStage
+
+_SPLITS: dict[str | None, Callable[..., Split]] = {"row": split_rows, "payload": split_payloads}
+_SIGNALS = {"t": slice(0, 1), "q": slice(1, 8), "dq": slice(8, 15), "tau": slice(15, 22)}
+
+
+def run_study(
+    basis: Basis,
+    results: str | Path,
+    *,
+    until: float | None = None,
+    progress: bool = False,
+    say: Callable[[str], None] = lambda _: None,
+) -> dict[str, dict[str, Any]]:
+    """Measure what is not finished yet and return all finished cells by name.
+
+    Args:
+        basis: what it rests on.
+        results: folder of the cells' files; those with the right key are not measured again.
+        until: seconds after which no further cell is begun; None: to the end.
+        progress: bars on stderr.
+        say: told which cell is next.
+    """
+    folder, started, fingerprint = Path(results), time.monotonic(), basis.fingerprint
+    cells, todo = load_cells(folder), plan(basis.size)
+    for number, spec in enumerate(todo, start=1):
+        if cells.get(spec.name, {}).get("key") == spec.key(fingerprint):
+            continue
+        if until is not None and time.monotonic() - started > until:
+            say(f"stopped before cell {number} of {len(todo)}: run it again to go on")
+            break
+        say(f"cell {number} of {len(todo)}: {spec.name}")
+        begun = time.perf_counter()
+        measured = _benchmark(spec, basis) if spec.kind == "benchmark" else _learned(spec, basis, progress)
+        cell = {
+            "name": spec.name,
+            "key": spec.key(fingerprint),
+            "spec": asdict(spec),
+            "wall_s": round(time.perf_counter() - begun, 1),
+            "rows": basis.size.rows * len(basis.loadings),
+            "payloads": len(basis.loadings),
+            "versions": _versions(),
+            **measured,
+        }
+        save_cell(folder, cell)
+        cells[spec.name] = json.loads(json.dumps(cell))
+    names = {spec.name for spec in todo}
+    return {name: cell for name, cell in cells.items() if name in names}
+
+
+def _learned(spec: Spec, basis: Basis, progress: bool) -> dict[str, Any]:
+    """Train an ensemble, then measure it on its own test rows and on every run."""
+    from armload.learners import save_model
+
+    dataset = basis.dataset(spec.sensors, progress)
+    split = _SPLITS[spec.split](dataset, spec.seed)
+    hidden = [_SIGNALS[signal] for signal in spec.drop]
+
+    def seen(X: np.ndarray) -> np.ndarray:
+        X = X.copy()
+        for columns in hidden:
+            X[:, columns] = 0.0
+        return X
+
+    model = _untrained(spec)
+    checkpoint = basis.folder / "checkpoints" / f"{spec.name}.npz"
+    checkpoint.parent.mkdir(parents=True, exist_ok=True)
+    parts = (split.train, split.validation)
+    data = [a for rows in parts for a in (seen(dataset.X[rows]), dataset.y[rows])]
+    model.fit(*data, progress=progress, checkpoint=checkpoint)
+    file = basis.folder / "models" / f"{spec.name}.safetensors"
+    save_model(file, model, arm=basis.arm, motion=basis.motion, dataset_hash=dataset.hash, notes=spec.name)
+    answers = np.asarray(model.predict(seen(dataset.X[split.test])))
+    held_out = mean_absolute_error(answers, dataset.y[split.test])
+    measured = measure_learned(lambda X: model.predict(seen(X)), basis.runs)
+    measured["protocols"]["held_out"] = {"single": held_out.tolist()}
+    for left in checkpoint.parent.glob(f"{spec.name}.*"):
+        left.unlink()
+    epochs = None if model.epochs_ is None else np.ravel(model.epochs_).tolist()
+    return {"epochs": epochs, "file_bytes": file.stat().st_size, **measured}
+
+
+def _untrained(spec: Spec) -> BaggingEnsemble | TwoStage | MixedEnsemble:
+    from armload.learners import BaggingEnsemble, MixedEnsemble, NetworkLearner, TreeLearner, TwoStage
+
+    network = NetworkLearner(
+        hidden=spec.hidden, batch=spec.batch, max_epochs=spec.max_epochs, learning_rate=spec.learning_rate
+    )
+    tree = TreeLearner(max_depth=spec.max_depth)
+    rest: dict[str, Any] = {"members": spec.members, "seed": spec.seed}
+    rest["scale"] = "none" if spec.scale == "raw" else "standard"
+    if spec.kind == "mixed":
+        return MixedEnsemble((tree, network), **rest)
+    return (BaggingEnsemble, TwoStage)[spec.stages - 1](network if spec.kind == "network" else tree, **rest)
+
+
+def _benchmark(spec: Spec, basis: Basis) -> dict[str, Any]:
+    """Measure least squares or a baseline on every run."""
+    robot = basis.arm
+    if spec.method == "training-mean":
+        dataset = basis.dataset("ideal")
+        split = _SPLITS[spec.split](dataset, spec.seed)
+        mean = np.asarray(dataset.y[split.train].mean(axis=0))
+        measured = measure_learned(lambda X: np.tile(mean, (len(X), 1)), basis.runs)
+        error = mean_absolute_error(mean, dataset.y[split.test])
+        measured["protocols"]["held_out"] = {"single": error.tolist()}
+        return {"epochs": None, "file_bytes": None, **measured}
+
+    prior = GaussianPrior.of([p.parameters for p in basis.loadings], "the training payloads")
+
+    def make(run: EvaluationRun) -> Identifier:
+        if spec.method == "rls":
+            return RecursiveLeastSquares(robot)
+        if spec.method == "rls-filter":
+            return FilteredRecursiveLeastSquares(robot)
+        if spec.method == "rls-filter-calibrated":
+            assert run.tare is not None
+            return Tared(FilteredRecursiveLeastSquares(robot), run.tare)
+        if spec.method == "same-prior":
+            return PriorLeastSquares(robot, prior.mean, prior.covariance)
+        return PosteriorLeastSquares(robot, run.tare if spec.method == "map-tare" else None)
+
+    return {"epochs": None, "file_bytes": None, **measure_stream(make, basis.runs)}
+
+
+def _versions() -> dict[str, str]:
+    from importlib.metadata import version
+
+    return {name: version(name) for name in ("armload", "numpy", "scikit-learn", "jax", "pin", "mujoco")}
