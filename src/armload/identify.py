@@ -32,7 +32,7 @@ Z95 = 1.959963984540054  # half-width of a normal 95 % interval, in standard dev
 # "determined" for a method without a prior: 95 % half-width below 50 g, 5 g·m, 5e-3 kg·m²
 _SMALL = np.array([0.05] + [0.005] * 3 + [0.005] * 6)
 _SHRINK = 3.0  # "determined" for a method with a prior: its half-width shrinks at least so much
-_MISFIT = 5.0  # standard deviations between the estimate and the nearest body, beyond which something is wrong
+_MISFIT = 3.0  # standard deviations between the estimate and the nearest body, beyond which something is wrong
 _HELD = 3.0  # standard deviations of mass above zero before something counts as held
 
 

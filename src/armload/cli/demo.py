@@ -11,7 +11,7 @@ from armload.cli.printing import print_note, print_table
 _EXAMPLES = """\
 examples:
   armload demo
-  armload demo --out /tmp/demo --quick
+  armload demo --out my-demo --quick
   armload identify out/demo/run.csv --robot panda --tare out/demo/tare.csv     (afterwards)
 """
 
