@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from armload.arms import Arm, arm
+from armload.atomic import replacing
 from armload.dataset import Dataset, Split, build_dataset, split_payloads
 from armload.errors import DatasetError
 from armload.evaluate import Comparison, EvaluationRun, Table, compare
@@ -115,7 +116,7 @@ def run_demo(
 
     clock.start("identifying", f"{test_payload().name} ({test_payload().parameters.mass:.3f} kg), outside the loadings")
     answer = identify(run, robot, tare=tare)
-    (folder / "identified.json").write_text(json.dumps(answer.to_dict(), indent=1, allow_nan=False) + "\n")
+    _write_json(folder / "identified.json", answer.to_dict())
     truth = InertialParameters(test_payload().parameters.phi, robot.frame)
     runs = [EvaluationRun(run, truth, test_payload().name, tare, seed + 1)]
     training = [dataset.truth(k) for k in np.unique(dataset.run[split.train])]
@@ -131,7 +132,7 @@ def run_demo(
     clock.start("reporting", "tables and figures")
     table = _table(comparison)
     report = _report(folder / "report.html", comparison, runs, robot, table)
-    (folder / "comparison.json").write_text(json.dumps(comparison.to_dict(), allow_nan=False) + "\n")
+    _write_json(folder / "comparison.json", comparison.to_dict())
     clock.stop()
     return DemoResult(table, comparison, answer, folder, report, clock.seconds)
 
@@ -268,6 +269,11 @@ def _table(c: Comparison) -> Table:
     note = f"Inertia error: mean of six, about the origin of {c.frame}. {c.conditions}"
     baselines = tuple(1 + c.methods.index(name) for name in c.baselines)
     return Table("An unseen payload, identified after one motion", columns, tuple(rows), note, baselines)
+
+
+def _write_json(path: Path, content: dict) -> None:
+    with replacing(path) as temporary:
+        temporary.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def _millimetres(vector: np.ndarray) -> str:

@@ -23,8 +23,9 @@ from armload.atomic import replacing
 from armload.errors import ArmloadError, ModelError
 from armload.inertia import NAMES
 from armload.learners.compiled import Beside, Compiled, CompiledNetworks, CompiledTrees, Together
-from armload.learners.model import LearnedModel, feature_names
+from armload.learners.model import LearnedModel
 from armload.motion import Motion, MotionFingerprint
+from armload.recording.columns import column_names
 
 if TYPE_CHECKING:
     from armload.learners.bagging import Ensemble
@@ -83,7 +84,7 @@ def save_model(
         "frame": arm.frame,
         "motions": [m.to_dict() for m in prints],
         "dataset_hash": dataset_hash,
-        "features": feature_names(arm.n),
+        "features": column_names(arm.n),
         "phi_mean": model.y_mean_.tolist(),
         "phi_std": model.y_std_.tolist(),
         "error_std": None if error_std is None else np.asarray(error_std, dtype=float).tolist(),

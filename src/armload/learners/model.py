@@ -14,11 +14,7 @@ from armload.inertia import NAMES, UNITS
 from armload.learners.compiled import Compiled
 from armload.motion import MotionFingerprint
 from armload.recording import Recording
-
-
-def feature_names(n: int) -> list[str]:
-    """The columns of X for n joints: t, q1 … qn, dq1 … dqn, tau1 … taun; t is 0 at the first sample."""
-    return ["t", *(f"{signal}{j}" for signal in ("q", "dq", "tau") for j in range(1, n + 1))]
+from armload.recording.columns import column_names
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +48,8 @@ class LearnedModel:
 
     @property
     def features(self) -> list[str]:
-        """Names of the columns of X."""
-        return feature_names(len(self.joint_names))
+        """Names of the columns of X: those of a log, with t = 0 at the first sample."""
+        return column_names(len(self.joint_names))
 
     def predict(self, X: ArrayLike, return_std: bool = False) -> Any:
         """phi (N, 10), and with return_std its spread (N, 10), for rows X (N, 1 + 3n) of (t, q, dq, tau).
