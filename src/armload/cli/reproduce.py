@@ -35,6 +35,13 @@ def parser() -> Parser:
     parser.add_argument("--out", metavar="DIR", help="data sets, models, report (default: out/taie2024)")
     parser.add_argument("--results", metavar="DIR", help="finished cells (default: benchmarks/results/taie2024)")
     parser.add_argument("--page", metavar="FILE", help="the page to write (default: docs/paper.md)")
+    parser.add_argument(
+        "--jobs",
+        type=int,
+        default=1,
+        metavar="N",
+        help="cells measured at once, each on one core (default: 1); the numbers are the same",
+    )
     parser.add_argument("--hours", type=float, metavar="H", help="begin no further cell after so many hours")
     parser.add_argument(
         "--real-log",
@@ -50,6 +57,8 @@ def run(options: argparse.Namespace) -> None:
 
     if options.hours is not None and not options.hours >= 0:
         raise UsageError(f"--hours is {options.hours}: expected a number of hours, 0 or more")
+    if options.jobs < 1:
+        raise UsageError(f"--jobs is {options.jobs}: expected a number of processes, 1 or more")
     out = Path(options.out or ("out/taie2024-quick" if options.quick else "out/taie2024"))
     results = Path(options.results or (out / "cells" if options.quick else "benchmarks/results/taie2024"))
     page = Path(options.page or (out / "paper.md" if options.quick else "docs/paper.md"))
@@ -60,6 +69,7 @@ def run(options: argparse.Namespace) -> None:
         basis,
         results,
         until=None if options.hours is None else 3600.0 * options.hours,
+        jobs=options.jobs,
         progress=sys.stderr.isatty(),
         say=print_note,
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
+import os
 import time
 from functools import cache
 from pathlib import Path
@@ -176,6 +177,8 @@ def plateaued(losses: NDArray[np.float64], patience: int, tolerance: float) -> b
 @cache
 def _functions() -> tuple[Any, Any]:
     """The two compiled computations: an epoch of Adam steps, and the validation loss. JAX is imported here."""
+    # On one thread an epoch takes a tenth longer, and its sums do not depend on how many cores there are.
+    os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false")
     # JAX remarks on every GPU it sees and was not built for; these networks are small enough for a processor.
     logging.getLogger("jax._src.xla_bridge").setLevel(logging.ERROR)
     import jax

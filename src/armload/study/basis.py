@@ -100,7 +100,7 @@ class Basis:
 
     @cached_property
     def runs(self) -> dict[str, list[EvaluationRun]]:
-        """The runs by protocol; every method gets the same ones.
+        """The runs by protocol, their tares on another motion; every method gets the same runs.
 
         test_payload_nominal: the test payload on the nominal arm with real sensors, three noise seeds.
         test_payload_real_like: on arms that differ from the model as real ones do; the stand-in for the real robot.
@@ -108,6 +108,14 @@ class Basis:
         other_motion: the test payload on other motions, nominal arm.
         test_payload_semi_real: the test payload's torque added to a real unloaded log, which shows another motion.
         """
+        return self._simulated(same_motion=False) | self._on_real_log()
+
+    @cached_property
+    def runs_with_own_motion_tared(self) -> dict[str, list[EvaluationRun]]:
+        """The same runs, their tares on each run's own motion (Kurdas et al. 2022); a real log has none of those."""
+        return self._simulated(same_motion=True) | self._on_real_log()
+
+    def _simulated(self, same_motion: bool) -> dict[str, list[EvaluationRun]]:
         robot, size, sensors = self.arm, self.size, Sensors.panda(self.arm)
         nominal = World.nominal(robot)
         worlds = [World.real_like(robot, WORLDS + k) for k in range(size.worlds)]
@@ -125,18 +133,23 @@ class Basis:
         for protocol, rows in plan.items():
             first = NOISE + 1000 * len(out)
             log_of = [Run(m, p, w, sensors, first + k) for k, (_, m, p, w) in enumerate(rows)]
-            # the tare is the empty arm in the same world on another motion
-            tare_motion = random_motion(robot, TARE, duration=20.0, harmonics=10)
-            tare_of = [Run(tare_motion, None, w, sensors, first + 500 + k) for k, (_, _, _, w) in enumerate(rows)]
-            logs = simulate_many(robot, log_of, rate=size.rows / self.motion.duration)
-            tares = simulate_many(robot, tare_of, rate=200.0)
+            # the tare is the empty arm in the same world
+            other = random_motion(robot, TARE, duration=20.0, harmonics=10)
+            tare_of = [
+                Run(m if same_motion else other, None, w, sensors, first + 500 + k)
+                for k, (_, m, _, w) in enumerate(rows)
+            ]
+            rate = size.rows / self.motion.duration
+            logs = simulate_many(robot, log_of, rate=rate)
+            tares = simulate_many(robot, tare_of, rate=rate if same_motion else 200.0)
             out[protocol] = [
                 EvaluationRun(log, truth, label, tare, first + k)
                 for k, ((label, _, truth, _), log, tare) in enumerate(zip(rows, logs, tares, strict=True))
             ]
-        if self.real_log is not None:
-            out["test_payload_semi_real"] = self._semi_real(self.real_log)
         return out
+
+    def _on_real_log(self) -> dict[str, list[EvaluationRun]]:
+        return {} if self.real_log is None else {"test_payload_semi_real": self._semi_real(self.real_log)}
 
     def _semi_real(self, path: Path) -> list[EvaluationRun]:
         """Three 6 s windows of the real log with the payload's torque added; its first 10 s are the tare."""

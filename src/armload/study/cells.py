@@ -15,7 +15,7 @@ from typing import Any
 from armload.atomic import replacing
 from armload.errors import DatasetError
 
-FORMAT = 1  # of a cell's file; a change makes every cell unfinished
+FORMAT = 2  # of a cell's file; a change makes every cell unfinished
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,8 @@ Cells = Mapping[str, Cell]
 
 PAPER_EPOCHS = 1000  # the paper's "at most"; a network cell with fewer is called capped
 EXACT = 1e-9  # [SI] errors below are rounding: a parameter that is the same in every payload is learned exactly
-AVERAGED = ("rls", "rls-filter", "rls-filter-calibrated")  # judged by their mean over the second half, as in [7]
+# Judged by their mean over the second half, as in [7].
+AVERAGED = ("rls", "rls-filter", "rls-filter-calibrated", "rls-filter-calibrated-other")
 
 
 class Ensemble(NamedTuple):

@@ -20,21 +20,24 @@ _POINTS, _STREAM_POINTS = 120, 60  # of a curve; a stream's estimates cost more
 def measure_learned(predict: Predict, runs: dict[str, list[EvaluationRun]]) -> dict[str, Any]:
     """What a learned method makes of every run: `protocols` and `izz` of its cell.
 
-    single: mean |K(x) − phi| over samples and runs (10,); running: |mean of K(x) − phi over a run|, each run (R, 10).
+    single: mean |K(x) − phi| over samples and runs (10,); first: |K(x) − phi| of each run's first sample (R, 10);
+    running: |mean of K(x) − phi over a run|, each run (R, 10).
     """
     protocols, izz = {}, {}
     for protocol, members in runs.items():
-        single, running = [], []
+        single, first, running = [], [], []
         for k, run in enumerate(members):
             answers = predict(features(run.recording))
             error = answers - run.truth.phi
             single.append(np.abs(error).mean(axis=0))
+            first.append(np.abs(error[0]))
             running.append(np.abs(error.mean(axis=0)))
             if k == 0 and protocol in _SHOWN:
                 average = np.cumsum(answers[:, 9]) / np.arange(1, len(answers) + 1)
                 izz[protocol] = _curve(run, answers[:, 9], average)
         protocols[protocol] = {
             "running": _listed(running),
+            "first": _listed(first),
             "single": _listed(np.mean(single, axis=0)),
             "labels": [run.label for run in members],
         }
@@ -44,21 +47,23 @@ def measure_learned(predict: Predict, runs: dict[str, list[EvaluationRun]]) -> d
 def measure_stream(make: Callable[[EvaluationRun], Identifier], runs: dict[str, list[EvaluationRun]]) -> dict[str, Any]:
     """What a stream identifier makes of every run.
 
-    single: mean |error| over the estimates along the runs; running: |error| of the last estimate; second_half: |error|
-    of the mean over the estimates of the second half, as the benchmark's authors report.
+    single: mean |error| over the estimates along the runs; first: |error| of the estimate after one sample; running:
+    |error| of the last estimate; second_half: |error| of the mean over the estimates of the second half, as the
+    benchmark's authors report.
 
     Args:
         make: the identifier for a run, already calibrated or told the tare where it uses one.
     """
     protocols, izz = {}, {}
     for protocol, members in runs.items():
-        single, running, half = [], [], []
+        single, first, running, half = [], [], [], []
         for k, run in enumerate(members):
             every = max(1, len(run.recording) // _STREAM_POINTS)
             trace = make(run).trace(run.recording, every)
             phi = np.array([e.phi for e in trace])
             error = phi - run.truth.phi
             single.append(np.abs(error).mean(axis=0))
+            first.append(np.abs(error[0]))
             running.append(np.abs(error[-1]))
             half.append(np.abs(error[len(error) // 2 :].mean(axis=0)))
             if k == 0 and protocol in _SHOWN:
@@ -66,6 +71,7 @@ def measure_stream(make: Callable[[EvaluationRun], Identifier], runs: dict[str, 
                 izz[protocol] = curve
         protocols[protocol] = {
             "running": _listed(running),
+            "first": _listed(first),
             "second_half": _listed(half),
             "single": _listed(np.mean(single, axis=0)),
             "labels": [run.label for run in members],

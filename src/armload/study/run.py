@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import asdict
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,7 @@ from armload.least_squares import (
     PosteriorLeastSquares,
     RecursiveLeastSquares,
 )
-from armload.study.basis import Basis
+from armload.study.basis import Basis, Size
 from armload.study.cells import Spec, load_cells, save_cell
 from armload.study.plan import plan
 from armload.study.protocols import measure_learned, measure_stream
@@ -37,6 +38,7 @@ def run_study(
     results: str | Path,
     *,
     until: float | None = None,
+    jobs: int = 1,
     progress: bool = False,
     say: Callable[[str], None] = lambda _: None,
 ) -> dict[str, dict[str, Any]]:
@@ -45,35 +47,59 @@ def run_study(
     Args:
         basis: what it rests on.
         results: folder of the cells' files; those with the right key are not measured again.
-        until: seconds after which no further cell is begun; None: to the end.
-        progress: bars on stderr.
+        jobs: cells measured at once, each in a process of its own; the numbers do not depend on it.
+        progress: bars on stderr, for one job.
         say: told which cell is next.
     """
+    from joblib import Parallel, delayed
+
     folder, started, fingerprint = Path(results), time.monotonic(), basis.fingerprint
     cells, todo = load_cells(folder), plan(basis.size)
-    for number, spec in enumerate(todo, start=1):
-        if cells.get(spec.name, {}).get("key") == spec.key(fingerprint):
-            continue
-        if until is not None and time.monotonic() - started > until:
-            say(f"stopped before cell {number} of {len(todo)}: run it again to go on")
-            break
-        say(f"cell {number} of {len(todo)}: {spec.name}")
-        begun = time.perf_counter()
-        measured = _benchmark(spec, basis) if spec.kind == "benchmark" else _learned(spec, basis, progress)
-        cell = {
-            "name": spec.name,
-            "key": spec.key(fingerprint),
-            "spec": asdict(spec),
-            "wall_s": round(time.perf_counter() - begun, 1),
-            "rows": basis.size.rows * len(basis.loadings),
-            "payloads": len(basis.loadings),
-            "versions": _versions(),
-            **measured,
-        }
-        save_cell(folder, cell)
-        cells[spec.name] = json.loads(json.dumps(cell))
+
+    def unfinished() -> Iterator[Spec]:
+        for number, spec in enumerate(todo, start=1):
+            if cells.get(spec.name, {}).get("key") == spec.key(fingerprint):
+                continue
+            if until is not None and time.monotonic() - started > until:
+                say(f"stopped before cell {number} of {len(todo)}: run it again to go on")
+                return
+            say(f"cell {number} of {len(todo)}: {spec.name}")
+            yield spec
+
+    if jobs > 1:  # or each process would build them
+        for sensors in sorted({spec.sensors for spec in todo}):
+            basis.dataset(sensors, progress)
+    rests_on = (basis.folder, basis.size, basis.real_log)
+    tasks = (delayed(_measured)(spec, rests_on, folder, progress and jobs == 1) for spec in unfinished())
+    for cell in Parallel(n_jobs=jobs, pre_dispatch=jobs, batch_size=1, return_as="generator_unordered")(tasks):
+        cells[cell["name"]] = cell
     names = {spec.name for spec in todo}
     return {name: cell for name, cell in cells.items() if name in names}
+
+
+def _measured(spec: Spec, rests_on: tuple[Path, Size, Path | None], folder: Path, progress: bool) -> dict[str, Any]:
+    """Measure one cell and keep it: its file is written where it was measured, whatever becomes of the others."""
+    basis = _basis_of_process(*rests_on)
+    begun = time.perf_counter()
+    measured = _benchmark(spec, basis) if spec.kind == "benchmark" else _learned(spec, basis, progress)
+    cell = {
+        "name": spec.name,
+        "key": spec.key(basis.fingerprint),
+        "spec": asdict(spec),
+        "wall_s": round(time.perf_counter() - begun, 1),
+        "rows": basis.size.rows * len(basis.loadings),
+        "payloads": len(basis.loadings),
+        "versions": _versions(),
+        **measured,
+    }
+    save_cell(folder, cell)
+    return json.loads(json.dumps(cell))
+
+
+@lru_cache(maxsize=1)
+def _basis_of_process(folder: Path, size: Size, real_log: Path | None) -> Basis:
+    """One for all cells that a process measures, so that its runs are simulated once."""
+    return Basis(folder, size, real_log)
 
 
 def _learned(spec: Spec, basis: Basis, progress: bool) -> dict[str, Any]:
@@ -141,14 +167,15 @@ def _benchmark(spec: Spec, basis: Basis) -> dict[str, Any]:
             return RecursiveLeastSquares(robot)
         if spec.method == "rls-filter":
             return FilteredRecursiveLeastSquares(robot)
-        if spec.method == "rls-filter-calibrated":
+        if spec.method.startswith("rls-filter-calibrated"):
             assert run.tare is not None
             return Tared(FilteredRecursiveLeastSquares(robot), run.tare)
         if spec.method == "same-prior":
             return PriorLeastSquares(robot, prior.mean, prior.covariance)
         return PosteriorLeastSquares(robot, run.tare if spec.method == "map-tare" else None)
 
-    return {"epochs": None, "file_bytes": None, **measure_stream(make, basis.runs)}
+    runs = basis.runs_with_own_motion_tared if spec.method == "rls-filter-calibrated" else basis.runs
+    return {"epochs": None, "file_bytes": None, **measure_stream(make, runs)}
 
 
 def _versions() -> dict[str, str]:

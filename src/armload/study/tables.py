@@ -19,7 +19,8 @@ LEARNERS = {"tree": "trees", "network": "networks", "mixed": "networks and trees
 LEAST_SQUARES = {
     "rls": "RLS",
     "rls-filter": "filtered RLS",
-    "rls-filter-calibrated": "filtered RLS, virtual calibration",
+    "rls-filter-calibrated": "filtered RLS, virtual calibration on the same motion",
+    "rls-filter-calibrated-other": "filtered RLS, virtual calibration on another motion",
     "map": "MAP least squares",
     "map-tare": "MAP least squares, with tare",
     "same-prior": "same-prior least squares",
