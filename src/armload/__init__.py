@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from armload.arms import ARMS, Arm, arm
     from armload.errors import ArmloadError
     from armload.identifier import Estimate, Identifier
-    from armload.identify import METHODS, Identification
+    from armload.identify import Identification
     from armload.inertia import InertialParameters
     from armload.learners import LearnedIdentifier, load_model, save_model
     from armload.least_squares import (
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
         PosteriorLeastSquares,
         RecursiveLeastSquares,
     )
+    from armload.methods import METHODS
     from armload.motion import FourierMotion, Motion, check_motion, taie2024
     from armload.payloads import Payload, read_payload, write_payload
     from armload.recording import Recording, Sample, read_recording, write_recording
@@ -41,7 +42,7 @@ _ROOMS = {
     "ArmloadError": "errors",
     "Estimate": "identifier",
     "Identifier": "identifier",
-    "METHODS": "identify",
+    "METHODS": "methods",
     "Identification": "identify",
     "InertialParameters": "inertia",
     "LearnedIdentifier": "learners",

@@ -12,21 +12,12 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.errors import IdentificationError
-from armload.identifier import Estimate, Identifier, Tared
+from armload.identifier import Estimate
 from armload.inertia import NAMES, UNITS, InertialParameters, is_consistent, nearest_consistent, phi_to_com
-from armload.least_squares import (
-    FilteredRecursiveLeastSquares,
-    PosteriorLeastSquares,
-    RecursiveLeastSquares,
-    payload_prior_std,
-)
+from armload.least_squares import PosteriorLeastSquares, payload_prior_std
+from armload.methods import DEFAULT, METHODS
 from armload.recording import Recording, check_plausible
 
-METHODS = {
-    "map": "MAP least squares with the arm's own mismatch as an unknown: any motion, any payload (the default)",
-    "rls": "recursive least squares on differentiated acceleration: the plain benchmark",
-    "rls-filter": "recursive least squares behind a momentum observer, virtual calibration from the tare",
-}
 LOWEST_RATE = 20.0  # [Hz]
 Z95 = 1.959963984540054  # half-width of a normal 95 % interval, in standard deviations
 # "determined" for a method without a prior: 95 % half-width below 50 g, 5 g·m, 5e-3 kg·m²
@@ -117,7 +108,8 @@ def identify(
             added since.
         tool: a tool mounted in the recording whose parameters are known; the answer is what it carries. Whether it was
             mounted at the tare too is found from the tare.
-        method: a name in `METHODS`, or the path of a trained model; None: the most trustworthy for any log, "map".
+        method: a name in `armload.methods.METHODS`, or the path of a trained model; None: the most trustworthy for any
+            log, "map".
         progress: told in a few words what is being done.
 
     Raises:
@@ -185,20 +177,18 @@ def _check(log: Recording, arm: Arm) -> None:
 
 def _run(recording: Recording, arm: Arm, tare: Recording | None, method: str | Path | None) -> _Found:
     nothing, weak = np.zeros(10), payload_prior_std(arm)
-    if method is None or method == "map":
+    entry = METHODS.get(DEFAULT if method is None else str(method))
+    if entry is not None and not (entry.needs == "training" and Path(entry.name).is_file()):
         why = (
-            "map holds for any motion and payload; a trained model is taken only when named"
+            f"{DEFAULT} holds for any motion and payload; a trained model is taken only when named"
             if method is None
             else "asked for"
         )
-        if tare is None:
+        if entry.name == DEFAULT and tare is None:
             why += "; without a tare the error bars allow for the model's errors"
-        return _Found(PosteriorLeastSquares(arm, tare).run(recording), nothing, weak, True, "map", why)
-    if method in ("rls", "rls-filter"):
-        identifier: Identifier = RecursiveLeastSquares(arm) if method == "rls" else FilteredRecursiveLeastSquares(arm)
-        if tare is not None:
-            identifier = Tared(identifier, tare)
-        return _Found(identifier.run(recording), nothing, weak, False, str(method), "asked for")
+        estimate = entry.make(arm, tare).run(recording)
+        return _Found(estimate, nothing, weak, entry.prior, entry.name, why)
+    assert method is not None
     if not Path(method).is_file():
         raise IdentificationError(
             f"unknown method {str(method)!r}: expected one of {', '.join(METHODS)}, or the path of a trained model"

@@ -45,7 +45,7 @@ def parser() -> Parser:
         "--method",
         type=file_name,
         metavar="M",
-        help="map, rls, rls-filter, or the path of a trained model (default: the most trustworthy for this log)",
+        help="a name `armload methods` lists, or the path of a trained model (default: the most trustworthy)",
     )
     parser.add_argument("--topic", metavar="T", help="JointState topic of a bag, where it has several")
     parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")

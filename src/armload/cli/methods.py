@@ -1,0 +1,60 @@
+"""`armload methods`: the catalogue of estimators, when to use each, and what is left out."""
+
+from __future__ import annotations
+
+import argparse
+
+from armload.cli.arguments import Parser
+from armload.cli.printing import console, print_json, table
+
+_EXAMPLES = """\
+examples:
+  armload methods
+  armload methods --json
+  armload identify run.csv --robot panda --method rls-filter
+"""
+
+
+def parser() -> Parser:
+    """The arguments of `armload methods`."""
+    parser = Parser(
+        prog="armload methods",
+        description="List the methods of identification: when to use each, what it makes of a tare, where it is from.",
+        epilog=_EXAMPLES,
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+    return parser
+
+
+def run(options: argparse.Namespace) -> None:
+    """Print the catalogue."""
+    from armload.methods import DEFAULT, LEFT_OUT, METHODS
+
+    if options.json:
+        shown = ("name", "title", "when", "source", "tare", "prior", "needs")
+        print_json(
+            {
+                "methods": [{field: getattr(method, field) for field in shown} for method in METHODS.values()],
+                "default": DEFAULT,
+                "left_out": [{"what": what, "why": why} for what, why in LEFT_OUT.items()],
+            }
+        )
+        return
+    out = console()
+    rows = table("methods, best first", "name", "when to use", "tare", "source", left=4)
+    for method in METHODS.values():
+        name = method.name + (" (default)" if method.name == DEFAULT else "")
+        needs = f"; needs {_NEEDS[method.needs]}" if method.needs else ""
+        rows.add_row(name, f"{method.title}\n→ {method.when}{needs}", method.tare, method.source)
+    for column, width in zip(rows.columns, (None, 90, None, 44), strict=True):
+        column.max_width = width
+    out.print(rows)
+    left_out = table("left out of the paper's related work (its reference numbers)", "what", "why", left=2)
+    for what, why in LEFT_OUT.items():
+        left_out.add_row(*(text.replace("[", "\\[") for text in (what, why)))
+    for column in left_out.columns:
+        column.max_width = 80
+    out.print(left_out)
+
+
+_NEEDS = {"tare": "a tare", "training": "a trained model's file", "motion": "the commanded motion (Python only)"}

@@ -1,0 +1,165 @@
+"""The catalogue: every way armload has of identifying a payload, and what of the related work it leaves out.
+
+    METHODS["rls"].make(arm, tare)      # an Identifier, whatever the method
+
+`armload methods` prints it, `identify(method=...)` takes its names, docs/methods.md shows it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from armload.arms import Arm
+from armload.errors import IdentificationError
+from armload.identifier import Identifier, Tared
+from armload.least_squares import FilteredRecursiveLeastSquares, PosteriorLeastSquares, RecursiveLeastSquares
+from armload.recording import Recording
+
+TARES = ("own equation", "virtual calibration", "same motion", "none")
+NEEDS = ("", "tare", "training", "motion")
+
+
+@dataclass(frozen=True)
+class Method:
+    """One estimator of the catalogue.
+
+    name: what tables and the command line call it. title: what it is, in a few words. when: when to use it.
+    source: primary literature.
+    tare: what it makes of a tare: "own equation" (a log of any motion enters its equations), "virtual calibration"
+        (what it says of the tare is subtracted, `Tared`), "same motion" (a tare along the run's own motion), "none".
+    prior: whether it starts from a prior on the payload; "determined" then asks how far the log has narrowed it.
+    needs: what it cannot work without, beside a log: "", "tare", "training" (a trained model's file) or "motion" (the
+        commanded motion).
+    build: makes the identifier; call `make`.
+    """
+
+    name: str
+    title: str
+    when: str
+    source: str
+    tare: str
+    prior: bool
+    build: Callable[[Arm, Recording | None], Identifier] = field(repr=False)
+    needs: str = ""
+
+    def __post_init__(self) -> None:
+        if self.tare not in TARES or self.needs not in NEEDS:
+            raise ValueError(f"{self.name}: tare {self.tare!r} and needs {self.needs!r}: expected {TARES} and {NEEDS}")
+
+    def make(self, arm: Arm, tare: Recording | None = None) -> Identifier:
+        """The method for an arm, relative to a tare where one is given.
+
+        Raises:
+            IdentificationError: it needs what was not given, or cannot use the tare that was.
+        """
+        if self.needs == "tare" and tare is None:
+            raise IdentificationError(
+                f"the method {self.name} needs a tare and none was given: record an earlier log of the same arm"
+                + (" on the same motion" if self.tare == "same motion" else "")
+                + " and name it (--tare), or use the method map"
+            )
+        if tare is not None and self.tare == "none":
+            raise IdentificationError(
+                f"the method {self.name} cannot use a tare: leave the tare out, or use the method map"
+            )
+        return self.build(arm, tare)
+
+
+def calibrated(kind: Callable[[Arm], Identifier]) -> Callable[[Arm, Recording | None], Identifier]:
+    """Builds a method that knows nothing of tares; with one, its virtual calibration is subtracted."""
+    return lambda arm, tare: kind(arm) if tare is None else Tared(kind(arm), tare)
+
+
+def _trained(name: str) -> Callable[[Arm, Recording | None], Identifier]:
+    def refuse(*_: object) -> Identifier:
+        raise IdentificationError(
+            f"the method {name} is a trained model: name its file instead, as `armload train --kind {name}` wrote it"
+        )
+
+    return refuse
+
+
+# In the order of recommendation. A new estimator gets its row here, and nothing else but its own module and tests.
+_CATALOGUE = (
+    Method(
+        "map",
+        "MAP least squares with the arm's own mismatch as an unknown",
+        "any motion, any payload, any arm, with or without a tare: the default",
+        "Khalil, Gautier & Lemoine, ICRA 2007; Bishop 2006, ch. 3",
+        tare="own equation",
+        prior=True,
+        build=PosteriorLeastSquares,
+    ),
+    Method(
+        "rls-filter",
+        "recursive least squares behind a momentum observer, signals lagged alike",
+        "the benchmark of the paper: to compare with published results, best with a tare",
+        "Kurdas et al., ICRA 2022",
+        tare="virtual calibration",
+        prior=False,
+        build=calibrated(FilteredRecursiveLeastSquares),
+    ),
+    Method(
+        "rls",
+        "recursive least squares on differentiated velocity",
+        "the plain benchmark: where logs are nearly free of noise, or to see what noise costs",
+        "Atkeson, An & Hollerbach, IJRR 1986",
+        tare="virtual calibration",
+        prior=False,
+        build=calibrated(RecursiveLeastSquares),
+    ),
+    Method(
+        "tree",
+        "bagged decision trees of the paper",
+        "one arm, one motion, one family of payloads, all known when it is trained; an answer from the first sample",
+        "Taie et al., RA-L 2024; Breiman 1996",
+        tare="none",
+        prior=True,
+        build=_trained("tree"),
+        needs="training",
+    ),
+    Method(
+        "network",
+        "bagged neural networks of the paper",
+        "as tree, smoother between the payloads it was trained on, slower to train",
+        "Taie et al., RA-L 2024; Breiman 1996",
+        tare="none",
+        prior=True,
+        build=_trained("network"),
+        needs="training",
+    ),
+    Method(
+        "mixed",
+        "trees and networks in one bag, the paper's future work",
+        "as tree, where neither kind alone is trusted",
+        "Taie et al., RA-L 2024, section VI",
+        tare="none",
+        prior=True,
+        build=_trained("mixed"),
+        needs="training",
+    ),
+)
+METHODS: dict[str, Method] = {method.name: method for method in _CATALOGUE}
+DEFAULT = "map"
+
+# What the paper's related work names (its reference numbers) and armload does not build, with the reason.
+LEFT_OUT: dict[str, str] = {
+    "vision: geometry, colour or depth images [8]": "needs a camera and a density; a log of the joints holds neither",
+    "exploration: pushing, poking, tilting an object [8]": (
+        "needs contact experiments before the object is grasped, not a log of a grasped one"
+    ),
+    "vision and force/torque sensor together [9]": "needs both sensors",
+    "wrist force/torque sensor with an IMU [15]": (
+        "needs a sensor between flange and payload; where there is one, its wrench is the better measurement"
+    ),
+    "quaternion-based filtering [14]": (
+        "estimates orientation and acceleration from an IMU; joint encoders know the orientation already"
+    ),
+    "chaotic sparrow search with Kent map, Student's t and Lévy flight [19]": (
+        "a global search for a problem that is linear here and has its one optimum in closed form"
+    ),
+    "unsupervised classification of payload changes from torque [20]": (
+        "tells that a payload changed, not its ten parameters; `held` answers that question"
+    ),
+}
