@@ -1,0 +1,148 @@
+"""Random motions of many kinds that an arm may run: within its limits, clear of the floor and of itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm
+from armload.errors import MotionError
+from armload.inertia import InertialParameters
+from armload.motion import FourierMotion, Motion, check_motion, rated_load
+from armload.motion.blended import BlendedMotion
+from armload.motion.collision import CapsuleArm, capsule_arm
+
+_SPEED = 1.5  # [rad/s] velocity limit of an arm whose maker gives none
+_TO_SPEED = 0.25  # [s] in which it reaches its velocity limit, where no acceleration limit is given
+_TO_PUSH = 0.10  # [s] in which it reaches its acceleration limit, where no jerk limit is given
+_POSES = 512  # poses tried for the list of clear ones
+_TRIALS = 40  # motions tried until one may be run
+_FACTORS = 0.8 ** np.arange(7)  # by which all amplitudes are reduced until nothing touches
+_FLOOR, _SELF = 0.05, 0.01  # [m] clearances kept
+BLEND = 0.5  # [s]
+
+
+@dataclass(frozen=True, eq=False)
+class MotionSource:
+    """Draws motions for one arm; what does not depend on the draw is made once.
+
+    arm: any arm; limits its maker does not give are replaced by sane ones.
+    floor: height of the floor in the base's frame [m]; None: there is none.
+    """
+
+    arm: Arm
+    floor: float | None = 0.0
+
+    def fourier(
+        self,
+        rng: np.random.Generator,
+        duration: float,
+        *,
+        harmonics: int = 5,
+        period: float | None = None,
+        share: float = 0.7,
+        travel: tuple[float, float] = (0.5, 1.2),
+        moving: NDArray[np.bool_] | None = None,
+        name: str = "fourier",
+    ) -> Motion:
+        """A Fourier motion about a clear pose, from rest with a blend-in of 0.5 s, and back to rest after `duration`.
+
+        Coefficients fall with the harmonic; each joint is scaled to its travel or to a share of its limits, and all of
+        them down together until the arm may run it with its rated payload.
+
+        Args:
+            duration: of the motion at speed [s]; the blend-out comes after it.
+            harmonics, period: K and T [s] of the excitation; T None: `duration`.
+            share: of each limit that may be used.
+            travel: how far a joint may go from its mean, drawn per joint [rad].
+            moving: joints (n,) that move; None: all.
+
+        Raises:
+            MotionError: nothing found that the arm may run.
+        """
+        n, k = self.arm.n, np.arange(1.0, harmonics + 1.0)
+        for _ in range(_TRIALS):
+            pose = self.poses[rng.integers(len(self.poses))]
+            sine, cosine = rng.normal(size=(2, n, harmonics)) / k
+            reach = rng.uniform(*travel, size=n)
+            if moving is not None:
+                reach = np.where(moving, reach, 0.0)
+            whole = duration if period is None else period
+            inner = FourierMotion(pose, sine, cosine, whole, name, f"random, about a clear pose, {harmonics} harmonics")
+            inner = inner.scaled(self._scale(BlendedMotion(inner, duration + BLEND, BLEND), pose, share, reach))
+            for factor in _FACTORS:
+                motion = BlendedMotion(inner.scaled(factor), duration + BLEND, BLEND)
+                if self.may_run(motion):
+                    return motion
+        raise MotionError(
+            f"no random motion of {self.arm.name} found that stays clear of the floor and of itself and below its "
+            "torque limits with the rated payload: try another seed, or floor=None if its base does not stand on the "
+            "floor"
+        )
+
+    def may_run(self, motion: Motion) -> bool:
+        """Whether the arm may run the motion with its rated payload, with some clearance."""
+        ticks = np.linspace(0.0, motion.duration, max(50, round(12 * motion.duration)))
+        clear = self.model.clearance(motion(ticks)[0], self.floor)
+        if clear.floor.min() < _FLOOR or clear.self.min() < _SELF:
+            return False
+        return check_motion(self.arm, motion, self.load, floor=self.floor, rate=100.0, collision_rate=25.0).ok
+
+    @cached_property
+    def model(self) -> CapsuleArm:
+        """The arm as capsules."""
+        return capsule_arm(self.arm)
+
+    @cached_property
+    def load(self) -> InertialParameters | None:
+        """The maker's rated payload."""
+        return rated_load(self.arm)
+
+    @cached_property
+    def limits(self) -> dict[str, NDArray[np.float64]]:
+        """low, high [rad] and the largest velocity, acceleration and jerk, (n,) each, all finite."""
+        given = self.arm.limits
+        velocity = np.where(np.isfinite(given.velocity), given.velocity, _SPEED)
+        acceleration = np.where(np.isfinite(given.acceleration), given.acceleration, velocity / _TO_SPEED)
+        return {
+            "low": np.maximum(given.position_low, -np.pi),
+            "high": np.minimum(given.position_high, np.pi),
+            "velocity": velocity,
+            "acceleration": acceleration,
+            "jerk": np.where(np.isfinite(given.jerk), given.jerk, acceleration / _TO_PUSH),
+        }
+
+    @cached_property
+    def poses(self) -> NDArray[np.float64]:
+        """Clear poses (P, n) from the middle of the range that the arm can hold with its rated payload."""
+        low, high = self.limits["low"], self.limits["high"]
+        rng = np.random.default_rng(0)
+        poses = (low + high) / 2 + 0.35 * (high - low) * rng.uniform(-1.0, 1.0, size=(_POSES, self.arm.n))
+        clear = self.model.clearance(poses, self.floor)
+        held = np.abs((self.arm if self.load is None else self.arm.with_payload(self.load)).torque(poses))
+        fit = np.all(held <= 0.7 * self.arm.limits.effort, axis=1)
+        poses = poses[(clear.floor >= 2 * _FLOOR) & (clear.self >= 2 * _SELF) & fit]
+        if not len(poses):
+            raise MotionError(
+                f"no pose of {self.arm.name} found that is clear of the floor and of itself and within its torque "
+                "limits with the rated payload: give floor=None if its base does not stand on the floor"
+            )
+        return poses
+
+    def _scale(
+        self, motion: Motion, pose: NDArray[np.float64], share: float, travel: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Factor (n,) by which each joint may be scaled about the pose."""
+        t = np.linspace(0.0, motion.duration, max(301, round(50 * motion.duration)))
+        q, dq, ddq = motion(t)
+        room = share * np.minimum(pose - self.limits["low"], self.limits["high"] - pose)
+        used = [
+            (np.abs(q - pose), np.minimum(travel, room)),
+            (np.abs(dq), share * self.limits["velocity"]),
+            (np.abs(ddq), share * self.limits["acceleration"]),
+            (np.abs(motion.jerk(t)), share * self.limits["jerk"]),
+        ]
+        return np.min([allowed / value.max(axis=0) for value, allowed in used], axis=0)
