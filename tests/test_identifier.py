@@ -11,7 +11,8 @@ from armload.evaluate import GaussianPrior, PriorLeastSquares, TrainingMean
 from armload.identifier import BatchIdentifier, Identifier, Tared
 from armload.inertia import InertialParameters
 from armload.learners import BaggingEnsemble, LearnedIdentifier, save_model
-from armload.least_squares import FilteredRecursiveLeastSquares, PosteriorLeastSquares, RecursiveLeastSquares
+from armload.least_squares import CommandedLeastSquares, PosteriorLeastSquares, RecursiveLeastSquares
+from armload.methods import METHODS
 from armload.motion import taie2024
 from armload.recording import Recording
 from armload.simulate import simulate
@@ -44,10 +45,14 @@ def model(panda, log, tmp_path_factory):
     return save_model(path, ensemble, arm=panda, motion=taie2024(), dataset_hash="none")
 
 
-MAKE = {
-    "rls": lambda arm, *_: RecursiveLeastSquares(arm),
-    "rls-filter": lambda arm, *_: FilteredRecursiveLeastSquares(arm),
-    "map": lambda arm, *_: PosteriorLeastSquares(arm),
+# Every method of the catalogue that needs no trained model and no motion; one that needs a tare gets it.
+CATALOGUE = {
+    name: lambda arm, empty, _, method=method: method.make(arm, empty if method.needs == "tare" else None)
+    for name, method in METHODS.items()
+    if method.needs in ("", "tare")
+}
+MAKE = CATALOGUE | {
+    "commanded": lambda arm, *_: CommandedLeastSquares(arm, taie2024()),
     "map, with tare": lambda arm, empty, _: PosteriorLeastSquares(arm, empty),
     "rls, tared": lambda arm, empty, _: Tared(RecursiveLeastSquares(arm), empty),
     "trees": lambda arm, _, model: LearnedIdentifier(model, arm),

@@ -13,7 +13,16 @@ from dataclasses import dataclass, field
 from armload.arms import Arm
 from armload.errors import IdentificationError
 from armload.identifier import Identifier, Tared
-from armload.least_squares import FilteredRecursiveLeastSquares, PosteriorLeastSquares, RecursiveLeastSquares
+from armload.least_squares import (
+    FilteredRecursiveLeastSquares,
+    MomentumLeastSquares,
+    OrdinaryLeastSquares,
+    PolynomialLeastSquares,
+    PosteriorLeastSquares,
+    RecursiveLeastSquares,
+    RecursiveTotalLeastSquares,
+    WeightedLeastSquares,
+)
 from armload.recording import Recording
 
 TARES = ("own equation", "virtual calibration", "same motion", "none")
@@ -80,6 +89,13 @@ def _trained(name: str) -> Callable[[Arm, Recording | None], Identifier]:
     return refuse
 
 
+def _commanded(*_: object) -> Identifier:
+    raise IdentificationError(
+        "the method commanded needs the motion the controller was told, which a log does not hold: in Python, "
+        "CommandedLeastSquares(arm, motion); from a log alone use polynomial"
+    )
+
+
 # In the order of recommendation. A new estimator gets its row here, and nothing else but its own module and tests.
 _CATALOGUE = (
     Method(
@@ -92,6 +108,52 @@ _CATALOGUE = (
         build=PosteriorLeastSquares,
     ),
     Method(
+        "wls",
+        "weighted least squares on the acceleration-free filtered regression",
+        "a plain estimate without any prior, on an arm whose joints differ in how well their torque fits the model",
+        "Gautier & Poignet, Control Engineering Practice 2001; Hsu et al., ICRA 1987",
+        tare="virtual calibration",
+        prior=False,
+        build=calibrated(WeightedLeastSquares),
+    ),
+    Method(
+        "ols",
+        "ordinary least squares on the same rows",
+        "exact for an exact arm and the easiest to reason about: the yardstick of every other row",
+        "Atkeson, An & Hollerbach, IJRR 1986; Hsu et al., ICRA 1987",
+        tare="virtual calibration",
+        prior=False,
+        build=calibrated(OrdinaryLeastSquares),
+    ),
+    Method(
+        "momentum",
+        "least squares on the change of momentum over windows of 0.1 s",
+        "as ols, where no filter may stand between sensor and estimate",
+        "De Luca et al., IROS 2006; Gautier, ICRA 1997",
+        tare="virtual calibration",
+        prior=False,
+        build=calibrated(MomentumLeastSquares),
+    ),
+    Method(
+        "polynomial",
+        "least squares with the acceleration of a local polynomial in the measured positions",
+        "logs whose velocity is poor or missing its scale: only positions and torque enter; stands in for commanded",
+        "Savitzky & Golay, Analytical Chemistry 1964; Atkeson, An & Hollerbach, IJRR 1986",
+        tare="virtual calibration",
+        prior=False,
+        build=calibrated(PolynomialLeastSquares),
+    ),
+    Method(
+        "commanded",
+        "least squares with the commanded acceleration of the known trajectory",
+        "you know the motion to the sample and the controller tracks it well",
+        "Atkeson, An & Hollerbach, IJRR 1986; Swevers et al., IEEE TRA 1997",
+        tare="virtual calibration",
+        prior=False,
+        build=_commanded,
+        needs="motion",
+    ),
+    Method(
         "rls-filter",
         "recursive least squares behind a momentum observer, signals lagged alike",
         "the benchmark of the paper: to compare with published results, best with a tare",
@@ -99,6 +161,15 @@ _CATALOGUE = (
         tare="virtual calibration",
         prior=False,
         build=calibrated(FilteredRecursiveLeastSquares),
+    ),
+    Method(
+        "rtls",
+        "recursive total least squares: the regressor's errors are allowed for",
+        "differentiated velocity and no filter: what rls would give if its acceleration were not noisy",
+        "Kubus, Kröger & Wahl, IROS 2008; Golub & Van Loan, SIAM J. Numer. Anal. 1980",
+        tare="virtual calibration",
+        prior=False,
+        build=calibrated(RecursiveTotalLeastSquares),
     ),
     Method(
         "rls",
@@ -158,6 +229,9 @@ LEFT_OUT: dict[str, str] = {
     ),
     "chaotic sparrow search with Kent map, Student's t and Lévy flight [19]": (
         "a global search for a problem that is linear here and has its one optimum in closed form"
+    ),
+    "offline techniques of dynamic identification compared in [10]": (
+        "that comparison finds only least squares and machine-learning regression fit to work online"
     ),
     "unsupervised classification of payload changes from torque [20]": (
         "tells that a payload changed, not its ten parameters; `held` answers that question"

@@ -1,19 +1,29 @@
-"""Least squares on the torque a payload adds: recursive, behind an observer, and MAP with the arm's own mismatch."""
+"""Least squares on the torque a payload adds: ordinary, weighted, total, recursive, MAP with the arm's own mismatch."""
 
+from armload.least_squares.acceleration import CommandedLeastSquares, PolynomialLeastSquares
 from armload.least_squares.autocorrelation import BlockMeans
 from armload.least_squares.correction import Correction, effort_scale
+from armload.least_squares.momentum import MomentumLeastSquares
+from armload.least_squares.normal import OrdinaryLeastSquares, WeightedLeastSquares
 from armload.least_squares.posterior import Posterior, PosteriorLeastSquares
 from armload.least_squares.prior import GaussianPrior, payload_prior_std
 from armload.least_squares.recursive import FilteredRecursiveLeastSquares, RecursiveLeastSquares
+from armload.least_squares.total import RecursiveTotalLeastSquares
 
 __all__ = [
     "BlockMeans",
+    "CommandedLeastSquares",
     "Correction",
     "FilteredRecursiveLeastSquares",
     "GaussianPrior",
+    "MomentumLeastSquares",
+    "OrdinaryLeastSquares",
+    "PolynomialLeastSquares",
     "Posterior",
     "PosteriorLeastSquares",
     "RecursiveLeastSquares",
+    "RecursiveTotalLeastSquares",
+    "WeightedLeastSquares",
     "effort_scale",
     "payload_prior_std",
 ]
