@@ -10,7 +10,7 @@ from armload.episodes import draw_episodes, simulate_episodes
 from armload.errors import ArmError
 from armload.motion import FourierMotion
 from armload.motion.blended import BlendedMotion
-from armload.simulate import simulate
+from armload.simulate import Resolution, simulate
 
 SHORT = {"duration": 0.5, "tare_duration": 0.5}
 
@@ -38,7 +38,9 @@ def test_a_blend_s_derivatives_are_those_of_its_positions():
 
 def test_an_episode_s_logs_are_the_simulations_of_its_parts(panda):
     drawn = [replace(e, **SHORT) for e in draw_episodes(panda, "reference", 2, seed=4)]
-    for episode, (run, tare, truth) in zip(drawn, simulate_episodes(drawn, rate=100.0), strict=True):
+    for episode, (run, tare, truth) in zip(
+        drawn, simulate_episodes(drawn, rate=100.0, resolution=Resolution()), strict=True
+    ):
         alone = simulate(
             panda,
             episode.motion,

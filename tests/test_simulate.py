@@ -13,7 +13,19 @@ from armload.errors import ArmError, MotionError, PayloadError
 from armload.inertia import InertialParameters, is_consistent
 from armload.least_squares import PosteriorLeastSquares
 from armload.motion import FourierMotion, taie2024
-from armload.simulate import Command, Gains, Run, SmoothTorque, World, build_model, rollout, runs, simulate
+from armload.simulate import (
+    Command,
+    Friction,
+    Gains,
+    Resolution,
+    Run,
+    SmoothTorque,
+    World,
+    build_model,
+    rollout,
+    runs,
+    simulate,
+)
 from armload.simulate import simulate_many as many
 
 PAYLOAD = InertialParameters.from_com(2.0, (0.02, -0.03, 0.08), np.diag([8e-3, 9e-3, 6e-3]))
@@ -99,11 +111,10 @@ def test_nominal_log_is_the_inverse_dynamics_of_arm_and_payload(panda, payload, 
     assert rms(mismatch(loaded, log)[inner]).max() < 5e-4
 
 
-def test_what_is_left_falls_with_the_square_of_the_step(panda, monkeypatch):
+def test_what_is_left_falls_with_the_square_of_the_step(panda):
     left = []
     for step in (5e-4, 2.5e-4):
-        monkeypatch.setattr(rollout, "MAX_STEP", step)
-        log = simulate(panda, taie2024(), PAYLOAD)
+        log = many(panda, [Run(taie2024(), PAYLOAD)], resolution=Resolution(step=step))[0]
         left.append(rms(mismatch(panda.with_payload(PAYLOAD), log))[:4])
     np.testing.assert_allclose(left[1] / left[0], 0.25, atol=0.05)
 
@@ -173,7 +184,7 @@ def test_logs_are_even_and_as_long_as_asked(panda):
 @pytest.mark.parametrize("rate", [10.0, 540.67, 1000.0, 1999.0, 8000.0])
 def test_clock_divides_the_period_of_the_log(rate):
     clock = rollout.Clock.at(rate, 11)
-    assert clock.step <= rollout.MAX_STEP * (1 + 1e-9)
+    assert clock.step <= Resolution().step * (1 + 1e-9)
     assert clock.step * clock.every == pytest.approx(1 / rate)
     np.testing.assert_allclose(clock.times, np.arange(11) / rate)
 
@@ -195,15 +206,15 @@ def replace_tau(log, tau):
     return replace(log, tau=tau)
 
 
-def test_friction_and_residual_converge_to_the_motion_that_comes_out(any_arm, monkeypatch):
+def test_friction_and_residual_converge_to_the_motion_that_comes_out(any_arm):
     gains, clock, motion = Gains.of(any_arm), rollout.Clock.at(500.0, 3000), motion_of(any_arm)
     world = World.real_like(any_arm, seed=1)
     command = Command.along(any_arm, motion, clock.step, clock.steps)
     prepared = runs._prepare(world.arm(any_arm), gains, Run(motion, PAYLOAD, world), world, command, clock)
     left = {}
     for passes in (1, 2, 4):
-        monkeypatch.setattr(rollout, "PASSES", passes)
-        left[passes] = rms(rollout.iteration_error([prepared], gains, clock, 1)[0]).max()
+        fine = replace(clock, resolution=Resolution(passes=passes))
+        left[passes] = rms(rollout.iteration_error([prepared], fine, 1)[0]).max()
     assert left[2] < 0.25 * left[1]
     assert left[4] < 0.1 * left[2]
     assert left[2] < 0.01
@@ -211,7 +222,7 @@ def test_friction_and_residual_converge_to_the_motion_that_comes_out(any_arm, mo
 
 def test_friction_disturbs_the_motion(panda):
     nominal = World.nominal(panda)
-    sticky = replace(nominal, friction_level=np.full(7, 3.0), friction_width=np.full(7, 0.06))
+    sticky = replace(nominal, friction=Friction(np.full(7, 3.0), np.full(7, 0.06)))
     motion = taie2024()
     smooth, rough = (simulate(panda, motion, world=world, rate=200.0) for world in (nominal, sticky))
     assert np.abs(rough.q - motion(rough.t)[0]).max() > 100 * np.abs(smooth.q - motion(smooth.t)[0]).max()
@@ -241,7 +252,7 @@ def test_a_world_does_not_depend_on_what_is_attached(panda):
 
 def test_panda_worlds_scatter_as_measured(panda):
     worlds = [World.real_like(panda, seed) for seed in range(150)]
-    offsets, frictions = (np.array([getattr(w, name) for w in worlds]) for name in ("offset", "friction_level"))
+    offsets, frictions = np.array([w.offset for w in worlds]), np.array([w.friction.level for w in worlds])
     np.testing.assert_allclose(rms(offsets), [0.2, 0.3, 0.12, 0.25, 0.05, 0.08, 0.02], rtol=0.25)
     np.testing.assert_allclose(frictions.mean(axis=0), [0.25, 0.25, 0.2, 0.35, 0.35, 0.2, 0.26], rtol=0.1)
     masses = np.array([w.links[:, 0] for w in worlds]) / panda.link_parameters[:, 0]

@@ -12,7 +12,8 @@ from armload.inertia import InertialParameters
 from armload.motion import Motion
 from armload.payloads import Payload
 from armload.recording import Recording
-from armload.simulate import Run, Sensors, World, simulate_many
+from armload.simulate import Resolution, Run, Sensors, World, simulate_many
+from armload.simulate.resolution import COARSE
 
 _TARE_NOISE = 1 << 30  # the tare's sensor noise is another than the run's
 _BATCH = 8  # episodes a process simulates at a time: what memory holds, and how often progress is told
@@ -69,6 +70,7 @@ def simulate_episodes(
     *,
     rate: float | None = None,
     workers: int = 1,
+    resolution: Resolution = COARSE,
     progress: Callable[[int, int], None] | None = None,
 ) -> Iterator[EpisodeLogs]:
     """The logs of each episode, in their order, a few at a time so that memory stays bounded.
@@ -76,6 +78,7 @@ def simulate_episodes(
     Args:
         rate: of all logs [Hz]; None: each episode's own.
         workers: processes; the logs do not depend on it.
+        resolution: how finely the engine works.
         progress: called as progress(done, total) after every episode handed out.
 
     Raises:
@@ -85,7 +88,7 @@ def simulate_episodes(
         raise ArmError(f"{workers} workers asked for: expected at least 1")
     batches = [episodes[k : k + _BATCH] for k in range(0, len(episodes), _BATCH)]
     done = 0
-    for logs in _batches(batches, rate, workers):
+    for logs in _batches(batches, rate, workers, resolution):
         for entry in logs:
             done += 1
             if progress is not None:
@@ -93,17 +96,19 @@ def simulate_episodes(
             yield entry
 
 
-def _batches(batches: Sequence[Sequence[Episode]], rate: float | None, workers: int) -> Iterable[list[EpisodeLogs]]:
+def _batches(
+    batches: Sequence[Sequence[Episode]], rate: float | None, workers: int, resolution: Resolution
+) -> Iterable[list[EpisodeLogs]]:
     if workers == 1:
-        return (_simulated(batch, rate) for batch in batches)
+        return (_simulated(batch, rate, resolution) for batch in batches)
     from joblib import Parallel, delayed
 
     parallel: Any = Parallel  # its annotations are narrower than what it takes
     run = parallel(n_jobs=workers, pre_dispatch=workers + 1, batch_size=1, return_as="generator")
-    return run(delayed(_simulated)(batch, rate) for batch in batches)
+    return run(delayed(_simulated)(batch, rate, resolution) for batch in batches)
 
 
-def _simulated(batch: Sequence[Episode], rate: float | None) -> list[EpisodeLogs]:
+def _simulated(batch: Sequence[Episode], rate: float | None, resolution: Resolution) -> list[EpisodeLogs]:
     """Simulate a few episodes; runs of one arm, length and rate go through the engine together."""
     groups: dict[tuple, list[tuple[int, str, Run]]] = {}
     for k, e in enumerate(batch):
@@ -120,6 +125,8 @@ def _simulated(batch: Sequence[Episode], rate: float | None) -> list[EpisodeLogs
     logs: dict[tuple[int, str], Recording] = {}
     for (_, hz, seconds), members in groups.items():
         arm = batch[members[0][0]].arm
-        found = simulate_many(arm, [run for *_, run in members], rate=hz, duration=seconds, workers=1)
+        found = simulate_many(
+            arm, [run for *_, run in members], rate=hz, duration=seconds, workers=1, resolution=resolution
+        )
         logs.update({(k, part): log for (k, part, _), log in zip(members, found, strict=True)})
     return [EpisodeLogs(logs[k, "run"], logs.get((k, "tare")), e.truth) for k, e in enumerate(batch)]

@@ -39,6 +39,14 @@ class Motion(ABC):
         """Position, velocity and acceleration at times t (N,) [s]; each (N, n) [rad, rad/s, rad/s²]."""
         return self._at(t, 0), self._at(t, 1), self._at(t, 2)
 
+    def position(self, t: ArrayLike) -> NDArray[np.float64]:
+        """q alone at times t (N,) [s]; (N, n) [rad]."""
+        return self._at(t, 0)
+
+    def velocity(self, t: ArrayLike) -> NDArray[np.float64]:
+        """dq alone at times t (N,) [s]; (N, n) [rad/s]."""
+        return self._at(t, 1)
+
     def jerk(self, t: ArrayLike) -> NDArray[np.float64]:
         """Third derivative of q at times t (N,) [s]; (N, n) [rad/s³]."""
         return self._at(t, 3)

@@ -1,14 +1,20 @@
 """Simulation: the arm under a joint controller that does not know the payload, in a world, seen through sensors."""
 
 from armload.simulate.controller import Command, Gains
+from armload.simulate.friction import Friction
 from armload.simulate.plant import build_model, settled_start
+from armload.simulate.residual import SmoothTorque
+from armload.simulate.resolution import Resolution
 from armload.simulate.runs import Run, simulate, simulate_many
 from armload.simulate.sensors import Sensors
-from armload.simulate.worlds import SmoothTorque, World
+from armload.simulate.worlds import Drift, World
 
 __all__ = [
     "Command",
+    "Drift",
+    "Friction",
     "Gains",
+    "Resolution",
     "Run",
     "Sensors",
     "SmoothTorque",

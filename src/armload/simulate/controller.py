@@ -26,7 +26,6 @@ _FULL_LOAD_SAG = 0.02
 # inertia is not modelled: a displaced joint needs at least this long to come back. (franka_ros' joint impedance example
 # is slower still: its kd/kp is 0.03 s and more.)
 _SHORTEST_RETURN = 0.01  # [s]
-_FEED_FORWARD_KNOTS = 2e-3  # [s] the feed-forward is computed at these instants and interpolated by a cubic spline
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +52,14 @@ class Gains:
         )
         return cls(stiffness, np.maximum(2.0 * np.sqrt(stiffness * inertia), _SHORTEST_RETURN * stiffness))
 
+    def stiffer(self, factor: float) -> Gains:
+        """The stiffness multiplied, the damping ratio kept; softer below 1.
+
+        As in `of`, a displaced joint needs at least 10 ms to come back, which is what keeps the integration stable.
+        """
+        stiffness = factor * self.stiffness
+        return Gains(stiffness, np.maximum(np.sqrt(factor) * self.damping, _SHORTEST_RETURN * stiffness))
+
 
 @dataclass(frozen=True, eq=False)
 class Command:
@@ -68,14 +75,17 @@ class Command:
     feed_forward: NDArray[np.float64]
 
     @classmethod
-    def along(cls, arm: Arm, motion: Motion, step: float, steps: int) -> Command:
-        """The command for `steps` steps of a motion, with the inverse dynamics of `arm`, the controller's model."""
+    def along(cls, arm: Arm, motion: Motion, step: float, steps: int, apart: float = 2e-3) -> Command:
+        """The command for `steps` steps of a motion, with the inverse dynamics of `arm`, the controller's model.
+
+        The feed-forward is computed at instants `apart` [s] and interpolated by a cubic spline.
+        """
         from scipy.interpolate import CubicSpline
 
         t = step * np.arange(steps)
-        knots = np.linspace(0.0, max(t[-1], step), max(4, int(np.ceil(t[-1] / _FEED_FORWARD_KNOTS)) + 1))
+        knots = np.linspace(0.0, max(t[-1], step), max(4, int(np.ceil(t[-1] / apart)) + 1))
         feed_forward = CubicSpline(knots, arm.torque(*motion(knots)))(t)
-        return cls(motion(t)[0], motion(t + 0.5 * step)[1], feed_forward)
+        return cls(motion.position(t), motion.velocity(t + 0.5 * step), feed_forward)
 
     def control(self, gains: Gains) -> NDArray[np.float64]:
         """The actuators' input ctrl (N, n) = tau_ff + kp·q_d + kd·dq_d [N·m]."""

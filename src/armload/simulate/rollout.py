@@ -3,55 +3,54 @@
 MuJoCo steps whole runs in C++ threads. What is logged at time t_j = j·h makes the channels one instant of the leapfrog
 that the integrator is (see `simulate.plant`; v lives half a step before its q):
 
-    q = q_j,      dq = (v_j + v_{j+1})/2,      tau = ctrl_j − kp·q_j − kd·v_{j+1} + [c(q_j, dq) − c(q_j, v_j)] + offset
+    q = q_j,      dq = (v_j + v_{j+1})/2,      tau = ctrl_j − kp·q_j − kd·v_{j+1} + [c(q_j, dq) − c(q_j, v_j)]
 
 The bracket belongs to the integrator, which takes the Coriolis torque c at v_j and so misses it by a first-order error
 (6 mN·m rms for the Panda with 2 kg on the committed excitation). With it, tau equals the inverse dynamics at
 (q, dq, ddq) to second order in h. h is an integer fraction of the log's period, so that logs are even at any rate.
 
 The rollout cannot call back into Python. Friction and residual d(q, dq) therefore act as a torque along time: first
-evaluated along the desired motion, then along the motion that came out (Picard iteration, `PASSES` rollouts). The log
-is exact whatever is left of that iteration, because it holds what moved the rigid bodies plus d at the logged q and dq.
-The rest only means that the controller acted as if it had misread its own torque by as much.
+evaluated along the desired motion, then along the motion that came out (Picard iteration, `Resolution.passes`
+rollouts). The log is exact whatever is left of that iteration, because it holds what moved the rigid bodies plus d at
+the logged q and dq. The rest only means that the controller acted as if it had misread its own torque by as much.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import repeat
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armload.simulate.controller import Command, Gains
+from armload.simulate.resolution import FINE, Resolution
 from armload.simulate.worlds import World
 
 if TYPE_CHECKING:
     import mujoco
 
-MAX_STEP = 5e-4  # [s]
-PASSES = 2
-_KNOTS = 1e-2  # [s] what is smooth along a run is evaluated at these instants, cubic between them
-
 
 @dataclass(frozen=True)
 class Clock:
-    """step: h [s]; every: steps per row of the log; samples: rows of the log."""
+    """step: h [s]; every: steps per row of the log; samples: rows of the log; resolution: what it was made for."""
 
     step: float
     every: int
     samples: int
+    resolution: Resolution = FINE
 
     @classmethod
-    def at(cls, rate: float, samples: int) -> Clock:
-        """The largest step up to `MAX_STEP` that divides the period of a log of the given rate [Hz].
+    def at(cls, rate: float, samples: int, resolution: Resolution = FINE) -> Clock:
+        """The largest step up to the resolution's that divides the period of a log of the given rate [Hz].
 
         >>> Clock.at(1000.0, 6000).every
         2
         """
-        every = max(1, int(np.ceil(1.0 / (rate * MAX_STEP) - 1e-9)))
-        return cls(1.0 / (rate * every), every, samples)
+        every = max(1, int(np.ceil(1.0 / (rate * resolution.step) - 1e-9)))
+        return cls(1.0 / (rate * every), every, samples, resolution)
 
     @property
     def steps(self) -> int:
@@ -66,41 +65,43 @@ class Clock:
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A run ready to go: its plant, world, command, and where it starts (q_0 and v_0, each (n,))."""
+    """A run ready to go: plant, world, gains, command, where it starts (q_0 and v_0, each (n,)), and when [s]."""
 
     model: mujoco.MjModel
     world: World
+    gains: Gains
     command: Command
     position: NDArray[np.float64]
     velocity: NDArray[np.float64]
+    start: float = 0.0
 
 
 def roll_out(
-    runs: Sequence[Prepared], gains: Gains, clock: Clock, workers: int
+    runs: Sequence[Prepared], clock: Clock, workers: int
 ) -> list[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]]:
     """(q, dq, tau) of each run, each (samples, n), noise-free; NaN where a run diverged."""
-    states, applied = _picard(runs, gains, clock, workers)
+    states, applied = _picard(runs, clock, workers)
     logs = []
     for run, state, disturbance in zip(runs, states, applied, strict=True):
         rows = slice(None, None, clock.every)
         every_step = _leapfrog(run, state)
         q, v, after = (x[rows] for x in every_step)
         dq = 0.5 * (v + after)
+        gains = run.gains
         rigid = run.command.control(gains)[rows] - disturbance[rows] - gains.stiffness * q - gains.damping * after
         rigid += _coriolis_missed(run.model, clock, *every_step)[rows]
-        logs.append((q, dq, rigid + run.world.disturbance(q, dq) + run.world.offset))
+        joint = rigid + run.world.disturbance(q, dq, rigid)
+        logs.append((q, dq, run.world.measured(joint, run.start + clock.times)))
     return logs
 
 
-def iteration_error(runs: Sequence[Prepared], gains: Gains, clock: Clock, workers: int) -> list[NDArray[np.float64]]:
+def iteration_error(runs: Sequence[Prepared], clock: Clock, workers: int) -> list[NDArray[np.float64]]:
     """What the Picard iteration leaves: d(applied) − d(at the motion that came out), (steps, n) per run [N·m]."""
-    states, applied = _picard(runs, gains, clock, workers)
-    return [u - _along(run, clock, state) for run, state, u in zip(runs, states, applied, strict=True)]
+    states, applied = _picard(runs, clock, workers)
+    return [u - _along(run, clock, state, u) for run, state, u in zip(runs, states, applied, strict=True)]
 
 
-def _picard(
-    runs: Sequence[Prepared], gains: Gains, clock: Clock, workers: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _picard(runs: Sequence[Prepared], clock: Clock, workers: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The last pass: states after each step (runs, steps, 1 + 2n) and the disturbance applied (runs, steps, n)."""
     import mujoco
     from mujoco import rollout
@@ -108,20 +109,27 @@ def _picard(
     models = [run.model for run in runs]
     threads = [mujoco.MjData(models[0]) for _ in range(max(1, min(workers, len(runs))))]
     start = np.array([np.concatenate([[0.0], run.position, run.velocity]) for run in runs])
-    control = np.array([run.command.control(gains) for run in runs])
-    applied = np.array([_disturbance(run.world, clock, run.command.position, run.command.velocity) for run in runs])
+    control = np.array([run.command.control(run.gains) for run in runs])
+    applied = np.array([_disturbance(run.world, clock, *_commanded(run.command)) for run in runs])
     states = np.asarray(rollout.rollout(models, threads, start, control - applied)[0], dtype=float)
     if any(run.world.disturbed for run in runs):
-        for _ in range(PASSES - 1):
-            applied = np.array([_along(run, clock, state) for run, state in zip(runs, states, strict=True)])
+        for _ in range(clock.resolution.passes - 1):
+            applied = np.array([_along(*each) for each in zip(runs, repeat(clock), states, applied, strict=False)])
             states = np.asarray(rollout.rollout(models, threads, start, control - applied)[0], dtype=float)
     return states, applied
 
 
-def _along(run: Prepared, clock: Clock, state: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The disturbance (steps, n) along the motion that came out."""
+def _commanded(command: Command) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    return command.position, command.velocity, command.feed_forward
+
+
+def _along(
+    run: Prepared, clock: Clock, state: NDArray[np.float64], applied: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """The disturbance (steps, n) along the motion that came out with `applied` (steps, n)."""
     q, v, after = _leapfrog(run, state)
-    return _disturbance(run.world, clock, q, 0.5 * (v + after))
+    torque = run.command.control(run.gains) - applied - run.gains.stiffness * q - run.gains.damping * after
+    return _disturbance(run.world, clock, q, 0.5 * (v + after), torque)
 
 
 def _leapfrog(
@@ -134,11 +142,13 @@ def _leapfrog(
     return q, v, state[:, n + 1 : 2 * n + 1]
 
 
-def _disturbance(world: World, clock: Clock, q: NDArray[np.float64], dq: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Friction and residual (steps, n) along a motion given at every step."""
+def _disturbance(
+    world: World, clock: Clock, q: NDArray[np.float64], dq: NDArray[np.float64], torque: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Friction and residual (steps, n) along a motion and its rigid-body torque, given at every step."""
     if not world.disturbed:
         return np.zeros_like(q)
-    out = world.friction(dq)
+    out = world.friction(dq, torque)
     if world.residual is None:
         return out
     knots = _knots(clock, len(q))
@@ -168,7 +178,7 @@ def _coriolis_missed(
 
 def _knots(clock: Clock, steps: int) -> NDArray[np.intp]:
     """Steps that are `_KNOTS` seconds apart, the last one among them."""
-    return np.unique(np.append(np.arange(0, steps, max(1, int(_KNOTS / clock.step))), steps - 1))
+    return np.unique(np.append(np.arange(0, steps, max(1, int(clock.resolution.slow_knots / clock.step))), steps - 1))
 
 
 def _between(knots: NDArray[np.intp], values: NDArray[np.float64], steps: int) -> NDArray[np.float64]:

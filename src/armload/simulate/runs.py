@@ -16,6 +16,7 @@ from armload.motion import Motion
 from armload.recording import Recording
 from armload.simulate.controller import Command, Gains
 from armload.simulate.plant import build_model, settled_start
+from armload.simulate.resolution import FINE, Resolution
 from armload.simulate.rollout import Clock, Prepared, roll_out
 from armload.simulate.sensors import Sensors
 from armload.simulate.worlds import World
@@ -33,6 +34,8 @@ class Run:
         world: the arm as it really is; None: nominal.
         sensors: None: ideal.
         seed: of the sensors' noise.
+        gains: the controller's; None: the arm's (`Gains.of`).
+        start: when the run begins, on the clock of the world's drift [s].
     """
 
     motion: Motion
@@ -40,6 +43,8 @@ class Run:
     world: World | None = None
     sensors: Sensors | None = None
     seed: int = 0
+    gains: Gains | None = None
+    start: float = 0.0
 
 
 def simulate(
@@ -87,11 +92,13 @@ def simulate_many(
     duration: float | None = None,
     workers: int = 2,
     progress: Callable[[int, int], None] | None = None,
+    resolution: Resolution = FINE,
 ) -> list[Recording]:
     """Simulate many runs in native batches: what `simulate` does, once per run, in the order of `runs`.
 
     Args:
         workers: threads.
+        resolution: how finely the engine works; `simulate` does it finely.
         progress: called as progress(done, total) after every batch.
     """
     if not (np.isfinite(rate) and rate > 0):
@@ -102,7 +109,7 @@ def simulate_many(
     gains = Gains.of(arm)
     logs: dict[int, Recording] = {}
     for samples, indices in batches.items():
-        clock = Clock.at(rate, samples)
+        clock = Clock.at(rate, samples, resolution)
         chunk = max(workers, int(_CHUNK_BYTES / (8 * clock.steps * (4 * arm.n + 1))))
         for part in (indices[k : k + chunk] for k in range(0, len(indices), chunk)):
             logs.update(zip(part, _batch(arm, gains, [runs[k] for k in part], clock, workers), strict=True))
@@ -120,12 +127,12 @@ def _batch(arm: Arm, gains: Gains, runs: list[Run], clock: Clock, workers: int) 
     for run in runs:
         world = run.world or nominal
         if id(run.motion) not in commands:
-            commands[id(run.motion)] = Command.along(arm, run.motion, clock.step, clock.steps)
+            commands[id(run.motion)] = Command.along(arm, run.motion, clock.step, clock.steps, clock.resolution.knots)
         if id(world) not in actual:
             actual[id(world)] = world.arm(arm)
-        prepared.append(_prepare(actual[id(world)], gains, run, world, commands[id(run.motion)], clock))
+        prepared.append(_prepare(actual[id(world)], run.gains or gains, run, world, commands[id(run.motion)], clock))
     logs = []
-    for run, (q, dq, tau) in zip(runs, roll_out(prepared, gains, clock, workers), strict=True):
+    for run, (q, dq, tau) in zip(runs, roll_out(prepared, clock, workers), strict=True):
         if not np.all(np.isfinite(tau)):
             raise ArmError(
                 f"the simulated {arm.name} diverged on the motion {_name(run.motion)!r}: its gains do not suit it"
@@ -141,13 +148,16 @@ def _prepare(actual: Arm, gains: Gains, run: Run, world: World, command: Command
     """A run ready to go, with `actual` the world's arm."""
     payload = _parameters(run.payload)
     model = build_model(actual if payload is None else actual.with_payload(payload), gains, clock.step)
+    if world.rotor_inertia is not None:
+        model.dof_armature[:] = world.rotor_inertia
     q, dq, ddq = (x[0] for x in run.motion([0.0]))
 
     def disturbance(pose: NDArray[np.float64]) -> NDArray[np.float64]:
-        return world.disturbance(pose, dq).reshape(-1)
+        return world.disturbance(pose, dq, command.feed_forward[0]).reshape(-1)
 
     start = settled_start(model, gains, (q, dq, ddq), command.feed_forward[0], disturbance)
-    return Prepared(model, world, command, start, dq - 0.5 * clock.step * ddq)  # v lives half a step before q
+    velocity = dq - 0.5 * clock.step * ddq  # v lives half a step before q
+    return Prepared(model, world, gains, command, start, velocity, run.start)
 
 
 def _parameters(payload: Any) -> InertialParameters | None:

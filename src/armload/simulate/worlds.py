@@ -2,15 +2,16 @@
 
 The measured joint torque of a world is
 
-    tau_J = rigid body(links) + friction(dq) + residual(q) + offset
+    tau_J = gain·[rigid body(links) + rotor inertia·ddq + friction(dq, tau) + residual(q)] + offset + drift(t)
 
-Friction and residual are torques inside the joint: they disturb the arm's motion and show in the sensor. The offset is
-the sensor's own.
+Friction and residual are torques inside the joint: they disturb the arm's motion and show in the sensor. Rotor inertia
+is there only where the torque is measured on the motor's side of the gear. Gain, offset and drift are the sensor's own.
 
 The figures for the Panda are measured ones: two robots, published model, below 10 Hz. After links, offsets and friction
 have been fitted, (.20 .29 .19 .20 .08 .05 .05) N·m rms remain, smooth in q and repeatable: a torque outside the
 rigid-body span. The link figures (2 % of mass, 2 mm, 5 % of inertia) are our choice. Other arms scale with rated
-torque.
+torque. Worlds beyond the measured ones (`World.beyond`) are our choice altogether: they are to make a learner and its
+error bars ready for an arm that nobody has measured.
 """
 
 from __future__ import annotations
@@ -24,7 +25,9 @@ from numpy.typing import ArrayLike, NDArray
 from armload.arms import Arm
 from armload.errors import ArmError
 from armload.inertia import com_to_phi, nearest_consistent, phi_to_com
+from armload.simulate.friction import Friction
 from armload.simulate.ratings import rated_effort
+from armload.simulate.residual import SmoothTorque
 
 # one standard deviation of a link's mass [1], centre of mass [m] and inertia [1]
 _LINK_MASS, _LINK_COM, _LINK_INERTIA = 0.02, 0.002, 0.05
@@ -34,38 +37,31 @@ _PANDA_RESIDUAL = (0.20, 0.28, 0.19, 0.20, 0.08, 0.05, 0.045)  # [N·m], rms
 _OTHER_OFFSET, _OTHER_FRICTION, _OTHER_RESIDUAL = 0.003, 0.01, 0.0035  # of the rated torque
 _FRICTION_WIDTH = 0.06  # [rad/s]
 _FRICTION_SPREAD = 0.3
-_LENGTH_SCALE = (0.7, 1.5)  # [rad]
-_WAVES = 48
+
+# beyond the measured ones
+_HEAVIER = (1.0, 3.0)  # each mismatch over its reference
+_WIDTHS = (0.02, 0.2)  # [rad/s]
+_LENGTHS = (0.3, 3.0)  # [rad]
+_STRIBECK, _VISCOUS, _LOAD = 0.6, 0.5, 0.015  # at most: of the level, of the level per rad/s, of the torque
+_GAIN, _MOTOR_GAIN = 0.01, 0.03  # torque scale, at most
+_WARMING = (60.0, 1200.0)  # [s]
+_MOTOR_FRICTION = (0.05, 0.15)  # of the rated torque
+_ROTOR = (0.002, 0.02)  # [s²] rotor inertia over rated torque
 
 
 @dataclass(frozen=True, eq=False)
-class SmoothTorque:
-    """A smooth random function of the pose, f_i(q) = sum_k a_ik·cos(w_k·q) + b_ik·sin(w_k·q) [N·m].
+class Drift:
+    """A sensor's offset that follows a warming joint: size·(1 − exp(−t/time)), t since the first log began.
 
-    Random Fourier features of a Gaussian process with a squared-exponential kernel (Rahimi & Recht, NIPS 2007); the
-    waves are shared by the joints, the amplitudes are each joint's own. Over all poses, joint i has the rms it was
-    drawn with.
-
-    waves: w (K, n) [1/rad]; cosine, sine: a, b (K, n) [N·m].
+    size: (n,) [N·m]; time: [s].
     """
 
-    waves: NDArray[np.float64]
-    cosine: NDArray[np.float64]
-    sine: NDArray[np.float64]
+    size: NDArray[np.float64]
+    time: float
 
-    @classmethod
-    def drawn(cls, rms: ArrayLike, rng: np.random.Generator) -> SmoothTorque:
-        """Draw one with the given rms (n,) [N·m] and length scales between 0.7 and 1.5 rad."""
-        rms = np.asarray(rms, dtype=float)
-        waves = rng.normal(size=(_WAVES, len(rms))) / rng.uniform(*_LENGTH_SCALE, size=(_WAVES, 1))
-        a, b = rng.normal(size=(2, _WAVES, len(rms)))
-        scale = rms / np.sqrt(0.5 * (a**2 + b**2).sum(axis=0))
-        return cls(waves, a * scale, b * scale)
-
-    def __call__(self, q: ArrayLike) -> NDArray[np.float64]:
-        """f (N, n) at poses q (N, n)."""
-        angle = np.atleast_2d(q) @ self.waves.T
-        return np.cos(angle) @ self.cosine + np.sin(angle) @ self.sine
+    def __call__(self, t: ArrayLike) -> NDArray[np.float64]:
+        """Drift (N, n) [N·m] at times t (N,) [s]."""
+        return -np.multiply.outer(np.expm1(-np.asarray(t, dtype=float) / self.time), self.size)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,21 +77,28 @@ class World:
         seed: what it was drawn with.
         links: inertial parameters (n, 10) of the moving links about their joint frames, without what is attached.
         offset: torque sensor offset (n,) [N·m].
-        friction_level, friction_width: friction = level·tanh(dq/width), (n,) [N·m] and [rad/s].
+        friction: joint torque as a function of velocity and transmitted torque.
         residual: joint torque as a function of the pose; None: none.
+        gain: scale (n,) of the torque sensor; None: 1.
+        drift: what the torque sensor's offset gains with time; None: nothing.
+        rotor_inertia: (n,) seen through the gear [kg·m²]; None: the torque is measured behind the gear.
     """
 
     name: str
     seed: int | None
     links: NDArray[np.float64] = field(repr=False)
     offset: NDArray[np.float64] = field(repr=False)
-    friction_level: NDArray[np.float64] = field(repr=False)
-    friction_width: NDArray[np.float64] = field(repr=False)
+    friction: Friction = field(repr=False)
     residual: SmoothTorque | None = field(default=None, repr=False)
+    gain: NDArray[np.float64] | None = field(default=None, repr=False)
+    drift: Drift | None = field(default=None, repr=False)
+    rotor_inertia: NDArray[np.float64] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         n = len(self.links)
-        for name, shape in (("links", (n, 10)), ("offset", (n,)), ("friction_level", (n,)), ("friction_width", (n,))):
+        for name, shape in (("links", (n, 10)), ("offset", (n,)), ("gain", (n,)), ("rotor_inertia", (n,))):
+            if getattr(self, name) is None:
+                continue
             value = np.array(getattr(self, name), dtype=float)
             if value.shape != shape or not np.all(np.isfinite(value)):
                 raise ArmError(
@@ -103,31 +106,65 @@ class World:
                 )
             value.setflags(write=False)
             object.__setattr__(self, name, value)
+        if len(self.friction.level) != n:
+            raise ArmError(f"the friction of the world {self.name!r} is of {len(self.friction.level)} joints, not {n}")
 
     @classmethod
     def nominal(cls, arm: Arm) -> World:
         """The arm exactly as its model says: no friction, no offset, nothing unmodelled."""
-        zero = np.zeros(arm.n)
-        return cls("nominal", None, _bare_links(arm), zero, zero, np.ones(arm.n))
+        return cls("nominal", None, _bare_links(arm), np.zeros(arm.n), Friction.none(arm.n))
 
     @classmethod
     def real_like(cls, arm: Arm, seed: int) -> World:
         """An arm that differs from its model about as much as real ones were measured to."""
         rng = np.random.default_rng([seed, 1])
-        if arm.name == "panda" and arm.n == 7:
-            offset, friction, residual = (np.array(x) for x in (_PANDA_OFFSET, _PANDA_FRICTION, _PANDA_RESIDUAL))
-        else:
-            offset, friction, residual = (
-                rated_effort(arm) * x for x in (_OTHER_OFFSET, _OTHER_FRICTION, _OTHER_RESIDUAL)
-            )
+        offset, friction, residual = _sizes(arm)
         return cls(
             "real-like",
             seed,
             np.array([_perturbed(phi, rng) for phi in _bare_links(arm)]),
             offset * rng.normal(size=arm.n),
-            friction * np.clip(1.0 + _FRICTION_SPREAD * rng.normal(size=arm.n), 0.1, None),
-            np.full(arm.n, _FRICTION_WIDTH),
+            _plain_friction(friction, rng),
             SmoothTorque.drawn(residual, rng),
+        )
+
+    @classmethod
+    def beyond(cls, arm: Arm, seed: int, motor_side: bool | None = None) -> World:
+        """An arm unlike the measured ones: heavier mismatch, other friction, another residual, a gain error, drift.
+
+        Each size is 1 to 3 times that of `real_like`, uniform in its logarithm. Friction may have another width, a
+        Stribeck peak, two levels, a viscous part and one that grows with the torque; the residual has length scales of
+        0.3–3 rad and may ripple with each joint's own angle. With torque measured on the motor's side, friction is
+        5–15 % of the rated torque, the gain is off by up to 3 % and the rotors' inertia shows.
+
+        Args:
+            motor_side: where torque is measured; None: drawn, on the motor's side in a third of the worlds.
+        """
+        rng = np.random.default_rng([seed, 2])
+        offset, level, residual = _sizes(arm)
+        heavier = np.exp(rng.uniform(*np.log(_HEAVIER), size=6))
+        on_motor = rng.random() < 1 / 3 if motor_side is None else motor_side
+        rotor = None
+        if on_motor:
+            level = rated_effort(arm) * np.exp(rng.uniform(*np.log(_MOTOR_FRICTION), size=arm.n))
+            rotor = rated_effort(arm) * np.exp(rng.uniform(*np.log(_ROTOR), size=arm.n))
+        else:
+            level = heavier[4] * level
+        rippled = rng.random() < 0.5
+        share = rng.uniform(0.2, 0.7) if rippled else 0.0
+        smooth = SmoothTorque.of_length(np.sqrt(1 - share**2) * heavier[5] * residual, _LENGTHS, rng)
+        worst = _MOTOR_GAIN if on_motor else _GAIN
+        warming = float(np.exp(rng.uniform(*np.log(_WARMING))))
+        return cls(
+            "beyond, motor side" if on_motor else "beyond",
+            seed,
+            np.array([_perturbed(phi, rng, heavier[:3]) for phi in _bare_links(arm)]),
+            heavier[3] * offset * rng.normal(size=arm.n),
+            _any_friction(level, rng),
+            smooth + SmoothTorque.ripple(share * heavier[5] * residual, rng) if rippled else smooth,
+            1.0 + rng.uniform(-worst, worst, size=arm.n),
+            Drift(0.5 * offset * rng.normal(size=arm.n), warming) if rng.random() < 0.5 else None,
+            rotor,
         )
 
     def arm(self, nominal: Arm) -> Arm:
@@ -143,24 +180,30 @@ class World:
     @property
     def disturbed(self) -> bool:
         """Whether anything but rigid-body torque acts in the joints."""
-        return self.residual is not None or bool(np.any(self.friction_level))
+        return self.residual is not None or not self.friction.zero
 
-    def friction(self, dq: ArrayLike) -> NDArray[np.float64]:
-        """level·tanh(dq/width) for velocities (N, n) [N·m]."""
-        return self.friction_level * np.tanh(np.asarray(dq, dtype=float) / self.friction_width)
-
-    def disturbance(self, q: ArrayLike, dq: ArrayLike) -> NDArray[np.float64]:
-        """Friction and residual (N, n), what the joints must supply beyond rigid-body torque [N·m]."""
-        friction = self.friction(dq)
+    def disturbance(self, q: ArrayLike, dq: ArrayLike, torque: ArrayLike | None = None) -> NDArray[np.float64]:
+        """Friction and residual (N, n), what the joints must supply beyond rigid-body torque (N, n) [N·m]."""
+        friction = self.friction(dq, torque)
         return friction if self.residual is None else friction + self.residual(q)
+
+    def measured(self, torque: NDArray[np.float64], t: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What the torque sensor shows of joint torques (N, n) at times t (N,) since the first log began [s]."""
+        seen = torque if self.gain is None else self.gain * torque
+        seen = seen + self.offset
+        return seen if self.drift is None else seen + self.drift(t)
 
     @property
     def fingerprint(self) -> str:
         """SHA-256 of all its numbers."""
         digest = hashlib.sha256()
-        arrays = [self.links, self.offset, self.friction_level, self.friction_width]
+        arrays = [self.links, self.offset, *self.friction.numbers]
         if self.residual is not None:
             arrays += [self.residual.waves, self.residual.cosine, self.residual.sine]
+        for name, value in (("gain", self.gain), ("rotor inertia", self.rotor_inertia), ("drift", self.drift)):
+            if value is not None:
+                digest.update(name.encode())
+                arrays += [np.append(value.size, value.time)] if isinstance(value, Drift) else [value]
         for array in arrays:
             digest.update(np.round(array, 12).tobytes())
         return digest.hexdigest()
@@ -170,11 +213,48 @@ def _bare_links(arm: Arm) -> NDArray[np.float64]:
     return (arm if arm.attached is None else replace(arm, attached=None)).link_parameters
 
 
-def _perturbed(phi: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
-    """A link somewhat off its model, still a body that can exist."""
+def _sizes(arm: Arm) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Offset, friction and residual (n,) of an arm like the measured ones [N·m]."""
+    if arm.name == "panda" and arm.n == 7:
+        return np.array(_PANDA_OFFSET), np.array(_PANDA_FRICTION), np.array(_PANDA_RESIDUAL)
+    rated = rated_effort(arm)
+    return rated * _OTHER_OFFSET, rated * _OTHER_FRICTION, rated * _OTHER_RESIDUAL
+
+
+def _spread(level: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+    return level * np.clip(1.0 + _FRICTION_SPREAD * rng.normal(size=len(level)), 0.1, None)
+
+
+def _plain_friction(level: NDArray[np.float64], rng: np.random.Generator) -> Friction:
+    return Friction(_spread(level, rng), np.full(len(level), _FRICTION_WIDTH))
+
+
+def _any_friction(level: NDArray[np.float64], rng: np.random.Generator) -> Friction:
+    """Friction of any width, with each other shape in half of the worlds."""
+    n = len(level)
+    level = _spread(level, rng)
+    width = np.exp(rng.uniform(*np.log(_WIDTHS), size=n))
+    has = rng.random(4) < 0.5
+    return Friction(
+        level,
+        width,
+        has[0] * np.clip(0.2 * rng.normal(size=n), -0.5, 0.5),
+        has[1] * level * rng.uniform(0.0, _STRIBECK, size=n),
+        width + rng.uniform(0.03, 0.2, size=n),
+        has[2] * level * rng.uniform(0.0, _VISCOUS, size=n),
+        has[3] * rng.uniform(0.0, _LOAD, size=n),
+    )
+
+
+def _perturbed(
+    phi: NDArray[np.float64], rng: np.random.Generator, heavier: NDArray[np.float64] | None = None
+) -> NDArray[np.float64]:
+    """A link somewhat off its model, still a body that can exist; heavier: of mass, centre and inertia."""
     mass, com, inertia = phi_to_com(phi)
+    more = np.ones(3) if heavier is None else heavier
     root = np.sqrt(np.abs(np.diag(inertia)))
     noise = rng.normal(size=(3, 3))
-    inertia = inertia + _LINK_INERTIA * np.outer(root, root) * (np.triu(noise) + np.triu(noise, 1).T)
-    changed = com_to_phi(mass * (1 + _LINK_MASS * rng.normal()), com + _LINK_COM * rng.normal(size=3), inertia)
+    inertia = inertia + more[2] * _LINK_INERTIA * np.outer(root, root) * (np.triu(noise) + np.triu(noise, 1).T)
+    off = mass * (1 + more[0] * _LINK_MASS * rng.normal())
+    changed = com_to_phi(off, com + more[1] * _LINK_COM * rng.normal(size=3), inertia)
     return nearest_consistent(changed)
