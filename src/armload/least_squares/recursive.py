@@ -21,6 +21,7 @@ from armload.arms import Arm, payload_regressor
 from armload.arms.filtered import Lag
 from armload.identifier import BatchIdentifier, Estimate
 from armload.least_squares.autocorrelation import BlockMeans
+from armload.least_squares.normal import GAP
 
 _AT_REST = 0.01  # [rad/s]
 _TRANSIENT = 5.0  # time constants after which an observer started in motion has settled
@@ -64,6 +65,16 @@ class _Recursive(BatchIdentifier):
         """Forget the signal processing's past."""
 
     def _take(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
+        gaps = np.flatnonzero(np.diff(t, prepend=t[0] if self._last_t is None else self._last_t) > GAP)
+        for start, stop in zip([0, *gaps], [*gaps, len(t)], strict=True):
+            if start in gaps:
+                self._restart()
+                self._last_t = None
+            if stop > start:
+                self._segment(t[start:stop], q[start:stop], dq[start:stop], tau[start:stop])
+
+    def _segment(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
+        """Take samples without a gap between them."""
         y, Y = self._equations(t, q, dq, tau)
         residual = _recursion(self._phi, self._P, self._information, y, Y, self.forgetting)
         h = np.diff(t, prepend=t[0] if self._last_t is None else self._last_t)
