@@ -89,6 +89,7 @@ def test_errors_that_cancel_over_a_run_count_for_single_samples_only(runs):
     measured = measure_learned(predict, runs)["protocols"]["test_payload_nominal"]
     assert measured["single"] == pytest.approx([0.5] * 10)
     assert np.array(measured["running"]) == pytest.approx(np.zeros((2, 10)), abs=1e-6)
+    assert np.array(measured["first"]) == pytest.approx(np.full((2, 10), 0.5))
 
 
 def test_a_learned_method_sees_time_from_the_start_of_each_run(runs):
@@ -105,7 +106,7 @@ def test_a_learned_method_sees_time_from_the_start_of_each_run(runs):
 def test_a_stream_s_error_is_that_of_its_last_estimate(runs, panda):
     measured = measure_stream(lambda _: Constant(panda, TRUTH.phi + 0.25), runs)
     protocol = measured["protocols"]["test_payload_nominal"]
-    for kind in ("running", "second_half"):
+    for kind in ("running", "second_half", "first"):
         assert np.array(protocol[kind]) == pytest.approx(np.full((2, 10), 0.25))
     assert measured["izz"]["test_payload_nominal"]["truth"] == TRUTH.phi[9]
 
@@ -138,6 +139,21 @@ def test_the_same_seed_gives_the_same_numbers(quick):
     name = next(name for name in cells if name.startswith("tree-2stage"))
     (folder / "cells" / f"{name}.json").unlink()
     assert run_study(Basis(folder, QUICK), folder / "cells")[name]["protocols"] == cells[name]["protocols"]
+
+
+def test_the_numbers_do_not_depend_on_how_many_cells_are_measured_at_once(quick):
+    folder, _, cells, _ = quick
+    left = ("benchmark-rls-s0", "network-1stage-raw-row-ideal-s0", "tree-2stage-raw-payload-ideal-s1")
+    names = [name for name in cells if name.startswith(left)][:4]
+    for name in names:
+        (folder / "cells" / f"{name}.json").unlink()
+    said = []
+    again = run_study(Basis(folder, QUICK), folder / "cells", jobs=2, say=said.append)
+    assert len(said) == len(names) >= 3
+    for name in names:
+        for field in ("key", "spec", "epochs", "file_bytes", "protocols", "izz"):
+            assert again[name].get(field) == cells[name].get(field)
+    assert load_cells(folder / "cells") == again
 
 
 def test_a_cell_of_another_size_is_measured_again(quick):

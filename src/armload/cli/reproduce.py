@@ -16,6 +16,7 @@ _EXAMPLES = """\
 examples:
   armload reproduce taie2024 --quick            (every table at reduced size, in about two minutes)
   armload reproduce taie2024                    (full size: hours; stop it at any time, the same command goes on)
+  armload reproduce taie2024 --jobs 2           (two cells at once: about half the hours, the same numbers)
   armload reproduce taie2024 --hours 3
 
 Each method, training and split is a cell with a file of its own in --results; finished cells are not measured again.
@@ -40,7 +41,7 @@ def parser() -> Parser:
         type=int,
         default=1,
         metavar="N",
-        help="cells measured at once, each on one core (default: 1); the numbers are the same",
+        help="cells measured at once, each on one core (default: 1); the numbers do not depend on it",
     )
     parser.add_argument("--hours", type=float, metavar="H", help="begin no further cell after so many hours")
     parser.add_argument(

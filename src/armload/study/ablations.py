@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -11,17 +12,19 @@ from armload.evaluate.table import GROUPS, SHOWN_UNITS
 from armload.study.numbers import Cell, Cells, Ensemble, at_end, benchmark, cap, matched
 from armload.study.tables import (
     COMMAND,
-    LEARNERS,
     MISSING,
     NOMINAL,
     NOT_YET,
     PROTOCOLS,
     REAL,
     SPLITS,
+    SPREAD,
+    TRAINING_MEAN,
+    baselines_of,
     cap_shown,
+    ensemble_shown,
     errors_of,
     group_shown,
-    stages_shown,
     value,
 )
 
@@ -34,26 +37,33 @@ ABLATIONS = {
     "sweep": "The hyper-parameters the paper set by trial and error",
     "sensors": "Trained on noise-free signals, or on signals with sensor noise",
 }
+_SHOWN = {"held_out": "test rows", REAL: "real-like"}
+_ALSO_SHOWN = {"time": {"other_motion": "other motions"}}
+_SIZES_SHOWN = ("members", "depth")
+_SIGNALS = {"t": "the time stamp", "tau": "torque"}
 
 
 def ablation_table(cells: Cells, ablation: str) -> Table:
-    """The cells of an ablation beside the cells they differ from in one thing only."""
+    """The cells of an ablation, each below the cell it differs from in one thing only, with the same cap on epochs."""
     own = [c for c in cells.values() if _belongs(c, ablation)]
     kept: dict[str, Cell] = {}
     for cell in own:
         kept |= {c["name"]: c for c in (*_references(cells, cell, ablation), cell)}
-    order = sorted(kept.values(), key=lambda c: (c["spec"]["kind"], c["spec"]["split"], c["spec"]["stages"]))
-    rows = [(_label(c), SPLITS[c["spec"]["split"]], cap_shown(cap(c)), *_six([c]), _size(c)) for c in order]
+    protocols = _SHOWN | _ALSO_SHOWN.get(ablation, {})
+    sized = ablation in _SIZES_SHOWN
+    rows = []
+    for c in sorted(kept.values(), key=lambda c: _order(c, _belongs(c, ablation))):
+        labels = (_label(c, ablation), SPLITS[c["spec"]["split"]], cap_shown(cap(c)))
+        rows.append((*labels, *_errors([c], protocols), *([_size(c)] * sized)))
     if ablation == "torque" and own:
-        for split in SPLITS:
-            found = list(benchmark(cells, "training-mean", split).values())
-            if found:
-                rows.append(("training mean", SPLITS[split], "none", *_six(found), MISSING))
+        for split, shown in SPLITS.items():
+            if found := benchmark(cells, "training-mean", split):
+                rows.append((TRAINING_MEAN, shown, "none", *_errors([next(iter(found.values()))], protocols)))
     heads = [f"{g} [{SHOWN_UNITS[p][0]}]" for g, p in GROUPS.items()]
-    columns = ("method", "split", "epochs", *(f"{where}: {h}" for where in ("test rows", "real-like") for h in heads))
-    note = "Seed 0. " + (NOT_YET if own else f"Not measured yet: `{COMMAND}` measures it.")
-    baselines = tuple(k for k, row in enumerate(rows) if row[0] == "training mean")
-    return Table(ABLATIONS[ablation], (*columns, "file [kB]"), tuple(rows), note, baselines)
+    columns = ("method", "split", "epochs", *(f"{where}: {h}" for where in protocols.values() for h in heads))
+    columns += ("file [kB]",) * sized
+    note = f"Seed 0. {SPREAD} {NOT_YET}" if own else f"Not measured yet: `{COMMAND}` measures it."
+    return Table(ABLATIONS[ablation], columns, tuple(rows), note, baselines_of(rows))
 
 
 def _belongs(cell: Cell, ablation: str) -> bool:
@@ -74,23 +84,30 @@ def _references(cells: Cells, cell: Cell, ablation: str) -> list[Cell]:
     return [match.cells[0][match.seeds.index(0)] for match in alike]
 
 
-def _label(cell: Cell) -> str:
+def _order(cell: Cell, own: bool) -> tuple[Any, ...]:
+    """Trees first, the paper's split first, the larger cap first; what is compared with above what is compared."""
     spec = cell["spec"]
-    parts = [LEARNERS[spec["kind"]], stages_shown(spec["stages"])]
-    parts += ["standardised"] if spec["scale"] == "standard" else []
+    settings = (spec.get("max_depth") or 0, spec.get("hidden", 0), spec.get("batch", 0), spec.get("learning_rate", 0.0))
+    kind, split = ("tree", "network").index(spec["kind"]), list(SPLITS).index(spec["split"])
+    return kind, split, spec["stages"], -(cap(cell) or 0), own, *settings, cell["name"]
+
+
+def _label(cell: Cell, ablation: str) -> str:
+    spec = cell["spec"]
+    parts = [ensemble_shown(spec["kind"], spec["scale"], stages=spec["stages"])]
     parts += ["trained with sensor noise"] if spec["sensors"] != "ideal" else []
-    parts += [f"without {signal}" for signal in spec.get("drop") or ()]
+    parts += [f"without {_SIGNALS[signal]}" for signal in spec.get("drop") or ()]
     parts += [f"depth ≤ {spec['max_depth']}"] if spec.get("max_depth") else []
-    parts += [f"{spec['members']} members"] if spec.get("ablation") == "members" else []
-    if spec.get("ablation") == "sweep":
-        named = {"hidden": "{} units", "batch": "batch {}", "learning_rate": "learning rate {:g}"}
+    parts += [f"{spec['members']} members"] if ablation == "members" else []
+    if ablation == "sweep":
+        named = {"hidden": "{} units", "batch": "batches of {}", "learning_rate": "learning rate {:g}"}
         parts += [text.format(spec[key]) for key, text in named.items() if spec.get(key) is not None]
     return ", ".join(parts)
 
 
-def _six(group: Sequence[Cell]) -> list[str]:
+def _errors(group: Sequence[Cell], protocols: dict[str, str]) -> list[str]:
     errors = errors_of(group)
-    return [group_shown(errors(p), part) for p in ("held_out", REAL) for part in GROUPS.values()]
+    return [group_shown(errors(protocol), part) for protocol in protocols for part in GROUPS.values()]
 
 
 def _size(cell: Cell) -> str:
@@ -103,7 +120,7 @@ def single_or_mean_table(cells: Cells) -> Table:
     for kind in ("tree", "network"):
         for stages in (1, 2):
             found = matched(cells, Ensemble(kind, stages))
-            label = f"{LEARNERS[kind]}, {stages_shown(stages)}"
+            label = ensemble_shown(kind, stages=stages, most=found[0].cap if found else None)
             for protocol in (NOMINAL, REAL):
                 group = found[0].cells[0] if found else ()
                 running = at_end(group, protocol)

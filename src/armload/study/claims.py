@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from armload.inertia import NAMES
 from armload.study.numbers import (
     EXACT,
+    LEAST,
     Cell,
     Cells,
     Ensemble,
@@ -37,7 +38,6 @@ VERDICTS = (CONFIRMED, NOT_CONFIRMED, DEPENDS, NOT_MEASURED)
 SPLITS = ("row", "payload")  # the paper's, and the one that keeps whole payloads from the training
 REAL = "test_payload_real_like"  # the stand-in for the real robot
 SEMI_REAL = "test_payload_semi_real"
-LEAST = 1.0  # [%] an improvement below this is none
 
 RULE = (
     "A claim is confirmed if its direction (or, without a number, its criterion) holds under the paper's own protocol, "

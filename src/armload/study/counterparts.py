@@ -5,15 +5,45 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armload.evaluate import Table
-from armload.evaluate.table import SHOWN_SCALE, parameter_columns, short
+from armload.evaluate.table import GROUPS, SHOWN_SCALE, SHOWN_UNITS, parameter_columns, short
+from armload.inertia import NAMES
 from armload.payloads import test_payload
-from armload.study.numbers import Cells, Ensemble, at_end, benchmark, held_out, matched
+from armload.study.numbers import (
+    EXACT,
+    Answers,
+    Cells,
+    Ensemble,
+    at_end,
+    at_first,
+    benchmark,
+    both_stages,
+    held_out,
+    matched,
+    mean_ratio,
+)
 from armload.study.statements import izz
-from armload.study.tables import COMMAND, LEARNERS, LEAST_SQUARES, MISSING, NOMINAL, REAL, SEMI_REAL, SPLITS, Row
+from armload.study.tables import (
+    BASELINES,
+    COMMAND,
+    LEAST_SQUARES,
+    MISSING,
+    NOMINAL,
+    NOT_YET,
+    REAL,
+    SEMI_REAL,
+    SPLITS,
+    SPREAD,
+    TRAINING_MEAN,
+    Row,
+    baselines_of,
+    ensemble_shown,
+    group_shown,
+)
 
+RIVALS = ("rls", "rls-filter", "rls-filter-calibrated", "map", "same-prior")
+SHOWN_ENSEMBLES = (("tree", "raw"), ("tree", "standard"), ("network", "raw"), ("network", "standard"))
 _TIMES = (0.0, 0.5, 1.0, 2.0, 2.85, 3.0, 4.0, 5.0, 6.0)  # [s] of the table to Fig. 8
 
 
@@ -32,7 +62,10 @@ def training_rows(cells: Cells, stages: int) -> list[Row]:
     """Fig. 4 (single-stage) and 5 (two-stage): single samples on held-out rows, both splits."""
     rows: list[Row] = []
     for split, shown in SPLITS.items():
-        rows += [(f"{LEARNERS[k]}, {shown} held out", _best(cells, k, stages, split)) for k in ("tree", "network")]
+        for kind in ("tree", "network"):
+            found = matched(cells, Ensemble(kind, stages, split))
+            name = ensemble_shown(kind, most=found[0].cap if found else None)
+            rows.append((f"{name}, {shown} held out", held_out(found[0].cells[0]) if found else None))
     return rows
 
 
@@ -41,29 +74,83 @@ def real_rows(cells: Cells) -> list[Row]:
     rows: list[Row] = []
     for kind in ("tree", "network"):
         for protocol, shown in ((NOMINAL, "simulation"), (REAL, "real-like arms"), (SEMI_REAL, "real log")):
-            rows.append((f"{LEARNERS[kind]}, {shown}", best_of_stages(cells, kind, "row", protocol)))
+            found = both_stages(cells, kind, "row", protocol)
+            rows.append((f"{_shown(kind, 'raw', found)}, {shown}", found and found.errors))
     return rows
 
 
-def benchmark_rows(cells: Cells) -> list[Row]:
-    """Fig. 7: ensembles and least squares with the test payload on real-like arms."""
-    rows: list[Row] = [(LEARNERS[k], best_of_stages(cells, k, "row", REAL)) for k in ("network", "tree")]
+def benchmark_rows(cells: Cells, reduced: bool = False) -> list[Row]:
+    """Fig. 7: ensembles and least squares, the test payload on real-like arms; reduced: what a figure has room for."""
+    rows: list[Row] = []
+    for kind, scale in SHOWN_ENSEMBLES:
+        found = both_stages(cells, kind, "row", REAL, scale)
+        rows.append((_shown(kind, scale, found), found and found.errors))
     rows += [(name, at_end(list(benchmark(cells, m).values()), REAL)) for m, name in LEAST_SQUARES.items()]
-    return [*rows, ("training mean", at_end(list(benchmark(cells, "training-mean", "row").values()), REAL))]
+    rows.append((TRAINING_MEAN, at_end(list(benchmark(cells, "training-mean", "row").values()), REAL)))
+    left_out = (ensemble_shown("tree", "standard"), LEAST_SQUARES["rls-filter-calibrated-other"])
+    return [row for row in rows if not (reduced and row[0] in left_out)]
 
 
-def best_of_stages(cells: Cells, kind: str, split: str, protocol: str) -> NDArray[np.float64] | None:
-    """Errors (R, 10) at the end of runs: mass and first moments from one stage, inertia from two."""
-    found = matched(cells, Ensemble(kind, 1, split), Ensemble(kind, 2, split))
-    if not found:
-        return None
-    one, two = (at_end(group, protocol) for group in found[0].cells)
-    return None if one is None or two is None else np.concatenate([one[:, :4], two[:, 4:]], axis=1)
+def ratio_table(cells: Cells) -> Table:
+    """Where the ensembles beat least squares: their errors over those of each method, parameter by parameter."""
+    theirs = {LEAST_SQUARES[m]: at_end(list(benchmark(cells, m).values()), REAL) for m in RIVALS}
+    theirs[TRAINING_MEAN] = at_end(list(benchmark(cells, "training-mean", "row").values()), REAL)
+    rows = []
+    for kind, scale in SHOWN_ENSEMBLES:
+        own = both_stages(cells, kind, "row", REAL, scale)
+        if own is None or (kind, scale) == ("tree", "standard"):  # its errors are in Fig. 7
+            continue
+        for name, other in theirs.items():
+            if other is not None:
+                a, b = own.errors.mean(axis=0), other.mean(axis=0)
+                each = [short(x / y, 2) if min(x, y) > EXACT else MISSING for x, y in zip(a, b, strict=True)]
+                rows.append((_shown(kind, scale, own), name, *each, short(mean_ratio(a, b), 2)))
+    note = (
+        "Below 1 the ensemble errs less. Test payload on real-like arms, rows split at random, at the end of the run; "
+        "all ten: geometric mean. Fig. 7 below has the errors and further methods. "
+    )
+    columns = ("ensemble", "against", *NAMES, "all ten")
+    unmeasured = "" if rows else f"Not measured yet: `{COMMAND}` measures it."
+    marked = tuple(k for k, row in enumerate(rows) if row[1] in BASELINES)
+    title = "Error of the ensembles over that of least squares"
+    return Table(title, columns, tuple(rows), (note + unmeasured).strip(), marked)
 
 
-def _best(cells: Cells, kind: str, stages: int, split: str) -> NDArray[np.float64] | None:
-    found = matched(cells, Ensemble(kind, stages, split))
-    return held_out(found[0].cells[0]) if found else None
+def first_table(cells: Cells) -> Table:
+    """What the first sample of a run tells, beside what the whole run tells."""
+    read = {"first": at_first, "end": at_end}
+    mean = list(benchmark(cells, "training-mean", "row").values())
+    blind = at_first(mean, REAL)
+    wanted = [("first", NOMINAL), ("first", REAL), ("end", REAL)]
+    rows = []
+    for kind, scale in SHOWN_ENSEMBLES:
+        found = [both_stages(cells, kind, "row", protocol, scale, read[when]) for when, protocol in wanted]
+        rows.append((_shown(kind, scale, found[1]), [answers and answers.errors for answers in found]))
+    named = {name: list(benchmark(cells, method).values()) for method, name in LEAST_SQUARES.items()}
+    for name, group in (named | {TRAINING_MEAN: mean}).items():
+        rows.append((name, [read[when](group, protocol) for when, protocol in wanted]))
+    filled = []
+    for name, errors in rows:
+        groups = [group_shown(e, part) for e in errors for part in GROUPS.values()]
+        real, over = errors[1], MISSING
+        if real is not None and blind is not None:
+            over = short(mean_ratio(real.mean(axis=0), blind.mean(axis=0)), 2)
+        filled.append((name, *groups, over))
+    heads = [f"{g} [{SHOWN_UNITS[p][0]}]" for g, p in GROUPS.items()]
+    columns = (
+        "method",
+        *(f"{w}: {h}" for w in ("first, nominal", "first, real-like", "end, real-like") for h in heads),
+    )
+    note = (
+        "Test payload, rows split at random. First: the answer to the first sample of a run. Over the training mean: "
+        "error of the first estimate on real-like arms over that of the training mean, geometric mean over the ten "
+        f"parameters; below 1 the first sample told something. {SPREAD} {NOT_YET}"
+    )
+    return Table("First estimates", (*columns, "over the training mean"), tuple(filled), note, baselines_of(filled))
+
+
+def _shown(kind: str, scale: str, found: Answers | None) -> str:
+    return ensemble_shown(kind, scale, most=found and found.cap)
 
 
 def curves(cells: Cells) -> dict[str, dict[str, Any]]:
@@ -72,27 +159,25 @@ def curves(cells: Cells) -> dict[str, dict[str, Any]]:
     for kind in ("network", "tree"):
         found = matched(cells, Ensemble(kind, 2))
         if found:
-            out[LEARNERS[kind]] = izz(found[0].cells[0][0])
+            out[ensemble_shown(kind, most=found[0].cap)] = izz(found[0].cells[0][0])
     for method in ("rls", "rls-filter", "rls-filter-calibrated", "same-prior"):
         for cell in benchmark(cells, method).values():
             out.setdefault(LEAST_SQUARES[method], izz(cell))
     for cell in benchmark(cells, "training-mean", "row").values():
-        out.setdefault("training mean", izz(cell))
+        out.setdefault(TRAINING_MEAN, izz(cell))
     return {name: curve for name, curve in out.items() if curve is not None}
 
 
 def izz_table(cells: Cells) -> Table:
     """Fig. 8 in numbers: running mean (ensembles) or estimate (least squares) of Izz over time, beside the truth."""
     shown = curves(cells)
-    rows, baselines = [], []
+    rows = []
     for name, curve in shown.items():
         if not rows:
-            rows.append(("truth", MISSING, *[short(SHOWN_SCALE * float(curve["truth"]))] * len(_TIMES)))
-        if name.startswith(("training mean", "same-prior")):
-            baselines.append(len(rows))
+            rows.append(("truth", *[short(SHOWN_SCALE * float(curve["truth"]))] * len(_TIMES)))
         at = [int(np.argmin(np.abs(curve["t"] - t))) for t in _TIMES]
-        running = [short(SHOWN_SCALE * float(curve["running"][k])) for k in at]
-        rows.append((name, short(SHOWN_SCALE * float(curve["single"][0])), *running))
-    heads = ("method", "first estimate", *(f"{t:g} s" for t in _TIMES))
-    note = f"One run on a real-like arm, seed 0. {'' if shown else 'Not measured yet: `' + COMMAND + '` measures it.'}"
-    return Table("Fig. 8: Izz over time [g·m²]", heads, tuple(rows), note.strip(), tuple(baselines))
+        rows.append((name, *(short(SHOWN_SCALE * float(curve["running"][k])) for k in at)))
+    heads = ("method", *(f"{t:g} s" for t in _TIMES))
+    note = "One run on a real-like arm, seed 0: the running mean of an ensemble, the estimate of least squares. "
+    note += "" if shown else f"Not measured yet: `{COMMAND}` measures it."
+    return Table("Fig. 8: Izz over time [g·m²]", heads, tuple(rows), note.strip(), baselines_of(rows))

@@ -12,18 +12,31 @@ from armload.inertia import NAMES
 from armload.report.style import COLOURS, TRUTH, look, new_figure
 from armload.study.counterparts import benchmark_rows, curves, real_rows, training_rows
 from armload.study.numbers import Cells
-from armload.study.tables import Row
+from armload.study.tables import BASELINES, LEARNERS, LEAST_SQUARES, TRAINING_MEAN, Row, ensemble_shown
 
 if TYPE_CHECKING:
     from armload.report.style import Figure  # matplotlib belongs to report
 
 _LOG_FROM = 30.0  # ratio of largest to smallest error from which an axis becomes logarithmic
-_BASELINE = "#8A8A8A"
+_METHODS = (
+    LEARNERS["network"],
+    LEARNERS["tree"],
+    *(LEAST_SQUARES[method] for method in ("rls", "rls-filter", "rls-filter-calibrated")),
+    ensemble_shown("network", "standard"),
+    *(LEAST_SQUARES[method] for method in ("map", "map-tare")),
+)
+_COLOUR_OF = dict(zip(_METHODS, COLOURS, strict=True)) | dict(zip(BASELINES, ("#8A8A8A", "#4D4D4D"), strict=True))
+_HATCH_OF = {"payloads held out": "////", "real-like arms": "////", "real log": "...."}
 
 
 def figures(cells: Cells) -> dict[int, Figure]:
     """Figure number → figure, for the figures that have something to show."""
-    bars = {4: training_rows(cells, 1), 5: training_rows(cells, 2), 6: real_rows(cells), 7: benchmark_rows(cells)}
+    bars = {
+        4: training_rows(cells, 1),
+        5: training_rows(cells, 2),
+        6: real_rows(cells),
+        7: benchmark_rows(cells, reduced=True),
+    }
     out = {number: error_bars(rows) for number, rows in bars.items() if any(e is not None for _, e in rows)}
     shown = curves(cells)
     return out | ({8: over_time(shown)} if shown else {})
@@ -56,7 +69,7 @@ def error_bars(rows: Sequence[Row]) -> Figure:
                     label=label if ax is axes[0] else "_nolegend_",
                     yerr=bar,
                     error_kw={"elinewidth": 0.9, "ecolor": "#222222", "capsize": 1.5},
-                    **_style(label, m),
+                    **_style(label),
                 )
             if log:
                 ax.set_yscale("log")
@@ -76,9 +89,9 @@ def over_time(shown: dict[str, dict[str, Any]]) -> Figure:
         figure = new_figure(3.8)
         ax = figure.add_subplot()
         ax.axhline(truth, color=TRUTH, linewidth=1.2, label="truth")
-        for m, (label, curve) in enumerate(shown.items()):
-            colour = _style(label, m)["color"]
-            dash = ":" if label.startswith("training mean") else "-"
+        for label, curve in shown.items():
+            colour = _style(label)["color"]
+            dash = ":" if label.startswith(TRAINING_MEAN) else "-"
             ax.plot(curve["t"], SHOWN_SCALE * curve["running"], dash, color=colour, label=label)
             if not np.array_equal(curve["single"], curve["running"]):
                 ax.plot(curve["t"], SHOWN_SCALE * curve["single"], ".", color=colour, markersize=3, alpha=0.5)
@@ -90,10 +103,16 @@ def over_time(shown: dict[str, dict[str, Any]]) -> Figure:
     return figure
 
 
-def _style(label: str, number: int) -> dict[str, Any]:
-    if label.startswith("training mean"):
-        return {"color": _BASELINE, "hatch": "////", "edgecolor": "white", "linewidth": 0.0}
-    return {"color": COLOURS[number % len(COLOURS)]}
+def _style(label: str) -> dict[str, Any]:
+    """A method has one colour in all figures; a hatch tells what it was measured on."""
+    parts = [part for part in label.split(", ") if not part.startswith("≤")]
+    hatch = _HATCH_OF.get(parts[-1])
+    if parts[0] in LEARNERS.values() and parts[-1] != "standardised":
+        parts = parts[:1]
+    colour = _COLOUR_OF[", ".join(parts)]
+    if label.startswith(TRAINING_MEAN):
+        hatch = "////"
+    return {"color": colour} | ({"hatch": hatch, "edgecolor": "white", "linewidth": 0.0} if hatch else {})
 
 
 def _legend(figure: Figure, ax: Any) -> None:

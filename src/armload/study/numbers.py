@@ -15,6 +15,7 @@ Cell = Mapping[str, Any]
 Cells = Mapping[str, Cell]
 
 PAPER_EPOCHS = 1000  # the paper's "at most"; a network cell with fewer is called capped
+LEAST = 1.0  # [%] an improvement below this is none
 EXACT = 1e-9  # [SI] errors below are rounding: a parameter that is the same in every payload is learned exactly
 # Judged by their mean over the second half, as in [7].
 AVERAGED = ("rls", "rls-filter", "rls-filter-calibrated", "rls-filter-calibrated-other")
@@ -92,6 +93,45 @@ def at_end(group: Sequence[Cell], protocol: str) -> NDArray[np.float64] | None:
     if not group or any(protocol not in cell["protocols"] for cell in group):
         return None
     return np.mean([_answers(cell, cell["protocols"][protocol]) for cell in group], axis=0)
+
+
+def at_first(group: Sequence[Cell], protocol: str) -> NDArray[np.float64] | None:
+    """|error| of the first answer to each run of a protocol, (R, 10), averaged over the cells' seeds.
+
+    For an ensemble that is its answer to the first sample, for least squares the estimate after one sample.
+    """
+    if not group or any("first" not in cell["protocols"].get(protocol, {}) for cell in group):
+        return None
+    return np.mean([cell["protocols"][protocol]["first"] for cell in group], axis=0)
+
+
+class Answers(NamedTuple):
+    """Errors (R, 10) of an ensemble on the runs of a protocol, with the cap on epochs and the seeds behind them."""
+
+    errors: NDArray[np.float64]
+    cap: int | None
+    seeds: tuple[int, ...]
+
+
+def both_stages(
+    cells: Cells,
+    kind: str,
+    split: str,
+    protocol: str,
+    scale: str = "raw",
+    read: Callable[[Sequence[Cell], str], NDArray[np.float64] | None] = at_end,
+) -> Answers | None:
+    """An ensemble on whole runs: mass and first moments from one stage, inertia from two, as the paper found better.
+
+    It does not say which training it used there. read: `at_end` or `at_first`. None: a cell is missing.
+    """
+    found = matched(cells, Ensemble(kind, 1, split, scale), Ensemble(kind, 2, split, scale))
+    if not found:
+        return None
+    one, two = (read(group, protocol) for group in found[0].cells)
+    if one is None or two is None:
+        return None
+    return Answers(np.concatenate([one[:, :4], two[:, 4:]], axis=1), found[0].cap, found[0].seeds)
 
 
 def _answers(cell: Cell, measured: Mapping[str, Any]) -> NDArray[np.float64]:

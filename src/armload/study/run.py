@@ -71,7 +71,9 @@ def run_study(
             basis.dataset(sensors, progress)
     rests_on = (basis.folder, basis.size, basis.real_log)
     tasks = (delayed(_measured)(spec, rests_on, folder, progress and jobs == 1) for spec in unfinished())
-    for cell in Parallel(n_jobs=jobs, pre_dispatch=jobs, batch_size=1, return_as="generator_unordered")(tasks):
+    one_by_one: dict[str, Any] = {"pre_dispatch": jobs, "batch_size": 1, "return_as": "generator_unordered"}
+    finished: Any = Parallel(n_jobs=jobs, **one_by_one)(tasks)
+    for cell in finished:
         cells[cell["name"]] = cell
     names = {spec.name for spec in todo}
     return {name: cell for name, cell in cells.items() if name in names}

@@ -13,13 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.study.numbers import (
+    LEAST,
+    Answers,
     Cell,
     Cells,
     Ensemble,
     at_end,
+    at_first,
     benchmark,
+    both_stages,
     held_out,
-    improvement,
     matched,
     mean_ratio,
     spread,
@@ -50,17 +53,6 @@ class Rule(NamedTuple):
     criterion: str
 
 
-def _both_stages(cells: Cells, kind: str | None, split: str, protocol: str) -> tuple[NDArray, int | None, tuple] | None:
-    """Errors (R, 10) of an ensemble at the end of runs: mass and first moments from one stage, inertia from two."""
-    found = matched(cells, Ensemble(str(kind), 1, split), Ensemble(str(kind), 2, split))
-    if not found:
-        return None
-    one, two = (at_end(group, protocol) for group in found[0].cells)
-    if one is None or two is None:
-        return None
-    return np.concatenate([one[:, :4], two[:, 4:]], axis=1), found[0].cap, found[0].seeds
-
-
 def izz(cell: Cell, protocol: str = REAL) -> dict[str, NDArray[np.float64]] | None:
     """Izz of one run over time: t, single, running (T,), and their signed errors `single_error`, `running_error`."""
     curve = cell.get("izz", {}).get(protocol)
@@ -78,14 +70,17 @@ def _curves(cells: Cells, kind: str | None, split: str) -> tuple[list[dict[str, 
 
 
 def _first_step(cells: Cells, learner: str | None, split: str) -> Measured | None:
-    own = _curves(cells, learner, split)
-    means = [c for c in map(izz, benchmark(cells, "training-mean", split).values()) if c is not None]
-    if own is None or not means:
+    own = both_stages(cells, str(learner), split, REAL, read=at_first)
+    mean = at_first(list(benchmark(cells, "training-mean", split).values()), REAL)
+    if own is None or mean is None:
         return None
-    first = np.array([[abs(curve["single_error"][0])] for curve in own[0]])
-    blind = float(np.mean([abs(curve["single_error"][0]) for curve in means]))
-    value = improvement(float(first.mean()), blind)
-    return Measured(value, spread(lambda e: improvement(float(e.mean()), blind), first), value > 0.0, *own[1:])
+    return _over_arms(own, lambda errors: _percent_of_means(errors, mean))
+
+
+def _over_arms(own: Answers, improvement: Callable[[NDArray], float]) -> Measured:
+    """An improvement [%] of an ensemble's errors, its spread over the runs, and whether it counts as one."""
+    value = improvement(own.errors)
+    return Measured(value, spread(improvement, own.errors), value >= LEAST, own.cap, own.seeds)
 
 
 def _flat(cells: Cells, learner: str | None, split: str) -> Measured | None:
@@ -118,39 +113,37 @@ def _close(cells: Cells, learner: str | None, split: str) -> Measured | None:
     found = _real_and_nominal(cells, learner, split)
     if found is None:
         return None
-    real, nominal, cap, seeds = found
-    value = mean_ratio(real.mean(axis=0), nominal)
-    return Measured(value, spread(lambda e: mean_ratio(e.mean(axis=0), nominal), real), value <= CLOSE, cap, seeds)
+    real, nominal = found
+
+    def ratio(errors: NDArray) -> float:
+        return mean_ratio(errors.mean(axis=0), nominal)
+
+    value = ratio(real.errors)
+    return Measured(value, spread(ratio, real.errors), value <= CLOSE, real.cap, real.seeds)
 
 
 def _better_on_real(cells: Cells, learner: str | None, split: str) -> Measured | None:
     found = _real_and_nominal(cells, learner, split)
     if found is None:
         return None
-    real, nominal, cap, seeds = found
-
-    def percent(errors: NDArray) -> float:
-        return 100.0 * (1.0 - mean_ratio(errors.mean(axis=0)[:4], nominal[:4]))
-
-    return Measured(percent(real), spread(percent, real), percent(real) > 0.0, cap, seeds)
+    real, nominal = found
+    return _over_arms(real, lambda errors: 100.0 * (1.0 - mean_ratio(errors.mean(axis=0)[:4], nominal[:4])))
 
 
-def _real_and_nominal(
-    cells: Cells, learner: str | None, split: str
-) -> tuple[NDArray, NDArray, int | None, tuple[int, ...]] | None:
-    real, nominal = (_both_stages(cells, learner, split, protocol) for protocol in (REAL, NOMINAL))
-    return None if real is None or nominal is None else (real[0], nominal[0].mean(axis=0), *real[1:])
+def _real_and_nominal(cells: Cells, learner: str | None, split: str) -> tuple[Answers, NDArray] | None:
+    real, nominal = (both_stages(cells, str(learner), split, protocol) for protocol in (REAL, NOMINAL))
+    return None if real is None or nominal is None else (real, nominal.errors.mean(axis=0))
 
 
 def _no_filter(cells: Cells, learner: str | None, split: str) -> Measured | None:
-    own = _both_stages(cells, learner, split, REAL)
-    methods = ("rls-filter", "rls-filter-calibrated")
+    own = both_stages(cells, str(learner), split, REAL)
+    methods = ("rls-filter", "rls-filter-calibrated")  # those of [7]
     others = [e for m in methods if (e := at_end(list(benchmark(cells, m).values()), REAL)) is not None]
     if own is None or len(others) < len(methods):
         return None
-    best = min(others, key=lambda e: mean_ratio(e.mean(axis=0), own[0].mean(axis=0)))
-    value = _percent_of_means(own[0], best)
-    return Measured(value, spread(_percent_of_means, own[0], best), value > 0.0, *own[1:])
+    best = min(others, key=lambda e: mean_ratio(e.mean(axis=0), own.errors.mean(axis=0)))
+    value = _percent_of_means(own.errors, best)
+    return Measured(value, spread(_percent_of_means, own.errors, best), value >= LEAST, own.cap, own.seeds)
 
 
 def _trees_better(cells: Cells, _learner: str | None, split: str) -> Measured | None:
@@ -186,7 +179,7 @@ def _held_out_comparison(
     match, a, b = pairs[0]
     value = _percent_of_means(a, b)
     many = max(pairs, key=lambda pair: len(pair[0].seeds))
-    return Measured(value, spread(_percent_of_means, *many[1:]), value > 0.0, match.cap, match.seeds)
+    return Measured(value, spread(_percent_of_means, *many[1:]), value >= LEAST, match.cap, match.seeds)
 
 
 def _percent_of_means(a: NDArray, b: NDArray) -> float:
@@ -201,19 +194,21 @@ RULES = {
     "first-step": Rule(
         _first_step,
         "% less error than the training mean",
-        "on a real-like arm the first estimate of Izz is nearer to the truth than the mean of the training payloads, "
-        "which looks at no measurement: the least that accurate can mean",
+        "on real-like arms the first estimate, from one sample, errs less than the mean of the training payloads, "
+        "which looks at no measurement: the least that accurate can mean (geometric mean over the ten parameters; by "
+        "group of parameters under The first time step)",
     ),
     "flat": Rule(
         _flat,
         "% of the truth",
-        f"on a real-like arm the running mean of Izz stays within {FLAT:g} % of the truth of its last value "
+        f"in one run on a real-like arm the running mean of Izz stays within {FLAT:g} % of the truth of its last value "
         f"after {FLAT_AFTER:g} s",
     ),
     "overshoot": Rule(
         _overshoot,
         "% of the truth, peak error",
-        f"on a real-like arm the error of RLS peaks before {SECOND_HALF:g} s, above that of the answer 0 (100 %)",
+        f"in one run on a real-like arm the error of RLS on Izz peaks before {SECOND_HALF:g} s, above 100 % of the "
+        "truth, the error of the answer 0",
     ),
     "close": Rule(
         _close,
@@ -224,23 +219,25 @@ RULES = {
     "better-on-real": Rule(
         _better_on_real,
         "% less error than simulated",
-        "errors of mass and first moments are smaller on real-like arms than on the nominal arm (geometric mean)",
+        "errors of mass and first moments are smaller on real-like arms than on the nominal arm (geometric mean over "
+        "these four)",
     ),
     "no-filter": Rule(
         _no_filter,
         "% less error than filtered RLS",
-        "on real-like arms the ensemble, fed raw signals, errs less than filtered RLS, calibrated or not, whichever is "
-        "better (geometric mean over the parameters)",
+        "on real-like arms the ensemble, fed raw signals, errs less than filtered RLS and than filtered RLS calibrated "
+        "as in [7] (geometric mean over the parameters; the number is against the better of the two)",
     ),
     "trees-better": Rule(
         _trees_better,
         "% less error than networks",
-        "on held-out rows of the simulated data set (geometric mean over parameters and both trainings)",
+        "trees err less than networks on held-out rows of the simulated data set (geometric mean over the parameters "
+        "and over one stage and two)",
     ),
     "mixed-better": Rule(
         _mixed_better,
         "% less error than the better of trees and networks",
-        "on held-out rows of the simulated data set, one stage, the same cap on epochs (geometric mean over the "
-        "parameters)",
+        "the mixed ensemble errs less than the better of the two on held-out rows of the simulated data set, one "
+        "stage, all at the same cap on epochs (geometric mean over the parameters)",
     ),
 }

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from armload.evaluate import Table
 from armload.evaluate.table import GROUPS, SHOWN_SCALE, SHOWN_UNITS, parameter_columns, short
-from armload.study.numbers import PAPER_EPOCHS, Cell, Cells, Ensemble, at_end, benchmark, held_out, matched
+from armload.study.numbers import EXACT, PAPER_EPOCHS, Cell, Cells, Ensemble, at_end, benchmark, held_out, matched
 
 COMMAND = "armload reproduce taie2024"
 MISSING = "–"
@@ -19,12 +19,14 @@ LEARNERS = {"tree": "trees", "network": "networks", "mixed": "networks and trees
 LEAST_SQUARES = {
     "rls": "RLS",
     "rls-filter": "filtered RLS",
-    "rls-filter-calibrated": "filtered RLS, virtual calibration on the same motion",
-    "rls-filter-calibrated-other": "filtered RLS, virtual calibration on another motion",
+    "rls-filter-calibrated": "filtered RLS calibrated as in [7]",
+    "rls-filter-calibrated-other": "filtered RLS calibrated on another motion",
     "map": "MAP least squares",
-    "map-tare": "MAP least squares, with tare",
+    "map-tare": "MAP least squares with tare",
     "same-prior": "same-prior least squares",
 }
+TRAINING_MEAN = "training mean"
+BASELINES = (TRAINING_MEAN, LEAST_SQUARES["same-prior"])
 SPLITS = {"row": "rows", "payload": "payloads"}
 PROTOCOLS = {
     "held_out": "test rows, single samples",
@@ -46,20 +48,19 @@ Row = tuple[str, NDArray[np.float64] | None]  # a method and its errors (R, 10)
 def main_tables(cells: Cells) -> tuple[Table, ...]:
     """Mass, first moment and inertia: every method under every protocol."""
     rows = [*_ensemble_rows(cells), *_least_squares_rows(cells)]
-    note = (
-        "Split: what was held out from training, rows drawn at random (the paper's) or whole payloads; epochs: the "
-        "cap; the errors of a group are averaged over its parameters. Test rows: single samples of the simulated data "
-        "set; all other columns: the running mean of an ensemble at the end of a run, the mean over the second half "
-        f"for RLS and filtered RLS, the last estimate of the other least squares. {SPREAD} {NOT_YET}"
-    )
-    baselines = tuple(k for k, row in enumerate(rows) if row[0].startswith(("training mean", "same-prior")))
     tables = []
     for group, part in GROUPS.items():
         unit = SHOWN_UNITS[part][0]
         columns = ("method", "split", "epochs", "seeds", *(f"{name} [{unit}]" for name in PROTOCOLS.values()))
         filled = tuple((*labels, *(group_shown(errors(p), part) for p in PROTOCOLS)) for *labels, errors in rows)
-        tables.append(Table(f"Mean absolute error of the {group}", columns, filled, note, baselines))
+        title = f"Mean absolute error of the {group}"
+        tables.append(Table(title, columns, filled, f"{SPREAD} {NOT_YET}", baselines_of(filled)))
     return tuple(tables)
+
+
+def baselines_of(rows: Sequence[tuple[str, ...]]) -> tuple[int, ...]:
+    """Which rows are baselines, to be set apart."""
+    return tuple(k for k, row in enumerate(rows) if row[0].startswith(BASELINES))
 
 
 def errors_of(group: Sequence[Cell]) -> Callable[[str], NDArray[np.float64] | None]:
@@ -70,10 +71,10 @@ def errors_of(group: Sequence[Cell]) -> Callable[[str], NDArray[np.float64] | No
 def _ensemble_rows(cells: Cells) -> list[tuple[str, str, str, str, Callable]]:
     rows = []
     wanted = [Ensemble(kind, stages, split) for kind in ("tree", "network") for stages in (1, 2) for split in SPLITS]
+    wanted += [Ensemble("network", stages, split, "standard") for stages in (1, 2) for split in SPLITS]
     wanted += [Ensemble("mixed", 1, split, scale) for scale in ("raw", "standard") for split in SPLITS]
     for ensemble in wanted:
-        label = f"{LEARNERS[ensemble.kind]}, {stages_shown(ensemble.stages)}"
-        label += ", standardised" if ensemble.scale == "standard" else ""
+        label = ensemble_shown(ensemble.kind, ensemble.scale, stages=ensemble.stages)
         found = matched(cells, ensemble)
         for match in found:
             seeds = ", ".join(map(str, match.seeds))
@@ -91,8 +92,42 @@ def _least_squares_rows(cells: Cells) -> list[tuple[str, str, str, str, Callable
     for split, shown in SPLITS.items():
         found = benchmark(cells, "training-mean", split)
         seeds = ", ".join(map(str, found)) or MISSING
-        rows.append(("training mean", shown, "none", seeds, errors_of(list(found.values()))))
+        rows.append((TRAINING_MEAN, shown, "none", seeds, errors_of(list(found.values()))))
     return rows
+
+
+def ensemble_shown(kind: str, scale: str = "raw", *, stages: int | None = None, most: int | None = None) -> str:
+    """The name of an ensemble; `most` is named where it is less than the epochs of the paper."""
+    parts = [LEARNERS[kind]] + ([stages_shown(stages)] if stages else []) + ["standardised"] * (scale == "standard")
+    return ", ".join(parts) + capped(most)
+
+
+def capped(most: int | None) -> str:
+    """What to add to the name of networks that trained for fewer epochs than the paper's might."""
+    return "" if most in (None, PAPER_EPOCHS) else f", ≤ {most} epochs"
+
+
+def epochs_table(cells: Cells) -> Table:
+    """How long the networks trained until their validation loss came to rest."""
+    wanted = [
+        Ensemble("network", stages, split, scale)
+        for scale in ("raw", "standard")
+        for stages in (1, 2)
+        for split in SPLITS
+    ]
+    rows = []
+    for ensemble in wanted:
+        for match in matched(cells, ensemble):
+            used = np.concatenate([np.ravel(cell["epochs"]) for cell in match.cells[0]])
+            minutes = np.mean([cell["wall_s"] for cell in match.cells[0]]) / 60.0
+            label = ensemble_shown("network", ensemble.scale, stages=ensemble.stages)
+            seeds = ", ".join(map(str, match.seeds))
+            spent = (f"{np.median(used):.0f}", f"{used.min():.0f}–{used.max():.0f}", f"{minutes:.1f}")
+            rows.append((label, SPLITS[ensemble.split], cap_shown(match.cap), seeds, *spent))
+    columns = ("method", "split", "cap", "seeds", "epochs, median", "epochs, range", "minutes")
+    note = "Over members, stages and seeds; the minutes are those of training and measuring one cell. "
+    note = note + NOT_YET if rows else f"Not measured yet: `{COMMAND}` measures it."
+    return Table("Epochs the networks used", columns, tuple(rows), note)
 
 
 def stages_shown(count: int) -> str:
@@ -104,11 +139,14 @@ def cap_shown(most: int | None) -> str:
 
 
 def value(mean: float, spread: float | None) -> str:
-    """Mean and spread in the units tables are shown in, the spread to the same decimal."""
-    shown = short(SHOWN_SCALE * float(mean))
-    if spread is None or not np.isfinite(spread):
-        return shown
-    return f"{shown} ± {SHOWN_SCALE * float(spread):.{len(shown.partition('.')[2])}f}"
+    """Mean ± spread in the units tables are shown in, three digits of the larger one; no spread where there is none."""
+    if not np.isfinite(mean) or abs(mean) <= EXACT:
+        return "0" if abs(mean) <= EXACT else short(SHOWN_SCALE * float(mean))
+    apart = SHOWN_SCALE * float(spread) if spread is not None and spread > EXACT else 0.0
+    shown = SHOWN_SCALE * float(mean)
+    largest = float(f"{max(abs(shown), apart):.2e}")  # 9.996 is 10.0, with one decimal
+    decimals = int(np.clip(2 - np.floor(np.log10(largest)), 0, 4))
+    return f"{shown:.{decimals}f}" + (f" ± {apart:.{decimals}f}" if apart else "")
 
 
 def group_shown(errors: NDArray | None, part: slice) -> str:
@@ -125,8 +163,9 @@ def parameter_table(title: str, rows: Iterable[Row], note: str) -> Table:
     for label, errors in rows:
         shown = [MISSING] * 10 if errors is None else [mean_and_spread(errors[:, k]) for k in range(10)]
         filled.append((label, *shown))
-    baselines = tuple(k for k, row in enumerate(filled) if row[0].startswith(("training mean", "same-prior")))
-    return Table(title, ("method", *parameter_columns()), tuple(filled), f"{note} {SPREAD} {NOT_YET}", baselines)
+    return Table(
+        title, ("method", *parameter_columns()), tuple(filled), f"{note} {SPREAD} {NOT_YET}", baselines_of(filled)
+    )
 
 
 def claims_table(claims: Sequence[dict[str, Any]], title: str) -> Table:
@@ -145,10 +184,9 @@ def claims_table(claims: Sequence[dict[str, Any]], title: str) -> Table:
     columns = ("claim", "where", "what the paper says", "paper", "ours, rows split at random")
     columns += ("payloads held out", "real log", "epochs", "verdict")
     note = (
-        "± is the standard deviation over seeds (simulated rows) or arms (real-like). Real log: the test payload's "
-        "torque added to a log of a real unloaded Panda on another motion than the training's; it does not enter the "
-        "verdict. "
-        f"* the number is smaller than its spread. {NOT_YET}"
+        "± is the standard deviation over seeds (test rows) or arms (real-like). Payloads held out, real log: the same "
+        "number, in the same unit, under these; the real log, which shows another motion than the training, does not "
+        f"enter the verdict. * the number is smaller than its spread. {NOT_YET}"
     )
     return Table(title, columns, tuple(rows), note)
 
