@@ -12,8 +12,9 @@ alone: v is the generalised eigenvector of the smallest eigenvalue 1/λ. From it
     phi = (A_YY − B_YY/λ)⁻¹·(A_Yy − B_Yy/λ).
 
 A and B accumulate in constant memory, which makes it recursive. Scaling: columns by the size a payload may have, rows
-by the residual of each joint. The noise is found from the log: e_i from fifth differences of the velocity, e_tau is
-what the residual holds beyond them.
+by the residual of each joint. The noise is found from the log: e_i from fourth differences of the acceleration over
+every other row, where a smooth motion leaves nothing and neighbours of a differenced signal do not count twice; e_tau
+is what the residual holds beyond e.
 
 Sources: Golub & Van Loan, SIAM J. Numer. Anal. 1980 (TLS); Van Huffel & Vandewalle, SIAM 1991 (known error covariance,
 nongeneric problems); Kubus, Kröger & Wahl, IROS 2008, doi 10.1109/IROS.2008.4650672 (RTLS for loads; they update a
@@ -30,8 +31,8 @@ from armload.arms import Arm, momentum_regressor, payload_regressor
 from armload.identifier import Estimate
 from armload.least_squares.normal import UNKNOWN, NormalLeastSquares
 
-_ORDER = 5  # of the differences that leave nothing but the velocity's noise
-_GAIN = 252.0  # by which they raise its variance: Σ_k binomial(5, k)²
+_FOURTH = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # the fourth difference: what it leaves of a smooth motion is noise
+_APART = 2  # rows between its terms: differences of a white velocity are uncorrelated from there on
 _PASSES = 4  # the torque's share of the residual follows from phi and the other way round
 _LEAST_TORQUE = 0.02  # of the residual's variance is the torque's at least
 # Share of a direction of A that may be the regressor's error: beyond it the problem is nongeneric, and the little that
@@ -62,26 +63,22 @@ class RecursiveTotalLeastSquares(NormalLeastSquares):
     def reset(self) -> None:
         """Forget everything; the next sample is the first."""
         n = self.arm.n
-        self._D = np.zeros((n, n, 11, 11))  # Σ 2/h²·d_ijᵀ·d_ij: what one unit of velocity noise does to A
-        self._noise, self._differences = np.zeros(n), 0  # sum of squared fifth differences, and how many
+        self._D = np.zeros((n, n, 11, 11))  # Σ d_ijᵀ·d_ij: what a unit of noise in the acceleration does to A
+        self._noise, self._differences = np.zeros(n), 0  # sum of squared fourth differences, and how many
         super().reset()
 
     def _restart(self) -> None:
         self._before: tuple[NDArray, ...] | None = None  # t, q, dq, tau of the last sample, each (1, ...)
-        self._velocities = np.zeros((0, self.arm.n))  # the last five
+        self._accelerations = np.zeros((0, self.arm.n))  # the last eight
 
     def _rows(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-        velocities = np.concatenate([self._velocities, dq])
-        self._velocities = velocities[-_ORDER:]
-        if len(velocities) > _ORDER:
-            self._noise += np.sum(np.diff(velocities, n=_ORDER, axis=0) ** 2, axis=0)
-            self._differences += len(velocities) - _ORDER
         samples: tuple[NDArray, ...] = (t, q, dq, tau)
         if self._before is not None:
             samples = tuple(np.concatenate([b, x]) for b, x in zip(self._before, samples, strict=True))
         self._before = tuple(x[-1:] for x in samples)
         h = np.diff(samples[0])[:, None]
         ddq = np.diff(samples[2], axis=0) / h
+        self._listen(ddq)
         t, q, dq, tau = (0.5 * (x[1:] + x[:-1]) for x in samples)
         if not len(t):
             return t, tau, np.zeros((0, self.arm.n, 10))
@@ -89,20 +86,29 @@ class RecursiveTotalLeastSquares(NormalLeastSquares):
         M = np.array([self.arm.mass_matrix(pose) for pose in q])
         for i in range(self.arm.n):
             unit = np.zeros_like(q)
-            unit[:, i] = np.sqrt(2.0) / h[:, 0]
+            unit[:, i] = 1.0
             # the payload's inertia torque is linear in ddq as its momentum is in dq, with the same matrix
-            d = np.concatenate(
-                [momentum_regressor(motion, unit).momentum, -(M[:, i] * unit[:, i : i + 1])[..., None]], 2
-            )
+            d = np.concatenate([momentum_regressor(motion, unit).momentum, -M[:, i, :, None]], 2)
             self._D[i] += np.einsum("kja,kjb->jab", d, d, optimize=True)
         return t, tau - self.arm.torque(q, dq, ddq), payload_regressor(motion, dq, ddq)
+
+    def _listen(self, ddq: NDArray) -> None:
+        """Take the next accelerations (M, n) into the estimate of their noise."""
+        seen = np.concatenate([self._accelerations, ddq])
+        last = _APART * (len(_FOURTH) - 1)
+        self._accelerations = seen[-last:]
+        count = len(seen) - last
+        if count > 0:
+            terms = (c * seen[_APART * k : _APART * k + count] for k, c in enumerate(_FOURTH))
+            self._noise += np.sum(np.sum(list(terms), axis=0) ** 2, axis=0)
+            self._differences += count
 
     def _estimate(self, t: float) -> Estimate:
         if not self._rows_seen:
             return super()._estimate(t)
         phi, _ = self._solve(np.ones(self.arm.n))
         w = 1.0 / self._residual_variance(phi)
-        variance = self._noise / (_GAIN * max(self._differences, 1))  # σ_i² of the velocity [rad²/s²]
+        variance = self._noise / (np.sum(_FOURTH**2) * max(self._differences, 1))  # of e_i [rad²/s⁴]
         scale = np.append(UNKNOWN, 1.0)
         error = np.einsum("i,ijab->jab", variance, self._D) * np.outer(scale, scale)
         A = np.einsum("j,jab->ab", w, self._moments()) * np.outer(scale, scale)
