@@ -293,6 +293,17 @@ def test_plain_words_follow_from_the_numbers():
     assert "Networks: test payload, nominal arm 0.6; test payload, real-like arms 0.8" in text  # 0.3 and 0.4 over 0.5
 
 
+def test_what_torque_is_worth_is_measured_against_the_same_training_with_it():
+    cells = study(tree_1_payload=2.0)
+    for split in ("row", "payload"):
+        blind = cell("tree", split=split, held_out=6.0, ablation="torque", drop=["tau"])
+        cells[blind["name"]] = blind
+    (text,) = [p for p in paragraphs(cells, evaluate(cells)) if p.startswith("**Without torque")]
+    assert "Trees, rows held out: mass 6, first moment 6, inertia 6, mass error 600 g;" in text
+    assert "trees, payloads held out: mass 3, first moment 3, inertia 3, mass error 600 g." in text
+    assert "networks" not in text
+
+
 def test_the_tally_counts_the_verdicts():
     claims = evaluate(study(tree_1_row=0.142))
     first = paragraphs(study(), claims)[0]

@@ -66,6 +66,12 @@ def ablation_table(cells: Cells, ablation: str) -> Table:
     return Table(ABLATIONS[ablation], columns, tuple(rows), note, baselines_of(rows))
 
 
+def compared(cells: Cells, ablation: str) -> list[tuple[Cell, Cell]]:
+    """Pairs of cells that differ in what the ablation changes, and in nothing else: as it was, changed."""
+    own = sorted((c for c in cells.values() if _belongs(c, ablation)), key=lambda c: _order(c, own=True))
+    return [(reference, cell) for cell in own for reference in _references(cells, cell, ablation)]
+
+
 def _belongs(cell: Cell, ablation: str) -> bool:
     spec = cell["spec"]
     if spec["kind"] not in ("tree", "network") or spec["seed"] != 0:
