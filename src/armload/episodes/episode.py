@@ -12,7 +12,7 @@ from armload.inertia import InertialParameters
 from armload.motion import Motion
 from armload.payloads import Payload
 from armload.recording import Recording
-from armload.simulate import Resolution, Run, Sensors, World, simulate_many
+from armload.simulate import Gains, Resolution, Run, Sensors, World, simulate_many
 from armload.simulate.resolution import COARSE
 
 _TARE_NOISE = 1 << 30  # the tare's sensor noise is another than the run's
@@ -30,6 +30,8 @@ class Episode:
     sensors: how both runs are seen.
     tare_motion, tare_duration: what it did before; None: there is no tare.
     tool: on the arm in both runs, and known to nobody; None: the flange was bare at the tare.
+    gains: the controller's; None: the arm's own.
+    elapsed: from the start of the tare to the start of the run [s]; a world's offset may drift meanwhile.
     rate: of the logs [Hz].
     seed: of the sensors' noise.
     population: where it was drawn from.
@@ -44,6 +46,8 @@ class Episode:
     tare_motion: Motion | None = None
     tare_duration: float = 0.0
     tool: Payload | None = field(default=None, repr=False)
+    gains: Gains | None = field(default=None, repr=False)
+    elapsed: float = 60.0
     rate: float = 200.0
     seed: int = 0
     population: str = ""
@@ -116,9 +120,9 @@ def _simulated(batch: Sequence[Episode], rate: float | None, resolution: Resolut
         tool = None if e.tool is None else e.tool.parameters
         carried = InertialParameters(e.payload.parameters.phi)
         loaded = carried if tool is None else carried + InertialParameters(tool.phi)
-        runs = [("run", e.duration, Run(e.motion, loaded, e.world, e.sensors, e.seed))]
+        runs = [("run", e.duration, Run(e.motion, loaded, e.world, e.sensors, e.seed, e.gains, e.elapsed))]
         if e.tare_motion is not None:
-            tare = Run(e.tare_motion, tool, e.world, e.sensors, e.seed + _TARE_NOISE)
+            tare = Run(e.tare_motion, tool, e.world, e.sensors, e.seed + _TARE_NOISE, e.gains)
             runs.append(("tare", e.tare_duration, tare))
         for part, seconds, run in runs:
             groups.setdefault((id(e.arm), hz, seconds), []).append((k, part, run))

@@ -5,17 +5,19 @@ A payload is about the origin and in the axes of the arm's payload frame.
 
 from armload.payloads import solids
 from armload.payloads.container import container, container_loadings, test_payload
-from armload.payloads.families import random_payload, random_payloads
+from armload.payloads.families import FAMILIES, draw_payload, random_payload, random_payloads
 from armload.payloads.files import read_payload, write_payload
 from armload.payloads.hand import franka_hand
 from armload.payloads.mesh import from_mesh
 from armload.payloads.payload import Box, Payload
 
 __all__ = [
+    "FAMILIES",
     "Box",
     "Payload",
     "container",
     "container_loadings",
+    "draw_payload",
     "franka_hand",
     "from_mesh",
     "random_payload",

@@ -1,15 +1,35 @@
-"""Random payloads off the container's family: a few boxes of any size and weight, consistent by construction."""
+"""Random payloads by family, all made of solids and so consistent by construction.
+
+| family      | what                                                                                    |
+|-------------|-----------------------------------------------------------------------------------------|
+| `boxes`     | one to four boxes of any size and weight, 0.2–2.8 kg together: the reference             |
+| `shapes`    | blocks, cylinders, balls, dense lumps, thin plates, long rods, brackets, a full gripper  |
+| `tools`     | what is bolted to a flange: grippers, brackets, torches                                  |
+| `container` | the paper's container with any filling, by its own rules                                 |
+| `nothing`   | no payload                                                                               |
+
+Figures are those of an arm rated for 3 kg. For another, masses grow with its rating and lengths with the cube root.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from armload.errors import PayloadError
+from armload.inertia import InertialParameters
+from armload.payloads.container import BOTTOM, POSITIONS, TOP, container, position_centre
 from armload.payloads.payload import Box, Payload
+from armload.payloads.shapes import SHAPES, TOOLS, Shape
 
 MASS = (0.2, 2.8)  # [kg] of all boxes together
 CENTRE_LOW, CENTRE_HIGH = (-0.08, -0.08, 0.0), (0.08, 0.08, 0.16)  # [m] of each box
 SIDE = (0.02, 0.12)  # [m]
+RATED = 3.0  # [kg] of the arm that all figures are for
+
+_SHAPE_MASS, _TOOL_MASS = (0.1, 2.9), (0.2, 1.8)  # [kg]
+_MOST_WEIGHTS, _HEAVIEST_FILLING = 5, 2.163  # [1, kg] paper
+_ODD_WEIGHT = (0.05, 0.36)  # [kg]
+_SHIFT = 0.005  # [m] how far an odd weight may lie off its slot's axis
 
 
 def random_payload(seed: int) -> Payload:
@@ -28,6 +48,75 @@ def random_payloads(count: int, seed: int) -> list[Payload]:
     if count < 0:
         raise PayloadError(f"{count} random payloads asked for: expected a count of 0 or more")
     return [_draw(np.random.default_rng([_seed(seed), k]), f"random {seed}-{k}") for k in range(count)]
+
+
+def draw_payload(family: str, seed: int, rated: float = RATED) -> Payload:
+    """A random payload of a family, for an arm that is rated for so much [kg].
+
+    The same arguments give the same payload; `boxes` for 3 kg is `random_payload`.
+
+    >>> draw_payload("container", 5).parameters.mass < 2.2
+    True
+
+    Raises:
+        PayloadError: no such family, a seed that is not a whole number of 0 or more, or a rating not above 0.
+    """
+    if family not in FAMILIES:
+        raise PayloadError(f"no family of payloads is called {family!r}: expected one of {', '.join(FAMILIES)}")
+    if not (np.isfinite(rated) and rated > 0):
+        raise PayloadError(f"the arm's rated payload is {rated} kg: expected a number above 0")
+    name, scale = f"{family} {seed}", rated / RATED
+    if family == "nothing":
+        _seed(seed)
+        return Payload("nothing", InertialParameters.zero())
+    if family == "boxes":
+        return _scaled(_draw(np.random.default_rng(_seed(seed)), f"random {seed}"), scale)
+    rng = np.random.default_rng([_seed(seed), FAMILIES.index(family)])
+    if family == "container":
+        # a small arm carries a small container; a large one the same as everybody
+        return _scaled(_filling(rng, name), min(1.0, scale))
+    shapes, masses = (SHAPES, _SHAPE_MASS) if family == "shapes" else (TOOLS, _TOOL_MASS)
+    return _shaped(shapes, rng.uniform(*masses) * scale, float(np.cbrt(scale)), rng, name)
+
+
+FAMILIES = ("boxes", "shapes", "tools", "container", "nothing")
+
+
+def _shaped(shapes: dict[str, Shape], mass: float, scale: float, rng: np.random.Generator, name: str) -> Payload:
+    kind = list(shapes)[rng.integers(len(shapes))]
+    return Payload(f"{name}, {kind}", shapes[kind](rng, mass, scale))
+
+
+def _filling(rng: np.random.Generator, name: str) -> Payload:
+    """The container with up to five weights: the paper's in any of their places, or odd ones anywhere in the slots."""
+    taken = rng.choice(len(POSITIONS), size=rng.integers(0, _MOST_WEIGHTS + 1), replace=False)
+    if rng.random() < 0.5:
+        return container("".join("1" if k in taken else "0" for k in range(len(POSITIONS))), name)
+    empty = container()
+    boxes, room = [], _HEAVIEST_FILLING - empty.parameters.mass
+    for k in taken:
+        mass = min(float(rng.uniform(*_ODD_WEIGHT)), room)
+        if mass < _ODD_WEIGHT[0]:
+            break
+        room -= mass
+        x, y, _ = position_centre(POSITIONS[k])
+        centre = (x + rng.uniform(-_SHIFT, _SHIFT), y + rng.uniform(-_SHIFT, _SHIFT), rng.uniform(BOTTOM, TOP))
+        boxes.append(Box((0.03, 0.03, 0.03 * mass / 0.2), centre, mass))
+    return Payload.from_boxes(name, [*empty.boxes, *boxes])
+
+
+def _scaled(payload: Payload, scale: float) -> Payload:
+    """The same body with its mass multiplied and its lengths by the cube root: of the same density."""
+    if scale == 1.0 or not np.any(payload.parameters.phi):
+        return payload
+    p, longer = payload.parameters, float(np.cbrt(scale))
+    parameters = InertialParameters.from_com(p.mass * scale, p.com * longer, p.inertia_com * scale * longer**2, p.frame)
+    boxes = []
+    for box in payload.boxes:
+        (a, b, c), (x, y, z) = box.size, box.centre
+        size, centre = (longer * a, longer * b, longer * c), (longer * x, longer * y, longer * z)
+        boxes.append(Box(size, centre, scale * box.mass))
+    return Payload(payload.name, parameters, tuple(boxes))
 
 
 def _draw(rng: np.random.Generator, name: str) -> Payload:

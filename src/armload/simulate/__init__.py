@@ -3,6 +3,7 @@
 from armload.simulate.controller import Command, Gains
 from armload.simulate.friction import Friction
 from armload.simulate.plant import build_model, settled_start
+from armload.simulate.ratings import rated_mass
 from armload.simulate.residual import SmoothTorque
 from armload.simulate.resolution import Resolution
 from armload.simulate.runs import Run, simulate, simulate_many
@@ -20,6 +21,7 @@ __all__ = [
     "SmoothTorque",
     "World",
     "build_model",
+    "rated_mass",
     "settled_start",
     "simulate",
     "simulate_many",
