@@ -14,7 +14,12 @@ from armload.arms import Arm
 from armload.errors import IdentificationError
 from armload.identifier import Identifier, Tared
 from armload.least_squares import (
+    ConsistentLeastSquares,
+    DifferenceLeastSquares,
+    ExtendedKalmanFilter,
     FilteredRecursiveLeastSquares,
+    JointLeastSquares,
+    LogCholeskyLeastSquares,
     MomentumLeastSquares,
     OrdinaryLeastSquares,
     PolynomialLeastSquares,
@@ -80,6 +85,14 @@ def calibrated(kind: Callable[[Arm], Identifier]) -> Callable[[Arm, Recording | 
     return lambda arm, tare: kind(arm) if tare is None else Tared(kind(arm), tare)
 
 
+def _with_tare(kind: Callable[[Arm, Recording], Identifier]) -> Callable[[Arm, Recording | None], Identifier]:
+    def build(arm: Arm, tare: Recording | None) -> Identifier:
+        assert tare is not None  # `Method.make` has asked for it
+        return kind(arm, tare)
+
+    return build
+
+
 def _trained(name: str) -> Callable[[Arm, Recording | None], Identifier]:
     def refuse(*_: object) -> Identifier:
         raise IdentificationError(
@@ -106,6 +119,44 @@ _CATALOGUE = (
         tare="own equation",
         prior=True,
         build=PosteriorLeastSquares,
+    ),
+    Method(
+        "difference",
+        "torque difference with a tare along the same motion, on the filtered regression",
+        "a repeated motion that was also run without the payload: then the most accurate of all",
+        "Atkeson, An & Hollerbach, IJRR 1986; Hsu et al., ICRA 1987",
+        tare="same motion",
+        prior=False,
+        build=_with_tare(DifferenceLeastSquares),
+        needs="tare",
+    ),
+    Method(
+        "joint",
+        "joint identification of arm and payload: all base parameters, without priors",
+        "an arm whose description cannot be trusted at all, with a long tare that moves every joint widely",
+        "Khalil, Gautier & Lemoine, ICRA 2007; Gautier, J. Robotic Systems 1991",
+        tare="own equation",
+        prior=False,
+        build=_with_tare(JointLeastSquares),
+        needs="tare",
+    ),
+    Method(
+        "log-cholesky",
+        "weighted least squares in a chart of the bodies that can exist",
+        "a body is wanted without a prior, with error bars that know its inertia cannot be negative",
+        "Rucker & Wensing, RA-L 2022",
+        tare="virtual calibration",
+        prior=False,
+        build=LogCholeskyLeastSquares,
+    ),
+    Method(
+        "lmi",
+        "weighted least squares subject to physical consistency, a semidefinite program",
+        "as log-cholesky, where the optimum must be the global one, or a reference body shall pull (Python)",
+        "Sousa & Cortesão, IJRR 2014; Wensing, Kim & Slotine, RA-L 2018; Lee, Wensing & Park, T-RO 2020",
+        tare="virtual calibration",
+        prior=False,
+        build=ConsistentLeastSquares,
     ),
     Method(
         "wls",
@@ -152,6 +203,15 @@ _CATALOGUE = (
         prior=False,
         build=_commanded,
         needs="motion",
+    ),
+    Method(
+        "ekf",
+        "extended Kalman filter on the forward dynamics: joint state, payload and friction",
+        "a filtered joint state is wanted as well, at a few hundred hertz; torque on the link side",
+        "Bucy & Joseph 1968; Bell & Cathey, IEEE TAC 1993; Gautier & Poignet, Control Engineering Practice 2001",
+        tare="virtual calibration",
+        prior=True,
+        build=calibrated(ExtendedKalmanFilter),
     ),
     Method(
         "rls-filter",
@@ -208,6 +268,16 @@ _CATALOGUE = (
         tare="none",
         prior=True,
         build=_trained("mixed"),
+        needs="training",
+    ),
+    Method(
+        "svr",
+        "bagged support-vector machines with a Gaussian kernel",
+        "as network, where training must take minutes and a few thousand rows say enough",
+        "Vapnik 1995; Smola & Schölkopf, Statistics and Computing 2004",
+        tare="none",
+        prior=True,
+        build=_trained("svr"),
         needs="training",
     ),
 )

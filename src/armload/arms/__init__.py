@@ -2,6 +2,7 @@
 
 from armload.arms.catalogue import ARMS, arm
 from armload.arms.filtered import FilteredRegression, first_order_lag
+from armload.arms.forward import ForwardDerivatives, ForwardDynamics
 from armload.arms.model import Arm, BodyMotion, Limits
 from armload.arms.regressors import (
     MomentumRegressor,
@@ -15,6 +16,8 @@ __all__ = [
     "Arm",
     "BodyMotion",
     "FilteredRegression",
+    "ForwardDerivatives",
+    "ForwardDynamics",
     "Limits",
     "MomentumRegressor",
     "arm",

@@ -36,12 +36,12 @@ def parser() -> Parser:
     """The arguments of `armload train`."""
     parser = Parser(
         prog="armload train",
-        description="Train a bag of trees or networks on a data set and save it.",
+        description="Train a bag of trees, networks or support-vector machines on a data set and save it.",
         epilog=_EXAMPLES,
     )
     parser.add_argument("--dataset", required=True, metavar="DIR", help="folder written by armload dataset")
     parser.add_argument("--out", required=True, metavar="FILE", help="model to write (.safetensors)")
-    parser.add_argument("--kind", choices=("tree", "network", "mixed"), default="tree", help="(default: tree)")
+    parser.add_argument("--kind", choices=("tree", "network", "mixed", "svr"), default="tree", help="(default: tree)")
     parser.add_argument(
         "--stages",
         type=int,
@@ -106,7 +106,7 @@ def _untrained(options: argparse.Namespace) -> BaggingEnsemble | TwoStage | Mixe
     network = NetworkLearner(max_epochs=options.epochs)
     if options.kind == "mixed":
         return MixedEnsemble(("tree", network), options.members, options.seed)
-    kind = network if options.kind == "network" else "tree"
+    kind = network if options.kind == "network" else options.kind
     return (BaggingEnsemble, TwoStage)[options.stages - 1](kind, options.members, options.seed)
 
 

@@ -123,11 +123,48 @@ def log_cholesky(phi: ArrayLike) -> NDArray[np.float64]:
 
 def from_log_cholesky(theta: ArrayLike) -> NDArray[np.float64]:
     """phi of log-Cholesky coordinates (10,): consistent for every real θ."""
+    U = _root_of_chart(theta)
+    return pseudo_inertia_to_phi(U @ U.T)
+
+
+def log_cholesky_jacobian(theta: ArrayLike) -> NDArray[np.float64]:
+    """∂phi/∂θ (10, 10) of `from_log_cholesky`: dJ = dU·Uᵀ + U·dUᵀ, and phi is linear in J. Regular for every real θ."""
+    U = _root_of_chart(theta)
+    dJ = _root_derivatives(U) @ U.T
+    return pseudo_inertia_to_phi(dJ + np.swapaxes(dJ, 1, 2)).T
+
+
+def log_cholesky_curvature(theta: ArrayLike, weights: ArrayLike) -> NDArray[np.float64]:
+    """∂²(weights·phi)/∂θ² (10, 10) of `from_log_cholesky`, weights (10,): what Newton's method needs beside ∂phi/∂θ."""
+    U = _root_of_chart(theta)
+    dU = _root_derivatives(U)
+    entries = pseudo_inertia_to_phi(np.eye(16).reshape(16, 4, 4)) @ np.asarray(weights, dtype=float)
+    G = entries.reshape(4, 4)
+    G = 0.5 * (G + G.T)  # weights·phi = tr(G·J)
+    curvature = 2.0 * np.einsum("iab,bc,jca->ij", np.swapaxes(dU, 1, 2), G, dU)
+    second = 2.0 * np.einsum("kab,ab->k", dU, G @ U)  # of U: α with anything gives dU, a diagonal entry with itself
+    curvature[0, :] += second
+    curvature[1:, 0] += second[1:]
+    curvature[[1, 2, 3], [1, 2, 3]] += second[1:4]
+    return curvature
+
+
+def _root_derivatives(U: NDArray[np.float64]) -> NDArray[np.float64]:
+    """∂U/∂θ (10, 4, 4)."""
+    dU = np.zeros((10, 4, 4))
+    dU[0] = U
+    for k in range(3):
+        dU[1 + k, k, k] = U[k, k]
+    for k, (row, column) in enumerate([(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)], start=4):
+        dU[k, row, column] = U[3, 3]
+    return dU
+
+
+def _root_of_chart(theta: ArrayLike) -> NDArray[np.float64]:
     alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3 = np.asarray(theta, dtype=float)
-    U = np.exp(alpha) * np.array(
+    return np.exp(alpha) * np.array(
         [[np.exp(d1), s12, s13, t1], [0, np.exp(d2), s23, t2], [0, 0, np.exp(d3), t3], [0, 0, 0, 1]]
     )
-    return pseudo_inertia_to_phi(U @ U.T)
 
 
 def _scaled(J: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from armload.learners.online import LearnedIdentifier
     from armload.learners.progress import Progress
     from armload.learners.stages import MixedEnsemble, TwoStage
+    from armload.learners.support_vectors import SupportVectorLearner
     from armload.learners.tree import TreeLearner
 
 __all__ = [
@@ -28,6 +29,7 @@ __all__ = [
     "MixedEnsemble",
     "NetworkLearner",
     "Progress",
+    "SupportVectorLearner",
     "TreeLearner",
     "TwoStage",
     "held_out_error",
@@ -43,6 +45,7 @@ _HOME = {
     "MixedEnsemble": "stages",
     "NetworkLearner": "network",
     "Progress": "progress",
+    "SupportVectorLearner": "support_vectors",
     "TreeLearner": "tree",
     "TwoStage": "stages",
     "held_out_error": "held_out",

@@ -23,6 +23,7 @@ from armload.atomic import replacing
 from armload.errors import ArmloadError, ModelError
 from armload.inertia import NAMES
 from armload.learners.compiled import Beside, Compiled, CompiledNetworks, CompiledTrees, Together
+from armload.learners.kernel import CompiledSupportVectors
 from armload.learners.model import LearnedModel
 from armload.motion import Motion, MotionFingerprint
 from armload.recording.columns import column_names
@@ -32,7 +33,11 @@ if TYPE_CHECKING:
 
 FORMAT = 1
 _HEADER = "armload"
-_LEAVES: dict[str, type[Compiled]] = {"trees": CompiledTrees, "networks": CompiledNetworks}
+_LEAVES: dict[str, type[Compiled]] = {
+    "trees": CompiledTrees,
+    "networks": CompiledNetworks,
+    "support vectors": CompiledSupportVectors,
+}
 _BRANCHES: dict[str, type[Beside] | type[Together]] = {"beside": Beside, "together": Together}
 
 

@@ -16,9 +16,10 @@ from armload.errors import ModelError
 from armload.learners.bag import Learner, draw_bag
 from armload.learners.network import NetworkLearner
 from armload.learners.progress import Report, reporter
+from armload.learners.support_vectors import SupportVectorLearner
 from armload.learners.tree import TreeLearner
 
-KINDS: dict[str, type[Learner]] = {"tree": TreeLearner, "network": NetworkLearner}
+KINDS: dict[str, type[Learner]] = {"tree": TreeLearner, "network": NetworkLearner, "svr": SupportVectorLearner}
 
 
 Rows = tuple[NDArray[np.float64], NDArray[np.float64]]  # X (N, d) and y (N, k)
@@ -145,7 +146,8 @@ class BaggingEnsemble(OneKind):
     ((1, 1), True)
 
     Args:
-        kind: "tree", "network", or a `TreeLearner` or `NetworkLearner` with other settings than the paper's.
+        kind: "tree", "network" or "svr", or a `TreeLearner`, `NetworkLearner` or `SupportVectorLearner` with other
+            settings (the paper's are the defaults; it has no support vectors).
         members: M; 5 in the paper.
         seed: of every random draw; the same seed and data give the same ensemble.
         bootstrap: False: every member sees every row once (then trees differ only in ties).
@@ -186,7 +188,7 @@ class BaggingEnsemble(OneKind):
 
     @property
     def kind_name(self) -> str:
-        """ "tree" or "network"."""
+        """ "tree", "network" or "svr"."""
         return as_learner(self.kind).kind
 
 

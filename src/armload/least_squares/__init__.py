@@ -2,7 +2,11 @@
 
 from armload.least_squares.acceleration import CommandedLeastSquares, PolynomialLeastSquares
 from armload.least_squares.autocorrelation import BlockMeans
+from armload.least_squares.consistent import ConsistentLeastSquares, LogCholeskyLeastSquares
 from armload.least_squares.correction import Correction, effort_scale
+from armload.least_squares.difference import DifferenceLeastSquares
+from armload.least_squares.joint import JointLeastSquares
+from armload.least_squares.kalman import ExtendedKalmanFilter
 from armload.least_squares.momentum import MomentumLeastSquares
 from armload.least_squares.normal import OrdinaryLeastSquares, WeightedLeastSquares
 from armload.least_squares.posterior import Posterior, PosteriorLeastSquares
@@ -13,9 +17,14 @@ from armload.least_squares.total import RecursiveTotalLeastSquares
 __all__ = [
     "BlockMeans",
     "CommandedLeastSquares",
+    "ConsistentLeastSquares",
     "Correction",
+    "DifferenceLeastSquares",
+    "ExtendedKalmanFilter",
     "FilteredRecursiveLeastSquares",
     "GaussianPrior",
+    "JointLeastSquares",
+    "LogCholeskyLeastSquares",
     "MomentumLeastSquares",
     "OrdinaryLeastSquares",
     "PolynomialLeastSquares",

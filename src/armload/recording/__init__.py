@@ -1,7 +1,17 @@
 """Recordings: what a robot's joints did, the files they come in, and whether they can be believed."""
 
+from armload.recording.alignment import Alignment, same_motion
 from armload.recording.files import read_recording, write_recording
 from armload.recording.plausibility import check_plausible
 from armload.recording.recording import CHANNELS, Recording, Sample
 
-__all__ = ["CHANNELS", "Recording", "Sample", "check_plausible", "read_recording", "write_recording"]
+__all__ = [
+    "CHANNELS",
+    "Alignment",
+    "Recording",
+    "Sample",
+    "check_plausible",
+    "read_recording",
+    "same_motion",
+    "write_recording",
+]
