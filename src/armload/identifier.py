@@ -56,11 +56,15 @@ class Estimate:
 class Identifier(ABC):
     """A payload identifier fed sample by sample: constant memory, no acceleration needed from the caller.
 
-    Subclasses implement `reset` and `update`. `name` is how tables and the command line call the method.
+    Subclasses implement `reset` and `update`. `name` is how tables and the command line call the method. `calibrated`
+    says whether ±1.96 standard deviations were checked to hold on episodes held out; `known` is what the method knew of
+    the payload beforehand, mean and standard deviation (10,), if that is its own knowledge.
     """
 
     name: str
     arm: Arm
+    calibrated: bool = False
+    known: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
 
     @abstractmethod
     def reset(self) -> None:

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.errors import IdentificationError
-from armload.identifier import Estimate
+from armload.identifier import Estimate, Identifier
 from armload.inertia import NAMES, UNITS, InertialParameters, is_consistent, nearest_consistent, phi_to_com
 from armload.least_squares import PosteriorLeastSquares, payload_prior_std
-from armload.methods import DEFAULT, METHODS
+from armload.methods import METHODS, default_for
 from armload.recording import Recording, check_plausible
 
 LOWEST_RATE = 20.0  # [Hz]
@@ -153,7 +153,10 @@ def _carries(log: Recording, arm: Arm, tool: InertialParameters) -> bool:
 
 
 class _Found(NamedTuple):
-    """What a method found, and what was known before: mean and standard deviation (10,), used as a prior or not."""
+    """What a method found, and what was known before: mean and standard deviation (10,), used as a prior or not.
+
+    calibrated: whether its error bars were checked on held-out episodes.
+    """
 
     estimate: Estimate
     before: NDArray[np.float64]
@@ -161,6 +164,7 @@ class _Found(NamedTuple):
     prior: bool
     method: str
     why: str
+    calibrated: bool = False
 
 
 def _check(log: Recording, arm: Arm) -> None:
@@ -176,25 +180,28 @@ def _check(log: Recording, arm: Arm) -> None:
 
 
 def _run(recording: Recording, arm: Arm, tare: Recording | None, method: str | Path | None) -> _Found:
-    nothing, weak = np.zeros(10), payload_prior_std(arm)
-    entry = METHODS.get(DEFAULT if method is None else str(method))
+    weak = payload_prior_std(arm)
+    entry = METHODS.get(default_for(arm) if method is None else str(method))
     if entry is not None and not (entry.needs == "training" and Path(entry.name).is_file()):
         why = (
-            f"{DEFAULT} holds for any motion and payload; a trained model is taken only when named"
+            f"{entry.name} holds for any motion and payload; an ensemble of the paper is taken only when named"
             if method is None
             else "asked for"
         )
-        if entry.name == DEFAULT and tare is None:
+        if method is None and tare is None:
             why += "; without a tare the error bars allow for the model's errors"
-        estimate = entry.make(arm, tare).run(recording)
-        return _Found(estimate, nothing, weak, entry.prior, entry.name, why)
+        return _found(entry.make(arm, tare), recording, weak, entry.prior, why)
     assert method is not None
     if not Path(method).is_file():
         raise IdentificationError(
             f"unknown method {str(method)!r}: expected one of {', '.join(METHODS)}, or the path of a trained model"
         )
+    from armload.hybrid import HybridIdentifier, HybridModel
     from armload.learners import LearnedIdentifier, load_model
 
+    if HybridModel.wrote(method):
+        trained = HybridIdentifier(arm, tare, HybridModel.load(method))
+        return _found(trained, recording, weak, True, f"asked for; {method} was trained for this arm")
     model = load_model(method)
     if tare is not None:
         raise IdentificationError(
@@ -208,6 +215,12 @@ def _run(recording: Recording, arm: Arm, tare: Recording | None, method: str | P
         estimate = replace(estimate, covariance=np.diag(family**2))
     why = f"asked for; {method} was trained on this arm and motion"
     return _Found(estimate, model.phi_mean, family, True, model.kind, why)
+
+
+def _found(identifier: Identifier, recording: Recording, weak: NDArray, prior: bool, why: str) -> _Found:
+    known, std = (np.zeros(10), weak) if identifier.known is None else identifier.known
+    estimate = identifier.run(recording)
+    return _Found(estimate, known, std, prior, identifier.name, why, identifier.calibrated)
 
 
 def _answer(
@@ -256,7 +269,7 @@ def _answer(
         phi=phi.tolist(),
         phi_low=low.tolist(),
         phi_high=high.tolist(),
-        interval="approximate",
+        interval="calibrated" if found.calibrated else "approximate",
         determined=[bool(x) for x in determined],
         mass=mass,
         com=com.tolist(),

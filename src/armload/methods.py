@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from armload.arms import Arm
-from armload.errors import IdentificationError
+from armload.errors import IdentificationError, ModelError
 from armload.identifier import Identifier, Tared
 from armload.least_squares import (
     ConsistentLeastSquares,
@@ -26,6 +26,7 @@ from armload.least_squares import (
     PosteriorLeastSquares,
     RecursiveLeastSquares,
     RecursiveTotalLeastSquares,
+    SmoothPosteriorLeastSquares,
     WeightedLeastSquares,
 )
 from armload.recording import Recording
@@ -102,6 +103,12 @@ def _trained(name: str) -> Callable[[Arm, Recording | None], Identifier]:
     return refuse
 
 
+def _hybrid(arm: Arm, tare: Recording | None) -> Identifier:
+    from armload.hybrid import HybridIdentifier
+
+    return HybridIdentifier(arm, tare)
+
+
 def _commanded(*_: object) -> Identifier:
     raise IdentificationError(
         "the method commanded needs the motion the controller was told, which a log does not hold: in Python, "
@@ -112,9 +119,27 @@ def _commanded(*_: object) -> Identifier:
 # In the order of recommendation. A new estimator gets its row here, and nothing else but its own module and tests.
 _CATALOGUE = (
     Method(
+        "hybrid",
+        "map-gp with a learned payload prior and learned error bars",
+        "any motion, any payload, with or without a tare, on an arm with a trained model: the default there",
+        "this project; Rahimi & Recht, NIPS 2007; Lei et al., JASA 2018; Breiman, Machine Learning 1996",
+        tare="own equation",
+        prior=True,
+        build=_hybrid,
+    ),
+    Method(
+        "map-gp",
+        "MAP least squares with the arm's rigid and its smooth mismatch as unknowns",
+        "any motion, any payload, any arm, with or without a tare: the default where no hybrid is trained",
+        "Khalil, Gautier & Lemoine, ICRA 2007; Rahimi & Recht, NIPS 2007; Bishop 2006, ch. 3 and 9",
+        tare="own equation",
+        prior=True,
+        build=SmoothPosteriorLeastSquares,
+    ),
+    Method(
         "map",
-        "MAP least squares with the arm's own mismatch as an unknown",
-        "any motion, any payload, any arm, with or without a tare: the default",
+        "MAP least squares with the arm's rigid mismatch alone as an unknown",
+        "as map-gp at a third of its cost, with wider and rougher error bars",
         "Khalil, Gautier & Lemoine, ICRA 2007; Bishop 2006, ch. 3",
         tare="own equation",
         prior=True,
@@ -282,7 +307,23 @@ _CATALOGUE = (
     ),
 )
 METHODS: dict[str, Method] = {method.name: method for method in _CATALOGUE}
-DEFAULT = "map"
+DEFAULT = "hybrid"
+_ELSEWHERE = "map-gp"
+
+
+def default_for(arm: Arm) -> str:
+    """The name of the most trustworthy method for an arm: the hybrid where one is shipped, map-gp elsewhere."""
+    from armload.hybrid import HybridModel
+
+    shipped = HybridModel.shipped(arm.name)
+    if shipped is None:
+        return _ELSEWHERE
+    try:
+        HybridModel.load(shipped).prior_for(arm)
+    except ModelError:  # an arm of that name with other links
+        return _ELSEWHERE
+    return DEFAULT
+
 
 # What the paper's related work names (its reference numbers) and armload does not build, with the reason.
 LEFT_OUT: dict[str, str] = {

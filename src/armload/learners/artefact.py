@@ -98,7 +98,7 @@ def save_model(
         "epochs": None if model.epochs_ is None else model.epochs_.tolist(),
         "versions": _versions(),
         "notes": notes,
-        "structure": _take_apart(compiled, "", tensors),
+        "structure": take_apart(compiled, "", tensors),
     }
     from safetensors.numpy import save
 
@@ -143,7 +143,7 @@ def load_model(path: str | PathLike[str]) -> LearnedModel:
         digest = header.pop("sha256")
         if digest != _digest(header, tensors):
             raise ModelError(f"{path} was altered after it was saved (its SHA-256 differs): copy it again")
-        compiled = _put_together(header["structure"], "", tensors)
+        compiled = put_together(header["structure"], "", tensors)
         arm = header["arm"]
         model = LearnedModel(
             compiled=compiled,
@@ -175,11 +175,11 @@ def load_model(path: str | PathLike[str]) -> LearnedModel:
     return model
 
 
-def _take_apart(compiled: Compiled, prefix: str, tensors: dict[str, NDArray]) -> dict[str, Any]:
+def take_apart(compiled: Compiled, prefix: str, tensors: dict[str, NDArray]) -> dict[str, Any]:
     """The tree of parts as plain data; their arrays go to `tensors`, named by their place."""
     for kind, branch in _BRANCHES.items():
         if isinstance(compiled, branch):
-            parts = [_take_apart(part, f"{prefix}{k}.", tensors) for k, part in enumerate(compiled.parts)]
+            parts = [take_apart(part, f"{prefix}{k}.", tensors) for k, part in enumerate(compiled.parts)]
             return {"type": kind, "parts": parts}
     kind = next(kind for kind, leaf in _LEAVES.items() if isinstance(compiled, leaf))
     out: dict[str, Any] = {"type": kind}
@@ -192,10 +192,10 @@ def _take_apart(compiled: Compiled, prefix: str, tensors: dict[str, NDArray]) ->
     return out
 
 
-def _put_together(structure: dict[str, Any], prefix: str, tensors: dict[str, NDArray]) -> Compiled:
+def put_together(structure: dict[str, Any], prefix: str, tensors: dict[str, NDArray]) -> Compiled:
     kind = structure["type"]
     if kind in _BRANCHES:
-        parts = [_put_together(part, f"{prefix}{k}.", tensors) for k, part in enumerate(structure["parts"])]
+        parts = [put_together(part, f"{prefix}{k}.", tensors) for k, part in enumerate(structure["parts"])]
         return _BRANCHES[kind](parts)
     leaf = _LEAVES[kind]
     values = {f.name: tensors.get(prefix + f.name, structure.get(f.name)) for f in fields(leaf)}  # type: ignore[arg-type]

@@ -5,11 +5,13 @@ from armload.least_squares.autocorrelation import BlockMeans
 from armload.least_squares.consistent import ConsistentLeastSquares, LogCholeskyLeastSquares
 from armload.least_squares.correction import Correction, effort_scale
 from armload.least_squares.difference import DifferenceLeastSquares
+from armload.least_squares.features import JointFeatures
 from armload.least_squares.joint import JointLeastSquares
 from armload.least_squares.kalman import ExtendedKalmanFilter
+from armload.least_squares.map import PosteriorLeastSquares, SmoothPosteriorLeastSquares
 from armload.least_squares.momentum import MomentumLeastSquares
 from armload.least_squares.normal import OrdinaryLeastSquares, WeightedLeastSquares
-from armload.least_squares.posterior import Posterior, PosteriorLeastSquares
+from armload.least_squares.posterior import Posterior
 from armload.least_squares.prior import GaussianPrior, payload_prior_std
 from armload.least_squares.recursive import FilteredRecursiveLeastSquares, RecursiveLeastSquares
 from armload.least_squares.total import RecursiveTotalLeastSquares
@@ -23,6 +25,7 @@ __all__ = [
     "ExtendedKalmanFilter",
     "FilteredRecursiveLeastSquares",
     "GaussianPrior",
+    "JointFeatures",
     "JointLeastSquares",
     "LogCholeskyLeastSquares",
     "MomentumLeastSquares",
@@ -32,6 +35,7 @@ __all__ = [
     "PosteriorLeastSquares",
     "RecursiveLeastSquares",
     "RecursiveTotalLeastSquares",
+    "SmoothPosteriorLeastSquares",
     "WeightedLeastSquares",
     "effort_scale",
     "payload_prior_std",

@@ -1,14 +1,15 @@
 """MAP least squares: payload and arm mismatch together, with an uncertainty that knows the residual is correlated.
 
-    r = W·phi + Z·eta + e,      phi ~ N(0, P_phi),  eta ~ N(0, P_eta),  e_j of long-run variance S_j
+    r = W·phi + Z·eta + G·g + e,   phi ~ N(0, P_phi), eta ~ N(0, P_eta), g_j ~ N(0, P_g), e_j of long-run variance S_j
 
-r, W and Z come from the acceleration-free filtered regression (`arms.filtered`), eta is the arm's own mismatch
-(`correction.py`). The information A = Σ_j ∫ X_jᵀ·X_j dt / S_j with X = [W Z] accumulates in constant memory; the
-posterior is x = (A + P⁻¹)⁻¹·b. S_j (batch means of the residual) and the scale of each friction and offset prior
-(expectation–maximisation) are found from the data in a few iterations.
+r, W, Z, G come from the acceleration-free filtered regression (`regression.py`); eta is what the arm's rigid-body model
+gets wrong (`correction.py`), g_j are the weights of joint j's smooth functions of pose and velocity (`features.py`).
+The information A = Σ_j ∫ X_jᵀ·X_j dt / S_j with X = [W Z G] accumulates in constant memory; the posterior is
+x = (A + P⁻¹)⁻¹·b, joint by joint with g_j eliminated first. S_j (batch means of the residual) and the scales of the
+priors of offsets, friction and features (expectation–maximisation) are found from the data in a few iterations.
 
-A tare run enters the same model: it sees phi_0 (whatever was mounted then) with the same eta, the later run sees
-phi_0 + phi. Virtual calibration [Kurdas 2022] is the special case without eta.
+A tare run enters the same model: it sees phi_0 (whatever was mounted then) with the same eta and g, the later run sees
+phi_0 + phi. Virtual calibration [Kurdas 2022] is the special case without eta and g.
 
 Sources: information form and EM: Bishop 2006, ch. 3 and 9; arm and load together: Khalil, Gautier, Lemoine, ICRA 2007.
 """
@@ -19,97 +20,58 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
-from armload.arms import Arm, momentum_regressor
-from armload.arms.filtered import Lag, filtered_regressor
-from armload.identifier import BatchIdentifier, Estimate
-from armload.least_squares.autocorrelation import BlockMeans
-from armload.least_squares.correction import FRICTION_WIDTH, Correction, effort_scale
-from armload.least_squares.prior import GaussianPrior, payload_prior_std
-from armload.recording import Recording, Sample
+from armload.least_squares.prior import GaussianPrior
+from armload.least_squares.regression import NOVELTY, RegressionData
 
-REGRESSOR_RATE = 200.0  # [Hz] W and Z are computed no more often: they hold nothing above a few hertz
-GAP = 0.1  # [s] a longer pause between samples restarts the lags
-# variance of a joint's residual grows up to 1 + this where the joint stands still: friction is unknown there
-_PRESLIDING = 10.0
-_WIDE = 4.0  # the solution's prior is so much wider than the stated one: it must not pull a determined payload
 # standard deviation of first moments and inertia per kilogram: bodies within about 20 cm of the frame's origin
 _REACH = np.array([0.2] * 3 + [0.2**2] * 6)  # [m, m²]
 _LIGHTEST = 0.02  # [kg]
-_PRIOR_COUNT = 4.0  # weight of the prior long-run variance, in blocks
-_PRIOR_RESIDUAL = 4e-3  # prior standard deviation of the unexplained torque, as a fraction of the effort limit
-# [s] the mismatch is a function of the configuration: more time on similar motions does not average it away
-_NOVELTY = 10.0
 # Coulomb friction above this fraction of the effort limit: the torque is the motor's, not the link's
 _MOTOR_SIDE = 0.01
 _GAIN_STD = {"link": 0.005, "motor": 0.02}  # torque calibration, 1 sigma; motor constants are known to a few per cent
+# prior rms of a joint's smooth functions, as fractions of its effort limit, and the weight of these figures
+_POSE, _VELOCITY, _FEATURE_COUNT = 3e-3, 2e-3, 20.0
 
 
-class RegressionData:
-    """What one recording says about x = [phi, eta]: information per joint and block sums, in constant memory."""
+@dataclass(frozen=True)
+class NoiseModel:
+    """What is expected of the residual e.
 
-    def __init__(self, correction: Correction, gain: float) -> None:
-        self.correction, self.gain = correction, gain
-        arm, size = correction.arm, 10 + correction.size
-        self.A = np.zeros((arm.n, size, size))  # ∫ X_jᵀ·X_j dt
-        self.b = np.zeros((arm.n, size))  # ∫ X_jᵀ·r_j dt
-        self.blocks = BlockMeans((arm.n, size + 1))  # of √w·[X, r]
-        self._torque, self._bare, self._regressor = Lag(gain), Lag(gain), Lag(gain)
-        self._last_sample = self._last_row = -np.inf
+    Args:
+        residual: prior standard deviation of the unexplained torque over a block, as a fraction of the effort limit.
+        block: length of the residual's batch means [s].
+        floor: whether the residual is never taken to be smaller than `residual`: what is left of skew between the
+            channels and of the sensors' quirks follows the motion, and does not average out.
+        novelty: [s] beyond which more time on similar motions counts no more, as for a mismatch that is a function of
+            the configuration and has no unknown of its own.
+    """
 
-    def add(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
-        """Take the next samples (N,), (N, n); W and Z are computed at `REGRESSOR_RATE`, torque at its full rate."""
-        edges = np.flatnonzero(np.diff(t, prepend=self._last_sample) > GAP)
-        for start, stop in zip([0, *edges], [*edges, len(t)], strict=True):
-            if start in edges:
-                for lag in (self._torque, self._bare, self._regressor):
-                    lag.reset()
-                self._last_row = -np.inf
-            if stop > start:
-                self._segment(t[start:stop], q[start:stop], dq[start:stop], tau[start:stop])
-        self._last_sample = t[-1]
+    residual: float
+    block: float
+    floor: bool
+    novelty: float
 
-    def _segment(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
-        lagged = self._torque(t, tau)
-        rows, last = [], self._last_row
-        for k, now in enumerate(t):
-            if now - last >= 0.9 / REGRESSOR_RATE:
-                rows.append(k)
-                last = now
-        if not rows:
-            return
-        h = np.diff(t[rows], prepend=self._last_row)
-        h[~np.isfinite(h)] = 0.0
-        self._last_row = last
-        arm, gain, t, q, dq = self.correction.arm, self.gain, t[rows], q[rows], dq[rows]
-        p, drift = arm.momentum(q, dq)
-        r = lagged[rows] - gain * p - self._bare(t, drift - gain * p, initial=-gain * p[0])
-        payload, own = momentum_regressor(arm.frame_motion(q), dq), self.correction.regressor(q, dq)
-        momentum = np.concatenate([payload.momentum, own.momentum], axis=2)
-        drift = np.concatenate([payload.drift, own.drift], axis=2)
-        X = filtered_regressor(t, momentum, drift, self._regressor)
-        moving = np.tanh(np.abs(dq) / FRICTION_WIDTH)
-        w = 1.0 / (1.0 + _PRESLIDING * (1.0 - moving**2))  # (N, n)
-        for j in range(arm.n):
-            weighted = X[:, j] * (w[:, j] * h)[:, None]
-            self.A[j] += weighted.T @ X[:, j]
-            self.b[j] += weighted.T @ r[:, j]
-        rooted = np.sqrt(w)[:, :, None] * np.concatenate([X, r[:, :, None]], axis=2)
-        for duration, value in zip(h, rooted, strict=True):
-            self.blocks.add(duration, value)
 
-    def selected(self, E: NDArray) -> tuple[NDArray, NDArray]:
-        """A and b over the unknowns z, where x = E·z."""
-        return E.T @ self.A @ E, self.b @ E
+# without features, the smooth mismatch is in the residual: it is large and repeats
+RIGID = NoiseModel(residual=4e-3, block=1.0, floor=False, novelty=NOVELTY)
+SMOOTH = NoiseModel(residual=1e-3, block=0.25, floor=True, novelty=np.inf)
 
-    def residual_variance(self, x: NDArray, prior: NDArray) -> NDArray[np.float64]:
-        """Long-run variance S (n,) of the residual at x, pulled towards the prior by `_PRIOR_COUNT` blocks."""
-        means, times = self.blocks.means()
-        residual = means[:, :, -1] - means[:, :, :-1] @ x
-        total = _PRIOR_COUNT * prior + np.sum(residual**2 * times[:, None], axis=0)
-        return total / (_PRIOR_COUNT + max(len(times) - 2, 0)) * max(1.0, self.blocks.duration / _NOVELTY)
+
+@dataclass(frozen=True, eq=False)
+class Scales:
+    """What expectation–maximisation finds.
+
+    noise: S of each run (K, n) [N²·m²·s]. eta: prior variance (p,). features: prior variance of the weights (n, R).
+    payloads: prior variance of each run's payload (10·K,).
+    """
+
+    noise: NDArray[np.float64]
+    eta: NDArray[np.float64]
+    features: NDArray[np.float64]
+    payloads: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,150 +79,203 @@ class Posterior:
     """Mean and covariance of phi, and of what else was found along the way.
 
     phi, covariance: (10,), (10, 10) of the payload (relative to the tare, if there was one).
+    information, vector: Λ (10, 10) and Λ·phi_ML (10,): what the logs alone say, all else integrated out.
     eta: (p,) the arm's mismatch.
     residual: √S (n,) of the run [N·m·√s].
     torque: "link" or "motor", the side the torque seems to be measured on.
+    gain_std: relative standard deviation of the torque's calibration.
+    scales: what expectation–maximisation found; another solution may start there.
+    ratios: the scales (n,) of "noise", "pose", "velocity" and "friction" over what was expected of them, as variances.
     """
 
     phi: NDArray[np.float64]
     covariance: NDArray[np.float64]
+    information: NDArray[np.float64]
+    vector: NDArray[np.float64]
     eta: NDArray[np.float64]
     residual: NDArray[np.float64]
     torque: str
+    gain_std: float
+    scales: Scales
+    ratios: dict[str, NDArray[np.float64]]
 
 
 @cache
-def _threads() -> ThreadpoolController:
+def threads() -> ThreadpoolController:
+    """Limits BLAS to one thread: for matrices of a hundred rows more cost up to 100 × on a busy machine."""
     return ThreadpoolController()
 
 
 def solve(
-    runs: list[RegressionData], prior_std: ArrayLike, prior: GaussianPrior | None = None, iterations: int = 12
+    runs: list[RegressionData],
+    prior_std: NDArray[np.float64],
+    prior: GaussianPrior | None = None,
+    noise: NoiseModel = RIGID,
+    iterations: int = 12,
+    start: Scales | None = None,
 ) -> Posterior:
     """Posterior of the payload of the last run; runs before it are tares.
 
-    Unknowns z = [phi_1, phi_2 − phi_1, …, eta]: run k carries the sum of the first k of them. Each payload is near
-    zero within `prior_std` (10,), a tare's moments also within `_REACH` of its mass; the last one follows `prior` where
-    that is given.
+    Unknowns z = [phi_1, phi_2 − phi_1, …, eta], and g_j: run k carries the sum of the first k payloads. Each payload is
+    near zero within `prior_std` (10,), a tare's moments also within `_REACH` of its mass; the last one follows `prior`
+    where that is given. `start` holds scales found before, of the same runs or of all but the last.
     """
-    correction, count = runs[0].correction, len(runs)
-    p, prior_std = correction.size, np.asarray(prior_std)
-    size = 10 * count + p
-    variance0 = np.concatenate([np.tile(prior_std, count), correction.prior_std]) ** 2
-    variance = variance0.copy()
-    at = slice(10 * (count - 1), 10 * count)
-    mean, payload_root = np.zeros(size), None
-    if prior is not None:
-        mean[at], payload_root = prior.mean, prior.root
-    adaptive = 10 * count + np.flatnonzero(correction.adaptive)
-    selections = []
-    for k in range(count):
-        E = np.zeros((10 + p, size))
-        for i in range(k + 1):
-            E[:10, 10 * i : 10 * i + 10] = np.eye(10)
-        E[10:, 10 * count :] = np.eye(p)
-        selections.append(E)
-    parts = [run.selected(E) for run, E in zip(runs, selections, strict=True)]
-    prior_residual = (_PRIOR_RESIDUAL * correction.effort) ** 2 * runs[0].blocks.block
-    S = [prior_residual for _ in runs]
-    z, P = np.zeros(size), np.diag(variance)
-    for _ in range(iterations):
-        A = sum(np.einsum("jab,j->ab", A, 1 / s) for (A, _), s in zip(parts, S, strict=True))
-        b = sum(np.einsum("ja,j->a", b, 1 / s) for (_, b), s in zip(parts, S, strict=True))
-        root = np.diag(np.sqrt(variance))
-        if payload_root is not None:
-            root[at, at] = payload_root
-        P = root @ np.linalg.inv(root.T @ A @ root + np.eye(size)) @ root.T
-        P = 0.5 * (P + P.T)
-        z = mean + P @ (b - A @ mean)
-        S = [run.residual_variance(E @ z, prior_residual) for run, E in zip(runs, selections, strict=True)]
-        # EM for the prior's scale, with one pseudo-observation at the stated value
-        variance[adaptive] = 0.5 * (variance0[adaptive] + z[adaptive] ** 2 + np.diag(P)[adaptive])
-        # a light body has small moments: what was mounted at a tare seldom weighs much, and its moments follow its mass
-        for k in range(count - 1):
-            heaviest = max(abs(z[10 * k]) + 2.0 * np.sqrt(P[10 * k, 10 * k]), _LIGHTEST)
-            moments = slice(10 * k + 1, 10 * k + 10)
-            variance[moments] = np.minimum(variance0[moments], (heaviest * _REACH) ** 2)
-    eta = z[10 * count :]
-    torque = "motor" if np.median(np.abs(correction.coulomb(eta)) / correction.effort) > _MOTOR_SIDE else "link"
-    return Posterior(
-        phi=z[at],
-        covariance=P[at, at] + _GAIN_STD[torque] ** 2 * np.outer(z[at], z[at]),
-        eta=eta,
-        residual=np.sqrt(S[-1]),
-        torque=torque,
-    )
+    with threads().limit(limits=1):
+        problem = _Problem(runs, prior_std, prior, noise)
+        scales = problem.scales(start)
+        for _ in range(iterations - 1):
+            scales = problem.improved(scales, problem.posterior(scales))
+        return problem.answer(scales, problem.posterior(scales))
 
 
-class PosteriorLeastSquares(BatchIdentifier):
-    """MAP least squares with the arm's mismatch as an unknown: the method for a log of any motion of any arm.
+@dataclass(frozen=True, eq=False)
+class _Gaussian:
+    """z ~ N(mean, covariance); g_j | z ~ N(own − slope·z, rest)."""
 
-    >>> from armload.arms import arm
-    >>> PosteriorLeastSquares(arm("panda")).name
-    'map'
-
-    Args:
-        arm: the bare arm.
-        tare: an earlier recording of the same arm, on any motion, with whatever was mounted then; estimates are
-            relative to it.
-        gain: λ of the lag [1/s].
-        refresh: the posterior is solved anew at most this often [s] while streaming; `run` solves at the end only.
-        prior: what is known about the payload before; None: the weak prior of `payload_prior_std`.
-    """
-
-    name = "map"
-
-    def __init__(
-        self,
-        arm: Arm,
-        tare: Recording | None = None,
-        gain: float = 20.0,
-        refresh: float = 0.02,
-        prior: GaussianPrior | None = None,
-    ) -> None:
-        self.arm, self.gain, self.refresh, self.prior = arm, gain, refresh, prior
-        self._correction: Correction | None = None
-        self._tare: RegressionData | None = None
-        if tare is not None:
-            self._correction = Correction(arm, effort_scale(arm, tare.tau))
-            self._tare = RegressionData(self._correction, gain)
-            self._tare.add(tare.t, tare.q, tare.dq, tare.tau)
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget the run (not the tare); the next sample is the first."""
-        self._run: RegressionData | None = None
-        self._solved_at, self._posterior, self._count = -np.inf, None, 0
-
-    def update(self, sample: Sample) -> Estimate:
-        """Take one sample (t, q, dq, tau) and return the estimate so far, at most `refresh` old."""
-        if self._posterior is None or sample.t - self._solved_at >= self.refresh:
-            return super().update(sample)
-        self._take(np.array([sample.t]), sample.q[None], sample.dq[None], sample.tau[None])
-        return self._last(sample.t)
+    mean: NDArray
+    covariance: NDArray
+    own: NDArray  # (n, R)
+    slope: NDArray  # (n, R, z)
+    rest: NDArray  # (n, R, R)
 
     @property
-    def posterior(self) -> Posterior:
-        """The last solution, with the arm's mismatch and the residual."""
-        if self._posterior is None:
-            raise RuntimeError("no sample has been seen: call update or run first")
-        return self._posterior
+    def weights(self) -> NDArray:
+        """Mean of g (n, R)."""
+        return self.own - self.slope @ self.mean
 
-    def _take(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
-        if self._run is None:
-            if self._correction is None:
-                self._correction = Correction(self.arm, effort_scale(self.arm, tau))
-            self._run = RegressionData(self._correction, self.gain)
-        self._run.add(t, q, dq, tau)
-        self._count += len(t)
 
-    def _estimate(self, t: float) -> Estimate:
-        assert self._run is not None
-        runs = [self._run] if self._tare is None else [self._tare, self._run]
-        with _threads().limit(limits=1):  # matrices of a hundred rows: BLAS threads cost up to 100 × on a busy machine
-            self._posterior = solve(runs, _WIDE * payload_prior_std(self.arm), self.prior)
-        self._solved_at = t
-        return self._last(t)
+class _Problem:
+    """One solution's fixed part: which unknowns a run sees, the stated priors."""
 
-    def _last(self, t: float) -> Estimate:
-        return Estimate(float(t), self.posterior.phi, self.posterior.covariance, self._count, str(self.arm.frame))
+    def __init__(
+        self, runs: list[RegressionData], prior_std: NDArray, prior: GaussianPrior | None, noise: NoiseModel
+    ) -> None:
+        self.runs, self.noise_model, self.correction = runs, noise, runs[0].correction
+        self.features = runs[0].features
+        count, p = len(runs), self.correction.size
+        self.payloads, self.size = 10 * count, 10 * count + p
+        self.last = slice(10 * (count - 1), 10 * count)
+        self.payload_variance = np.tile(np.asarray(prior_std) ** 2, count)
+        self.mean, self.root = np.zeros(self.size), None
+        if prior is not None:
+            self.mean[self.last], self.root = prior.mean, prior.root
+        self.expected = (noise.residual * self.correction.effort) ** 2 * noise.block
+        self.selections = []
+        for k in range(count):
+            E = np.zeros((10 + p, self.size))
+            for i in range(k + 1):
+                E[:10, 10 * i : 10 * i + 10] = np.eye(10)
+            E[10:, self.payloads :] = np.eye(p)
+            self.selections.append(E)
+        self.parts = [run.selected(E) for run, E in zip(runs, self.selections, strict=True)]
+        group = np.repeat([_POSE, _VELOCITY], [self.features.pose, self.features.velocity])
+        self.feature_variance = (np.outer(self.correction.effort, group)) ** 2
+
+    def scales(self, start: Scales | None) -> Scales:
+        """Where expectation–maximisation begins."""
+        noise = np.tile(self.expected, (len(self.runs), 1))
+        if start is None:
+            return Scales(noise, self.correction.prior_std**2, self.feature_variance, self.payload_variance)
+        noise[: len(start.noise)] = start.noise[: len(noise)]
+        return Scales(noise, start.eta, start.features, self.payload_variance)
+
+    def posterior(self, scales: Scales) -> _Gaussian:
+        """z and g given the scales: each g_j is eliminated first (it occurs in the rows of joint j only)."""
+        n, R, c = len(self.correction.effort), self.features.size, 10 + self.correction.size
+        S = scales.noise
+        A = sum(np.einsum("jab,j->ab", part, 1.0 / s) for (part, _), s in zip(self.parts, S, strict=True))
+        b = sum(np.einsum("ja,j->a", part, 1.0 / s) for (_, part), s in zip(self.parts, S, strict=True))
+        own, slope, rest = np.zeros((n, R)), np.zeros((n, R, self.size)), np.zeros((n, R, R))
+        for j in range(n if R else 0):
+            Agg = sum(run.A[j, c:, c:] / s[j] for run, s in zip(self.runs, S, strict=True))
+            Agz = sum(run.A[j, c:, :c] @ E / s[j] for run, E, s in zip(self.runs, self.selections, S, strict=True))
+            bg = sum(run.b[j, c:] / s[j] for run, s in zip(self.runs, S, strict=True))
+            root = np.sqrt(scales.features[j])
+            M = np.linalg.inv(root[:, None] * Agg * root + np.eye(R))
+            rest[j] = root[:, None] * (0.5 * (M + M.T)) * root
+            own[j], slope[j] = rest[j] @ bg, rest[j] @ Agz
+            A, b = A - Agz.T @ slope[j], b - Agz.T @ own[j]
+        root = np.diag(np.sqrt(np.concatenate([scales.payloads, scales.eta])))
+        if self.root is not None:
+            root[self.last, self.last] = self.root
+        P = root @ np.linalg.inv(root.T @ (0.5 * (A + A.T)) @ root + np.eye(self.size)) @ root.T
+        P = 0.5 * (P + P.T)
+        return _Gaussian(self.mean + P @ (b - A @ self.mean), P, own, slope, rest)
+
+    def improved(self, scales: Scales, found: _Gaussian) -> Scales:
+        """One step of expectation–maximisation, each scale held to its stated value by pseudo-observations."""
+        z, P = found.mean, found.covariance
+        variance = np.diag(P)
+        eta, stated = scales.eta.copy(), self.correction.prior_std**2
+        adaptive = self.correction.adaptive
+        seen = z[self.payloads :] ** 2 + variance[self.payloads :]
+        eta[adaptive] = 0.5 * (stated + seen)[adaptive]
+        features = scales.features.copy()
+        weights = found.weights
+        if self.features.size:
+            spread = np.einsum("jrr->jr", found.rest) + ((found.slope @ P) * found.slope).sum(axis=2)
+            for part in (slice(0, self.features.pose), slice(self.features.pose, None)):
+                size = weights[:, part].shape[1]
+                total = (weights[:, part] ** 2 + spread[:, part]).sum(axis=1, keepdims=True)
+                known = _FEATURE_COUNT * self.feature_variance[:, part]
+                features[:, part] = (known + total) / (_FEATURE_COUNT + size)
+        return Scales(self._noise(found), eta, features, self._payloads(z, variance))
+
+    def _noise(self, found: _Gaussian) -> NDArray[np.float64]:
+        """S of each run."""
+        model, out = self.noise_model, []
+        for run, E in zip(self.runs, self.selections, strict=True):
+            covariance = None
+            if self.features.size:
+                turned = found.slope @ found.covariance  # (n, R, z)
+                cross = -(E @ turned.swapaxes(1, 2))
+                own = found.rest + turned @ found.slope.swapaxes(1, 2)
+                shared = np.broadcast_to(E @ found.covariance @ E.T, (len(own), len(E), len(E)))
+                upper = np.concatenate([shared, cross], axis=2)
+                covariance = np.concatenate([upper, np.concatenate([cross.swapaxes(1, 2), own], axis=2)], axis=1)
+            S = run.residual_variance(E @ found.mean, self.expected, model.novelty, found.weights, covariance)
+            out.append(np.maximum(S, self.expected) if model.floor else S)
+        return np.array(out)
+
+    def _payloads(self, z: NDArray, variance: NDArray) -> NDArray:
+        """A light body has small moments: what was mounted at a tare seldom weighs much, and its moments follow."""
+        now = self.payload_variance.copy()
+        for k in range(len(self.runs) - 1):
+            heaviest = max(abs(z[10 * k]) + 2.0 * np.sqrt(variance[10 * k]), _LIGHTEST)
+            moments = slice(10 * k + 1, 10 * k + 10)
+            now[moments] = np.minimum(now[moments], (heaviest * _REACH) ** 2)
+        return now
+
+    def answer(self, scales: Scales, found: _Gaussian) -> Posterior:
+        """The payload of the last run."""
+        phi, covariance = found.mean[self.last], found.covariance[self.last, self.last]
+        eta = found.mean[self.payloads :]
+        side = np.median(np.abs(self.correction.coulomb(eta)) / self.correction.effort) > _MOTOR_SIDE
+        torque = "motor" if side else "link"
+        precision = np.linalg.inv(covariance)
+        if self.root is None:
+            before, pull = np.diag(1.0 / self.payload_variance[self.last]), np.zeros(10)
+        else:
+            before = np.linalg.inv(self.root @ self.root.T)
+            pull = before @ self.mean[self.last]
+        gain = _GAIN_STD[torque]
+        return Posterior(
+            phi=phi,
+            covariance=covariance + gain**2 * np.outer(phi, phi),
+            information=precision - before,
+            vector=precision @ phi - pull,
+            eta=eta,
+            residual=np.sqrt(scales.noise[-1]),
+            torque=torque,
+            gain_std=gain,
+            scales=scales,
+            ratios=self._ratios(scales),
+        )
+
+    def _ratios(self, scales: Scales) -> dict[str, NDArray[np.float64]]:
+        friction = self.correction.coulomb(scales.eta) / self.correction.coulomb(self.correction.prior_std**2)
+        out = {"noise": scales.noise[-1] / self.expected, "friction": friction}
+        for name, k in (("pose", 0), ("velocity", self.features.pose)):
+            if self.features.size > k:
+                out[name] = scales.features[:, k] / self.feature_variance[:, k]
+        return out

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm, Limits
 from armload.errors import MotionError
@@ -24,7 +24,13 @@ _FLOOR, _SELF = 0.05, 0.01  # [m] clearances kept
 
 
 def random_motion(
-    arm: Arm, seed: int, *, duration: float = 6.0, harmonics: int = 5, floor: float | None = 0.0
+    arm: Arm,
+    seed: int,
+    *,
+    duration: float = 6.0,
+    harmonics: int = 5,
+    floor: float | None = 0.0,
+    around: ArrayLike | None = None,
 ) -> FourierMotion:
     """A random Fourier motion, from rest to rest, that the arm may run with its rated payload.
 
@@ -42,9 +48,11 @@ def random_motion(
         duration: T [s].
         harmonics: number of harmonics K, at least 2 (one alone cannot start at rest).
         floor: height of the floor in the base's frame [m]; None: there is none.
+        around: mean pose (n,) [rad], as of an arm that works in one place; None: a clear one is drawn.
 
     Raises:
-        MotionError: fewer than 2 harmonics, a duration that is not positive, or no clear pose found.
+        MotionError: fewer than 2 harmonics, a duration that is not positive, a mean pose of another arm, or no clear
+            pose found.
     """
     if harmonics < 2:
         raise MotionError(f"{harmonics} harmonic(s) asked for: expected at least 2, one alone cannot start at rest")
@@ -54,7 +62,13 @@ def random_motion(
     limits, model, load = _filled(arm.limits), capsule_arm(arm), rated_load(arm)
     best: tuple[float, FourierMotion] | None = None
     k = np.arange(1.0, harmonics + 1.0)
-    for pose in _clear_poses(arm, model, limits, rng, floor)[:_TRIALS]:
+    if around is None:
+        poses = _clear_poses(arm, model, limits, rng, floor)[:_TRIALS]
+    else:
+        poses = np.tile(np.asarray(around, dtype=float), (_TRIALS, 1))
+        if poses.shape != (_TRIALS, arm.n):
+            raise MotionError(f"the mean pose has shape {poses.shape[1:]}: expected ({arm.n},)")
+    for pose in poses:
         sine, cosine = rng.normal(size=(2, arm.n, harmonics)) / k
         travel = rng.uniform(*_TRAVEL, size=arm.n)
         motion = FourierMotion(pose, sine, cosine, duration, f"random-{arm.name}-{seed}", f"random_motion, seed {seed}")

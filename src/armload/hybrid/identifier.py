@@ -1,0 +1,83 @@
+"""The hybrid as a stream identifier: physics for what is known, learned parts for what is not."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm
+from armload.errors import ModelError
+from armload.hybrid.evidence import Physics
+from armload.hybrid.model import HybridModel
+from armload.identifier import Estimate
+from armload.inertia import is_consistent, nearest_consistent
+from armload.recording import Recording
+
+_MARGIN = 1e-5
+_REMOVED = 0.1  # how likely it is, beforehand, that something was taken off since the tare
+
+
+class HybridIdentifier(Physics):
+    """MAP least squares with the arm's rigid and smooth mismatch, a learned payload prior, learned error bars.
+
+    ±1.96 times an estimate's standard deviation is its 95 % interval, calibrated on simulated episodes: arms that
+    differ from their models, payloads of many shapes, motions of many kinds. Estimates are bodies that can exist,
+    unless something was taken off since the tare.
+
+    Args:
+        arm: the bare arm.
+        tare: an earlier log of the same arm, on any motion, with whatever was mounted then.
+        model: the learned parts; None: those shipped for the arm.
+        refresh: solved anew at most this often [s] while streaming.
+
+    Raises:
+        ModelError: no model is shipped for this arm, or it was trained for another one.
+    """
+
+    name = "hybrid"
+    calibrated = True
+
+    def __init__(
+        self, arm: Arm, tare: Recording | None = None, model: HybridModel | None = None, refresh: float = 0.1
+    ) -> None:
+        self.model = shipped_model(arm) if model is None else model
+        self._payloads = self.model.prior_for(arm)
+        self.known = (self._payloads.mean, self._payloads.std)
+        super().__init__(arm, tare, refresh)
+
+    def reset(self) -> None:
+        """Forget the run (not the tare); the next sample is the first."""
+        super().reset()
+        self._phi, self._covariance = self._payloads.mean, np.diag(self._payloads.std**2)
+
+    def _estimate(self, t: float) -> Estimate:
+        super()._estimate(t)
+        evidence = self.evidence(t)
+        found = self.model.calibration.answer(evidence, self._payloads)
+        if evidence.kind:  # perhaps the payload was taken off: then −phi is a body
+            removed = self.model.calibration.answer(evidence.mirrored, self._payloads)
+            if removed.log_evidence + np.log(_REMOVED) > found.log_evidence:
+                self._phi, self._covariance = -removed.mean, removed.covariance
+                return self._last(t)
+        self._phi, self._covariance = body(found.mean, found.covariance), found.covariance
+        return self._last(t)
+
+    def _last(self, t: float) -> Estimate:
+        return Estimate(float(t), self._phi.copy(), self._covariance.copy(), self._count, str(self.arm.frame))
+
+
+def body(phi: NDArray[np.float64], covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The nearest parameters (10,) that a body can have, in the metric of the covariance."""
+    return phi if is_consistent(phi) else nearest_consistent(phi, np.linalg.inv(covariance), margin=_MARGIN)
+
+
+def shipped_model(arm: Arm) -> HybridModel:
+    """The learned parts that come with armload for an arm.
+
+    Raises:
+        ModelError: there are none.
+    """
+    path = HybridModel.shipped(arm.name)
+    if path is None:
+        raise ModelError(f"no hybrid is shipped for {arm.name}: train one with `armload train --method hybrid`")
+    return HybridModel.load(path)

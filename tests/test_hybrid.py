@@ -1,0 +1,283 @@
+"""The hybrid: closed forms of its prior, coverage of its error bars on data of known law, its file, its answers."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from armload.arms import arm
+from armload.episodes import draw_episodes, simulate_episodes
+from armload.errors import ModelError
+from armload.hybrid import (
+    TRAITS,
+    Calibration,
+    HybridIdentifier,
+    HybridModel,
+    MixturePrior,
+    Records,
+    cross_validated,
+    measure_episodes,
+    shipped_model,
+)
+from armload.identify import identify
+from armload.inertia import InertialParameters, is_consistent
+from armload.motion import random_motion
+from armload.payloads import random_payloads
+from armload.simulate import Sensors, World, simulate
+
+UNIT = np.array([0.5] + [0.05] * 3 + [5e-3] * 6)
+
+
+def spread(rng, scale=1.0):
+    root = rng.normal(size=(10, 10)) / 4 + np.eye(10)
+    return scale * (root @ root.T) * np.outer(UNIT, UNIT)
+
+
+@pytest.fixture(scope="module")
+def mixture():
+    rng = np.random.default_rng(1)
+    means = rng.normal(size=(3, 10)) * UNIT
+    return MixturePrior(np.array([0.5, 0.3, 0.2]), means, np.array([spread(rng) for _ in range(3)]), ("a", "b", "b"))
+
+
+@pytest.fixture(scope="module")
+def panda():
+    return arm("panda")
+
+
+# ---------------------------------------------------------------------------- the prior
+
+
+def test_one_component_gives_the_gaussian_posterior():
+    rng = np.random.default_rng(2)
+    C, mean, Λ = spread(rng), rng.normal(size=10) * UNIT, np.linalg.inv(spread(rng))
+    prior = MixturePrior(np.ones(1), mean[None], C[None], ("x",))
+    h = Λ @ (rng.normal(size=10) * UNIT)
+    P = np.linalg.inv(Λ + np.linalg.inv(C))
+    found = prior.posterior(Λ, h)
+    assert found.mean / UNIT == pytest.approx(P @ (h + np.linalg.solve(C, mean)) / UNIT, abs=1e-9)
+    assert found.covariance / np.outer(UNIT, UNIT) == pytest.approx(P / np.outer(UNIT, UNIT), abs=1e-9)
+
+
+def test_the_posterior_is_that_of_importance_sampling(mixture):
+    rng = np.random.default_rng(3)
+    R = spread(rng, 0.3)
+    truth = mixture.means[1]
+    found = mixture.posterior(np.linalg.inv(R), np.linalg.solve(R, truth))
+    counts = rng.multinomial(400_000, mixture.weights)
+    draws = np.concatenate(
+        [
+            rng.multivariate_normal(m, C, size=n)
+            for m, C, n in zip(mixture.means, mixture.covariances, counts, strict=True)
+        ]
+    )
+    w = multivariate_normal(truth, R).pdf(draws)
+    mean = w @ draws / w.sum()
+    std = np.sqrt(w @ (draws - mean) ** 2 / w.sum())
+    assert found.mean / UNIT == pytest.approx(mean / UNIT, abs=0.03)
+    assert np.sqrt(np.diag(found.covariance)) / std == pytest.approx(np.ones(10), abs=0.04)
+
+
+def test_without_evidence_the_posterior_is_the_prior(mixture):
+    found = mixture.posterior(np.zeros((10, 10)), np.zeros(10))
+    assert found.mean == pytest.approx(mixture.mean)
+    assert np.sqrt(np.diag(found.covariance)) == pytest.approx(mixture.std)
+    assert found.weights == pytest.approx(mixture.weights)
+
+
+def test_moving_the_prior_and_the_evidence_moves_the_posterior(mixture):
+    rng = np.random.default_rng(4)
+    T = np.diag(1.0 / UNIT) @ (np.eye(10) + 0.2 * rng.normal(size=(10, 10))) @ np.diag(UNIT)
+    Λ, inverse = np.linalg.inv(spread(rng)), np.linalg.inv(T)
+    h = Λ @ mixture.means[0]
+    here, there = mixture.posterior(Λ, h), mixture.moved(T).posterior(inverse.T @ Λ @ inverse, inverse.T @ h)
+    assert there.mean == pytest.approx(T @ here.mean)
+    assert there.covariance == pytest.approx(T @ here.covariance @ T.T)
+
+
+def test_who_knows_the_family_keeps_its_components(mixture):
+    known = mixture.only("b")
+    assert known.weights == pytest.approx([0.6, 0.4])
+    assert known.mean == pytest.approx(0.6 * mixture.means[1] + 0.4 * mixture.means[2])
+    with pytest.raises(ModelError, match="no family is called c: expected some of a, b"):
+        mixture.only("c")
+
+
+def test_fitting_finds_the_moments_of_the_draws():
+    rng = np.random.default_rng(5)
+    draws = {"x": rng.multivariate_normal(2 * UNIT, spread(rng), size=4000), "none": np.zeros((5, 10))}
+    prior = MixturePrior.fit(draws, {"x": 1.0, "none": 0.0})
+    assert prior.mean == pytest.approx(draws["x"].mean(axis=0), rel=0.02)
+    assert prior.std == pytest.approx(draws["x"].std(axis=0), rel=0.05)
+
+
+def test_a_covariance_that_is_none_is_refused():
+    with pytest.raises(ModelError, match="not positive definite"):
+        MixturePrior(np.ones(1), np.zeros((1, 10)), -np.eye(10)[None], ("x",))
+
+
+# ---------------------------------------------------------------------------- the error bars
+
+
+@pytest.fixture(scope="module")
+def synthetic(mixture):
+    """Records of known law: truths from the prior, evidence that claims to be 1 to 25 times as good as it is."""
+    rng = np.random.default_rng(6)
+    rows = []
+    for episode in range(700):
+        k = rng.choice(3, p=mixture.weights)
+        truth = rng.multivariate_normal(mixture.means[k], mixture.covariances[k])
+        trait = rng.uniform(0.0, 1.4)  # log10 of the overrating, which the learner may read
+        for t in (0.1, 1.0):
+            R = spread(rng, 0.05 / t)
+            seen = rng.multivariate_normal(truth, R * 10.0**trait)
+            traits = np.zeros(len(TRAITS))
+            traits[0], traits[1] = np.log10(t), trait
+            Λ = np.linalg.inv(R)
+            rows.append((Λ, Λ @ seen, 0.0, traits, t, episode % 2, truth, episode, "synthetic"))
+    columns = [np.array([row[k] for row in rows]) for k in range(9)]
+    return Records(*columns)
+
+
+def half_widths(calibration, records, prior):
+    answers = [calibration.answer(records.evidence(k), prior) for k in range(len(records))]
+    half = 1.959963984540054 * np.sqrt([np.diag(a.covariance) for a in answers])
+    return half, np.abs([a.mean for a in answers] - records.truth)
+
+
+@pytest.mark.parametrize("learned", [True, False])
+def test_intervals_hold_on_episodes_that_were_not_trained_on(synthetic, mixture, learned):
+    train, test = synthetic.select(synthetic.episode < 500), synthetic.select(synthetic.episode >= 500)
+    half, error = half_widths(Calibration.fit(train, mixture, learned=learned), test, mixture)
+    assert np.mean(error <= half) == pytest.approx(0.95, abs=0.025)
+
+
+def test_learning_how_far_evidence_is_overrated_makes_answers_and_intervals_better(synthetic, mixture):
+    train, test = synthetic.select(synthetic.episode < 500), synthetic.select(synthetic.episode >= 500)
+    (with_bag, error), (without, plain) = (
+        half_widths(Calibration.fit(train, mixture, learned=learned), test, mixture) for learned in (True, False)
+    )
+    assert np.mean(error / UNIT) < 0.99 * np.mean(plain / UNIT)
+    assert np.mean(with_bag / UNIT) < 0.95 * np.mean(without / UNIT)
+
+
+def test_kappa_follows_the_trait_that_carries_it(synthetic, mixture):
+    calibration = Calibration.fit(synthetic, mixture)
+    traits = np.zeros((2, len(TRAITS)))
+    traits[:, 1] = 0.2, 1.2
+    low, high = calibration.kappa(traits)
+    assert high / low == pytest.approx(10.0, rel=0.35)
+
+
+def test_cross_validation_covers_every_episode(synthetic, mixture):
+    checked = cross_validated(synthetic, mixture)
+    assert checked.episodes == 700
+    assert checked.pooled == pytest.approx(0.95, abs=0.02)
+
+
+# ---------------------------------------------------------------------------- the file
+
+
+def test_a_model_answers_the_same_after_it_was_saved(synthetic, mixture, panda, tmp_path):
+    calibration = Calibration.fit(synthetic, mixture)
+    model = HybridModel(mixture, calibration, panda.name, panda.fingerprint, str(panda.frame), panda.n, {"note": 1})
+    path = model.save(tmp_path / "model.safetensors")
+    back = HybridModel.load(path)
+    for k in (0, 7, 20):
+        evidence = synthetic.evidence(k)
+        assert np.array_equal(
+            back.calibration.answer(evidence, back.prior).mean, calibration.answer(evidence, mixture).mean
+        )
+    assert back.provenance == {"note": 1}
+    assert HybridModel.wrote(path)
+
+
+def test_a_file_that_is_no_hybrid_is_refused_in_a_sentence(tmp_path):
+    from safetensors.numpy import save_file
+
+    save_file({"x": np.zeros(3)}, tmp_path / "other.safetensors")
+    (tmp_path / "text.safetensors").write_text("hello")
+    for name in ("other", "text", "missing"):
+        assert not HybridModel.wrote(tmp_path / f"{name}.safetensors")
+        with pytest.raises(ModelError, match=name):
+            HybridModel.load(tmp_path / f"{name}.safetensors")
+
+
+def test_records_read_back_as_they_were_written(synthetic, tmp_path):
+    back = Records.load(synthetic.save(tmp_path / "records.npz"))
+    assert np.array_equal(back.information, synthetic.information)
+    assert np.array_equal(back.group, synthetic.group)
+    (tmp_path / "bad.npz").write_text("no")
+    with pytest.raises(ModelError, match="holds no records"):
+        Records.load(tmp_path / "bad.npz")
+
+
+# ---------------------------------------------------------------------------- on logs
+
+
+@pytest.fixture(scope="module")
+def logs(panda):
+    """The reference population: three arms, payloads, motions and tares."""
+    return list(simulate_episodes(draw_episodes(panda, "reference", 3, seed=77, motions=3)))
+
+
+def test_the_shipped_model_is_small_and_belongs_to_the_panda(panda):
+    path = HybridModel.shipped("panda")
+    assert path is not None
+    assert path.stat().st_size < 5e6
+    assert shipped_model(panda).prior_for(panda).mean[0] > 0.0
+    with pytest.raises(ModelError, match=r"trained for panda: ur10e"):
+        shipped_model(panda).prior_for(arm("ur10e"))
+
+
+def test_errors_on_real_like_arms_stay_near_their_error_bars(panda, logs):
+    inside = []
+    for log in logs:
+        estimate = HybridIdentifier(panda, log.tare).run(log.run)
+        inside.append(np.abs(estimate.phi - log.truth.phi) < 1.96 * estimate.std)
+        assert abs(estimate.phi[0] - log.truth.mass) < 0.05
+        assert is_consistent(estimate.phi)
+    assert np.mean(inside) > 0.8  # of 30, 95 % of them expected; an arm's errors come together
+
+
+def test_another_payload_frame_describes_the_same_body(panda, logs):
+    hand = arm("panda", "panda_hand") if "panda_hand" in panda.frames else None
+    if hand is None:
+        pytest.skip("the bare Panda has no other frame behind its last joint")
+    here, there = (HybridIdentifier(a, logs[0].tare).run(logs[0].run) for a in (panda, hand))
+    moved = hand.in_frame(InertialParameters(here.phi, panda.frame))
+    assert there.phi == pytest.approx(moved.phi, abs=2e-3)
+
+
+def test_what_was_taken_off_since_the_tare_is_negative(panda):
+    body, motion = random_payloads(1, seed=3)[0], random_motion(panda, 5)
+    other = random_motion(panda, 6, duration=12.0, around=motion([0.0])[0][0])
+    world, sensors = World.real_like(panda, 4), Sensors.panda(panda)
+    loaded = simulate(panda, other, body, world=world, sensors=sensors, rate=200.0, seed=1)
+    empty = simulate(panda, motion, None, world=world, sensors=sensors, rate=200.0, seed=2)
+    found = identify(empty, panda, tare=loaded)
+    assert found.mass == pytest.approx(-body.parameters.mass, abs=0.1)
+    assert not found.consistent
+    assert not found.held
+
+
+def test_a_tare_along_the_same_motion_is_recognised_and_better(panda):
+    episodes = draw_episodes(panda, "same-motion", 2, seed=4, motions=2)
+    records = measure_episodes(episodes, times=(6.0,))
+    assert sorted(records.kind.tolist()) == [0, 0, 2, 2]
+    error = [
+        np.abs(np.linalg.solve(records.information[k], records.vector[k]) - records.truth[k])
+        for k in np.flatnonzero(records.kind == 2)
+    ]
+    assert np.max(error, axis=0)[0] < 0.01
+    assert np.max(error, axis=0)[1:4].max() < 2e-3
+
+
+def test_identify_takes_the_hybrid_by_itself_and_says_its_intervals_are_calibrated(panda, logs):
+    found = identify(logs[1].run, panda, tare=logs[1].tare)
+    assert (found.method, found.interval) == ("hybrid", "calibrated")
+    assert found.held
+    assert found.consistent
+    turned = replace(panda, gravity=(0.0, 0.0, -9.81))
+    assert identify(logs[1].run, turned, tare=logs[1].tare).phi == pytest.approx(found.phi)
