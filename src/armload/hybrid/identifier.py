@@ -63,7 +63,8 @@ class HybridIdentifier(Physics):
         return self._last(t)
 
     def _last(self, t: float) -> Estimate:
-        return Estimate(float(t), self._phi.copy(), self._covariance.copy(), self._count, str(self.arm.frame))
+        seen = self._count + len(self._waiting)
+        return Estimate(float(t), self._phi.copy(), self._covariance.copy(), seen, str(self.arm.frame))
 
 
 def body(phi: NDArray[np.float64], covariance: NDArray[np.float64]) -> NDArray[np.float64]:
