@@ -22,9 +22,10 @@ from armload.least_squares import payload_prior_std
 from armload.payloads import draw_payload
 from armload.simulate import rated_mass
 
-EPISODES = 2400
-_CHUNK = 150  # episodes that are kept together: what an interruption can lose
-_MOTIONS = 60  # of a chunk
+EPISODES = 2000
+_CHUNK = 300  # episodes that are kept together: what an interruption can lose
+_MOTIONS = 120  # of a chunk
+_FIRST_SEED = 11  # of the first chunk; other seeds of a training begin far from it
 _LIGHTEST = 0.25  # of the rated payload
 _TOOL_SHARE = 0.6  # of the rated payload, which a tool is drawn for
 _DRAWS = 1500  # payloads of each family
@@ -162,7 +163,7 @@ def _records(
         if path is not None and path.is_file():
             part = Records.load(path)
         else:
-            drawn = draw_episodes(arm, population, count, seed + 1000 * (first // _CHUNK), motions=_MOTIONS)
+            drawn = draw_episodes(arm, population, count, 1000 * seed + _FIRST_SEED + first // _CHUNK, motions=_MOTIONS)
 
             def tell(done: int, _: int, first: int = first) -> None:
                 if progress is not None:
