@@ -22,7 +22,7 @@ from armload.least_squares import payload_prior_std
 from armload.payloads import draw_payload
 from armload.simulate import rated_mass
 
-EPISODES = 2000
+EPISODES = 2400
 _CHUNK = 300  # episodes that are kept together: what an interruption can lose
 _MOTIONS = 120  # of a chunk
 _FIRST_SEED = 11  # of the first chunk; other seeds of a training begin far from it
