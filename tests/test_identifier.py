@@ -102,6 +102,22 @@ def test_how_the_log_is_cut_into_pieces_changes_nothing(make, log):
     np.testing.assert_allclose(pieces[4].phi, halves.run(log.select(slice(at))).phi, rtol=0, atol=1e-9)
 
 
+def test_an_estimate_at_a_time_rests_on_the_samples_until_then(make, log):
+    late = Recording(log.t + 40.0, log.q, log.dq, log.tau)
+    early, middle, again, end = make().at(late, [0.0, 2.0, 2.01, 60.0])
+    assert [e.n_samples for e in (early, middle, again, end)] == [1, 101, 101, 300]
+    assert [e.t for e in (early, middle, again, end)] == [late.t[k] for k in (0, 100, 100, 299)]
+    halves = make()
+    np.testing.assert_allclose(middle.phi, halves.run(log.select(slice(101))).phi, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(end.phi, halves.run(log).phi, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("times", [[], [-0.1, 1.0], [1.0, 1.0], [2.0, 1.0], [np.nan], [[1.0]], 1.0])
+def test_times_that_do_not_rise_from_zero_are_refused(panda, log, times):
+    with pytest.raises(ArmloadError, match="rising seconds"):
+        PosteriorLeastSquares(panda).at(log, times)
+
+
 def test_reset_forgets_the_run(make, log):
     identifier = make()
     first = identifier.run(log)

@@ -13,7 +13,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
 from armload.errors import IdentificationError
@@ -85,6 +85,26 @@ class Identifier(ABC):
                 out.append(estimate)
         return out
 
+    def at(self, recording: Recording, times: ArrayLike) -> list[Estimate]:
+        """The estimates `times` [s] after a recording's first sample, from `reset` on: one for each time.
+
+        Each rests on all samples up to then, the first at least; a time beyond the end means the end.
+
+        Raises:
+            IdentificationError: times that are not a rising sequence of numbers from 0 on.
+        """
+        self._check(recording)
+        self.reset()
+        stops = samples_until(recording, times)
+        wanted, found = set(stops.tolist()), {}
+        for k, sample in enumerate(recording, start=1):
+            if k > stops[-1]:
+                break
+            estimate = self.update(sample)
+            if k in wanted:
+                found[k] = estimate
+        return [found[k] for k in stops.tolist()]
+
     def run(self, recording: Recording) -> Estimate:
         """The estimate after the whole recording."""
         return self.trace(recording, every=len(recording))[-1]
@@ -112,8 +132,22 @@ class BatchIdentifier(Identifier):
     def trace(self, recording: Recording, every: int = 1) -> list[Estimate]:
         """The estimates along a recording, as `update` gives them, computed many samples at a time."""
         self._check(recording)
+        return self._along(recording, [*range(1, len(recording), every), len(recording)])
+
+    def at(self, recording: Recording, times: ArrayLike) -> list[Estimate]:
+        """The estimates `times` [s] after a recording's first sample; nothing is solved in between.
+
+        Raises:
+            IdentificationError: times that are not a rising sequence of numbers from 0 on.
+        """
+        self._check(recording)
+        stops = samples_until(recording, times)
+        found = dict(zip(distinct := np.unique(stops).tolist(), self._along(recording, distinct), strict=True))
+        return [found[k] for k in stops.tolist()]
+
+    def _along(self, recording: Recording, stops: list[int]) -> list[Estimate]:
+        """The estimates after so many samples each, from `reset` on; `stops` rise."""
         self.reset()
-        stops = [*range(1, len(recording), every), len(recording)]
         out = []
         for start, stop in zip([0, *stops], stops, strict=False):
             for k in range(start, stop, self._CHUNK):
@@ -165,6 +199,26 @@ class Tared(Identifier):
         """The estimates along a recording, relative to the tare: one per `every` samples, and always the last."""
         return [self._relative(estimate) for estimate in self._identifier.trace(recording, every)]
 
+    def at(self, recording: Recording, times: ArrayLike) -> list[Estimate]:
+        """The estimates `times` [s] after a recording's first sample, relative to the tare."""
+        return [self._relative(estimate) for estimate in self._identifier.at(recording, times)]
+
     def _relative(self, estimate: Estimate) -> Estimate:
         before = self.before
         return replace(estimate, phi=estimate.phi - before.phi, covariance=estimate.covariance + before.covariance)
+
+
+def samples_until(recording: Recording, times: ArrayLike) -> NDArray[np.int_]:
+    """How many samples (T,) a recording has `times` (T,) [s] after its first, that one included.
+
+    Raises:
+        IdentificationError: times that are not a rising sequence of numbers from 0 on.
+    """
+    wanted = np.asarray(times, dtype=float)
+    if wanted.ndim != 1 or not wanted.size or not wanted[0] >= 0.0 or not np.all(np.diff(wanted) > 0.0):
+        raise IdentificationError(
+            f"the times asked for are {np.round(wanted, 6).tolist()}: expected rising seconds from 0 on, counted from "
+            "the recording's first sample"
+        )
+    # a nanosecond's slack: a sample that rounding puts behind its own time counts
+    return np.searchsorted(recording.t, recording.t[0] + wanted + 1e-9, side="right")

@@ -75,3 +75,7 @@ class PriorLeastSquares(Identifier):
     def trace(self, recording: Recording, every: int = 1) -> list[Estimate]:
         """The estimates along a recording: one per `every` samples, and always the last."""
         return self._solver.trace(recording, every)
+
+    def at(self, recording: Recording, times: ArrayLike) -> list[Estimate]:
+        """The estimates `times` [s] after a recording's first sample; nothing is solved in between."""
+        return self._solver.at(recording, times)

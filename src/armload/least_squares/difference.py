@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from armload.arms import Arm, momentum_regressor
 from armload.arms.filtered import Lag, filtered_regressor
 from armload.errors import IdentificationError
-from armload.identifier import Estimate
 from armload.least_squares.normal import GAP, NormalLeastSquares
 from armload.recording import Recording
 from armload.recording.alignment import LEAST, TOLERANCE, Aligned, MotionTracker, align
@@ -65,8 +64,9 @@ class DifferenceLeastSquares(NormalLeastSquares):
     """Weighted least squares on the torque difference with a tare along the same motion.
 
     What was mounted at the tare counts as part of the arm; the answer is what was added since. In a stream, samples
-    that the tare does not show are passed over; `trace` and `run` refuse a log of another motion first. The covariance
-    knows nothing of the torque's own calibration, which scales the answer: about 2 % where torque is motor current.
+    that the tare does not show are passed over; `trace`, `at` and `run` refuse a log of another motion first. The
+    covariance knows nothing of the torque's own calibration, which scales the answer: about 2 % where torque is motor
+    current.
 
     >>> from armload.arms import arm
     >>> from armload.motion import taie2024
@@ -88,18 +88,14 @@ class DifferenceLeastSquares(NormalLeastSquares):
 
     def __init__(self, arm: Arm, tare: Recording, gain: float = 20.0) -> None:
         self.arm, self.gain, self.tare = arm, gain, tare
-        self._check(tare)
+        super()._check(tare)
         self._tracker = MotionTracker(tare)
         self._tare_t, self._tare_r = _filtered_torque(arm, tare, gain)
         super().__init__(arm, weighted=True)
 
-    def trace(self, recording: Recording, every: int = 1) -> list[Estimate]:
-        """The estimates along a recording of the tare's motion: one per `every` samples, and always the last.
-
-        Raises:
-            IdentificationError: the tare shows another motion, or the recording is of another arm.
-        """
-        self._check(recording)
+    def _check(self, recording: Recording) -> None:
+        """Whole recordings are checked first: the tare has to show their motion."""
+        super()._check(recording)
         found = align(recording, self.tare)
         if found.coverage < LEAST or found.deviation > TOLERANCE:
             raise IdentificationError(
@@ -107,7 +103,6 @@ class DifferenceLeastSquares(NormalLeastSquares):
                 f"its path is found there within {TOLERANCE:.0%} of the motion's amplitude, expected at least "
                 f"{LEAST:.0%}; run the same motion without the payload, or use the method map, which takes any tare"
             )
-        return super().trace(recording, every)
 
     @property
     def seconds(self) -> float:
