@@ -8,12 +8,13 @@ import pytest
 
 from armload.errors import ReportError
 from armload.evaluate import Table
+from armload.report import markdown
 from armload.study.ablations import ABLATIONS, ablation_table, single_or_mean_table
 from armload.study.claims import evaluate
 from armload.study.counterparts import benchmark_rows, first_table, izz_table, ratio_table
 from armload.study.figures import figures
 from armload.study.numbers import both_stages
-from armload.study.page import html_report, markdown, sections, summary_json, write_page
+from armload.study.page import html_report, sections, summary_json, write_page
 from armload.study.summary import paragraphs
 from armload.study.tables import COMMAND, PROTOCOLS, claims_table, epochs_table, main_tables, value
 from test_study_claims import UNIT, cell, study

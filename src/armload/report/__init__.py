@@ -1,7 +1,17 @@
-"""Report: figures of a comparison and one self-contained HTML file."""
+"""Report: figures of a comparison, one self-contained HTML file, the same sections as Markdown."""
 
 from armload.report.html import ReportError, Section, render, write_report
 from armload.report.log import log_report
+from armload.report.markdown import markdown, write_markdown
 from armload.report.sections import default_report
 
-__all__ = ["ReportError", "Section", "default_report", "log_report", "render", "write_report"]
+__all__ = [
+    "ReportError",
+    "Section",
+    "default_report",
+    "log_report",
+    "markdown",
+    "render",
+    "write_markdown",
+    "write_report",
+]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -40,11 +40,16 @@ _LOOK: dict[Any, Any] = {
 
 def method_styles(comparison: Comparison) -> dict[str, dict]:
     """Colour and line style of every method, the same in all figures of a comparison; baselines are grey and dashed."""
-    styles, own = {}, [name for name in comparison.methods if name not in comparison.baselines]
+    return styles_of(comparison.methods, comparison.baselines)
+
+
+def styles_of(methods: Sequence[str], baselines: Sequence[str]) -> dict[str, dict]:
+    """Colour and line style by method; `baselines` are those of the methods that are grey and dashed."""
+    styles, own = {}, [name for name in methods if name not in baselines]
     for k, name in enumerate(own):
         dash = ("-", (0, (5, 1.5)), (0, (2, 1)))[min(k // len(COLOURS), 2)]
         styles[name] = {"color": COLOURS[k % len(COLOURS)], "linestyle": dash}
-    for k, name in enumerate(comparison.baselines):
+    for k, name in enumerate(baselines):
         styles[name] = {"color": _BASELINES[k % 2], "linestyle": (":", "--")[k % 2]}
     return styles
 

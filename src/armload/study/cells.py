@@ -1,19 +1,10 @@
-"""A cell of the study: one method, trained and measured in one way, with its result in one JSON file.
-
-A finished cell is never computed again: its file carries a key made of everything it depends on. So a study that takes
-hours may stop at any time, on any machine, and go on.
-"""
+"""A cell of the study: one method, trained and measured in one way, with its result in one file (`armload.cells`)."""
 
 from __future__ import annotations
 
-import hashlib
-import json
 from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
-from typing import Any
 
-from armload.atomic import replacing
-from armload.errors import DatasetError
+from armload.cells import key_of
 
 FORMAT = 2  # of a cell's file; a change makes every cell unfinished
 
@@ -67,30 +58,4 @@ class Spec:
 
         Which table a cell stands in changes nothing about its numbers.
         """
-        text = json.dumps([FORMAT, basis, asdict(replace(self, ablation=None))], sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()
-
-
-def load_cells(folder: str | Path) -> dict[str, dict[str, Any]]:
-    """The finished cells in a folder, by name.
-
-    Raises:
-        DatasetError: a file that is not a cell.
-    """
-    cells = {}
-    for path in sorted(Path(folder).glob("*.json")):
-        try:
-            cell = json.loads(path.read_text(encoding="utf-8"))
-            cells[cell["name"]] = cell
-        except (OSError, ValueError, KeyError, TypeError):
-            raise DatasetError(f"{path} is not a cell of the study: delete it, and it will be measured again") from None
-    return cells
-
-
-def save_cell(folder: str | Path, cell: dict[str, Any]) -> Path:
-    """Write a finished cell; the file appears whole or not at all."""
-    path = Path(folder) / f"{cell['name']}.json"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(path) as temporary:
-        temporary.write_text(json.dumps(cell, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    return path
+        return key_of(FORMAT, basis, asdict(replace(self, ablation=None)))

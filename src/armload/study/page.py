@@ -6,10 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from armload.atomic import replacing
-from armload.errors import ReportError
 from armload.evaluate import Table
-from armload.report import Section, write_report
+from armload.report import Section, write_markdown, write_report
 from armload.study import summary
 from armload.study.ablations import ABLATIONS, ablation_table, single_or_mean_table
 from armload.study.claims import RULE
@@ -89,16 +87,8 @@ def write_page(cells: Cells, claims: Sequence[dict[str, Any]], path: str | Path)
     Raises:
         ReportError: the file cannot be written.
     """
-    lines = [f"# {TITLE}", "", f"Written by `{COMMAND}`; every measured number on this page comes from its cells.", ""]
-    for section in sections(cells, claims):
-        lines += [f"## {section.title}", "", section.text.strip(), ""]
-        lines += [markdown(table) for table in section.tables]
-    try:
-        with replacing(path) as temporary:
-            temporary.write_text("\n".join(lines).rstrip() + "\n", encoding="utf-8")
-    except OSError as error:
-        raise ReportError(f"the page cannot be written to {path}: {error.strerror}; name a file elsewhere") from None
-    return Path(path)
+    note = f"Written by `{COMMAND}`; every measured number on this page comes from its cells."
+    return write_markdown(path, sections(cells, claims), TITLE, note)
 
 
 def html_report(cells: Cells, claims: Sequence[dict[str, Any]], path: str | Path) -> Path:
@@ -106,15 +96,6 @@ def html_report(cells: Cells, claims: Sequence[dict[str, Any]], path: str | Path
     from armload.study.figures import figures
 
     return write_report(path, sections(cells, claims, figures(cells)), TITLE)
-
-
-def markdown(table: Table) -> str:
-    """A table as Markdown: title, rows, note."""
-    if not table.rows:
-        return f"**{table.title}**\n\n{table.note}\n"
-    rows = [table.columns, ["---"] * len(table.columns), *table.rows]
-    lines = ["| " + " | ".join(str(cell).replace("|", "\\|") for cell in row) + " |" for row in rows]
-    return f"**{table.title}**\n\n" + "\n".join(lines) + f"\n\n{table.note}\n"
 
 
 def summary_json(cells: Cells, claims: Sequence[dict[str, Any]]) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from armload.cells import load_cells, save_cell
 from armload.dataset import Split, split_payloads, split_rows
 from armload.evaluate import EvaluationRun, PriorLeastSquares, mean_absolute_error
 from armload.identifier import Identifier, Tared
@@ -22,7 +23,7 @@ from armload.least_squares import (
     RecursiveLeastSquares,
 )
 from armload.study.basis import Basis, Size
-from armload.study.cells import Spec, load_cells, save_cell
+from armload.study.cells import Spec
 from armload.study.plan import plan
 from armload.study.protocols import measure_learned, measure_stream
 

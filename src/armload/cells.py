@@ -1,0 +1,53 @@
+"""Cells: measurements that are never made twice, one JSON file each.
+
+A cell carries its `name` and a `key` made of everything its numbers depend on; one whose key is still right is not
+measured again. So what takes hours may stop at any time, on any machine, and go on.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+from armload.atomic import replacing
+from armload.errors import DatasetError
+
+
+def key_of(*parts: Any) -> str:
+    """SHA-256 of anything that JSON can hold.
+
+    >>> key_of({"a": 1, "b": 2}) == key_of({"b": 2, "a": 1}) != key_of({"a": 1})
+    True
+    """
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+
+
+def load_cells(folder: str | Path) -> dict[str, dict[str, Any]]:
+    """The finished cells in a folder, by name.
+
+    Raises:
+        DatasetError: a file that is not a cell.
+    """
+    cells = {}
+    for path in sorted(Path(folder).glob("*.json")):
+        try:
+            cell = json.loads(path.read_text(encoding="utf-8"))
+            cells[cell["name"]] = cell
+        except (OSError, ValueError, KeyError, TypeError):
+            raise DatasetError(f"{path} is not a cell: delete it, and it will be measured again") from None
+    return cells
+
+
+def save_cell(folder: str | Path, cell: dict[str, Any], indent: int | None = 1) -> Path:
+    """Write a finished cell; the file appears whole or not at all.
+
+    Args:
+        indent: of the JSON; None: all on one line.
+    """
+    path = Path(folder) / f"{cell['name']}.json"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as temporary:
+        temporary.write_text(json.dumps(cell, indent=indent, allow_nan=False) + "\n", encoding="utf-8")
+    return path
