@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.identifier import Estimate
-from armload.least_squares import DifferenceLeastSquares, SmoothPosteriorLeastSquares, payload_prior_std
+from armload.least_squares import (
+    DifferenceLeastSquares,
+    JointFeatures,
+    SmoothPosteriorLeastSquares,
+    payload_prior_std,
+)
 from armload.least_squares.posterior import Posterior
 from armload.recording import Recording
 
@@ -109,14 +114,21 @@ class Physics(SmoothPosteriorLeastSquares):
     Args:
         arm: the bare arm. tare: an earlier log of it, if there is one.
         refresh: solved anew at most this often [s] while streaming.
+        features: of the smooth mismatch; a model's error bars were calibrated with the default.
     """
 
     name = "hybrid physics"
 
-    def __init__(self, arm: Arm, tare: Recording | None = None, refresh: float = 0.1) -> None:
+    def __init__(
+        self,
+        arm: Arm,
+        tare: Recording | None = None,
+        refresh: float = 0.1,
+        features: JointFeatures | None = None,
+    ) -> None:
         self._tare_time = 0.0 if tare is None else tare.duration
         self._difference = None if tare is None else DifferenceLeastSquares(arm, tare)
-        super().__init__(arm, tare, refresh=refresh)
+        super().__init__(arm, tare, refresh=refresh, features=features)
 
     def reset(self) -> None:
         """Forget the run (not the tare); the next sample is the first."""

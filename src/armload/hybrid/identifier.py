@@ -11,6 +11,7 @@ from armload.hybrid.evidence import Physics
 from armload.hybrid.model import HybridModel
 from armload.identifier import Estimate
 from armload.inertia import is_consistent, nearest_consistent
+from armload.least_squares import JointFeatures
 from armload.recording import Recording
 
 _MARGIN = 1e-5
@@ -29,6 +30,7 @@ class HybridIdentifier(Physics):
         tare: an earlier log of the same arm, on any motion, with whatever was mounted then.
         model: the learned parts; None: those shipped for the arm.
         refresh: solved anew at most this often [s] while streaming.
+        features: as in `Physics`.
 
     Raises:
         ModelError: no model is shipped for this arm, or it was trained for another one.
@@ -38,12 +40,17 @@ class HybridIdentifier(Physics):
     calibrated = True
 
     def __init__(
-        self, arm: Arm, tare: Recording | None = None, model: HybridModel | None = None, refresh: float = 0.1
+        self,
+        arm: Arm,
+        tare: Recording | None = None,
+        model: HybridModel | None = None,
+        refresh: float = 0.1,
+        features: JointFeatures | None = None,
     ) -> None:
         self.model = shipped_model(arm) if model is None else model
         self._payloads = self.model.prior_for(arm)
         self.known = (self._payloads.mean, self._payloads.std)
-        super().__init__(arm, tare, refresh)
+        super().__init__(arm, tare, refresh, features)
 
     def reset(self) -> None:
         """Forget the run (not the tare); the next sample is the first."""

@@ -5,6 +5,7 @@ safetensors with JSON in its header, nothing in it is executed when it is read.
 
 from __future__ import annotations
 
+import hashlib
 import json
 from dataclasses import dataclass, replace
 from os import PathLike
@@ -14,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from armload.arms import Arm
-from armload.arms.model import STANDARD_GRAVITY
 from armload.atomic import replacing
 from armload.errors import ModelError
 from armload.hybrid.calibration import Calibration
@@ -27,6 +27,17 @@ FORMAT = 1
 _HEADER = "armload-hybrid"
 
 
+def kinship(arm: Arm) -> str:
+    """SHA-256 of an arm's links and of how they sit to each other: the same however its base stands."""
+    R, p = arm.link_poses(np.linspace(-0.5, 0.7, arm.n))
+    frame_R, frame_p = arm.frame_pose(np.linspace(-0.5, 0.7, arm.n))
+    R, p = np.concatenate([R[0], frame_R]), np.concatenate([p[0], frame_p])
+    digest = hashlib.sha256(np.round(arm.link_parameters, 6).tobytes())
+    digest.update((np.round(R[0].T @ R, 6) + 0.0).tobytes())  # as seen from the first moving link
+    digest.update((np.round((p - p[0]) @ R[0], 6) + 0.0).tobytes())
+    return digest.hexdigest()
+
+
 @dataclass(frozen=True, eq=False)
 class HybridModel:
     """The learned parts of the hybrid.
@@ -34,7 +45,7 @@ class HybridModel:
     Args:
         prior: over the payloads.
         calibration: of the evidence and of the widths.
-        arm_name, arm_fingerprint, frame: of the arm it was trained on; the prior is about that frame.
+        arm_name, arm_fingerprint, frame: of the arm it was trained on (`kinship`); the prior is about that frame.
         provenance: what it was trained with, for people.
     """
 
@@ -54,8 +65,7 @@ class HybridModel:
         """
         if arm.n != self.n or self.frame not in arm.frames:
             raise ModelError(f"the hybrid was trained for {self.arm_name}: {arm.name} is another arm; train one for it")
-        bare = replace(arm, frame=self.frame, gravity=STANDARD_GRAVITY, attached=None)
-        if bare.fingerprint != self.arm_fingerprint:
+        if kinship(replace(arm, frame=self.frame, attached=None)) != self.arm_fingerprint:
             raise ModelError(
                 f"the hybrid was trained for {self.arm_name}: {arm.name} has other links; train one for it with "
                 "`armload train --method hybrid`"

@@ -16,7 +16,7 @@ from armload.errors import ModelError
 from armload.hybrid.calibration import Calibration
 from armload.hybrid.evidence import KINDS
 from armload.hybrid.mixture import MixturePrior
-from armload.hybrid.model import HybridModel
+from armload.hybrid.model import HybridModel, kinship
 from armload.hybrid.records import TIMES, Records, measure_episodes
 from armload.least_squares import payload_prior_std
 from armload.payloads import draw_payload
@@ -87,7 +87,7 @@ def train_hybrid(
         prior,
         Calibration.fit(records, prior, seed=seed),
         arm.name,
-        arm.fingerprint,
+        kinship(arm),
         str(arm.frame),
         arm.n,
         {
