@@ -300,7 +300,7 @@ class Arm:
         J = np.empty((N, 6, n))  # world frame, linear rows first
         R, p = np.empty((len(bodies), N, 3, 3)), np.empty((len(bodies), N, 3))
         for k in range(N):
-            J[k] = pin.computeJointJacobians(model, data, q[k])
+            J[k] = pin.computeJointJacobians(model, data, q[k]).reshape(6, n)  # one joint: pin gives a vector
             for b, (joint, rotation, translation) in enumerate(bodies):
                 placement = data.oMi[joint]
                 R[b, k] = placement.rotation @ rotation

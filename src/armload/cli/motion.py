@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING
 
 from armload.cli.arguments import Parser, add_arm_arguments, arm_of, at_least, file_name, motion_of, payload_of
-from armload.cli.printing import console, print_note, table, working
+from armload.cli.printing import console, print_json, print_note, table, working
+from armload.errors import UsageError
+
+if TYPE_CHECKING:
+    from armload.arms import Arm
+    from armload.motion import Motion, MotionCheck
 
 NOT_ALLOWED = 3  # exit code of a check that says no
 
@@ -13,11 +19,13 @@ _EXAMPLES = """\
 examples:
   armload motion show taie2024
   armload motion check mine.json --robot panda --payload tool.json
+  armload motion check run.csv --robot ur10e --tare empty.csv
   armload motion random --robot ur10e --seed 3 --out excite.json
   armload motion export excite.json --format ur --out excite.script
   armload motion export taie2024 --format ros2 --robot panda --out excite.yaml
 
-MOTION is taie2024, a JSON file, or random:SEED. `check` exits with 3 if the arm must not run the motion.
+MOTION is taie2024, a JSON file, or random:SEED. `check` says whether the arm may run a motion, exits with 3 if not, and
+says which parameters of a payload it can tell, and how well; it takes a log (CSV, Parquet, NPZ, ROS bag) as well.
 """
 
 
@@ -34,17 +42,25 @@ def parser() -> Parser:
 
     check = actions.add_parser(
         "check",
-        help="limits, torque with a payload, the floor, the arm itself",
-        description="Check a motion against the arm's limits, the torque with a payload, the floor and the arm itself.",
+        help="limits, torque with a payload, the floor, the arm itself; what it tells about a payload",
+        description="Check a motion against the arm's limits, the torque with a payload, the floor and the arm itself, "
+        "or a log against the limits; say which parameters of a payload it can tell, and how well: the Bayesian "
+        "Cramér-Rao bound.",
     )
-    check.add_argument("motion", metavar="MOTION", help="taie2024, a JSON file, or random:SEED")
+    check.add_argument("motion", metavar="LOG|MOTION", help="a log, or taie2024, a JSON file, or random:SEED")
     add_arm_arguments(check)
     check.add_argument(
         "--payload",
         metavar="FILE",
-        default="rated",
-        help="what the arm carries: a JSON file, franka-hand, none, or rated (default: the maker's rated payload)",
+        help="what the arm carries: a JSON file, franka-hand, none, or rated (default: the maker's rated payload); "
+        "for motions only",
     )
+    check.add_argument(
+        "--tare",
+        metavar="LOG|MOTION",
+        help="an earlier run of the arm, with anything mounted (default: the same motion again)",
+    )
+    check.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
 
     export = actions.add_parser(
         "export",
@@ -100,20 +116,62 @@ def _show(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> int:
-    from armload.motion import check_motion, rated_load
+    from armload.bound import advise, bound
+    from armload.cli import motion_check as said
+    from armload.inertia import NAMES, UNITS
+    from armload.recording import Recording
 
     arm = arm_of(options)
-    motion = motion_of(options.motion, arm)
-    if options.payload == "rated":
+    run = said.run_of(options.motion, arm)
+    tare = run if options.tare is None else said.run_of(options.tare, arm)
+    result, carried = None, ""
+    with working("checking"):
+        if isinstance(run, Recording):
+            if options.payload is not None:
+                raise UsageError("--payload is for motions: a log was made with whatever the arm carried; leave it out")
+            problems = said.passed(run, arm)
+        else:
+            result, carried = _limits(options.payload or "rated", arm, run)
+            problems = result.problems
+        alone, tared = bound(arm, run), bound(arm, run, tare=tare)
+        advice = advise(arm, run, tare) if options.tare else advise(arm, run)
+    if options.json:
+        print_json(
+            {
+                **said.check_fields(run, result, problems),
+                "robot": arm.name,
+                "frame": str(arm.frame),
+                "parameters": NAMES,
+                "units": UNITS,
+                "prior_half_width": alone.prior_half_width.tolist(),
+                "without_tare": said.bound_fields(alone),
+                "with_tare": said.bound_fields(tared),
+                "advice": None if advice is None else str(advice),
+            }
+        )
+        return NOT_ALLOWED if problems else 0
+    if isinstance(run, Recording):
+        said.print_passed(run, arm, problems)
+    else:
+        print(f"{result}\ntorque with {carried}")
+    for found in (alone, tared):
+        print()
+        said.print_bound(found)
+    said.print_advice(tared if options.tare else alone, advice)
+    return NOT_ALLOWED if problems else 0
+
+
+def _limits(payload_name: str, arm: Arm, motion: Motion) -> tuple[MotionCheck, str]:
+    """The check with a payload by name, and in words what is carried."""
+    from armload.motion import check_motion, rated_load
+
+    if payload_name == "rated":
         payload = rated_load(arm)
         carried = "the rated payload" if payload is not None else "nothing (its rated payload is not known)"
     else:
-        payload = None if options.payload == "none" else arm.in_frame(payload_of(options.payload))
-        carried = "nothing" if payload is None else options.payload
-    with working("checking"):
-        result = check_motion(arm, motion, payload)
-    print(f"{result}\ntorque with {carried}")
-    return 0 if result.ok else NOT_ALLOWED
+        payload = None if payload_name == "none" else arm.in_frame(payload_of(payload_name))
+        carried = "nothing" if payload is None else payload_name
+    return check_motion(arm, motion, payload), carried
 
 
 def _export(options: argparse.Namespace) -> int:
