@@ -103,7 +103,8 @@ def print_advice(found: Bound, advice: Advice | None) -> None:
     if not missing:
         return
     more = advice or "no joint alone, moved more, would change that"
-    print(f"not determined: {', '.join(missing)}; {more}")
+    which = "without a tare" if found.tare is None else "after this tare"
+    print(f"{which} not determined: {', '.join(missing)}; {more}")
 
 
 def _since(found: Bound, k: int) -> str:
