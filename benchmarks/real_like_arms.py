@@ -17,8 +17,9 @@ import numpy as np
 
 from armload import FilteredRecursiveLeastSquares, PosteriorLeastSquares, RecursiveLeastSquares, __version__, arm
 from armload.evaluate import Comparison, EvaluationRun, Table, compare
+from armload.hybrid import HybridIdentifier
 from armload.inertia import NAMES, InertialParameters
-from armload.least_squares import GaussianPrior
+from armload.least_squares import GaussianPrior, SmoothPosteriorLeastSquares
 from armload.motion import random_motion
 from armload.payloads import random_payloads
 from armload.simulate import Run, Sensors, World, simulate_many
@@ -60,11 +61,14 @@ def run(count: int) -> Comparison:
             "rls-filter, with tare": FilteredRecursiveLeastSquares(robot),
             "map": lambda _: PosteriorLeastSquares(robot),
             "map, with tare": lambda tare: PosteriorLeastSquares(robot, tare),
+            "map-gp, with tare": lambda tare: SmoothPosteriorLeastSquares(robot, tare),
+            "hybrid": lambda _: HybridIdentifier(robot),
+            "hybrid, with tare": lambda tare: HybridIdentifier(robot, tare),
         },
         cases(count),
         TIMES,
         training=prior,
-        split="nothing is trained; payloads, arms and motions all differ; tare on another motion",
+        split="payloads, arms and motions all differ, none of them in the hybrid's training; tare on another motion",
     )
 
 
