@@ -167,6 +167,7 @@ def bound(
         runs.append(empty())
         _add(runs[0], before, slice(None))
     runs.append(now)
+    noise = replace(noise, overrated=1.0)  # a bound is of the model itself
     nothing = GaussianPrior(np.zeros(10), prior.covariance)  # with b = 0 the answer is phi = 0, whatever was measured
     covariances, conditions, first = [], [], 0
     for stop in stops:
