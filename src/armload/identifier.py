@@ -66,6 +66,11 @@ class Identifier(ABC):
     calibrated: bool = False
     known: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
 
+    @property
+    def alone(self) -> NDArray[np.float64] | None:
+        """Standard deviation (10,) of the last estimate without what is `known`, under a weak prior; None: the same."""
+        return None
+
     @abstractmethod
     def reset(self) -> None:
         """Forget everything; the next sample is the first."""

@@ -36,7 +36,7 @@ class Identification:
     n_samples, duration: samples used and the time they span [s].
     phi, phi_low, phi_high: ten parameters in the paper's order, and their 95 % interval.
     interval: "calibrated" or "approximate".
-    determined: for each parameter, whether the log says more than was known before.
+    determined: for each parameter, whether the log itself says more than was known before.
     mass, com, inertia_com: the same payload about its centre of mass [kg, m, kg·m²], in the frame's axes.
     consistent: whether a body with these parameters can exist.
     held: whether anything is there at all (the mass lies at least three standard deviations above zero).
@@ -108,8 +108,8 @@ def identify(
             added since.
         tool: a tool mounted in the recording whose parameters are known; the answer is what it carries. Whether it was
             mounted at the tare too is found from the tare.
-        method: a name in `armload.methods.METHODS`, or the path of a trained model; None: the most trustworthy for any
-            log, "map".
+        method: a name in `armload.methods.METHODS`, or the path of a trained model; None: the most trustworthy for the
+            arm, "hybrid" where one is shipped, "map-gp" elsewhere.
         progress: told in a few words what is being done.
 
     Raises:
@@ -129,7 +129,7 @@ def identify(
         note = () if tare is None else ("the tool was mounted at the tare already",)
     else:
         found, relative_to = _run(recording, arm, tare, method), "tool"
-        found = found._replace(estimate=replace(found.estimate, phi=found.estimate.phi - tool.phi))
+        found = found.less(tool.phi)
         note = ("the tool was mounted after the tare: the answer is what was added since, less the tool",)
     return _answer(found, arm, recording, relative_to, note)
 
@@ -156,6 +156,8 @@ class _Found(NamedTuple):
     """What a method found, and what was known before: mean and standard deviation (10,), used as a prior or not.
 
     calibrated: whether its error bars were checked on held-out episodes.
+    alone: standard deviation (10,) without a learned prior, of a method that has one.
+    physics: the estimate before a learned prior, of such a method.
     """
 
     estimate: Estimate
@@ -165,6 +167,17 @@ class _Found(NamedTuple):
     method: str
     why: str
     calibrated: bool = False
+    alone: NDArray[np.float64] | None = None
+    physics: Estimate | None = None
+
+    def less(self, tool: NDArray[np.float64]) -> _Found:
+        """The same without a tool (10,)."""
+        parts = {
+            name: replace(value, phi=value.phi - tool)
+            for name in ("estimate", "physics")
+            if (value := getattr(self, name)) is not None
+        }
+        return self._replace(**parts)
 
 
 def _check(log: Recording, arm: Arm) -> None:
@@ -220,7 +233,18 @@ def _run(recording: Recording, arm: Arm, tare: Recording | None, method: str | P
 def _found(identifier: Identifier, recording: Recording, weak: NDArray, prior: bool, why: str) -> _Found:
     known, std = (np.zeros(10), weak) if identifier.known is None else identifier.known
     estimate = identifier.run(recording)
-    return _Found(estimate, known, std, prior, identifier.name, why, identifier.calibrated)
+    physics = None
+    if identifier.known is not None and isinstance(identifier, PosteriorLeastSquares):
+        solved = identifier.posterior
+        physics = replace(estimate, phi=solved.phi, covariance=solved.covariance)
+    return _Found(estimate, known, std, prior, identifier.name, why, identifier.calibrated, identifier.alone, physics)
+
+
+def _body(estimate: Estimate) -> NDArray[np.float64]:
+    """The nearest parameters (10,) that a body can have, in the metric of what is known."""
+    if is_consistent(estimate.phi):
+        return estimate.phi.copy()
+    return nearest_consistent(estimate.phi, np.linalg.inv(estimate.covariance), margin=1e-5)
 
 
 def _answer(
@@ -229,12 +253,15 @@ def _answer(
     estimate, before = found.estimate, found.before
     phi, half, half_before = estimate.phi.copy(), Z95 * estimate.std, Z95 * found.before_std
     determined = half <= (half_before / _SHRINK if found.prior else _SMALL)
+    if found.alone is not None:  # a family's bodies are alike: what follows from its mass alone, the log has not told
+        determined &= found.alone <= payload_prior_std(arm) / _SHRINK
     held = bool(determined[0] and phi[0] > _HELD * estimate.std[0])
     low_before, high_before = before - half_before, before + half_before
     if not found.prior:  # the method knew nothing of what was known before: its own interval counts too
         low_before, high_before = np.minimum(low_before, phi - half), np.maximum(high_before, phi + half)
-    low = np.where(determined, phi - half, low_before)
-    high = np.where(determined, phi + half, high_before)
+    own = determined | found.calibrated  # intervals that were checked to hold are reported as they are
+    low = np.where(own, phi - half, low_before)
+    high = np.where(own, phi + half, high_before)
     removed = determined[0] and phi[0] < -half[0]
     said = list(notes)
     if removed:
@@ -244,11 +271,10 @@ def _answer(
             else "the mass is negative: less is mounted than the model of the arm and its tool assume, or the torque's "
             "sign is turned"
         )
-    elif not is_consistent(phi):
-        # the nearest parameters that a body can have, in the metric of what is known
-        information = np.linalg.inv(estimate.covariance)
-        phi = nearest_consistent(phi, information, margin=1e-5)
-        away = phi - estimate.phi
+    else:
+        fitted = found.physics or estimate
+        phi = _body(estimate)
+        away, information = _body(fitted) - fitted.phi, np.linalg.inv(fitted.covariance)
         if away @ information @ away > _MISFIT**2:
             said.append(
                 "no body fits within the error bars: check the robot, the base (--gravity), what is mounted and the "

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.errors import ModelError
-from armload.hybrid.evidence import Physics
+from armload.hybrid.evidence import Evidence, Physics
 from armload.hybrid.model import HybridModel
 from armload.identifier import Estimate
 from armload.inertia import is_consistent, nearest_consistent
-from armload.least_squares import JointFeatures
+from armload.least_squares import JointFeatures, payload_prior_std
 from armload.recording import Recording
 
 _MARGIN = 1e-5
@@ -56,10 +56,11 @@ class HybridIdentifier(Physics):
         """Forget the run (not the tare); the next sample is the first."""
         super().reset()
         self._phi, self._covariance = self._payloads.mean, np.diag(self._payloads.std**2)
+        self._evidence: Evidence | None = None
 
     def _estimate(self, t: float) -> Estimate:
         super()._estimate(t)
-        evidence = self.evidence(t)
+        self._evidence = evidence = self.evidence(t)
         found = self.model.calibration.answer(evidence, self._payloads)
         if evidence.kind:  # perhaps the payload was taken off: then −phi is a body
             removed = self.model.calibration.answer(evidence.mirrored, self._payloads)
@@ -68,6 +69,15 @@ class HybridIdentifier(Physics):
                 return self._last(t)
         self._phi, self._covariance = body(found.mean, found.covariance), found.covariance
         return self._last(t)
+
+    @property
+    def alone(self) -> NDArray[np.float64]:
+        """Standard deviation (10,) of the last estimate under the weak prior of `payload_prior_std` instead."""
+        weak = payload_prior_std(self.arm)
+        if self._evidence is None:
+            return weak
+        trusted = self._evidence.information / self.model.calibration.kappa(self._evidence.traits[None])[0]
+        return weak * np.sqrt(np.diag(np.linalg.inv(np.eye(10) + weak[:, None] * trusted * weak)))
 
     def _last(self, t: float) -> Estimate:
         seen = self._count + len(self._waiting)
