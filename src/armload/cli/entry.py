@@ -32,6 +32,7 @@ COMMANDS = {
     "identify": "tell from a log what the robot holds: mass, centre of mass, inertia, with 95 % intervals",
     "methods": "list the methods of identification: when to use each, its source, and what is left out",
     "report": "write an HTML report: figures of the log and of every method's estimate over time",
+    "benchmark": "measure every method on every population: errors over time, intervals, repeatability",
     "reproduce": "run the paper's study again and put a verdict beside each of its claims",
     "motion": "show, check, export or draw an excitation motion",
 }
