@@ -138,7 +138,8 @@ def test_who_does_not_see_the_tare_is_told_the_tool(with_tool):
 
 
 def test_a_refusal_counts_as_knowing_nothing(with_tool):
-    found = measure(Teller("x", "", True), *with_tool, None, (0.1, 0.5))
+    episodes, logs = with_tool
+    found = measure(Teller("x", "", True), episodes, logs, None, (0.1, 0.5))
     assert found["refused"] == ["this log says nothing"]
     assert found["phi"] == [[[0.0] * 10] * 2]
     assert found["std"] == [[[None] * 10] * 2]
