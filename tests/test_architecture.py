@@ -23,8 +23,8 @@ OWNERS = {
     "pyarrow": {"recording", "dataset"},
     "mujoco": {"simulate"},
     "jax": {"learners"},
-    "sklearn": {"learners"},
-    "safetensors": {"learners"},
+    "sklearn": {"learners", "hybrid"},
+    "safetensors": {"learners", "hybrid"},
     "matplotlib": {"report"},
     "jinja2": {"report"},
 }

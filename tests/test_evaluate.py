@@ -24,7 +24,7 @@ from armload.evaluate import (
 from armload.identifier import Estimate, Identifier
 from armload.inertia import NAMES, InertialParameters
 from armload.least_squares import Correction, effort_scale
-from armload.least_squares.posterior import _PRIOR_RESIDUAL, RegressionData, solve
+from armload.least_squares.posterior import RIGID, RegressionData, solve
 from armload.recording import Recording
 
 CAMERA = InertialParameters.from_com(1.3, (0.03, -0.02, 0.06), np.diag([4e-3, 5e-3, 3e-3]))
@@ -280,7 +280,7 @@ def test_a_payload_prior_enters_as_bayes_rule_says(panda, analytic_log):
     data.add(log.t, log.q, log.dq, log.tau)
     prior = GaussianPrior.of(FAMILY)
     size = 10 + correction.size
-    residual = (_PRIOR_RESIDUAL * correction.effort) ** 2 * data.blocks.block
+    residual = (RIGID.residual * correction.effort) ** 2 * data.blocks.block
     A, b = np.einsum("jab,j->ab", data.A, 1 / residual), np.einsum("ja,j->a", data.b, 1 / residual)
     P0, z0 = np.zeros((size, size)), np.zeros(size)
     P0[:10, :10], P0[10:, 10:], z0[:10] = prior.covariance, np.diag(correction.prior_std**2), prior.mean
