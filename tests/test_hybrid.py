@@ -170,6 +170,14 @@ def test_kappa_follows_the_trait_that_carries_it(synthetic, mixture):
     assert high / low == pytest.approx(10.0, rel=0.35)
 
 
+def test_widths_belong_to_the_times_asked_for_however_samples_are_jittered(synthetic, mixture):
+    rng = np.random.default_rng(7)
+    jittered = replace(synthetic, t=synthetic.t * rng.uniform(0.9, 1.0, len(synthetic)))
+    calibration = Calibration.fit(jittered, mixture, learned=False)
+    assert calibration.times == pytest.approx([0.095, 0.95], rel=0.01)
+    assert calibration.widths == pytest.approx(Calibration.fit(synthetic, mixture, learned=False).widths)
+
+
 def test_cross_validation_covers_every_episode(synthetic, mixture):
     checked = cross_validated(synthetic, mixture)
     assert checked.episodes == 700
@@ -190,6 +198,7 @@ def test_a_model_answers_the_same_after_it_was_saved(synthetic, mixture, panda, 
             back.calibration.answer(evidence, back.prior).mean, calibration.answer(evidence, mixture).mean
         )
     assert back.provenance == {"note": 1}
+    assert not back.calibrated  # nobody has checked it
     assert HybridModel.wrote(path)
 
 
@@ -226,6 +235,7 @@ def test_the_shipped_model_is_small_and_belongs_to_the_panda(panda):
     path = HybridModel.shipped("panda")
     assert path is not None
     assert path.stat().st_size < 5e6
+    assert shipped_model(panda).calibrated
     assert shipped_model(panda).prior_for(panda).mean[0] > 0.0
     with pytest.raises(ModelError, match=r"trained for panda: ur10e"):
         shipped_model(panda).prior_for(arm("ur10e"))

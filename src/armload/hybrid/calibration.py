@@ -30,6 +30,7 @@ _INFORMATIVE = 9.0  # a direction counts as seen once the evidence shrinks its p
 _MEMBERS, _DEPTH, _UNITS, _EPOCHS = 5, 7, 32, 60
 _FEWEST = 30  # episodes below which a quantile is not worth its name
 _KAPPA = (0.1, 1e3)  # range of the factor
+_APART = 0.2  # ln of the least ratio of two times
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,20 +88,30 @@ class Calibration:
         episodes = rng.permutation(np.unique(records.episode))
         calibrated = np.isin(records.episode, episodes[: int(held_out * len(episodes))])
         bag, level = _fit_kappa(records.select(~calibrated), prior, learned, seed)
-        times = np.unique(np.round(records.t, 1))
+        times = _times(records.t)
         draft = cls(bag, level, times, np.ones((len(KINDS), len(times), 10)))
         rest = records.select(calibrated)
-        score = scores(rest, prior, draft)
+        score, nearest = scores(rest, prior, draft), _nearest(rest.t, times)
         widths = np.ones((len(KINDS), len(times), 10))
         for kind in range(len(KINDS)):
-            for b, time in enumerate(times):
-                rows = (rest.kind == kind) & (np.round(rest.t, 1) == time)
+            for b in range(len(times)):
+                rows = (rest.kind == kind) & (nearest == b)
                 if (n := int(rows.sum())) >= _FEWEST:
                     share = min(np.ceil((n + 1) * COVERAGE) / n, 1.0)
                     widths[kind, b] = np.quantile(score[rows], share, axis=0, method="higher")
                 elif kind > 0:  # too few to tell: as with any tare
                     widths[kind, b] = widths[kind - 1, b]
         return cls(bag, level, times, widths)
+
+
+def _times(t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The times [s] that records were taken at: samples are jittered and lost, so that none falls on them exactly."""
+    t = np.sort(t)
+    return np.array([np.median(part) for part in np.split(t, np.flatnonzero(np.diff(np.log(t)) > _APART) + 1)])
+
+
+def _nearest(t: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.intp]:
+    return np.argmin(np.abs(np.log(t[:, None] / times)), axis=1)
 
 
 def posterior(evidence: Evidence, prior: MixturePrior, kappa: float) -> MixturePosterior:

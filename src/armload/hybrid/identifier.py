@@ -37,7 +37,6 @@ class HybridIdentifier(Physics):
     """
 
     name = "hybrid"
-    calibrated = True
 
     def __init__(
         self,
@@ -49,6 +48,7 @@ class HybridIdentifier(Physics):
     ) -> None:
         self.model = shipped_model(arm) if model is None else model
         self._payloads = self.model.prior_for(arm)
+        self.calibrated = self.model.calibrated
         self.known = (self._payloads.mean, self._payloads.std)
         super().__init__(arm, tare, refresh, features)
 

@@ -16,7 +16,7 @@ from armload.errors import ModelError
 from armload.hybrid.calibration import Calibration
 from armload.hybrid.evidence import KINDS
 from armload.hybrid.mixture import MixturePrior
-from armload.hybrid.model import HybridModel, kinship
+from armload.hybrid.model import POOLED, HybridModel, kinship
 from armload.hybrid.records import TIMES, Records, measure_episodes
 from armload.least_squares import payload_prior_std
 from armload.payloads import draw_payload
@@ -94,7 +94,7 @@ def train_hybrid(
             "population": population,
             "episodes": episodes,
             "seed": seed,
-            "pooled coverage, cross-validated": round(checked.pooled, 4),
+            POOLED: round(checked.pooled, 4),
         },
     )
     return model, checked
