@@ -155,10 +155,10 @@ def _records(
     """Records of all episodes, chunk by chunk; a finished chunk is read back instead of measured again."""
     parts: list[Records] = []
     for first in range(0, episodes, _CHUNK):
-        count, name = (
-            min(_CHUNK, episodes - first),
-            f"{arm.fingerprint}{population}{seed}{first}{min(_CHUNK, episodes - first)}",
-        )
+        count = min(_CHUNK, episodes - first)
+        name = f"{arm.fingerprint}{population}{seed}{first}{count}"
+        if arm.rated_payload is None:  # the same links, but payloads are drawn for what the joints can hold
+            name += "unrated"
         path = None if folder is None else folder / f"episodes-{hashlib.sha256(name.encode()).hexdigest()[:12]}.npz"
         if path is not None and path.is_file():
             part = Records.load(path)
