@@ -11,7 +11,7 @@ from armload.benchmark.rows import BASELINES, BOUND, Row, fingerprint, rows_for
 from armload.benchmark.run import cell_name, measure
 from armload.benchmark.tables import AHEAD, group_table, losses_table, repeatability_table
 from armload.benchmark.targets import verdicts
-from armload.cells import load_cells
+from armload.cells import finished_cell, load_cells
 from armload.cli import main
 from armload.episodes import EpisodeLogs, Recipe, draw_episodes
 from armload.errors import ArmloadError, IdentificationError
@@ -267,6 +267,13 @@ def test_what_is_measured_is_not_measured_again_and_a_further_method_is_all_that
     after = {path.name: path.stat().st_mtime_ns for path in (finished / "cells").iterdir()}
     assert set(after) - set(before) == {"untared-900001-wls.json", "untared-900002-wls.json"}
     assert all(after[name] == at for name, at in before.items())
+
+
+def test_a_cell_counts_only_with_its_key(finished):
+    cell = load_cells(finished / "cells")["untared-900001-rls-filter"]
+    assert finished_cell(finished / "cells", cell["name"], cell["key"]) == cell
+    assert finished_cell(finished / "cells", cell["name"], "another") is None
+    assert finished_cell(finished / "cells", "untared-900009-rls-filter", cell["key"]) is None
 
 
 def test_a_longer_run_keeps_the_episodes_of_the_shorter(finished):

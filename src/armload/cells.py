@@ -30,14 +30,15 @@ def load_cells(folder: str | Path) -> dict[str, dict[str, Any]]:
     Raises:
         DatasetError: a file that is not a cell.
     """
-    cells = {}
-    for path in sorted(Path(folder).glob("*.json")):
-        try:
-            cell = json.loads(path.read_text(encoding="utf-8"))
-            cells[cell["name"]] = cell
-        except (OSError, ValueError, KeyError, TypeError):
-            raise DatasetError(f"{path} is not a cell: delete it, and it will be measured again") from None
-    return cells
+    cells = (_read(path) for path in sorted(Path(folder).glob("*.json")))
+    return {cell["name"]: cell for cell in cells}
+
+
+def finished_cell(folder: str | Path, name: str, key: str) -> dict[str, Any] | None:
+    """The cell of a name if its file is there with that key, whoever measured it; None otherwise."""
+    path = Path(folder) / f"{name}.json"
+    cell = _read(path) if path.is_file() else None
+    return cell if cell is not None and cell.get("key") == key else None
 
 
 def save_cell(folder: str | Path, cell: dict[str, Any], indent: int | None = 1) -> Path:
@@ -51,3 +52,13 @@ def save_cell(folder: str | Path, cell: dict[str, Any], indent: int | None = 1) 
     with replacing(path) as temporary:
         temporary.write_text(json.dumps(cell, indent=indent, allow_nan=False) + "\n", encoding="utf-8")
     return path
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        cell = json.loads(path.read_text(encoding="utf-8"))
+        if isinstance(cell["name"], str):
+            return cell
+    except (OSError, ValueError, KeyError, TypeError):
+        pass
+    raise DatasetError(f"{path} is not a cell: delete it, and it will be measured again")

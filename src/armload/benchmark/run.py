@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from armload.arms import Arm, arm
 from armload.benchmark.populations import ALL, REPEAT, Population, population, prior_of
 from armload.benchmark.rows import BOUND, Row, bound_std, default_names, fingerprint, rows_for, trained_on
-from armload.cells import key_of, load_cells, save_cell
+from armload.cells import finished_cell, key_of, load_cells, save_cell
 from armload.episodes import Episode, EpisodeLogs, simulate_episodes
 from armload.errors import ArmloadError, IdentificationError
 from armload.identifier import Estimate
@@ -186,11 +186,16 @@ def _arm_of_process(robot: str) -> Arm:
 
 def _measured(task: Task, size: Size, folder: Path) -> list[dict[str, Any]]:
     """Simulate the episodes once and put every missing row through them; each cell is written when it is done."""
-    robot, of = _arm_of_process(size.robot), population(task.population)
+    robot, of, cells, missing = _arm_of_process(size.robot), population(task.population), [], []
+    for row, key in task.rows:  # another run may have finished it meanwhile
+        cell = finished_cell(folder, cell_name(task.population, task.seed, row.name), key)
+        cells += [] if cell is None else [cell]
+        missing += [(row, key)] if cell is None else []
+    if not missing:
+        return cells
     episodes = of.episodes(robot, task.seed, task.count)
     logs, prior = list(simulate_episodes(episodes, rate=size.rate)), prior_of(of.recipe, robot)
-    cells = []
-    for row, key in task.rows:
+    for row, key in missing:
         cell = {
             "name": cell_name(task.population, task.seed, row.name),
             "key": key,
