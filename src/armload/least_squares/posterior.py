@@ -24,11 +24,13 @@ from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
 from armload.least_squares.prior import GaussianPrior
-from armload.least_squares.regression import NOVELTY, RegressionData
+from armload.least_squares.regression import NOVELTY, REGRESSOR_RATE, RegressionData
 
 # standard deviation of first moments and inertia per kilogram: bodies within about 20 cm of the frame's origin
 _REACH = np.array([0.2] * 3 + [0.2**2] * 6)  # [m, m²]
 _LIGHTEST = 0.02  # [kg]
+# [s] a run shorter than this sees one value of a residual that changes slowly: its mean does not grow with 1/T
+_MOMENT = 0.1
 # Coulomb friction above this fraction of the effort limit: the torque is the motor's, not the link's
 _MOTOR_SIDE = 0.01
 _GAIN_STD = {"link": 0.005, "motor": 0.02}  # torque calibration, 1 sigma; motor constants are known to a few per cent
@@ -162,7 +164,9 @@ class _Problem:
         self.mean, self.root = np.zeros(self.size), None
         if prior is not None:
             self.mean[self.last], self.root = prior.mean, prior.root
-        self.expected = (noise.residual * self.correction.effort) ** 2 * noise.block
+        whole = (noise.residual * self.correction.effort) ** 2 * noise.block
+        share = [min(1.0, max(run.blocks.duration, 1.0 / REGRESSOR_RATE) / _MOMENT) for run in runs]
+        self.expected = np.outer(share, whole)  # (K, n)
         self.selections = []
         for k in range(count):
             E = np.zeros((10 + p, self.size))
@@ -176,7 +180,7 @@ class _Problem:
 
     def scales(self, start: Scales | None) -> Scales:
         """Where expectation–maximisation begins."""
-        noise = np.tile(self.expected, (len(self.runs), 1))
+        noise = self.expected.copy()
         if start is None:
             return Scales(noise, self.correction.prior_std**2, self.feature_variance, self.payload_variance)
         noise[: len(start.noise)] = start.noise[: len(noise)]
@@ -227,7 +231,7 @@ class _Problem:
     def _noise(self, found: _Gaussian) -> NDArray[np.float64]:
         """S of each run."""
         model, out = self.noise_model, []
-        for run, E in zip(self.runs, self.selections, strict=True):
+        for run, E, expected in zip(self.runs, self.selections, self.expected, strict=True):
             covariance = None
             if self.features.size:
                 turned = found.slope @ found.covariance  # (n, R, z)
@@ -236,8 +240,8 @@ class _Problem:
                 shared = np.broadcast_to(E @ found.covariance @ E.T, (len(own), len(E), len(E)))
                 upper = np.concatenate([shared, cross], axis=2)
                 covariance = np.concatenate([upper, np.concatenate([cross.swapaxes(1, 2), own], axis=2)], axis=1)
-            S = run.residual_variance(E @ found.mean, self.expected, model.novelty, found.weights, covariance)
-            out.append(np.maximum(S, self.expected) if model.floor else S)
+            S = run.residual_variance(E @ found.mean, expected, model.novelty, found.weights, covariance)
+            out.append(np.maximum(S, expected) if model.floor else S)
         return np.array(out)
 
     def _payloads(self, z: NDArray, variance: NDArray) -> NDArray:
@@ -277,7 +281,7 @@ class _Problem:
 
     def _ratios(self, scales: Scales) -> dict[str, NDArray[np.float64]]:
         friction = self.correction.coulomb(scales.eta) / self.correction.coulomb(self.correction.prior_std**2)
-        out = {"noise": scales.noise[-1] / self.expected, "friction": friction}
+        out = {"noise": scales.noise[-1] / self.expected[-1], "friction": friction}
         for name, k in (("pose", 0), ("velocity", self.features.pose)):
             if self.features.size > k:
                 out[name] = scales.features[:, k] / self.feature_variance[:, k]
