@@ -5,7 +5,7 @@ python examples/identify_a_log.py [LOG.csv]        (a Panda's log; without one, 
 
 import sys
 
-from armload import FilteredRecursiveLeastSquares, PosteriorLeastSquares, arm, read_recording
+from armload import FilteredRecursiveLeastSquares, HybridIdentifier, arm, read_recording
 from armload.identify import identify
 from armload.motion import taie2024
 from armload.payloads import test_payload
@@ -21,7 +21,7 @@ else:
 print(identify(log, panda))
 
 # the same on a stream: a sample in, an estimate out
-for identifier in (PosteriorLeastSquares(panda), FilteredRecursiveLeastSquares(panda)):
+for identifier in (HybridIdentifier(panda), FilteredRecursiveLeastSquares(panda)):
     identifier.reset()
     for sample in log.between(log.t[0], log.t[0] + 2.0):
         estimate = identifier.update(sample)

@@ -31,14 +31,14 @@ save_model(path, ensemble, arm=panda, motion=motion, dataset_hash=dataset.hash, 
 # a loading that was held out, on the motion of the training
 unseen = loadings[dataset.payload[split.test[0]]]
 log = simulate(panda, motion, unseen, world=world, sensors=sensors, rate=200.0, seed=7)
-print(f"truth: {unseen.parameters.mass:.3f} kg")
-print(f"trees: {identify(log, panda, method=path).mass:.3f} kg")
-print(f"map:   {identify(log, panda).mass:.3f} kg")
+print(f"truth:  {unseen.parameters.mass:.3f} kg")
+print(f"trees:  {identify(log, panda, method=path).mass:.3f} kg")
+print(f"hybrid: {identify(log, panda).mass:.3f} kg")
 
 # the same payload on another motion: the trees do not know it and say so
 other = simulate(panda, random_motion(panda, seed=2), unseen, world=world, sensors=sensors, rate=200.0, seed=8)
 try:
     identify(other, panda, method=path)
 except ArmloadError as refusal:
-    print(f"trees: {refusal}")
-print(f"map:   {identify(other, panda).mass:.3f} kg")
+    print(f"trees:  {refusal}")
+print(f"hybrid: {identify(other, panda).mass:.3f} kg")

@@ -46,6 +46,8 @@ def test_demo_compares_every_kind_on_a_payload_nobody_trained_on(demo):
         "rls-filter, with tare",
         "map",
         "map, with tare",
+        "hybrid",
+        "hybrid, with tare",
         "trees",
         "trees, two stages",
         "networks",
@@ -58,13 +60,15 @@ def test_demo_compares_every_kind_on_a_payload_nobody_trained_on(demo):
     assert all(np.any(p.parameters.phi != truth.phi) for p in container_loadings())
     assert "by payload" in demo.table.note
     assert "seed 2024" in demo.table.note
-    best = demo.comparison.mae[names.index("map, with tare") - 1, -1, 0]
+    best = demo.comparison.mae[names.index("hybrid, with tare") - 1, -1, 0]
+    assert best < demo.comparison.mae[names.index("map, with tare") - 1, -1, 0]
     assert best < demo.comparison.mae[names.index("training mean") - 1, -1, 0]
 
 
 def test_demo_writes_what_it_found(demo):
     found = json.loads((demo.folder / "identified.json").read_text())
     assert found == demo.identification.to_dict()
+    assert (found["method"], found["interval"]) == ("hybrid", "calibrated")
     assert found["relative_to"] == "tare"
     assert found["mass"] == pytest.approx(unseen_payload().parameters.mass, abs=0.05)
     page = demo.report.read_text()
@@ -209,7 +213,16 @@ def test_report_of_a_log_shows_motion_torques_and_every_method(call, work, tmp_p
     argv = ("report", tmp_path / "log.csv", "--robot", "panda", "--out", tmp_path / "r.html")
     call(*argv, "--model", work / "trees.safetensors")
     page = text_of(tmp_path / "r.html")
-    for name in ("map", "rls", "rls-filter", "trees", "Estimates over time", "Joint position and velocity", "log.csv"):
+    for name in (
+        "hybrid",
+        "map",
+        "rls",
+        "rls-filter",
+        "trees",
+        "Estimates over time",
+        "Joint position and velocity",
+        "log.csv",
+    ):
         assert name in page
     assert "truth" not in page.replace("No truth is known", "")
 
@@ -221,7 +234,14 @@ def test_report_with_truth_shows_errors_and_baselines(call, tmp_path):
     argv = ("report", tmp_path / "log.npz", "--robot", "panda", "--out", tmp_path / "r.html")
     printed = call(*argv, "--tare", tmp_path / "tare.npz", "--truth", "franka-hand").out
     page = text_of(tmp_path / "r.html")
-    for name in ("map", "rls-filter", "training mean", "same-prior least squares", "What this does not prove"):
+    for name in (
+        "hybrid",
+        "map",
+        "rls-filter",
+        "training mean",
+        "same-prior least squares",
+        "What this does not prove",
+    ):
         assert name in page
     row = next(line.split() for line in printed.splitlines() if line.strip().startswith("map"))
     assert float(row[1]) < 10.0  # g

@@ -20,6 +20,7 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from armload.arms import ARMS, Arm, arm
     from armload.errors import ArmloadError
+    from armload.hybrid import HybridIdentifier
     from armload.identifier import Estimate, Identifier
     from armload.identify import Identification
     from armload.inertia import InertialParameters
@@ -40,6 +41,7 @@ _ROOMS = {
     "Arm": "arms",
     "arm": "arms",
     "ArmloadError": "errors",
+    "HybridIdentifier": "hybrid",
     "Estimate": "identifier",
     "Identifier": "identifier",
     "METHODS": "methods",
@@ -74,6 +76,7 @@ __all__ = [
     "Estimate",
     "FilteredRecursiveLeastSquares",
     "FourierMotion",
+    "HybridIdentifier",
     "Identification",
     "Identifier",
     "InertialParameters",

@@ -30,6 +30,7 @@ from armload.identifier import Identifier
 from armload.identify import Identification, identify
 from armload.inertia import InertialParameters
 from armload.least_squares import FilteredRecursiveLeastSquares, PosteriorLeastSquares, RecursiveLeastSquares
+from armload.methods import METHODS, default_for
 from armload.motion import Motion, random_motion, taie2024
 from armload.payloads import container_loadings, test_payload
 from armload.recording import Recording, write_recording
@@ -63,7 +64,7 @@ class DemoResult:
     """What the demo found; everything is also in `folder`.
 
     table: the one table: truth, methods, baselines. comparison: the numbers behind it.
-    identification: what `armload identify` says of the run (method map, with the tare).
+    identification: what `armload identify` says of the run (the default method, with the tare).
     report: the HTML file. seconds: what each part took.
     """
 
@@ -122,7 +123,7 @@ def run_demo(
     training = [dataset.truth(k) for k in np.unique(dataset.run[split.train])]
     validation = len(np.unique(dataset.run[split.validation]))
     comparison = compare(
-        _least_squares(robot) | learned,
+        _physical(robot) | learned,
         runs,
         training=training,
         split=f"by payload: {len(training)} loadings for training, {validation} for validation, the test payload is in "
@@ -227,14 +228,17 @@ def _learned(model: LearnedModel, robot: Arm, _: Recording | None) -> Identifier
     return LearnedIdentifier(model, robot)
 
 
-def _least_squares(robot: Arm) -> dict[str, Method]:
+def _physical(robot: Arm) -> dict[str, Method]:
     """The physical methods; those given as functions of the tare do not use it, or in their own way."""
+    default = METHODS[default_for(robot)]
     return {
         "rls": lambda _: RecursiveLeastSquares(robot),
         "rls-filter": lambda _: FilteredRecursiveLeastSquares(robot),
         "rls-filter, with tare": FilteredRecursiveLeastSquares(robot),
         "map": lambda _: PosteriorLeastSquares(robot),
         "map, with tare": lambda tare: PosteriorLeastSquares(robot, tare),
+        default.name: lambda _: default.make(robot),
+        f"{default.name}, with tare": lambda tare: default.make(robot, tare),
     }
 
 

@@ -247,6 +247,12 @@ def _body(estimate: Estimate) -> NDArray[np.float64]:
     return nearest_consistent(estimate.phi, np.linalg.inv(estimate.covariance), margin=1e-5)
 
 
+def _misfit(estimate: Estimate) -> float:
+    """Standard deviations between an estimate and the nearest body."""
+    away = _body(estimate) - estimate.phi
+    return float(np.sqrt(away @ np.linalg.inv(estimate.covariance) @ away)) if away.any() else 0.0
+
+
 def _answer(
     found: _Found, arm: Arm, recording: Recording, relative_to: str, notes: tuple[str, ...] = ()
 ) -> Identification:
@@ -272,10 +278,8 @@ def _answer(
             "sign is turned"
         )
     else:
-        fitted = found.physics or estimate
         phi = _body(estimate)
-        away, information = _body(fitted) - fitted.phi, np.linalg.inv(fitted.covariance)
-        if away @ information @ away > _MISFIT**2:
+        if _misfit(found.physics or estimate) > _MISFIT:
             said.append(
                 "no body fits within the error bars: check the robot, the base (--gravity), what is mounted and the "
                 "torques' signs"

@@ -28,7 +28,7 @@ from armload.errors import ArmloadError, UsageError
 COMMANDS = {
     "demo": "the main job from end to end, in under three minutes: simulate, train, identify, compare, report",
     "dataset": "build a data set of simulated runs: the paper's table of position, velocity, torque and payload",
-    "train": "train an ensemble of trees or networks on a data set",
+    "train": "train the hybrid for an arm, or an ensemble of trees or networks on a data set",
     "identify": "tell from a log what the robot holds: mass, centre of mass, inertia, with 95 % intervals",
     "methods": "list the methods of identification: when to use each, its source, and what is left out",
     "report": "write an HTML report: figures of the log and of every method's estimate over time",

@@ -29,8 +29,8 @@ examples:
   armload report --dataset data/paper --model trees.safetensors --out test.html
 
 With --truth the report shows errors too, beside two baselines. With --dataset it shows them for runs with payloads that
-`armload train` held out for testing (with the same --seed). A trained model answers for all that the arm holds, as in
-its training: the tare is not subtracted from it.
+`armload train` held out for testing (with the same --seed). A trained ensemble answers for all that the arm holds, as
+in its training: the tare is not subtracted from it.
 """
 
 
@@ -129,15 +129,22 @@ def _of_dataset(options: argparse.Namespace, say: Callable[[str], None]) -> tupl
 
 def _methods(arm: Arm, log: Recording, models: list[str]) -> dict[str, Callable[[Recording | None], Identifier]]:
     """Every method by name, each to be told of the tare."""
+    from armload.hybrid import HybridIdentifier, HybridModel
     from armload.learners import load_model
     from armload.least_squares import FilteredRecursiveLeastSquares, PosteriorLeastSquares, RecursiveLeastSquares
+    from armload.methods import METHODS, default_for
 
+    default = METHODS[default_for(arm)]
     methods: dict[str, Callable[[Recording | None], Identifier]] = {
+        default.name: partial(default.make, arm),
         "map": partial(PosteriorLeastSquares, arm),
         "rls": partial(_tared, RecursiveLeastSquares, arm),
         "rls-filter": partial(_tared, FilteredRecursiveLeastSquares, arm),
     }
     for path in models:
+        if HybridModel.wrote(path):
+            methods[Path(path).stem] = partial(HybridIdentifier, arm, model=HybridModel.load(path))
+            continue
         model = load_model(path)
         model.check(arm, log)
         methods[Path(path).stem] = partial(_learned, model, arm)

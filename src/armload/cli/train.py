@@ -146,6 +146,8 @@ def settle(options: argparse.Namespace) -> None:
     for name, value in own.items():
         if getattr(options, name) is None:
             setattr(options, name, value)
+    if options.method == "ensemble" and options.kind == "mixed" and options.stages == 2:
+        raise UsageError("--kind mixed has one stage: leave out --stages 2, or choose tree or network")
     if options.out is not None and not options.out.endswith(".safetensors"):
         raise UsageError(f"--out is {options.out!r}: expected a name that ends in .safetensors")
 
@@ -155,8 +157,6 @@ def _run_ensemble(options: argparse.Namespace) -> None:
     from armload.dataset import open_dataset, split_payloads, split_rows
     from armload.learners import held_out_error, save_model
 
-    if options.kind == "mixed" and options.stages == 2:
-        raise UsageError("--kind mixed has one stage: leave out --stages 2, or choose tree or network")
     dataset = open_dataset(options.dataset)
     arm = arm_of_dataset(dataset, options.robot)
     motions = _motions(dataset, arm, options.motion)
