@@ -235,8 +235,10 @@ def _found(identifier: Identifier, recording: Recording, weak: NDArray, prior: b
     estimate = identifier.run(recording)
     physics = None
     if identifier.known is not None and isinstance(identifier, PosteriorLeastSquares):
-        solved = identifier.posterior
-        physics = replace(estimate, phi=solved.phi, covariance=solved.covariance)
+        solved = identifier.posterior  # as its information stands, whatever error bars were made of it
+        unit = np.outer(weak, weak)
+        covariance = unit * np.linalg.inv(np.eye(10) + unit * solved.information)
+        physics = replace(estimate, phi=covariance @ solved.vector, covariance=0.5 * (covariance + covariance.T))
     return _Found(estimate, known, std, prior, identifier.name, why, identifier.calibrated, identifier.alone, physics)
 
 
