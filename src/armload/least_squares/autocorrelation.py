@@ -31,13 +31,26 @@ class BlockMeans:
 
     def add(self, duration: float, value: ArrayLike) -> None:
         """One value that stands for `duration` seconds."""
-        if self._times[self._filled] + 0.5 * duration >= self.block:
-            self._filled += 1
-            if self._filled == _MOST_BLOCKS:
-                self._join_pairs()
-        self._sums[self._filled] += duration * np.asarray(value)
-        self._times[self._filled] += duration
-        self._count += duration > 0
+        self.extend(np.array([duration], dtype=float), np.asarray(value, dtype=float)[None])
+
+    def extend(self, durations: NDArray[np.float64], values: NDArray[np.float64]) -> None:
+        """Values (N, *shape) that stand for `durations` (N,) seconds each."""
+        first, time = 0, float(self._times[self._filled])
+        for k, duration in enumerate(durations.tolist()):
+            if time + 0.5 * duration >= self.block:
+                self._put(durations[first:k], values[first:k])
+                first, time = k, 0.0
+                self._filled += 1
+                if self._filled == _MOST_BLOCKS:
+                    self._join_pairs()
+            time += duration
+        self._put(durations[first:], values[first:])
+
+    def _put(self, durations: NDArray[np.float64], values: NDArray[np.float64]) -> None:
+        """Into the block being filled."""
+        self._sums[self._filled] += np.tensordot(durations, values, 1)
+        self._times[self._filled] += durations.sum()
+        self._count += int(np.count_nonzero(durations > 0))
 
     @property
     def rate(self) -> float:

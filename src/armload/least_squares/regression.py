@@ -77,13 +77,13 @@ class RegressionData:
         X, r = self._rows(t[rows], q[rows], dq[rows], lagged[rows])
         moving = np.tanh(np.abs(dq[rows]) / FRICTION_WIDTH)
         w = 1.0 / (1.0 + _PRESLIDING * (1.0 - moving**2))  # (N, n)
-        for j in range(self.correction.arm.n):
-            weighted = X[:, j] * (w[:, j] * h)[:, None]
-            self.A[j] += weighted.T @ X[:, j]
-            self.b[j] += weighted.T @ r[:, j]
         rooted = np.sqrt(w)[:, :, None] * np.concatenate([X, r[:, :, None]], axis=2)
-        for duration, value in zip(h, rooted, strict=True):
-            self.blocks.add(duration, value)
+        for j in range(self.correction.arm.n):
+            Xr = rooted[:, j] * np.sqrt(h)[:, None]
+            products = Xr.T @ Xr
+            self.A[j] += products[:-1, :-1]
+            self.b[j] += products[:-1, -1]
+        self.blocks.extend(h, rooted)
 
     def _rows(self, t: NDArray, q: NDArray, dq: NDArray, lagged: NDArray) -> tuple[NDArray, NDArray]:
         """X (N, n, size) and r (N, n)."""

@@ -228,7 +228,10 @@ def same_motion(
 
 
 def _interpolated(at: NDArray, t: NDArray, x: NDArray) -> NDArray[np.float64]:
-    return np.stack([np.interp(at, t, column) for column in x.T], axis=1)
+    """x (N, n) at other times (M, n); constant beyond its ends. What it costs does not depend on N."""
+    k = np.clip(np.searchsorted(t, at), 1, len(t) - 1)
+    share = np.clip((at - t[k - 1]) / (t[k] - t[k - 1]), 0.0, 1.0)[:, None]
+    return (1.0 - share) * x[k - 1] + share * x[k]
 
 
 def _rms(x: NDArray) -> float:
