@@ -20,13 +20,17 @@ from armload.hybrid import (
     measure_episodes,
     shipped_model,
 )
+from armload.hybrid.calibration import overrating
 from armload.identify import identify
 from armload.inertia import InertialParameters, is_consistent
+from armload.least_squares import JointFeatures, PosteriorLeastSquares
+from armload.least_squares import SmoothPosteriorLeastSquares as Smooth
 from armload.motion import random_motion
 from armload.payloads import random_payloads
 from armload.simulate import Sensors, World, simulate
 
 UNIT = np.array([0.5] + [0.05] * 3 + [5e-3] * 6)
+BODY = InertialParameters.from_com(1.2, (0.02, -0.03, 0.07), np.diag([4e-3, 3e-3, 2e-3]))
 
 
 def spread(rng, scale=1.0):
@@ -117,6 +121,35 @@ def test_a_covariance_that_is_none_is_refused():
         MixturePrior(np.ones(1), np.zeros((1, 10)), -np.eye(10)[None], ("x",))
 
 
+# ---------------------------------------------------------------------------- the physics
+
+
+def test_pose_features_have_the_kernel_of_a_gaussian_process():
+    features, rng = JointFeatures(n=3, pose=20_000, velocity=0), np.random.default_rng(8)
+    q = rng.uniform(-1.0, 1.0, size=(6, 3))
+    squared = ((q[:, None] - q) ** 2).sum(axis=2)
+    kernel = np.mean([np.exp(-squared / (2.0 * scale**2)) for scale in (0.7, 0.9, 1.1, 1.3, 1.5)], axis=0)
+    assert features.of_pose(q) @ features.of_pose(q).T == pytest.approx(kernel, abs=0.03)
+
+
+def test_velocity_features_span_friction_of_any_shape():
+    dq = np.linspace(-1.5, 1.5, 601)
+    g = JointFeatures(n=1, pose=0).of_velocity(dq[:, None])[:, 0]
+    for shape in (np.tanh(dq / 0.06), np.sign(dq) * (0.6 + 0.4 * np.exp(-((dq / 0.1) ** 2))) * (np.abs(dq) > 0.05), dq):
+        left = shape - g @ np.linalg.lstsq(g, shape)[0]
+        assert np.sqrt(np.mean(left**2)) < 0.15 * np.sqrt(np.mean(shape**2))
+
+
+def test_a_smooth_torque_that_no_rigid_body_explains_is_not_taken_for_payload(panda, analytic_log):
+    def smooth(q, _):
+        return 0.25 * np.stack([np.sin(1.3 * q[:, (j + 1) % 7] + q[:, j] + j) for j in range(7)], axis=1)
+
+    run = analytic_log(panda, BODY, extra=smooth)
+    tare = analytic_log(panda, duration=20.0, phase=1.0, extra=smooth)
+    rigid, both = (method(panda, tare).run(run).phi - BODY.phi for method in (PosteriorLeastSquares, Smooth))
+    assert np.linalg.norm(both / UNIT) < 0.5 * np.linalg.norm(rigid / UNIT)
+
+
 # ---------------------------------------------------------------------------- the error bars
 
 
@@ -160,6 +193,11 @@ def test_learning_how_far_evidence_is_overrated_makes_answers_and_intervals_bett
     )
     assert np.mean(error / UNIT) < 0.99 * np.mean(plain / UNIT)
     assert np.mean(with_bag / UNIT) < 0.95 * np.mean(without / UNIT)
+
+
+def test_evidence_that_claims_too_much_is_found_to_do_so_by_its_own_factor(synthetic, mixture):
+    claimed = 10.0 ** synthetic.traits[:, 1]
+    assert np.nanmean(overrating(synthetic, mixture) / claimed) == pytest.approx(1.0, abs=0.05)
 
 
 def test_kappa_follows_the_trait_that_carries_it(synthetic, mixture):

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from armload.hybrid import Coverage
 
 _EVERY = 20.0  # [s] between two lines of progress
-_WORST = 3  # cells named
+_WORST, _FEWEST = 3, 20  # cells named; episodes that one must rest on
 _PACKAGES = ("armload", "jax", "joblib", "mujoco", "numpy", "pin", "scikit-learn", "scipy")
 
 
@@ -101,6 +101,7 @@ def summary(robot: Arm, coverage: Coverage) -> dict[str, Any]:
         "parameters": list(NAMES),
         "cells": _plain(coverage.cells.tolist()),
         "ratio": _plain(coverage.ratio.tolist()),
+        "counts": coverage.counts.tolist(),
     }
 
 
@@ -130,6 +131,7 @@ def cells_table(coverage: Coverage) -> RichTable:
         "share of held-out truths inside their 95 % interval [%]",
         "compared with",
         "after",
+        "episodes",
         *NAMES,
         "half-width / error",
         left=1,
@@ -139,15 +141,21 @@ def cells_table(coverage: Coverage) -> RichTable:
             cells, ratio = coverage.cells[kind, b], coverage.ratio[kind, b]
             if not np.isnan(cells).all():
                 shown = [f"{100 * share:.1f}" for share in cells]
-                rows.add_row(name, f"{t:g} s", *shown, f"{ratio.min():.1f}–{ratio.max():.1f}")
+                rows.add_row(
+                    name, f"{t:g} s", str(coverage.counts[kind, b]), *shown, f"{ratio.min():.1f}–{ratio.max():.1f}"
+                )
         rows.add_section()
     return rows
 
 
 def said(coverage: Coverage) -> list[str]:
-    """The pooled coverage, the cells where it is lowest and those where the intervals are widest, in words."""
+    """The pooled coverage, the cells where it is lowest and those where the intervals are widest, in words.
+
+    Cells of a few episodes are left out: their share says nothing.
+    """
     import numpy as np
 
+    few = coverage.counts[..., None] < _FEWEST
     lines = [
         f"pooled coverage {100 * coverage.pooled:.1f} % on {coverage.episodes} episodes, each answered by a model that "
         "had not seen it (cross-validated)"
@@ -156,9 +164,11 @@ def said(coverage: Coverage) -> list[str]:
         ("lowest coverage", 100 * coverage.cells, " %", 1.0),
         ("widest intervals, mean half-width over mean absolute error", coverage.ratio, "", -1.0),
     ):
+        values = np.where(few, np.nan, values)
         order = np.argsort(sign * values, axis=None)[: min(_WORST, int(np.isfinite(values).sum()))]
         named = [f"{values.flat[k]:.1f}{unit} {_cell(np.unravel_index(k, values.shape))}" for k in order]
-        lines.append(f"{what}: {', '.join(named)}")
+        if named:
+            lines.append(f"{what}: {', '.join(named)}")
     return lines
 
 

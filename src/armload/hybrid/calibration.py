@@ -91,11 +91,11 @@ class Calibration:
         times = _times(records.t)
         draft = cls(bag, level, times, np.ones((len(KINDS), len(times), 10)))
         rest = records.select(calibrated)
-        score, nearest = scores(rest, prior, draft), _nearest(rest.t, times)
+        score, which = scores(rest, prior, draft), nearest(rest.t, times)
         widths = np.ones((len(KINDS), len(times), 10))
         for kind in range(len(KINDS)):
             for b in range(len(times)):
-                rows = (rest.kind == kind) & (nearest == b)
+                rows = (rest.kind == kind) & (which == b)
                 if (n := int(rows.sum())) >= _FEWEST:
                     share = min(np.ceil((n + 1) * COVERAGE) / n, 1.0)
                     widths[kind, b] = np.quantile(score[rows], share, axis=0, method="higher")
@@ -110,7 +110,8 @@ def _times(t: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([np.median(part) for part in np.split(t, np.flatnonzero(np.diff(np.log(t)) > _APART) + 1)])
 
 
-def _nearest(t: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.intp]:
+def nearest(t: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Which of the times (B,) each t (N,) belongs to."""
     return np.argmin(np.abs(np.log(t[:, None] / times)), axis=1)
 
 

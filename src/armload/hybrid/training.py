@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from armload.arms import Arm
 from armload.episodes import draw_episodes
 from armload.errors import ModelError
-from armload.hybrid.calibration import Calibration
+from armload.hybrid.calibration import Calibration, nearest
 from armload.hybrid.evidence import KINDS
 from armload.hybrid.mixture import MixturePrior
 from armload.hybrid.model import POOLED, HybridModel, kinship
@@ -43,12 +43,14 @@ class Coverage:
     pooled: share of all parameters, times and episodes that lay inside.
     cells: (3, B, 10) the same by what there was to compare with (`KINDS`), time and parameter; NaN where nothing was.
     ratio: (3, B, 10) mean half-width over mean absolute error. episodes: how many.
+    counts: (3, B) how many of the episodes a cell rests on.
     """
 
     pooled: float
     cells: NDArray[np.float64]
     ratio: NDArray[np.float64]
     episodes: int
+    counts: NDArray[np.int64]
 
 
 def train_hybrid(
@@ -134,13 +136,15 @@ def cross_validated(records: Records, prior: MixturePrior, seed: int = 0, learne
             half[row] = 1.959963984540054 * np.sqrt(np.diag(found.covariance))
             inside[row] = error[row] <= half[row]
     cells, ratio = np.full((len(KINDS), len(TIMES), 10), np.nan), np.full((len(KINDS), len(TIMES), 10), np.nan)
+    counts, which = np.zeros((len(KINDS), len(TIMES)), dtype=int), nearest(records.t, np.array(TIMES))
     for kind in range(len(KINDS)):
-        for b, time in enumerate(TIMES):
-            rows = (records.kind == kind) & (np.abs(np.log(records.t / time)) < 0.1)
+        for b in range(len(TIMES)):
+            rows = (records.kind == kind) & (which == b)
+            counts[kind, b] = rows.sum()
             if rows.any():
                 cells[kind, b] = inside[rows].mean(axis=0)
                 ratio[kind, b] = half[rows].mean(axis=0) / error[rows].mean(axis=0)
-    return Coverage(float(inside.mean()), cells, ratio, len(episodes))
+    return Coverage(float(inside.mean()), cells, ratio, len(episodes), counts)
 
 
 def _records(
