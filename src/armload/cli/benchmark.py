@@ -14,7 +14,7 @@ examples:
   armload benchmark --quick                       (two populations, four episodes each: under a minute)
   armload benchmark --jobs 2                      (all: hours; stop it at any time, the same command goes on)
   armload benchmark --populations reference,tool --methods hybrid,map,rls-filter+tare
-  armload benchmark --methods ekf --episodes 20   (one more row; what is finished is not measured again)
+  armload benchmark --methods ekf                 (one more row; what is finished is not measured again)
 
 Populations: reference, untared, container, beyond, shapes, everyday, same-motion, elsewhere, tool, repeat. Methods are
 those of `armload methods`; NAME+tare subtracts what the method says of the tare. The two baselines are always there.
