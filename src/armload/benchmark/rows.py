@@ -131,4 +131,5 @@ def bound_std(arm: Arm, logs: EpisodeLogs, prior: GaussianPrior, times: Sequence
 def trained_on(identifier: Any) -> str:
     """What a trained method says it was trained on, "" for one that was not."""
     provenance = getattr(getattr(identifier, "model", None), "provenance", None)
-    return "" if not provenance else ", ".join(f"{name} {value}" for name, value in provenance.items())
+    said = ("population", "episodes", "seed")
+    return "" if not provenance else ", ".join(f"{name} {provenance[name]}" for name in said if name in provenance)
