@@ -74,7 +74,11 @@ def test_commands_on_the_page_exist(page):
             continue
         names = [words[0]]
         text = help_of(*names)
-        while len(names) < len(words) and re.search(rf"^[│\s]*{re.escape(words[len(names)])}\s", text, re.MULTILINE):
+        while (
+            len(names) < len(words)
+            and words[len(names)][0] != "-"
+            and re.search(rf"^[│\s]*{re.escape(words[len(names)])}\s", text, re.MULTILINE)
+        ):
             deeper = help_of(*names, words[len(names)])
             if deeper == text:
                 break
