@@ -209,7 +209,7 @@ def episodes_shown() -> Iterator[Callable[[int, int], None]]:
         task = bar.add_task("episodes", total=None)
 
         def show(done: int, total: int) -> None:
-            what = "episodes" if done < total else _LEARNING
+            what = "episodes" if done < total else "learning"
             bar.update(task, completed=done, total=total, description=what)
 
         yield show
