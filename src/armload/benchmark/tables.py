@@ -183,7 +183,7 @@ def repeatability_table(m: Measured, times: Sequence[float]) -> Table:
     seeds, counts = np.unique(m.seed, return_counts=True)
     note = (
         f"Standard deviation of the estimates over {counts.max()} motions, each with another tare and other noise, one "
-        f"payload on one arm; root mean square over {len(seeds)} arms with a payload each."
+        f"payload on one arm; root mean square over {len(seeds)} such pair{'' if len(seeds) == 1 else 's'}."
     )
     return Table("Repeatability", ("method", "after [s]", *parameter_columns()), tuple(rows), note)
 
