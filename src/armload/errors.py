@@ -37,6 +37,14 @@ class IdentificationError(ArmloadError, ValueError):
     """An identification that cannot be made from what was given."""
 
 
+class SourceError(ArmloadError, ConnectionError):
+    """A robot, topic or file that cannot be opened as a stream, or that was lost."""
+
+
+class SinkError(ArmloadError, ValueError):
+    """A payload that cannot be exported, or must not be written to a robot."""
+
+
 class UsageError(ArmloadError):
     """A command line that cannot be understood."""
 

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
+from armload.determined import SHRINK, Z95
 from armload.errors import IdentificationError
 from armload.inertia import NAMES, UNITS
 from armload.least_squares.correction import Correction, effort_scale
@@ -32,10 +33,9 @@ from armload.least_squares.regression import REGRESSOR_RATE, RegressionData
 from armload.motion import Motion
 from armload.recording import Recording
 
-DETERMINED = 3.0  # a parameter counts as determined if its half-width shrinks at least so much
 TIMES = (1.0, 3.0)  # [s] and the whole run
 _EARLIER = 0.95  # of the whole run: a time that is not worth a column of its own
-Z95 = 1.959963984540054
+
 _LENGTH = 0.15  # [m] L of the condition number: the payload prior's reach
 _CHUNK = 4096  # samples at a time
 
@@ -86,7 +86,7 @@ class Bound:
     @property
     def determined(self) -> NDArray[np.bool_]:
         """Which parameters (T, 10) are determined: the half-width is at most a third of the prior's."""
-        return self.std <= self.prior_std / DETERMINED
+        return self.std <= self.prior_std / SHRINK
 
     @property
     def combinations(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -25,6 +25,7 @@ from armload.inertia.parameters import (
     skew,
     vech,
 )
+from armload.inertia.projection import near_consistent
 
 __all__ = [
     "NAMES",
@@ -40,6 +41,7 @@ __all__ = [
     "log_cholesky",
     "log_cholesky_curvature",
     "log_cholesky_jacobian",
+    "near_consistent",
     "nearest_consistent",
     "phi_to_com",
     "pseudo_inertia",
