@@ -23,7 +23,7 @@ from armload.arms import (
     payload_regressor,
 )
 from armload.errors import ArmError, ArmloadError
-from armload.inertia import InertialParameters, to_order
+from armload.inertia import InertialParameters, is_consistent, to_order
 
 LEVEL, TILTED = (0.0, 0.0, -9.81), (3.0, -2.0, -9.1)
 PAYLOAD = InertialParameters.from_com(
@@ -92,20 +92,95 @@ def test_pandas_flange_is_where_the_maker_says(panda):
     np.testing.assert_allclose(R[0], np.diag([1.0, -1, -1]), atol=1e-12)
 
 
-def test_ur10es_flange_is_where_the_maker_says():
-    # the maker's Denavit–Hartenberg figures of the UR10e [m]
-    ur = arm("ur10e")
-    d1, a2, a3, d4, d5, d6 = 0.1807, -0.6127, -0.57155, 0.17415, 0.11985, 0.11655
-    q = np.array([[0.3, -1.1, 0.7, -0.4, 0.9, 0.2]])
-    T = np.eye(4)
+def test_fr3s_links_weigh_what_was_published():
+    # libfranka's test URDF; franka_description has the same. The FR3 v2 is another arm (2.4377 2.2375 …)
+    published = [2.92747, 2.93554, 2.2449, 2.6156, 2.32712, 1.81704, 0.62714]
+    np.testing.assert_allclose(arm("fr3").link_parameters[:, 0], published, rtol=1e-5)
+
+
+def test_fr3_moves_like_a_panda(panda):
+    q = random_states(7)[0]
+    for ours, pandas in zip(arm("fr3").frame_pose(q), panda.frame_pose(q), strict=True):
+        np.testing.assert_allclose(ours, pandas, atol=1e-12)
+
+
+def test_fr3s_inertias_about_the_links_origins_are_franka_descriptions():
+    # robots/fr3/inertials.yaml since 0.3.0: xx xy xz yy yz zz of links 1, 2, 5 and 7, rounded
+    links = arm("fr3").link_parameters
+    for k, published in {
+        0: [0.02392732, 1.331790e-05, -0.00011405, 0.02248216, -0.00199503, 0.00635010],
+        1: [0.04193895, 0.00020257, 0.00407778, 0.02514515, -0.00422522, 0.06170214],
+        4: [0.05161028, -0.00571517, -0.00356732, 0.04787730, 0.01067399, 0.01642363],
+        6: [0.00021092, -2.433299e-05, 4.564480e-05, 0.00017719, 8.744070e-05, 5.99319e-05],
+    }.items():
+        np.testing.assert_allclose(links[k, 4:], published, atol=6e-9)
+
+
+@pytest.mark.parametrize("name", sorted(ARMS))
+def test_every_built_in_arm_says_what_it_may_carry(name):
+    an_arm = arm(name)
+    assert an_arm.rated_payload is not None
+    assert 0 < an_arm.rated_payload < an_arm.link_parameters[:, 0].sum()
+
+
+@pytest.mark.parametrize("name", sorted(ARMS))
+def test_links_are_bodies_that_can_exist(name):
+    for phi in arm(name).link_parameters:
+        assert is_consistent(phi)
+
+
+# the makers' Denavit–Hartenberg figures d1, a2, a3, d4, d5, d6 [m], and how far our description may be off [m]
+UR_DH = {
+    "ur5e": ((0.1625, -0.425, -0.3922, 0.1333, 0.0997, 0.0996), 1e-12),
+    "ur10e": ((0.1807, -0.6127, -0.57155, 0.17415, 0.11985, 0.11655), 2e-3),
+}
+
+
+def ur_frames(figures, q):
+    """The Denavit–Hartenberg frames 1 to 6 (6, 4, 4) in base_link, half a turn about z from the frame they start in."""
+    d1, a2, a3, d4, d5, d6 = figures
+    T, frames = np.diag([-1.0, -1.0, 1.0, 1.0]), []
     for angle, d, a, twist in zip(
-        q[0], [d1, 0, 0, d4, d5, d6], [0, a2, a3, 0, 0, 0], np.pi / 2 * np.array([1, 0, 0, 1, -1, 0]), strict=True
+        q, [d1, 0, 0, d4, d5, d6], [0, a2, a3, 0, 0, 0], np.pi / 2 * np.array([1, 0, 0, 1, -1, 0]), strict=True
     ):
         c, s, ca, sa = np.cos(angle), np.sin(angle), np.cos(twist), np.sin(twist)
         T = T @ np.array([[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0, sa, ca, d], [0, 0, 0, 1]])
-    p = ur.frame_pose(q)[1][0]
-    # the DH base is turned half a turn about z against base_link
-    np.testing.assert_allclose(np.abs(p), np.abs(T[:3, 3]), atol=2e-3)
+        frames.append(T)
+    return np.array(frames)
+
+
+@pytest.mark.parametrize("name", UR_DH)
+def test_a_urs_flange_is_where_the_maker_says(name):
+    figures, off = UR_DH[name]
+    for q in random_states(6)[0]:
+        flange = ur_frames(figures, q)[-1]
+        R, p = arm(name).frame_pose(q[None])
+        np.testing.assert_allclose(p[0], flange[:3, 3], atol=off)
+        np.testing.assert_allclose(R[0], flange[:3, :3], atol=1e-12)
+
+
+def test_ur5es_gravity_torque_is_the_slope_of_its_potential_energy():
+    # masses [kg] and centres of mass [m] as the maker's article gives them, in the Denavit–Hartenberg frames
+    masses = np.array([3.761, 8.058, 2.846, 1.37, 1.3, 0.365])
+    coms = np.array(
+        [
+            [0, -0.02561, 0.00193],
+            [0.2125, 0, 0.11336],
+            [0.15, 0, 0.0265],
+            [0, -0.0018, 0.01634],
+            [0, 0.0018, 0.01634],
+            [0, 0, -0.001159],
+        ]
+    )
+
+    def energy(q):
+        T = ur_frames(UR_DH["ur5e"][0], q)
+        return 9.81 * masses @ (np.einsum("kj,kj->k", T[:, 2, :3], coms) + T[:, 2, 3])
+
+    h = 1e-5
+    for q in random_states(6)[0]:
+        slope = [(energy(q + h * e) - energy(q - h * e)) / (2 * h) for e in np.eye(6)]
+        np.testing.assert_allclose(arm("ur5e").torque(q), slope, atol=1e-7)
 
 
 @pytest.mark.parametrize("name", sorted(ARMS))
@@ -519,7 +594,8 @@ def test_the_default_frame_is_the_last_link():
     no_fingers = URDF_GRIPPER.split('<joint name="finger1"')[0] + "</robot>"
     assert Arm("g", no_fingers).frame == "hand"
     assert arm("panda").frame == "panda_link8"
-    assert arm("ur10e").frame == "tool0"
+    assert arm("fr3").frame == "fr3_link8"
+    assert arm("ur5e").frame == arm("ur10e").frame == "tool0"
 
 
 def test_any_frame_can_carry_the_payload():
@@ -546,7 +622,7 @@ ONE_LINK = robot(link("base"), joint("j", "revolute", "base", "a"), link("a", 1.
 @pytest.mark.parametrize(
     ("attempt", "says"),
     [
-        (lambda: arm("pandas"), r"unknown robot 'pandas': expected one of panda, ur10e"),
+        (lambda: arm("pandas"), r"unknown robot 'pandas': expected one of panda, fr3, ur5e, ur10e"),
         (lambda: arm("panda", frame="tool0"), r"unknown frame 'tool0' in panda: expected one of .*panda_link8"),
         (lambda: arm("panda", gravity=(0, 0)), r"gravity is \(0, 0\): expected 3 finite numbers"),
         (lambda: arm("panda", gravity=("a", 0, 0)), r"gravity is .*expected 3 finite numbers"),

@@ -1,9 +1,11 @@
 """The arms armload knows by name, and any other from a URDF file.
 
-| name  | what                                            | payload frame | source of the figures                   |
-|-------|-------------------------------------------------|---------------|-----------------------------------------|
-| panda | Franka Emika Panda (FER), bare to the flange    | `panda_link8` | Franka's documentation; Gaz et al. 2019 |
-| ur10e | Universal Robots UR10e, bare to the tool flange | `tool0`       | Universal Robots' published figures     |
+| name  | what                                            | payload frame | source of the figures                     |
+|-------|-------------------------------------------------|---------------|-------------------------------------------|
+| panda | Franka Emika Panda (FER), bare to the flange    | `panda_link8` | Franka's documentation; Gaz et al. 2019   |
+| fr3   | Franka Research 3, first version (not v2), bare | `fr3_link8`   | libfranka's test URDF; franka_description |
+| ur5e  | Universal Robots UR5e, bare to the tool flange  | `tool0`       | Universal Robots' published figures       |
+| ur10e | Universal Robots UR10e, bare to the tool flange | `tool0`       | Universal Robots' published figures       |
 
 Each description says more in its head. A Panda with its hand is `arm("panda").with_payload(franka_hand())`.
 """
@@ -26,6 +28,15 @@ ARMS: dict[str, dict[str, Any]] = {
         "acceleration": (15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0),  # [rad/s²]
         "jerk": (7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0),  # [rad/s³]
     },
+    "fr3": {
+        "frame": "fr3_link8",
+        "rated_payload": 3.0,  # [kg]
+        "link_spread": 3.0,  # the maker's own model for control, not checked against a robot here
+        # libfranka, rate_limiting.h for the FR3
+        "acceleration": (10.0,) * 7,  # [rad/s²]
+        "jerk": (5000.0,) * 7,  # [rad/s³]
+    },
+    "ur5e": {"frame": "tool0", "rated_payload": 5.0},
     "ur10e": {"frame": "tool0", "rated_payload": 12.5},
 }
 
