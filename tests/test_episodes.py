@@ -9,6 +9,7 @@ from armload.arms import FilteredRegression, arm
 from armload.episodes import POPULATIONS, Recipe, draw_episodes, simulate_episodes
 from armload.episodes.motions import KINDS, MotionSource
 from armload.errors import ArmError, MotionError
+from armload.hybrid.training import FAMILIES as PRIOR_FAMILIES
 from armload.inertia import is_consistent
 from armload.motion import FourierMotion, check_motion, rated_load
 from armload.motion.blended import BlendedMotion
@@ -140,6 +141,12 @@ def test_what_an_episode_carries_is_a_body_the_arm_is_rated_for(any_arm, name):
         carried = [p for p in (episode.payload, episode.tool) if p is not None]
         assert sum(p.parameters.mass for p in carried) <= any_arm.rated_payload
         assert all(is_consistent(p.parameters.phi) for p in carried if p.parameters.mass > 0)
+
+
+def test_training_sees_nothing_of_the_odd_payloads():
+    assert POPULATIONS["odd"].payloads == ("odd",)
+    assert "odd" not in POPULATIONS["broad"].payloads
+    assert "odd" not in PRIOR_FAMILIES
 
 
 def test_broad_holds_every_kind_of_episode(panda):

@@ -6,6 +6,7 @@ import pytest
 from armload.errors import PayloadError
 from armload.inertia import is_consistent
 from armload.payloads import FAMILIES, container, container_loadings, draw_payload, random_payload
+from armload.payloads.odd import ODD
 from armload.payloads.shapes import SHAPES, TOOLS
 
 SEEDS = range(60)
@@ -21,7 +22,7 @@ def test_every_payload_can_exist_and_is_within_what_the_arm_may_carry(family, ra
         assert is_consistent(payload.parameters.phi) or family == "nothing"
 
 
-@pytest.mark.parametrize("shape", {**SHAPES, **TOOLS}.values(), ids=lambda shape: shape.__name__)
+@pytest.mark.parametrize("shape", {**SHAPES, **TOOLS, **ODD}.values(), ids=lambda shape: shape.__name__)
 def test_a_shape_has_the_mass_asked_for_and_its_density_does_not_depend_on_the_scale(shape):
     for seed in range(10):
         small, large = (shape(np.random.default_rng(seed), m, s) for m, s in ((0.8, 1.0), (0.8 * 8, 2.0)))
@@ -54,6 +55,29 @@ def test_a_filling_is_the_empty_container_and_weights_by_the_paper_s_rules():
             assert 0.019 <= r[2] <= 0.081
         new += np.abs(known - phi).max(axis=1).min() > 1e-9
     assert new > 30
+
+
+def test_odd_payloads_lie_outside_every_other_family():
+    def aside_and_moment(family):
+        phi = np.array([draw_payload(family, seed).parameters.phi for seed in range(300)])
+        moment = np.hypot(phi[:, 1], phi[:, 2])
+        return moment / phi[:, 0], moment, phi[:, 0]
+
+    aside, moment, mass = aside_and_moment("odd")
+    assert 0.45 <= mass.min() < 0.6
+    assert 2.8 < mass.max() <= 3.0
+    for family in sorted(set(FAMILIES) - {"odd", "nothing"}):
+        other_aside, other_moment, _ = aside_and_moment(family)
+        assert np.mean(other_aside > aside.min()) < 0.02  # their centres of mass hardly meet
+        assert np.mean(moment > np.quantile(other_moment, 0.99)) > 0.5
+
+
+def test_a_ring_turns_about_its_axis_like_two_radii():
+    rng = np.random.default_rng(4)
+    body = ODD["ring"](rng, 2.0, 1.0)
+    largest = np.linalg.eigvalsh(body.inertia_com)[-1]  # about its axis: m·(R² + r²)/2
+    outer, thick = np.random.default_rng(4).uniform((0.12, 0.01), (0.25, 0.03))
+    assert largest == pytest.approx(2.0 * (outer**2 + (outer - thick) ** 2) / 2, rel=1e-9)
 
 
 def test_the_same_seed_gives_the_same_payload_and_families_differ():

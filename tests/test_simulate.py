@@ -33,7 +33,7 @@ PAPER_RATE = 3244 / 6  # [Hz]
 
 
 def motion_of(arm) -> FourierMotion:
-    if arm.name == "panda":
+    if arm.n == 7:
         return taie2024()
     rng = np.random.default_rng(0)
     sine, cosine = rng.normal(size=(2, arm.n, 5)) * 0.1
@@ -130,7 +130,8 @@ def test_least_squares_recovers_the_payload_without_noise(any_arm, rate):
 def test_the_default_method_recovers_the_payload_without_noise(any_arm):
     # though it allows for a mismatch of the arm that is not there
     phi = PosteriorLeastSquares(any_arm).run(simulate(any_arm, motion_of(any_arm), PAYLOAD)).phi
-    assert phi[0] == pytest.approx(PAYLOAD.mass, rel=1e-3)
+    # the links' prior, wide for nominal figures, keeps a little of the payload: most on the UR5e
+    assert phi[0] == pytest.approx(PAYLOAD.mass, rel=3e-3)
     np.testing.assert_allclose(phi[1:4], PAYLOAD.first_moment, rtol=0, atol=1e-3)
 
 
@@ -210,7 +211,7 @@ def test_friction_and_residual_converge_to_the_motion_that_comes_out(any_arm):
     gains, clock, motion = Gains.of(any_arm), rollout.Clock.at(500.0, 3000), motion_of(any_arm)
     world = World.real_like(any_arm, seed=1)
     command = Command.along(any_arm, motion, clock.step, clock.steps)
-    prepared = runs._prepare(world.arm(any_arm), gains, Run(motion, PAYLOAD, world), world, command, clock)
+    prepared = runs.prepare(world.arm(any_arm), gains, Run(motion, PAYLOAD, world), world, command, clock)
     left = {}
     for passes in (1, 2, 4):
         fine = replace(clock, resolution=Resolution(passes=passes))

@@ -6,14 +6,16 @@
 | `beyond`         | `World.beyond`     | boxes       | reference            | as reference               |
 | `container`      | `World.real_like`  | container   | reference            | as reference               |
 | `shapes`         | `World.real_like`  | shapes      | reference            | as reference               |
+| `odd`            | `World.real_like`  | odd         | reference            | as reference               |
 | `everyday`       | `World.real_like`  | boxes       | stops, slow, partial | as reference               |
 | `same-motion`    | `World.real_like`  | boxes       | reference            | bare, 6 s, the same motion |
 | `untared`        | `World.real_like`  | boxes       | reference            | none                       |
 | `elsewhere`      | `World.real_like`  | boxes       | reference            | bare, 20 s, another place  |
 | `tool`           | `World.real_like`  | boxes       | reference            | as reference, tool mounted |
-| `broad`          | half and half      | every family| every kind           | any, or none; tool or not  |
+| `broad`          | half and half      | all but odd | every kind           | any, or none; tool or not  |
 
-`reference` is the population that methods are compared on; the others change one thing each; `broad` is for training.
+`reference` is the population that methods are compared on; the others change one thing each; `broad` is for training;
+`odd` holds payloads unlike any that training sees.
 A tare's motion is another one near the run's mean pose, as of an arm that works in one place; `elsewhere` has it about
 a pose of its own, where an arm's residual, of a length scale of about 1 rad, is hardly the same. In `broad`, payloads
 are also lighter, and sensors, log rates and the controller's stiffness vary.
@@ -81,6 +83,7 @@ POPULATIONS: dict[str, Recipe] = {
     "beyond": replace(REFERENCE, worlds=("beyond",), elapsed=(30.0, 600.0)),
     "container": replace(REFERENCE, payloads=("container",)),
     "shapes": replace(REFERENCE, payloads=("shapes",)),
+    "odd": replace(REFERENCE, payloads=("odd",)),
     "everyday": replace(REFERENCE, motions=("point-to-point", "pick-and-place", "slow", "partial")),
     "same-motion": replace(REFERENCE, same_motion=1.0),
     "untared": replace(REFERENCE, untared=1.0),

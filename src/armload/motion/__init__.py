@@ -1,6 +1,7 @@
 """Motions: the Fourier excitation, its design and checks, and the files other people's robots read."""
 
 from armload.motion.check import MotionCheck, check_motion, rated_load
+from armload.motion.endless import EndlessMotion
 from armload.motion.export import export_motion
 from armload.motion.files import load_motion, save_motion, taie2024
 from armload.motion.fingerprint import MotionFingerprint
@@ -9,6 +10,7 @@ from armload.motion.motion import Motion
 from armload.motion.random_fourier import random_motion
 
 __all__ = [
+    "EndlessMotion",
     "FourierMotion",
     "Motion",
     "MotionCheck",

@@ -7,8 +7,10 @@
 | `tools`     | what is bolted to a flange: grippers, brackets, torches                                  |
 | `container` | the paper's container with any filling, by its own rules                                 |
 | `nothing`   | no payload                                                                               |
+| `odd`       | dumbbells, poles, panes, rings far off the flange's axis: unlike all of the others       |
 
-Figures are those of an arm rated for 3 kg. For another, masses grow with its rating and lengths with the cube root.
+No prior is fitted on `odd`: it is there to see what happens with a payload that nobody expected. Figures are those
+of an arm rated for 3 kg. For another, masses grow with its rating and lengths with the cube root.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ import numpy as np
 from armload.errors import PayloadError
 from armload.inertia import InertialParameters
 from armload.payloads.container import BOTTOM, POSITIONS, TOP, container, position_centre
+from armload.payloads.odd import ODD
 from armload.payloads.payload import Box, Payload
 from armload.payloads.shapes import SHAPES, TOOLS, Shape
 
@@ -27,6 +30,7 @@ SIDE = (0.02, 0.12)  # [m]
 RATED = 3.0  # [kg] of the arm that all figures are for
 
 _SHAPE_MASS, _TOOL_MASS = (0.1, 2.9), (0.2, 1.8)  # [kg]
+_ODD_MASS = (0.45, 3.0)  # [kg] 0.15 to 1 of what the arm is rated for
 _MOST_WEIGHTS, _HEAVIEST_FILLING = 5, 2.163  # [1, kg] paper
 _ODD_WEIGHT = (0.05, 0.36)  # [kg]
 _SHIFT = 0.005  # [m] how far an odd weight may lie off its slot's axis
@@ -75,11 +79,11 @@ def draw_payload(family: str, seed: int, rated: float = RATED) -> Payload:
     if family == "container":
         # a small arm carries a small container; a large one the same as everybody
         return _scaled(_filling(rng, name), min(1.0, scale))
-    shapes, masses = (SHAPES, _SHAPE_MASS) if family == "shapes" else (TOOLS, _TOOL_MASS)
+    shapes, masses = {"shapes": (SHAPES, _SHAPE_MASS), "tools": (TOOLS, _TOOL_MASS), "odd": (ODD, _ODD_MASS)}[family]
     return _shaped(shapes, rng.uniform(*masses) * scale, float(np.cbrt(scale)), rng, name)
 
 
-FAMILIES = ("boxes", "shapes", "tools", "container", "nothing")
+FAMILIES = ("boxes", "shapes", "tools", "container", "nothing", "odd")
 
 
 def _shaped(shapes: dict[str, Shape], mass: float, scale: float, rng: np.random.Generator, name: str) -> Payload:

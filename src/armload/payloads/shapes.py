@@ -17,7 +17,7 @@ from armload.payloads import solids
 Shape = Callable[[np.random.Generator, float, float], InertialParameters]  # of rng, mass [kg], scale of lengths
 
 
-def _turn(rng: np.random.Generator) -> NDArray[np.float64]:
+def any_turn(rng: np.random.Generator) -> NDArray[np.float64]:
     """A rotation (3, 3), uniform over all of them (QR of a Gaussian matrix, Stewart 1980)."""
     q, r = np.linalg.qr(rng.normal(size=(3, 3)))
     q = q * np.sign(np.diag(r))
@@ -31,13 +31,13 @@ def _place(rng: np.random.Generator, scale: float, side: float = 0.08, far: floa
 def block(rng: np.random.Generator, mass: float, scale: float) -> InertialParameters:
     """A box of any proportions, turned any way."""
     size = scale * rng.uniform(0.02, 0.2, size=3)
-    return solids.box(size, mass=mass, rotation=_turn(rng), translation=_place(rng, scale))
+    return solids.box(size, mass=mass, rotation=any_turn(rng), translation=_place(rng, scale))
 
 
 def cylinder(rng: np.random.Generator, mass: float, scale: float) -> InertialParameters:
     """A cylinder, turned any way."""
     radius, length = scale * rng.uniform(0.01, 0.08), scale * rng.uniform(0.02, 0.25)
-    return solids.cylinder(radius, length, mass=mass, rotation=_turn(rng), translation=_place(rng, scale))
+    return solids.cylinder(radius, length, mass=mass, rotation=any_turn(rng), translation=_place(rng, scale))
 
 
 def ball(rng: np.random.Generator, mass: float, scale: float) -> InertialParameters:
@@ -54,13 +54,13 @@ def lump(rng: np.random.Generator, mass: float, scale: float) -> InertialParamet
 def plate(rng: np.random.Generator, mass: float, scale: float) -> InertialParameters:
     """A thin plate, turned any way, held off its centre."""
     size = scale * np.append(rng.uniform(0.08, 0.35, size=2), rng.uniform(0.002, 0.01))
-    return solids.box(size, mass=mass, rotation=_turn(rng), translation=_place(rng, scale, 0.1))
+    return solids.box(size, mass=mass, rotation=any_turn(rng), translation=_place(rng, scale, 0.1))
 
 
 def rod(rng: np.random.Generator, mass: float, scale: float) -> InertialParameters:
     """A long rod, turned any way."""
     radius, length = scale * rng.uniform(0.005, 0.02), scale * rng.uniform(0.25, 0.7)
-    return solids.cylinder(radius, length, mass=mass, rotation=_turn(rng), translation=_place(rng, scale))
+    return solids.cylinder(radius, length, mass=mass, rotation=any_turn(rng), translation=_place(rng, scale))
 
 
 def bracket(rng: np.random.Generator, mass: float, scale: float) -> InertialParameters:
@@ -104,14 +104,14 @@ def gripped(rng: np.random.Generator, mass: float, scale: float) -> InertialPara
     share = rng.uniform(0.25, 0.7)
     at = scale * rng.uniform((-0.03, -0.03, 0.10), (0.03, 0.03, 0.24))
     size = scale * rng.uniform(0.02, 0.12, size=3)
-    held = solids.box(size, mass=(1 - share) * mass, rotation=_turn(rng), translation=at)
+    held = solids.box(size, mass=(1 - share) * mass, rotation=any_turn(rng), translation=at)
     return gripper(rng, share * mass, scale) + held
 
 
 def torch(rng: np.random.Generator, mass: float, scale: float) -> InertialParameters:
     """A holder on the flange and a slanted cylinder: a torch, a spindle, a camera on a stalk."""
     holder, length = scale * rng.uniform(0.03, 0.09), scale * rng.uniform(0.1, 0.35)
-    turn, share = _turn(rng), rng.uniform(0.2, 0.7)
+    turn, share = any_turn(rng), rng.uniform(0.2, 0.7)
     axis = turn[:, 2] if turn[2, 2] > 0 else -turn[:, 2]
     return solids.compose(
         [

@@ -18,7 +18,7 @@ the logged q and dq. The rest only means that the controller acted as if it had 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import repeat
 from typing import TYPE_CHECKING
 
@@ -81,18 +81,42 @@ def roll_out(
 ) -> list[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]]:
     """(q, dq, tau) of each run, each (samples, n), noise-free; NaN where a run diverged."""
     states, applied = _picard(runs, clock, workers)
-    logs = []
-    for run, state, disturbance in zip(runs, states, applied, strict=True):
-        rows = slice(None, None, clock.every)
-        every_step = _leapfrog(run, state)
-        q, v, after = (x[rows] for x in every_step)
-        dq = 0.5 * (v + after)
-        gains = run.gains
-        rigid = run.command.control(gains)[rows] - disturbance[rows] - gains.stiffness * q - gains.damping * after
-        rigid += _coriolis_missed(run.model, clock, *every_step)[rows]
-        joint = rigid + run.world.disturbance(q, dq, rigid)
-        logs.append((q, dq, run.world.measured(joint, run.start + clock.times)))
-    return logs
+    return [_log(run, clock, *_leapfrog(run, state), u) for run, state, u in zip(runs, states, applied, strict=True)]
+
+
+def roll_on(
+    run: Prepared, clock: Clock
+) -> tuple[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], Prepared]:
+    """A piece of a run that goes on: the log of `roll_out` but for its last row, and the same run ready from there.
+
+    The command of what is returned is still the old one.
+    """
+    states, applied = _picard([run], clock, 1)
+    q, v, after = _leapfrog(run, states[0])
+    log = _log(run, clock, q, v, after, applied[0])
+    onward = replace(
+        run, position=q[-1], velocity=v[-1], start=run.start + (clock.samples - 1) * clock.step * clock.every
+    )
+    return (log[0][:-1], log[1][:-1], log[2][:-1]), onward
+
+
+def _log(
+    run: Prepared,
+    clock: Clock,
+    q: NDArray[np.float64],
+    v: NDArray[np.float64],
+    after: NDArray[np.float64],
+    disturbance: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """What is logged of a leapfrog (steps, n) and the disturbance applied in it: (q, dq, tau), each (samples, n)."""
+    rows = slice(None, None, clock.every)
+    missed = coriolis_missed(run.model, clock, q, v, after)[rows]
+    control = run.command.control(run.gains)[rows]
+    q, v, after = q[rows], v[rows], after[rows]
+    dq = 0.5 * (v + after)
+    rigid = control - disturbance[rows] - run.gains.stiffness * q - run.gains.damping * after + missed
+    joint = rigid + run.world.disturbance(q, dq, rigid)
+    return q, dq, run.world.measured(joint, run.start + clock.times)
 
 
 def iteration_error(runs: Sequence[Prepared], clock: Clock, workers: int) -> list[NDArray[np.float64]]:
@@ -155,7 +179,7 @@ def _disturbance(
     return out + _between(knots, world.residual(q[knots]), len(q))
 
 
-def _coriolis_missed(
+def coriolis_missed(
     model: mujoco.MjModel, clock: Clock, q: NDArray[np.float64], v: NDArray[np.float64], after: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """c(q_j, (v_j + v_{j+1})/2) − c(q_j, v_j) along a run, (steps, n) [N·m]."""

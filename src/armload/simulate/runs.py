@@ -130,7 +130,7 @@ def _batch(arm: Arm, gains: Gains, runs: list[Run], clock: Clock, workers: int) 
             commands[id(run.motion)] = Command.along(arm, run.motion, clock.step, clock.steps, clock.resolution.knots)
         if id(world) not in actual:
             actual[id(world)] = world.arm(arm)
-        prepared.append(_prepare(actual[id(world)], run.gains or gains, run, world, commands[id(run.motion)], clock))
+        prepared.append(prepare(actual[id(world)], run.gains or gains, run, world, commands[id(run.motion)], clock))
     logs = []
     for run, (q, dq, tau) in zip(runs, roll_out(prepared, clock, workers), strict=True):
         if not np.all(np.isfinite(tau)):
@@ -144,9 +144,9 @@ def _batch(arm: Arm, gains: Gains, runs: list[Run], clock: Clock, workers: int) 
     return logs
 
 
-def _prepare(actual: Arm, gains: Gains, run: Run, world: World, command: Command, clock: Clock) -> Prepared:
+def prepare(actual: Arm, gains: Gains, run: Run, world: World, command: Command, clock: Clock) -> Prepared:
     """A run ready to go, with `actual` the world's arm."""
-    payload = _parameters(run.payload)
+    payload = payload_parameters(run.payload)
     model = build_model(actual if payload is None else actual.with_payload(payload), gains, clock.step)
     if world.rotor_inertia is not None:
         model.dof_armature[:] = world.rotor_inertia
@@ -160,7 +160,8 @@ def _prepare(actual: Arm, gains: Gains, run: Run, world: World, command: Command
     return Prepared(model, world, gains, command, start, velocity, run.start)
 
 
-def _parameters(payload: Any) -> InertialParameters | None:
+def payload_parameters(payload: Any) -> InertialParameters | None:
+    """The ten parameters of what can be given as a payload; None: nothing."""
     parameters = getattr(payload, "parameters", payload)
     if parameters is None:
         return None
