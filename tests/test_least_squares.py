@@ -110,7 +110,8 @@ def test_exact_data_give_the_payload_back(method, any_arm, analytic_log):
     # which tells on the heavy UR10e
     tolerance = {"rls": 0.25, "rls-filter": 0.4, "map": 0.05}[method.name]
     assert np.abs((phi - CAMERA.phi) / scale).max() < tolerance
-    assert phi[0] == pytest.approx(CAMERA.mass, rel=1e-3 if method.name != "rls-filter" else 0.02)
+    # map keeps a little of the payload for the links, whose prior is wide for nominal figures
+    assert phi[0] == pytest.approx(CAMERA.mass, rel={"rls": 1e-3, "rls-filter": 0.02, "map": 3e-3}[method.name])
 
 
 # ---------------------------------------------------------------------------- the recursion

@@ -8,6 +8,7 @@ from armload.least_squares.difference import DifferenceLeastSquares
 from armload.least_squares.features import JointFeatures
 from armload.least_squares.joint import JointLeastSquares
 from armload.least_squares.kalman import ExtendedKalmanFilter
+from armload.least_squares.live import StreamingIdentifier
 from armload.least_squares.map import PosteriorLeastSquares, SmoothPosteriorLeastSquares
 from armload.least_squares.momentum import MomentumLeastSquares
 from armload.least_squares.normal import OrdinaryLeastSquares, WeightedLeastSquares
@@ -36,6 +37,7 @@ __all__ = [
     "RecursiveLeastSquares",
     "RecursiveTotalLeastSquares",
     "SmoothPosteriorLeastSquares",
+    "StreamingIdentifier",
     "WeightedLeastSquares",
     "effort_scale",
     "payload_prior_std",

@@ -12,6 +12,7 @@ from armload.least_squares.features import JointFeatures
 from armload.least_squares.posterior import RIGID, SMOOTH, NoiseModel, Posterior, Scales, solve
 from armload.least_squares.prior import GaussianPrior, payload_prior_std
 from armload.least_squares.regression import RegressionData
+from armload.least_squares.streaming import StreamingPosterior
 from armload.recording import Recording, Sample
 
 _WIDE = 4.0  # the solution's prior is so much wider than the stated one: it must not pull a determined payload
@@ -89,6 +90,22 @@ class PosteriorLeastSquares(BatchIdentifier):
         if self._posterior is None:
             raise RuntimeError("no sample has been seen: call update or run first")
         return self._posterior
+
+    def streaming(self, tau: NDArray, reference: StreamingPosterior | None = None) -> StreamingPosterior:
+        """The same method for a live stream, with the same tare.
+
+        Args:
+            tau: (n,) [N·m] the first torque seen.
+            reference: an earlier run of the stream; it becomes the tare if there is no other.
+        """
+        if self._correction is None:
+            self._correction = Correction(self.arm, effort_scale(self.arm, np.atleast_2d(tau)))
+        tare, start = self._tare, self._start
+        if tare is None and reference is not None:
+            tare, start = reference.finish(), reference.posterior.scales
+        empty = self._data(self._correction)
+        std = _WIDE * payload_prior_std(self.arm)
+        return StreamingPosterior(self._correction, empty.features, self._noise, std, tare, start, self.gain)
 
     def _take(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
         if self._run is None:

@@ -18,13 +18,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
+from armload.least_squares.correction import Correction
 from armload.least_squares.prior import GaussianPrior
 from armload.least_squares.regression import NOVELTY, REGRESSOR_RATE, RegressionData
+from armload.least_squares.sequential import SequentialPosterior
 
 # standard deviation of first moments and inertia per kilogram: bodies within about 20 cm of the frame's origin
 _REACH = np.array([0.2] * 3 + [0.2**2] * 6)  # [m, m²]
@@ -62,7 +65,9 @@ class NoiseModel:
 
 # without features, the smooth mismatch is in the residual: it is large and repeats
 RIGID = NoiseModel(residual=4e-3, block=1.0, floor=False, novelty=NOVELTY)
-SMOOTH = NoiseModel(residual=1e-3, block=0.25, floor=True, novelty=np.inf, overrated=2.25)
+# what is left repeats all the same: errors hardly fall after half a minute (`benchmarks/long_logs.py`), nor may the
+# information grow for days, until its digits are gone
+SMOOTH = NoiseModel(residual=1e-3, block=0.25, floor=True, novelty=60.0, overrated=2.25)
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,6 +138,35 @@ def solve(
         return problem.answer(scales, problem.posterior(scales))
 
 
+def advance(
+    runs: list[RegressionData],
+    prior_std: NDArray[np.float64],
+    noise: NoiseModel = SMOOTH,
+    start: Scales | None = None,
+    steps: int = 1,
+) -> tuple[Posterior, SequentialPosterior]:
+    """The posterior after some steps of expectation–maximisation from `start`, and the same ready to take further rows.
+
+    Arguments as of `solve`.
+    """
+    with threads().limit(limits=1):
+        problem = _Problem(runs, prior_std, None, noise)
+        scales = problem.scales(start)
+        for _ in range(steps):
+            scales = problem.improved(scales, problem.posterior(scales))
+        return problem.answer(scales, problem.posterior(scales)), problem.sequential(scales)
+
+
+def whole_noise(correction: Correction, noise: NoiseModel) -> NDArray[np.float64]:
+    """S (n,) that is expected of a run of `_MOMENT` or more, before anything is seen [N²·m²·s]."""
+    return (noise.residual * correction.effort) ** 2 * noise.block
+
+
+def share_of_noise(seconds: float) -> float:
+    """The fraction of `whole_noise` that a run of so many seconds shows."""
+    return min(1.0, max(seconds, 1.0 / REGRESSOR_RATE) / _MOMENT)
+
+
 @dataclass(frozen=True, eq=False)
 class _Gaussian:
     """z ~ N(mean, covariance); g_j | z ~ N(own − slope·z, rest)."""
@@ -147,6 +181,16 @@ class _Gaussian:
     def weights(self) -> NDArray:
         """Mean of g (n, R)."""
         return self.own - self.slope @ self.mean
+
+
+class _Eliminated(NamedTuple):
+    """Information about z alone (A, b), and what it leaves of the joints' weights, as in `_Gaussian`."""
+
+    A: NDArray
+    b: NDArray
+    own: NDArray
+    slope: NDArray
+    rest: NDArray
 
 
 class _Problem:
@@ -164,9 +208,8 @@ class _Problem:
         self.mean, self.root = np.zeros(self.size), None
         if prior is not None:
             self.mean[self.last], self.root = prior.mean, prior.root
-        whole = (noise.residual * self.correction.effort) ** 2 * noise.block
-        share = [min(1.0, max(run.blocks.duration, 1.0 / REGRESSOR_RATE) / _MOMENT) for run in runs]
-        self.expected = np.outer(share, whole)  # (K, n)
+        share = [share_of_noise(run.blocks.duration) for run in runs]
+        self.expected = np.outer(share, whole_noise(self.correction, noise))  # (K, n)
         self.selections = []
         for k in range(count):
             E = np.zeros((10 + p, self.size))
@@ -187,11 +230,23 @@ class _Problem:
         return Scales(noise, start.eta, start.features, self.payload_variance)
 
     def posterior(self, scales: Scales) -> _Gaussian:
-        """z and g given the scales: each g_j is eliminated first (it occurs in the rows of joint j only)."""
+        """z and g given the scales."""
+        A, b, own, slope, rest = self._eliminated(scales)
+        root = np.diag(np.sqrt(np.concatenate([scales.payloads, scales.eta])))
+        if self.root is not None:
+            root[self.last, self.last] = self.root
+        P = root @ np.linalg.inv(root.T @ A @ root + np.eye(self.size)) @ root.T
+        P = 0.5 * (P + P.T)
+        return _Gaussian(self.mean + P @ (b - A @ self.mean), P, own, slope, rest)
+
+    def _eliminated(self, scales: Scales) -> _Eliminated:
+        """Each g_j is eliminated first: it occurs in the rows of joint j only."""
         n, R, c = len(self.correction.effort), self.features.size, 10 + self.correction.size
         S = scales.noise
-        A = sum(np.einsum("jab,j->ab", part, 1.0 / s) for (part, _), s in zip(self.parts, S, strict=True))
-        b = sum(np.einsum("ja,j->a", part, 1.0 / s) for (_, part), s in zip(self.parts, S, strict=True))
+        A, b = np.zeros((self.size, self.size)), np.zeros(self.size)
+        for (squares, products), s in zip(self.parts, S, strict=True):
+            A += np.einsum("jab,j->ab", squares, 1.0 / s)
+            b += np.einsum("ja,j->a", products, 1.0 / s)
         own, slope, rest = np.zeros((n, R)), np.zeros((n, R, self.size)), np.zeros((n, R, R))
         for j in range(n if R else 0):
             Agg = sum(run.A[j, c:, c:] / s[j] for run, s in zip(self.runs, S, strict=True))
@@ -202,12 +257,33 @@ class _Problem:
             rest[j] = root[:, None] * (0.5 * (M + M.T)) * root
             own[j], slope[j] = rest[j] @ bg, rest[j] @ Agz
             A, b = A - Agz.T @ slope[j], b - Agz.T @ own[j]
-        root = np.diag(np.sqrt(np.concatenate([scales.payloads, scales.eta])))
-        if self.root is not None:
-            root[self.last, self.last] = self.root
-        P = root @ np.linalg.inv(root.T @ (0.5 * (A + A.T)) @ root + np.eye(self.size)) @ root.T
-        P = 0.5 * (P + P.T)
-        return _Gaussian(self.mean + P @ (b - A @ self.mean), P, own, slope, rest)
+        return _Eliminated(0.5 * (A + A.T), b, own, slope, rest)
+
+    def sequential(self, scales: Scales) -> SequentialPosterior:
+        """The same posterior as a state that takes further rows of the last run: phi last to be integrated out."""
+        found = self._eliminated(scales)
+        first, last = 10 * (len(self.runs) - 1), self.last
+        shared = np.r_[0:first, last.stop : self.size]
+        order = np.r_[last.start : last.stop, shared]
+        prior = np.concatenate([scales.payloads, scales.eta])[shared]
+        A, b = found.A, found.b
+        root = np.sqrt(prior)
+        C = np.linalg.inv(root[:, None] * A[np.ix_(shared, shared)] * root + np.eye(len(root)))
+        C = root[:, None] * (0.5 * (C + C.T)) * root
+        slope, own = C @ A[shared][:, last], C @ b[shared]
+        Λ, h = A[last, last] - A[last][:, shared] @ slope, b[last] - A[last][:, shared] @ own
+        return SequentialPosterior(
+            C=np.ascontiguousarray(found.rest),
+            own=found.own,
+            slope=np.ascontiguousarray(found.slope[:, :, order]),
+            shared_C=C,
+            shared_own=own,
+            shared_slope=np.ascontiguousarray(slope),
+            information=0.5 * (Λ + Λ.T),
+            vector=h,
+            noise=scales.noise[-1].copy(),
+            tares=len(self.runs) - 1,
+        )
 
     def improved(self, scales: Scales, found: _Gaussian) -> Scales:
         """One step of expectation–maximisation, each scale held to its stated value by pseudo-observations."""
@@ -240,15 +316,16 @@ class _Problem:
                 shared = np.broadcast_to(E @ found.covariance @ E.T, (len(own), len(E), len(E)))
                 upper = np.concatenate([shared, cross], axis=2)
                 covariance = np.concatenate([upper, np.concatenate([cross.swapaxes(1, 2), own], axis=2)], axis=1)
-            S = run.residual_variance(E @ found.mean, expected, model.novelty, found.weights, covariance)
-            out.append(np.maximum(S, expected) if model.floor else S)
+            S = run.residual_variance(E @ found.mean, expected, np.inf, found.weights, covariance)
+            S = np.maximum(S, expected) if model.floor else S
+            out.append(S * max(1.0, run.blocks.duration / model.novelty))
         return np.array(out)
 
     def _payloads(self, z: NDArray, variance: NDArray) -> NDArray:
         """A light body has small moments: what was mounted at a tare seldom weighs much, and its moments follow."""
         now = self.payload_variance.copy()
         for k in range(len(self.runs) - 1):
-            heaviest = max(abs(z[10 * k]) + 2.0 * np.sqrt(variance[10 * k]), _LIGHTEST)
+            heaviest = max(abs(z[10 * k]) + 2.0 * np.sqrt(max(variance[10 * k], 0.0)), _LIGHTEST)
             moments = slice(10 * k + 1, 10 * k + 10)
             now[moments] = np.minimum(now[moments], (heaviest * _REACH) ** 2)
         return now
@@ -281,7 +358,8 @@ class _Problem:
 
     def _ratios(self, scales: Scales) -> dict[str, NDArray[np.float64]]:
         friction = self.correction.coulomb(scales.eta) / self.correction.coulomb(self.correction.prior_std**2)
-        out = {"noise": scales.noise[-1] / self.expected[-1], "friction": friction}
+        repeated = max(1.0, self.runs[-1].blocks.duration / self.noise_model.novelty)
+        out = {"noise": scales.noise[-1] / (repeated * self.expected[-1]), "friction": friction}
         for name, k in (("pose", 0), ("velocity", self.features.pose)):
             if self.features.size > k:
                 out[name] = scales.features[:, k] / self.feature_variance[:, k]

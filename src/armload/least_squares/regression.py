@@ -21,9 +21,35 @@ REGRESSOR_RATE = 200.0  # [Hz] W, Z and G are computed no more often: they hold 
 GAP = 0.1  # [s] a longer pause between samples restarts the lags
 # variance of a joint's residual grows up to 1 + this where the joint stands still: friction is unknown there
 _PRESLIDING = 10.0
+_STILL = (
+    1e-3  # [rad] an arm that stays so near for a block shows one value of its stiction: more of it tells nothing new
+)
 _PRIOR_COUNT = 4.0  # weight of the prior long-run variance, in blocks
 # [s] a mismatch that is a function of the configuration does not average away on similar motions
 NOVELTY = 10.0
+
+
+class Stiction:
+    """Whether an arm has stood still for so long that its stiction, one value while it lasts, is known.
+
+    Args:
+        settling: [s] that one pose counts.
+    """
+
+    def __init__(self, settling: float) -> None:
+        self.settling = settling
+        self._rest: tuple[float, NDArray] | None = None  # when and where the arm was last seen to move
+
+    def known(self, t: float, q: NDArray) -> bool:
+        """Whether the pose (n,) at t [s] tells nothing new; times rise."""
+        if self._rest is None or np.abs(q - self._rest[1]).max() > _STILL:
+            self._rest = (t, q)
+        return t - self._rest[0] > self.settling
+
+
+def presliding(dq: NDArray) -> NDArray[np.float64]:
+    """Weight of a joint's row at velocity dq [rad/s]: 1 in motion, less where friction is anything below stiction."""
+    return 1.0 / (1.0 + _PRESLIDING * (1.0 - np.tanh(np.abs(dq) / FRICTION_WIDTH) ** 2))
 
 
 class RegressionData:
@@ -49,6 +75,7 @@ class RegressionData:
         self._lags = tuple(Lag(gain) for _ in range(5))
         self._torque, self._bare, self._regressor, self._pose, self._velocity = self._lags
         self._last_sample = self._last_row = -np.inf
+        self._stiction = Stiction(block)
 
     def add(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
         """Take the next samples (N,), (N, n); W and Z are computed at `REGRESSOR_RATE`, torque at its full rate."""
@@ -73,10 +100,12 @@ class RegressionData:
             return
         h = np.diff(t[rows], prepend=self._last_row)
         h[~np.isfinite(h)] = 0.0
+        h[[self._stiction.known(now, pose) for now, pose in zip(t[rows].tolist(), q[rows], strict=True)]] = 0.0
         self._last_row = last
-        X, r = self._rows(t[rows], q[rows], dq[rows], lagged[rows])
-        moving = np.tanh(np.abs(dq[rows]) / FRICTION_WIDTH)
-        w = 1.0 / (1.0 + _PRESLIDING * (1.0 - moving**2))  # (N, n)
+        self.take_rows(h, *self._rows(t[rows], q[rows], dq[rows], lagged[rows]), presliding(dq[rows]))
+
+    def take_rows(self, h: NDArray, X: NDArray, r: NDArray, w: NDArray) -> None:
+        """Take rows X (N, n, size), r (N, n) that stand for h (N,) seconds each, of weights w (N, n)."""
         rooted = np.sqrt(w)[:, :, None] * np.concatenate([X, r[:, :, None]], axis=2)
         for j in range(self.correction.arm.n):
             Xr = rooted[:, j] * np.sqrt(h)[:, None]
