@@ -123,15 +123,15 @@ def test_report_draws_a_hybrid_beside_the_others(call, small):
 def test_the_worst_cells_are_named(coverage):
     pooled, lowest, widest = said(coverage)
     assert "95.1 % on 2400 episodes" in pooled
-    assert lowest.startswith("lowest coverage: 91.0 % (Ixx, 0.5 s, no tare), 95.0 %")
-    assert ": 4.0 (Izz, 1 s, tare), 2.5" in widest
+    assert lowest.startswith("lowest coverage: 91.0 % (Ixx, 0.05 s, no tare), 95.0 %")
+    assert ": 4.0 (Izz, 0.1 s, tare), 2.5" in widest
 
 
 def test_the_table_has_a_row_for_every_cell_that_was_seen(coverage):
     page = io.StringIO()
     Console(file=page, width=180).print(cells_table(coverage))
     rows = [line.split() for line in page.getvalue().splitlines() if " s " in line]
-    assert len(rows) == 2 * len(TIMES) + 2
+    assert len(rows) == 2 * len(TIMES) + 4
     assert sum(row.count("91.0") for row in rows) == 1
 
 

@@ -11,15 +11,17 @@ RESULTS = ROOT / "benchmarks" / "results"
 
 
 def test_the_readme_s_table_is_that_of_the_committed_benchmark():
-    result = json.loads((RESULTS / "real_like_arms.json").read_text())
-    end, second = result["times"].index(6.0), result["times"].index(1.0)
-    for method, mae in result["mae"].items():
-        error, spread = 1e3 * np.array(mae), 1e3 * np.array(result["spread"][method])
-        row = (
-            f"| {method} | {error[end, 0]:.0f} ± {spread[end, 0]:.0f} | {error[end, 1:4].mean():.1f} "
-            f"| {error[end, 4:].mean():.1f} | {error[second, 0]:.0f} ± {spread[second, 0]:.0f} |"
-        )
-        assert row in README
+    result = json.loads((RESULTS / "benchmark.json").read_text())
+    second, end = result["times"].index(1.0), result["times"].index(6.0)
+
+    def cell(population, method, k):
+        found = result["populations"][population]["methods"][method]
+        error, spread = 1e3 * np.array(found["mae"][k]), 1e3 * found["standard_error"][k][0]
+        return f"{error[0]:.0f} ± {spread:.0f} · {error[1:4].mean():.1f} · {error[4:].mean():.1f}"
+
+    columns = (("reference", second), ("reference", end), ("container", second), ("beyond", second))
+    for method in ("hybrid", "map-gp", "rls-filter+tare", "training mean", "same-prior least squares"):
+        assert f"| {method} | {' | '.join(cell(p, method, k) for p, k in columns)} |" in README
 
 
 def test_the_readme_s_real_logs_are_those_of_the_committed_benchmark():
@@ -30,3 +32,24 @@ def test_the_readme_s_real_logs_are_those_of_the_committed_benchmark():
     for name, digits in (("hybrid, with tare, 6 s", 1), ("hybrid, with tare, 1 s", 0), ("hybrid, 6 s", 0)):
         moment = np.mean(semi[name]["first_moment_g_m"])
         assert f"{semi[name]['mass_g']:.{digits}f} g and {moment:.1f} g·m" in README
+
+
+def test_the_ablation_of_the_hybrid_is_that_of_the_committed_benchmark():
+    page = (ROOT / "docs" / "hybrid.md").read_text(encoding="utf-8")
+    found = json.loads((RESULTS / "hybrid_ablation.json").read_text())["rows"]
+    for what in ("tare", "no tare"):
+        for name in dict.fromkeys(cell["row"] for cell in found):
+            cells = [cell for cell in found if (cell["row"], cell["what"]) == (name, what)]
+            columns = [
+                f"{c['mass_g']:.0f} ± {c['mass_g_se']:.0f} · {c['first_moment_g_m']:.1f} · {c['inertia_g_m2']:.2f}"
+                for c in cells
+            ]
+            width = f"{cells[1]['mass_g_half_width']:.0f} · {cells[1]['inertia_g_m2_half_width']:.1f}"
+            assert f"| {name} | {' | '.join(columns)} | {width} |" in page
+
+
+def test_the_width_of_the_shipped_hybrid_is_that_of_its_training_s_report():
+    page = (ROOT / "docs" / "hybrid.md").read_text(encoding="utf-8")
+    ratio = np.array(json.loads((RESULTS / "hybrid_panda.json").read_text())["ratio"], dtype=float)
+    assert f"mean half-width is {np.nanmean(ratio[:2]):.1f} times" in page
+    assert f"up to {np.nanmax(ratio):.1f} in the first tenth" in page

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
+from armload.determined import SMALL, Z95, held
+from armload.determined import determined as told
 from armload.errors import IdentificationError
 from armload.identifier import Estimate, Identifier
 from armload.inertia import NAMES, UNITS, InertialParameters, is_consistent, nearest_consistent, phi_to_com
@@ -19,12 +21,7 @@ from armload.methods import METHODS, default_for
 from armload.recording import Recording, check_plausible
 
 LOWEST_RATE = 20.0  # [Hz]
-Z95 = 1.959963984540054  # half-width of a normal 95 % interval, in standard deviations
-# "determined" for a method without a prior: 95 % half-width below 50 g, 5 g·m, 5e-3 kg·m²
-_SMALL = np.array([0.05] + [0.005] * 3 + [0.005] * 6)
-_SHRINK = 3.0  # "determined" for a method with a prior: its half-width shrinks at least so much
 _MISFIT = 3.0  # standard deviations between the estimate and the nearest body, beyond which something is wrong
-_HELD = 3.0  # standard deviations of mass above zero before something counts as held
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +220,7 @@ def _run(recording: Recording, arm: Arm, tare: Recording | None, method: str | P
         )
     model.check(arm, recording)
     estimate = LearnedIdentifier(model, arm).run(recording)
-    family = np.maximum(model.phi_std, _SMALL / Z95)  # what did not vary in training is not known exactly for that
+    family = np.maximum(model.phi_std, SMALL / Z95)  # what did not vary in training is not known exactly for that
     if model.error_std is None:  # how far the members disagree is no error bar
         estimate = replace(estimate, covariance=np.diag(family**2))
     why = f"asked for; {method} was trained on this arm and motion"
@@ -260,10 +257,8 @@ def _answer(
 ) -> Identification:
     estimate, before = found.estimate, found.before
     phi, half, half_before = estimate.phi.copy(), Z95 * estimate.std, Z95 * found.before_std
-    determined = half <= (half_before / _SHRINK if found.prior else _SMALL)
-    if found.alone is not None:  # a family's bodies are alike: what follows from its mass alone, the log has not told
-        determined &= found.alone <= payload_prior_std(arm) / _SHRINK
-    held = bool(determined[0] and phi[0] > _HELD * estimate.std[0])
+    determined = told(estimate.std, found.before_std if found.prior else None, found.alone, payload_prior_std(arm))
+    is_held = held(phi[0], estimate.std[0], determined[0])
     low_before, high_before = before - half_before, before + half_before
     if not found.prior:  # the method knew nothing of what was known before: its own interval counts too
         low_before, high_before = np.minimum(low_before, phi - half), np.maximum(high_before, phi + half)
@@ -307,7 +302,7 @@ def _answer(
         com=com.tolist(),
         inertia_com=inertia_com.tolist(),
         consistent=is_consistent(phi),
-        held=held,
+        held=is_held,
         why=found.why,
         notes=tuple(said),
     )

@@ -77,6 +77,7 @@ ALL = {
         Population("container", "container", "payloads of a known family: the paper's container with any filling"),
         Population("beyond", "beyond", "arms beyond the real-like ones: other friction, heavier mismatch, drift"),
         Population("shapes", "shapes", "plates, rods, lumps, grippers instead of boxes"),
+        Population("odd", "odd", "payloads unlike all that training saw: dumbbells, poles, panes, rings, off the axis"),
         Population("everyday", "everyday", "motions of work: stops, pick and place, slow, some joints only"),
         Population("same-motion", "same motion", "the tare along the run's own motion"),
         Population("elsewhere", "elsewhere", "the tare in another part of the workspace than the run"),

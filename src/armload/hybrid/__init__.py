@@ -6,6 +6,7 @@ from armload.hybrid.identifier import HybridIdentifier, shipped_model
 from armload.hybrid.mixture import MixturePosterior, MixturePrior
 from armload.hybrid.model import HybridModel
 from armload.hybrid.records import Records, measure_episodes
+from armload.hybrid.streaming import StreamingHybrid
 from armload.hybrid.training import Coverage, cross_validated, payload_mixture, train_hybrid
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "MixturePrior",
     "Physics",
     "Records",
+    "StreamingHybrid",
     "cross_validated",
     "measure_episodes",
     "payload_mixture",

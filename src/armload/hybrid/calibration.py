@@ -19,9 +19,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armload.determined import Z95
 from armload.hybrid.evidence import KINDS, Evidence
 from armload.hybrid.mixture import MixturePosterior, MixturePrior
-from armload.hybrid.records import Records
+from armload.hybrid.records import TIMES, Records
 from armload.learners import MixedEnsemble, NetworkLearner, TreeLearner
 from armload.learners.compiled import Compiled
 
@@ -30,7 +31,6 @@ _INFORMATIVE = 9.0  # a direction counts as seen once the evidence shrinks its p
 _MEMBERS, _DEPTH, _UNITS, _EPOCHS = 5, 7, 32, 60
 _FEWEST = 30  # episodes below which a quantile is not worth its name
 _KAPPA = (0.1, 1e3)  # range of the factor
-_APART = 0.2  # ln of the least ratio of two times
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,13 +59,27 @@ class Calibration:
         """Quantile (10,) of |error|/std after t seconds: linear in log t, constant beyond the calibrated times."""
         at = np.log(np.clip(t, self.times[0], self.times[-1]))
         table = self.widths[kind]
-        return np.array([np.interp(at, np.log(self.times), table[:, k]) for k in range(10)])
+        logs = np.log(self.times)
+        k = int(np.clip(np.searchsorted(logs, at) - 1, 0, max(len(logs) - 2, 0)))
+        if len(logs) == 1:
+            return table[0]
+        share = (at - logs[k]) / (logs[k + 1] - logs[k])
+        return (1.0 - share) * table[k] + share * table[k + 1]
 
     def answer(self, evidence: Evidence, prior: MixturePrior) -> MixturePosterior:
         """The posterior, its covariance such that ±1.96 standard deviations are the calibrated 95 % interval."""
-        found = posterior(evidence, prior, float(self.kappa(evidence.traits[None])[0]))
-        d = self.width(evidence.t, evidence.kind) / 1.959963984540054
-        return found._replace(covariance=found.covariance * np.outer(d, d))
+        return self.answers(evidence, prior)[0]
+
+    def answers(self, evidence: Evidence, prior: MixturePrior) -> list[MixturePosterior]:
+        """The same, and what it would be of −phi, which was taken off then."""
+        kappa = float(self.kappa(evidence.traits[None])[0])
+        d = self.width(evidence.t, evidence.kind) / Z95
+        vectors = np.stack([evidence.vector, -evidence.vector]) / kappa
+        out = []
+        for found in prior.posteriors(evidence.information / kappa, vectors):
+            gain = evidence.gain_std**2 * np.outer(found.mean, found.mean)
+            out.append(found._replace(covariance=(found.covariance + gain) * np.outer(d, d)))
+        return out
 
     @classmethod
     def fit(
@@ -73,7 +87,8 @@ class Calibration:
         records: Records,
         prior: MixturePrior,
         *,
-        learned: bool = True,
+        learned: tuple[str, ...] = ("tree", "network"),
+        trusted: bool = False,
         seed: int = 0,
         held_out: float = 0.5,
     ) -> Calibration:
@@ -81,13 +96,14 @@ class Calibration:
 
         Args:
             records: of many episodes. prior: the payload prior the answers will use.
-            learned: False: no bag, one kappa for all (the ablation).
+            learned: what the bag is made of; nothing: no bag, one kappa for all (the ablation).
+            trusted: kappa is 1, whatever the episodes say (the other ablation).
             held_out: share of the episodes that the widths are calibrated on.
         """
         rng = np.random.default_rng(seed)
         episodes = rng.permutation(np.unique(records.episode))
         calibrated = np.isin(records.episode, episodes[: int(held_out * len(episodes))])
-        bag, level = _fit_kappa(records.select(~calibrated), prior, learned, seed)
+        bag, level = (None, 1.0) if trusted else _fit_kappa(records.select(~calibrated), prior, learned, seed)
         times = _times(records.t)
         draft = cls(bag, level, times, np.ones((len(KINDS), len(times), 10)))
         rest = records.select(calibrated)
@@ -105,9 +121,11 @@ class Calibration:
 
 
 def _times(t: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The times [s] that records were taken at: samples are jittered and lost, so that none falls on them exactly."""
-    t = np.sort(t)
-    return np.array([np.median(part) for part in np.split(t, np.flatnonzero(np.diff(np.log(t)) > _APART) + 1)])
+    """The times [s] that records were taken at: samples are jittered and lost, so that few fall on them exactly."""
+    asked = np.array(TIMES)
+    which = nearest(t, asked)
+    counts = np.bincount(which, minlength=len(asked))
+    return np.array([np.median(t[which == b]) for b in range(len(asked)) if counts[b] >= max(0.01 * len(t), 1.0)])
 
 
 def nearest(t: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.intp]:
@@ -150,7 +168,9 @@ def overrating(records: Records, prior: MixturePrior) -> NDArray[np.float64]:
     return out
 
 
-def _fit_kappa(records: Records, prior: MixturePrior, learned: bool, seed: int) -> tuple[Compiled | None, float]:
+def _fit_kappa(
+    records: Records, prior: MixturePrior, learned: tuple[str, ...], seed: int
+) -> tuple[Compiled | None, float]:
     target = overrating(records, prior)
     keep = np.isfinite(target)
     target, traits, episode = target[keep], records.traits[keep], records.episode[keep]
@@ -160,10 +180,11 @@ def _fit_kappa(records: Records, prior: MixturePrior, learned: bool, seed: int) 
     rng = np.random.default_rng(seed + 1)
     episodes = rng.permutation(np.unique(episode))
     checked = np.isin(episode, episodes[: len(episodes) // 5])
-    learners: tuple[Any, ...] = (
-        TreeLearner(max_depth=_DEPTH),
-        NetworkLearner(hidden=_UNITS, batch=256, max_epochs=_EPOCHS),
-    )
+    kinds = {
+        "tree": TreeLearner(max_depth=_DEPTH),
+        "network": NetworkLearner(hidden=_UNITS, batch=256, max_epochs=_EPOCHS),
+    }
+    learners: tuple[Any, ...] = tuple(kinds[kind] for kind in learned)
     model = MixedEnsemble(learners, members=_MEMBERS, seed=seed, scale="standard")
     model.fit(traits[~checked], log[~checked], traits[checked], log[checked])
     bag: Compiled = model.compiled_

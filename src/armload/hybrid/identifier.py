@@ -7,10 +7,12 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.errors import ModelError
+from armload.hybrid.calibration import Calibration
 from armload.hybrid.evidence import Evidence, Physics
+from armload.hybrid.mixture import MixturePrior
 from armload.hybrid.model import HybridModel
 from armload.identifier import Estimate
-from armload.inertia import is_consistent, nearest_consistent
+from armload.inertia import is_consistent, near_consistent, nearest_consistent
 from armload.least_squares import JointFeatures, payload_prior_std
 from armload.recording import Recording
 
@@ -60,28 +62,41 @@ class HybridIdentifier(Physics):
 
     def _estimate(self, t: float) -> Estimate:
         super()._estimate(t)
-        self._evidence = evidence = self.evidence(t)
-        found = self.model.calibration.answer(evidence, self._payloads)
-        if evidence.kind:  # perhaps the payload was taken off: then −phi is a body
-            removed = self.model.calibration.answer(evidence.mirrored, self._payloads)
-            if removed.log_evidence + np.log(_REMOVED) > found.log_evidence:
-                self._phi, self._covariance = -removed.mean, removed.covariance
-                return self._last(t)
-        self._phi, self._covariance = body(found.mean, found.covariance), found.covariance
+        self._evidence = self.evidence(t)
+        self._phi, self._covariance = answer(self._evidence, self.model.calibration, self._payloads)
         return self._last(t)
 
     @property
     def alone(self) -> NDArray[np.float64]:
         """Standard deviation (10,) of the last estimate under the weak prior of `payload_prior_std` instead."""
-        weak = payload_prior_std(self.arm)
-        if self._evidence is None:
-            return weak
-        trusted = self._evidence.information / self.model.calibration.kappa(self._evidence.traits[None])[0]
-        return weak * np.sqrt(np.diag(np.linalg.inv(np.eye(10) + weak[:, None] * trusted * weak)))
+        return std_alone(self._evidence, self.model.calibration, payload_prior_std(self.arm))
 
     def _last(self, t: float) -> Estimate:
         seen = self._count + len(self._waiting)
         return Estimate(float(t), self._phi.copy(), self._covariance.copy(), seen, str(self.arm.frame))
+
+
+def answer(
+    evidence: Evidence, calibration: Calibration, payloads: MixturePrior, quick: bool = False
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """phi (10,), a body that can exist or what such a body left behind, and its covariance with calibrated widths.
+
+    `quick`: the body is found in bounded time, to a hundredth of a standard deviation.
+    """
+    found, removed = calibration.answers(evidence, payloads)
+    if evidence.kind and removed.log_evidence + np.log(_REMOVED) > found.log_evidence:
+        return -removed.mean, removed.covariance  # the payload was taken off since the tare: −phi is a body
+    if quick:
+        return near_consistent(found.mean, np.linalg.inv(found.covariance)), found.covariance
+    return body(found.mean, found.covariance), found.covariance
+
+
+def std_alone(evidence: Evidence | None, calibration: Calibration, weak: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Standard deviation (10,) under a weak prior of standard deviations `weak`, evidence trusted as far as it is."""
+    if evidence is None:
+        return weak
+    trusted = evidence.information / calibration.kappa(evidence.traits[None])[0]
+    return weak * np.sqrt(np.diag(np.linalg.inv(np.eye(10) + weak[:, None] * trusted * weak)))
 
 
 def body(phi: NDArray[np.float64], covariance: NDArray[np.float64]) -> NDArray[np.float64]:

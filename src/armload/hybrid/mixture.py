@@ -19,6 +19,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from armload.errors import ModelError
@@ -149,16 +150,82 @@ class MixturePrior:
 
     def posterior(self, information: NDArray, vector: NDArray) -> MixturePosterior:
         """phi given Λ (10, 10) and h (10,), moments matched."""
+        return self.posteriors(information, vector[None])[0]
+
+    def posteriors(self, information: NDArray, vectors: NDArray) -> list[MixturePosterior]:
+        """phi given Λ (10, 10) and each of several h (V, 10): one factorisation serves them all."""
         s = self._scale
-        precision = self._precisions + information * np.outer(s, s)
-        P = np.linalg.inv(precision)
-        pull = self._pulls + vector * s
-        means = np.einsum("kij,kj->ki", P, pull)
-        log = self._constants + 0.5 * np.einsum("ki,ki->k", means, pull) - 0.5 * np.linalg.slogdet(precision)[1]
-        w = np.exp(log - log.max())
-        total = float(log.max() + np.log(w.sum()))
-        w /= w.sum()
-        mean = w @ means
-        away = means - mean
-        covariance = np.einsum("k,kij->ij", w, P) + np.einsum("k,ki,kj->ij", w, away, away)
-        return MixturePosterior(mean * s, 0.5 * (covariance + covariance.T) * np.outer(s, s), w, total)
+        unit = np.outer(s, s)
+        means, covariances, weights, totals = _posteriors(
+            self._precisions, self._pulls, self._constants, information * unit, vectors * s
+        )
+        return [
+            MixturePosterior(m * s, c * unit, w, float(total))
+            for m, c, w, total in zip(means, covariances, weights, totals, strict=True)
+        ]
+
+
+@njit(cache=True, nogil=True)
+def _posteriors(precisions, pulls, constants, information, vectors):  # pragma: no cover - compiled
+    K, V, d = len(precisions), len(vectors), 10
+    means, covariances = np.zeros((V, K, d)), np.empty((K, d, d))
+    log = np.empty((V, K))
+    L, inverse = np.empty((d, d)), np.empty((d, d))
+    for k in range(K):
+        half = 0.0  # ½·ln|precision|
+        for j in range(d):
+            for i in range(j, d):
+                total = 0.5 * (precisions[k, i, j] + precisions[k, j, i] + information[i, j] + information[j, i])
+                for m in range(j):
+                    total -= L[i, m] * L[j, m]
+                if i == j:
+                    L[j, j] = np.sqrt(max(total, 1e-12))
+                    half += np.log(L[j, j])
+                else:
+                    L[i, j] = total / L[j, j]
+        for j in range(d):  # inverse of L, by columns
+            inverse[j, j] = 1.0 / L[j, j]
+            for i in range(j + 1, d):
+                total = 0.0
+                for m in range(j, i):
+                    total -= L[i, m] * inverse[m, j]
+                inverse[i, j] = total / L[i, i]
+        for i in range(d):
+            for j in range(i + 1):
+                total = 0.0
+                for m in range(i, d):
+                    total += inverse[m, i] * inverse[m, j]
+                covariances[k, i, j] = covariances[k, j, i] = total
+        for v in range(V):
+            quadratic = 0.0
+            for i in range(d):
+                total = 0.0
+                for j in range(d):
+                    total += covariances[k, i, j] * (pulls[k, j] + vectors[v, j])
+                means[v, k, i] = total
+                quadratic += total * (pulls[k, i] + vectors[v, i])
+            log[v, k] = constants[k] + 0.5 * quadratic - half
+    mean, covariance, totals = np.zeros((V, d)), np.zeros((V, d, d)), np.empty(V)
+    weights = np.empty((V, K))
+    for v in range(V):
+        largest = log[v].max()
+        weights[v] = np.exp(log[v] - largest)
+        total = weights[v].sum()
+        totals[v] = largest + np.log(total)
+        weights[v] /= total
+        for k in range(K):
+            w = weights[v, k]
+            for i in range(d):
+                mean[v, i] += w * means[v, k, i]
+        for k in range(K):
+            w = weights[v, k]
+            if w < 1e-12:
+                continue
+            for i in range(d):
+                away = means[v, k, i] - mean[v, i]
+                for j in range(i + 1):
+                    covariance[v, i, j] += w * (covariances[k, i, j] + away * (means[v, k, j] - mean[v, j]))
+        for i in range(d):
+            for j in range(i):
+                covariance[v, j, i] = covariance[v, i, j]
+    return mean, covariance, weights, totals

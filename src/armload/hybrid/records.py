@@ -16,7 +16,7 @@ from armload.errors import ModelError
 from armload.hybrid.evidence import Evidence, Physics
 from armload.recording import Recording
 
-TIMES = (0.1, 0.5, 1.0, 3.0, 6.0)  # [s] since the run began
+TIMES = (0.02, 0.05, 0.1, 0.5, 1.0, 3.0, 6.0)  # [s] since the run began
 _BATCH = 4  # episodes per task
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
+from armload.determined import Z95
 from armload.episodes import draw_episodes
 from armload.errors import ModelError
 from armload.hybrid.calibration import Calibration, nearest
@@ -82,7 +83,7 @@ def train_hybrid(
     """
     if episodes < 8 * FOLDS:
         raise ModelError(f"{episodes} episodes asked for: expected at least {8 * FOLDS}")
-    records = _records(arm, population, episodes, seed, Path(folder) if folder else None, jobs, progress)
+    records = episode_records(arm, population, episodes, seed, Path(folder) if folder else None, jobs, progress)
     prior = payload_mixture(arm, seed)
     checked = cross_validated(records, prior, seed)
     model = HybridModel(
@@ -122,7 +123,9 @@ def payload_mixture(arm: Arm, seed: int = 0) -> MixturePrior:
     return fitted.joined(MixturePrior(np.ones(1), np.zeros((1, 10)), wide[None], ("anything",)), _ANYTHING_SHARE)
 
 
-def cross_validated(records: Records, prior: MixturePrior, seed: int = 0, learned: bool = True) -> Coverage:
+def cross_validated(
+    records: Records, prior: MixturePrior, seed: int = 0, learned: tuple[str, ...] = ("tree", "network")
+) -> Coverage:
     """Coverage of the intervals on held-out episodes: each fold is answered by a calibration fitted on the others."""
     episodes = np.random.default_rng([seed, 8]).permutation(np.unique(records.episode))
     inside = np.zeros((len(records), 10), dtype=bool)
@@ -133,7 +136,7 @@ def cross_validated(records: Records, prior: MixturePrior, seed: int = 0, learne
         for row in np.flatnonzero(held):
             found = calibration.answer(records.evidence(int(row)), prior)
             error[row] = np.abs(found.mean - records.truth[row])
-            half[row] = 1.959963984540054 * np.sqrt(np.diag(found.covariance))
+            half[row] = Z95 * np.sqrt(np.diag(found.covariance))
             inside[row] = error[row] <= half[row]
     cells, ratio = np.full((len(KINDS), len(TIMES), 10), np.nan), np.full((len(KINDS), len(TIMES), 10), np.nan)
     counts, which = np.zeros((len(KINDS), len(TIMES)), dtype=int), nearest(records.t, np.array(TIMES))
@@ -147,16 +150,16 @@ def cross_validated(records: Records, prior: MixturePrior, seed: int = 0, learne
     return Coverage(float(inside.mean()), cells, ratio, len(episodes), counts)
 
 
-def _records(
+def episode_records(
     arm: Arm,
-    population: str,
-    episodes: int,
-    seed: int,
-    folder: Path | None,
-    jobs: int,
-    progress: Callable[[int, int], None] | None,
+    population: str = "broad",
+    episodes: int = EPISODES,
+    seed: int = 0,
+    folder: Path | None = None,
+    jobs: int = 1,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Records:
-    """Records of all episodes, chunk by chunk; a finished chunk is read back instead of measured again."""
+    """What a training rests on: evidence and truth of its episodes. Arguments as of `train_hybrid`."""
     parts: list[Records] = []
     for first in range(0, episodes, _CHUNK):
         count = min(_CHUNK, episodes - first)

@@ -1,0 +1,97 @@
+"""What each learned part of the hybrid brings: its training episodes, each answered by a model that had not seen it.
+
+    python benchmarks/hybrid_ablation.py       (on the training's records in --work; about 40 CPU minutes without them)
+
+All rows get the same evidence: the physics' information about phi, log by log. Cross-validated in four folds of
+episodes; se is the standard error over the folds. Writes benchmarks/results/hybrid_ablation.json.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+import numpy as np
+
+from armload import __version__, arm
+from armload.determined import Z95
+from armload.hybrid import Calibration, MixturePrior, payload_mixture
+from armload.hybrid.calibration import nearest
+from armload.hybrid.records import TIMES
+from armload.hybrid.training import EPISODES, FOLDS, episode_records
+
+RESULTS = Path(__file__).parent / "results" / "hybrid_ablation.json"
+SHOWN = (0.1, 1.0, 6.0)  # [s]
+GROUPS = {"mass_g": slice(0, 1), "first_moment_g_m": slice(1, 4), "inertia_g_m2": slice(4, 10)}
+
+
+def gaussian(prior: MixturePrior) -> MixturePrior:
+    """The same prior as one Gaussian: what least squares can be told of the payloads."""
+    away = prior.means - prior.mean
+    second = np.einsum("k,kij->ij", prior.weights, prior.covariances) + np.einsum(
+        "k,ki,kj->ij", prior.weights, away, away
+    )
+    return MixturePrior(np.ones(1), prior.mean[None], second[None], ("all",))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--work", type=Path, default=Path("out/hybrid-panda"))
+    parser.add_argument("--episodes", type=int, default=EPISODES)
+    parser.add_argument("--jobs", type=int, default=1)
+    options = parser.parse_args()
+    panda = arm("panda")
+    records = episode_records(panda, episodes=options.episodes, folder=options.work, jobs=options.jobs)
+    prior = payload_mixture(panda)
+    rows = {
+        "predict the training mean": None,
+        "same-prior least squares": (gaussian(prior), "trusted"),
+        "mixture prior": (prior, "trusted"),
+        "mixture prior, one kappa": (prior, ()),
+        "mixture prior, kappa by trees": (prior, ("tree",)),
+        "mixture prior, kappa by networks": (prior, ("network",)),
+        "hybrid: both": (prior, ("tree", "network")),
+    }
+    episodes = np.random.default_rng([0, 8]).permutation(np.unique(records.episode))
+    which = nearest(records.t, np.array(TIMES))
+    out = []
+    for name, how in rows.items():
+        error, half = np.zeros((len(records), 10)), np.zeros((len(records), 10))
+        fold = np.zeros(len(records), dtype=int)
+        for k in range(FOLDS):
+            held = np.isin(records.episode, episodes[k::FOLDS])
+            fold[held] = k
+            train = records.select(~held)
+            if how is None:
+                mean, std = train.truth.mean(axis=0), train.truth.std(axis=0)
+                error[held], half[held] = np.abs(mean - records.truth[held]), Z95 * std
+                continue
+            used, learned = how
+            # "trusted": the evidence is taken at its word; its widths are calibrated all the same
+            kinds = () if learned == "trusted" else learned
+            calibration = Calibration.fit(train, used, learned=kinds, trusted=learned == "trusted", seed=k)
+            for row in np.flatnonzero(held):
+                found = calibration.answer(records.evidence(int(row)), used)
+                error[row] = np.abs(found.mean - records.truth[row])
+                half[row] = Z95 * np.sqrt(np.diag(found.covariance))
+        for kind, what in ((0, "no tare"), (1, "tare")):
+            for t in SHOWN:
+                cell = (records.kind == kind) & (which == TIMES.index(t))
+                line = {"row": name, "what": what, "t": t, "episodes": int(cell.sum())}
+                for group, part in GROUPS.items():
+                    e, h = error[cell][:, part], half[cell][:, part]
+                    folds = [1e3 * error[cell & (fold == k)][:, part].mean() for k in range(FOLDS)]
+                    line[group] = round(1e3 * float(e.mean()), 3)
+                    line[f"{group}_se"] = round(float(np.std(folds, ddof=1) / np.sqrt(FOLDS)), 3)
+                    line[f"{group}_half_width"] = round(1e3 * float(h.mean()), 3)
+                    line[f"{group}_inside"] = round(float(np.mean(e <= h)), 4)
+                out.append(line)
+                print(json.dumps(line), flush=True)
+    command = f"python benchmarks/hybrid_ablation.py --episodes {options.episodes}"
+    report = {"command": command, "version": __version__, "seed": 0, "folds": FOLDS, "rows": out}
+    RESULTS.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

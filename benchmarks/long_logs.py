@@ -1,0 +1,119 @@
+"""Whether the hybrid's error bars hold on logs longer than those they were calibrated on.
+
+    python benchmarks/long_logs.py [--episodes 40] [--worlds real_like]
+
+The shipped model's widths were calibrated up to 6 s after a run began. Here runs last 60 s: every episode is another
+arm, payload and motion (a Fourier motion that repeats, a slow one that does not, stops at ever new poses, pick and
+place), logged at 200 Hz, identified without and with a tare of 20 s on another motion, at several times of the same
+run. Written to benchmarks/results/long_logs.json, for each world, with and without a tare, and each group of
+parameters, over time:
+
+coverage: share of the 95 % intervals that hold the truth. The episodes are few: `standard_error` is that of the
+    coverage, with an episode's parameters taken as one observation.
+half_width, error: mean over episodes and parameters, in kg, kg·m, kg·m²; the median of the half-widths, too: where an
+    answer leaves the families of payloads for the prior's wide component, its half-width grows tenfold.
+widen: 95 % quantile of |error| over half-width: by which factor the error bars would have to be widened.
+slope: d ln(error) / d ln(t) between two times; −0.5 where errors average out, 0 where more of the log tells no more.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from armload import Recording, __version__, arm
+from armload.determined import Z95
+from armload.episodes import Episode, Recipe, draw_episodes, simulate_episodes
+from armload.hybrid import HybridIdentifier, HybridModel, shipped_model
+from armload.hybrid.model import POOLED
+
+HERE = Path(__file__).resolve().parent
+TIMES = (1.0, 3.0, 6.0, 15.0, 30.0, 60.0)  # [s] since the run began
+FIRST_SEED = 910_001  # nothing is trained on it
+GROUPS = {"mass": slice(0, 1), "first_moment": slice(1, 4), "inertia": slice(4, 10)}
+MOTIONS = ("harmonics", "long", "point-to-point", "pick-and-place")
+LONG = Recipe(payloads=("boxes", "shapes", "tools", "container"), motions=MOTIONS, duration=TIMES[-1])
+
+
+def episodes(world: str, count: int) -> list[Episode]:
+    """`count` long episodes on arms of a world."""
+    recipe = replace(LONG, worlds=(world,), elapsed=(30.0, 600.0) if world == "beyond" else LONG.elapsed)
+    return draw_episodes(arm("panda"), recipe, count, FIRST_SEED, motions=count)
+
+
+def measured(model: HybridModel, run: Recording, tare: Recording | None, truth: NDArray) -> tuple[NDArray, NDArray]:
+    """|error| and half-width (T, 10) at the times."""
+    found = HybridIdentifier(arm("panda"), tare, model).at(run, TIMES)
+    return np.abs([e.phi - truth for e in found]), Z95 * np.array([e.std for e in found])
+
+
+def table(error: NDArray, half: NDArray) -> dict:
+    """What is written of one world with or without a tare; (E, T, 10) both."""
+    inside = error <= half
+    out = {}
+    for name, part in {**GROUPS, "all": slice(0, 10)}.items():
+        shares = inside[..., part].mean(axis=2)  # (E, T)
+        wrong = error[..., part].mean(axis=(0, 2))
+        out[name] = {
+            "coverage": shares.mean(axis=0).round(3).tolist(),
+            "standard_error": (shares.std(axis=0) / np.sqrt(len(shares))).round(3).tolist(),
+            "widen": [
+                round(float(np.quantile(error[:, k, part] / half[:, k, part], 0.95)), 2) for k in range(len(TIMES))
+            ],
+        }
+        if name in GROUPS:  # units do not mix
+            out[name] |= {
+                "half_width": [float(f"{x:.4g}") for x in half[..., part].mean(axis=(0, 2))],
+                "median_half_width": [float(f"{x:.4g}") for x in np.median(half[..., part], axis=(0, 2))],
+                "error": [float(f"{x:.4g}") for x in wrong],
+                "slope": (np.diff(np.log(wrong)) / np.diff(np.log(TIMES))).round(2).tolist(),
+            }
+    return out
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--episodes", type=int, default=40)
+    parser.add_argument("--worlds", default="real_like")
+    asked = parser.parse_args()
+    model = shipped_model(arm("panda"))
+    result = {
+        "command": f"python benchmarks/long_logs.py --episodes {asked.episodes} --worlds {asked.worlds}",
+        "version": __version__,
+        "model": {key: model.provenance.get(key) for key in ("population", "episodes", "seed", POOLED)},
+        "first_seed": FIRST_SEED,
+        "episodes": asked.episodes,
+        "times_s": list(TIMES),
+        "worlds": {},
+    }
+    with threadpool_limits(1):
+        for world in asked.worlds.split(","):
+            drawn, found = episodes(world, asked.episodes), {"no tare": [], "tare": []}
+            for k, logs in enumerate(simulate_episodes(drawn), start=1):
+                for name, tare in (("no tare", None), ("tare", logs.tare)):
+                    found[name].append(measured(model, logs.run, tare, logs.truth.phi))
+                print(f"{world}: {k} of {len(drawn)}, {time.process_time():.0f} s of CPU time", flush=True)
+            tables = {}
+            kinds = np.array([next(kind for kind in MOTIONS if f"run-{kind}" in str(e.motion.name)) for e in drawn])
+            for name, pairs in found.items():
+                error, half = (np.array(x) for x in zip(*pairs, strict=True))
+                tables[name] = table(error, half)
+                inside = (error <= half).mean(axis=2)
+                tables[name]["coverage_by_motion"] = {
+                    kind: inside[kinds == kind].mean(axis=0).round(3).tolist() for kind in sorted(set(kinds))
+                }
+            result["worlds"][world] = tables
+            text = json.dumps(result, indent=1)
+            (HERE / "results" / "long_logs.json").write_text(text + "\n")
+    print(text)
+
+
+if __name__ == "__main__":
+    main()

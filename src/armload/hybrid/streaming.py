@@ -1,0 +1,76 @@
+"""The hybrid for a live robot: every sample counts, the answer is never older than ten milliseconds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm
+from armload.hybrid.evidence import Evidence
+from armload.hybrid.identifier import answer, shipped_model, std_alone
+from armload.hybrid.model import HybridModel
+from armload.identifier import Estimate
+from armload.least_squares import SmoothPosteriorLeastSquares, payload_prior_std
+from armload.least_squares.live import StreamingIdentifier
+from armload.recording import Recording, Sample
+
+
+class StreamingHybrid(StreamingIdentifier):
+    """The hybrid on the streaming posterior of its physics (`least_squares.streaming`).
+
+    It gives what `HybridIdentifier` gives, up to the scales' lag: but a tare along the same motion is a tare like any
+    other here.
+
+    Args:
+        arm: the bare arm. tare: an earlier log of it, if there is one.
+        model: the learned parts; None: those shipped for the arm.
+        publish: the answer is at most this old [s].
+
+    Raises:
+        ModelError: no model is shipped for this arm, or it was trained for another one.
+    """
+
+    name = "hybrid"
+
+    def __init__(
+        self, arm: Arm, tare: Recording | None = None, model: HybridModel | None = None, publish: float = 0.01
+    ) -> None:
+        self.model = shipped_model(arm) if model is None else model
+        self._payloads = self.model.prior_for(arm)
+        self.calibrated = self.model.calibrated
+        self.known = (self._payloads.mean, self._payloads.std)
+        self._weak = payload_prior_std(arm)
+        self._tare_time = 0.0 if tare is None else tare.duration
+        super().__init__(SmoothPosteriorLeastSquares(arm, tare), publish)
+
+    def reset(self) -> None:
+        """Forget the run (not the tare); the next sample is the first."""
+        super().reset()
+        self._evidence: Evidence | None = None
+        self._squares, self._values = 0.0, 0
+
+    def update(self, sample: Sample) -> Estimate:
+        """Take one sample (t, q, dq, tau) and return the estimate so far, at most `publish` old."""
+        self._squares += float(sample.dq @ sample.dq)
+        self._values += len(sample.dq)
+        return super().update(sample)
+
+    def _before(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        return self._payloads.mean, np.diag(self._payloads.std**2)
+
+    def _answer(self, seconds: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        assert self.stream is not None
+        solved = replace(self.stream.posterior, information=self.stream.information, vector=self.stream.vector)
+        speed = float(np.sqrt(self._squares / self._values))
+        tare_time = self._tare_time
+        if self.stream.tare is not None and self.reference is not None and self.reference.stream is not None:
+            tare_time = tare_time or self.reference.stream.seconds
+        self._evidence = Evidence.of(solved, self.arm, seconds, tare_time, speed)
+        return answer(self._evidence, self.model.calibration, self._payloads, quick=True)
+
+    @property
+    def alone(self) -> NDArray[np.float64]:
+        """Standard deviation (10,) of the last estimate under the weak prior of `payload_prior_std` instead."""
+        return std_alone(self._evidence, self.model.calibration, self._weak)
