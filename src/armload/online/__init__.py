@@ -1,0 +1,9 @@
+"""Payload identification beside a running robot."""
+
+from armload.online.engines import engine
+from armload.online.estimate import OnlineEstimate
+from armload.online.event import Event
+from armload.online.gate import Gate, Health
+from armload.online.identifier import OnlineIdentifier
+
+__all__ = ["Event", "Gate", "Health", "OnlineEstimate", "OnlineIdentifier", "engine"]

@@ -1,0 +1,93 @@
+"""What a live identifier says at one instant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.determined import Z95
+from armload.identifier import Estimate
+from armload.inertia import is_consistent, phi_to_com
+from armload.online.event import Event
+from armload.online.gate import Health
+
+
+@dataclass(frozen=True, eq=False)
+class OnlineEstimate(Estimate):
+    """An `Estimate` with what a controller has to know of it.
+
+    t: time of the last sample, on the stream's clock [s]. n_samples: samples of this payload so far.
+    age: how much older the newest sample in phi is than the last one [s].
+    since: when this payload was taken up, on the stream's clock [s].
+    relative_to: "arm", "tare", or "before": the run before the last change was taken for a tare. method: its name.
+    determined: which parameters (10,) the data determine. held: whether anything is there at all.
+    calibrated: whether ±1.96 std were checked to be 95 % intervals.
+    moving: whether the arm has moved in the last half second: a standing arm cannot tell an inertia.
+    settling: whether the payload changed so shortly ago that phi is still what was known beforehand.
+    event: the last change of payload noticed, if any.
+    health: counts of the stream; the same object as long as the stream lives.
+    notes: what else there is to say, a few words each.
+    """
+
+    age: float
+    since: float
+    relative_to: str
+    method: str
+    determined: NDArray[np.bool_]
+    held: bool
+    calibrated: bool
+    moving: bool
+    settling: bool
+    event: Event | None
+    health: Health
+    notes: tuple[str, ...]
+
+    @property
+    def low(self) -> NDArray[np.float64]:
+        """Lower ends (10,) of the 95 % intervals."""
+        return self.phi - Z95 * self.std
+
+    @property
+    def high(self) -> NDArray[np.float64]:
+        """Upper ends (10,) of the 95 % intervals."""
+        return self.phi + Z95 * self.std
+
+    def to_dict(self) -> dict[str, Any]:
+        """One JSON object, its names those of `armload identify --json` where they mean the same.
+
+        Numbers are finite: the end of an interval of which the method knows nothing is null, and so are the centre of
+        mass and the inertia about it where there is no mass.
+        """
+        mass = float(self.phi[0])
+        com, inertia_com = (None, None) if mass == 0.0 else (x.tolist() for x in phi_to_com(self.phi)[1:])
+        return {
+            "t": self.t,
+            "method": self.method,
+            "frame": self.frame,
+            "relative_to": self.relative_to,
+            "n_samples": self.n_samples,
+            "age": self.age,
+            "since": self.since,
+            "phi": self.phi.tolist(),
+            "phi_low": _finite(self.low),
+            "phi_high": _finite(self.high),
+            "interval": "calibrated" if self.calibrated else "approximate",
+            "determined": self.determined.tolist(),
+            "mass": mass,
+            "com": com,
+            "inertia_com": inertia_com,
+            "consistent": bool(is_consistent(self.phi)),
+            "held": self.held,
+            "moving": self.moving,
+            "settling": self.settling,
+            "event": None if self.event is None else self.event.to_dict(),
+            "left_out": self.health.bad,
+            "notes": list(self.notes),
+        }
+
+
+def _finite(values: NDArray[np.float64]) -> list[float | None]:
+    return [x if np.isfinite(x) else None for x in values.tolist()]

@@ -1,0 +1,31 @@
+"""A change of payload, as it is told to whoever listens."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+KINDS = ("change", "grasp", "release", "swap", "return")
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something was taken up, put down or exchanged.
+
+    kind: "change" until it is known which; "grasp", "release", "swap" (one payload for another) or "return" (what
+        was held before the last event is held again: a push, say, is over).
+    t: when it was noticed, on the stream's clock [s]. began: when it seems to have begun [s].
+    mass: by how much the mass seems to have changed [kg], a first guess.
+    """
+
+    kind: str
+    t: float
+    began: float
+    mass: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {"kind": self.kind, "t": self.t, "began": self.began, "mass": self.mass}
+
+    def __str__(self) -> str:
+        return f"{self.kind} at {self.t:.2f} s: {self.mass:+.2f} kg"

@@ -1,0 +1,241 @@
+"""The identifier that runs beside a robot for days: nothing it is fed makes it stop, every sample is answered.
+
+identifier = OnlineIdentifier(arm("panda"))
+for sample in source:
+    estimate = identifier.update(*sample)
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm
+from armload.determined import determined, held
+from armload.errors import IdentificationError
+from armload.identifier import Estimate, Identifier
+from armload.least_squares import StreamingIdentifier, payload_prior_std
+from armload.methods import METHODS
+from armload.online.engines import engine
+from armload.online.estimate import OnlineEstimate
+from armload.online.event import Event
+from armload.online.gate import Gate, Health
+from armload.online.state import load_state, save_state
+from armload.online.watch import PayloadWatch
+from armload.recording import Recording, Sample
+
+_MOVING = 0.01  # [rad/s] of any joint, within the last so many seconds
+_RECENT = 0.5  # [s]
+_PUBLISH = 0.01  # [s] intervals and judgements are made anew at most this often
+
+
+class OnlineIdentifier:
+    """Payload identification on a live stream, with any method.
+
+    >>> from armload.arms import arm
+    >>> identifier = OnlineIdentifier(arm("panda"))
+    >>> estimate = identifier.update(0.0, [0, 0, 0, -1.5, 0, 1.5, 0], [0] * 7, [0, -24.9, 0, 22.4, 0, 2.5, 0])
+    >>> estimate.held, estimate.moving, identifier.update(0.0, [0], None, "x").health.bad
+    (False, False, 1)
+
+    Args:
+        arm: the bare arm, with the frame and gravity wanted.
+        tare: an earlier log of the same arm, on any motion, with whatever was mounted then: estimates are of what was
+            added since.
+        method: a name of the catalogue, or a trained model's file; None: the most trustworthy for the arm.
+
+    Raises:
+        ArmloadError: an unknown method, a model of another arm, or a tare that is none of this arm.
+    """
+
+    def __init__(self, arm: Arm, tare: Recording | None = None, method: str | Path | None = None) -> None:
+        self.arm, self.tare, self._tared = arm, tare, tare is not None
+        first = engine(arm, tare, method)
+        self._watch = PayloadWatch(first) if isinstance(first, StreamingIdentifier) else None
+        self._engine = first
+        self.method = self.engine.name
+        self._gate = Gate(arm)
+        self._weak = payload_prior_std(arm)
+        entry = METHODS.get(self.method)
+        known = self.engine.known
+        self._before: NDArray | None = None
+        if entry is None or entry.prior:
+            self._before = self._weak if known is None else known[1]
+        self.reset()
+
+    @property
+    def engine(self) -> Identifier:
+        """What identifies the current payload."""
+        return self._engine if self._watch is None else self._watch.run
+
+    @property
+    def relative_to(self) -> str:
+        """What the answer is relative to: the bare "arm", the "tare", or what was held "before" the last change."""
+        if self._tared:
+            return "tare"
+        return "arm" if getattr(self.engine, "reference", None) is None else "before"
+
+    @property
+    def event(self) -> Event | None:
+        """The last change of payload that was noticed, on the stream's clock."""
+        return self._event
+
+    @property
+    def health(self) -> Health:
+        """Counts of the stream since `reset`."""
+        return self._gate.health
+
+    def reset(self) -> None:
+        """Forget the stream (not the tare); the next sample is the first."""
+        self._gate.reset()
+        if self._watch is None:
+            self._engine.reset()
+        else:
+            self._watch.reset()
+        self._clock = self._internal = 0.0
+        self._moved = -np.inf
+        self._since: float | None = None
+        self._published = -np.inf
+        self._event: Event | None = None
+        self._estimate = self._nothing()
+        self._determined, self._held = np.zeros(10, dtype=bool), False
+        self._notes: tuple[str, ...] = ()
+
+    def update(self, t: Any, q: Any, dq: Any, tau: Any) -> OnlineEstimate:
+        """Take one sample and say what is known; a sample that cannot be right is counted and left out.
+
+        Args:
+            t: [s], on any clock. q, dq, tau: (n,) [rad, rad/s, N·m]; tau = rigid body + friction, gravity in it.
+        """
+        passed = self._gate.take(t, q, dq, tau)
+        if passed is None:
+            return self._said()
+        sample = passed.sample
+        self._clock, self._internal = float(t), sample.t
+        if self._since is None:
+            self._since = self._clock
+        if sample.t - self._moved > 0.1 * _RECENT and np.abs(sample.dq).max() > _MOVING:
+            self._moved = sample.t
+        self._identify(sample)
+        return self._said()
+
+    def close(self) -> None:
+        """Stop what runs beside; the identifier may go on."""
+        if self._watch is not None:
+            self._watch.close()
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write all there is to know to one .npz file; `restore` goes on from it exactly.
+
+        Raises:
+            IdentificationError: the method keeps something that cannot be written.
+        """
+        if self._watch is not None:
+            self._watch.hold()
+        state = {k: v for k, v in vars(self).items() if k not in ("arm", "tare")}
+        origin = {"arm": self.arm.fingerprint, "name": self.arm.name}
+        return save_state({"origin": origin, "state": state, "tared": self._tared}, self._known(), path)
+
+    @classmethod
+    def restore(cls, path: str | PathLike[str], arm: Arm, method: str | Path | None = None) -> Self:
+        """An identifier in the state that was saved.
+
+        Args:
+            path: what `save` wrote. arm, method: what the identifier was made with; a tare is in the state.
+
+        Raises:
+            IdentificationError: the file is none, or of another arm.
+        """
+        new = cls(arm, method=method)
+        saved = load_state(path, new._known())
+        if saved["origin"]["arm"] != arm.fingerprint:
+            raise IdentificationError(
+                f"{path} was saved for {saved['origin']['name']}: {arm.name} is another arm, or has another frame, "
+                "gravity or tool"
+            )
+        new.close()
+        new.__dict__.update(saved["state"])
+        new._tared = saved["tared"]
+        return new
+
+    def _known(self) -> dict[str, Any]:
+        """What a new identifier for the same arm has already: the arm and the trained parts."""
+        parts = {name: value for name in ("model", "_payloads") if (value := getattr(self._engine, name, None))}
+        return {"arm": self.arm, **parts}
+
+    def _identify(self, sample: Sample) -> None:
+        if self._watch is None:
+            estimate, fresh = self._engine.update(sample), not 0.0 <= sample.t - self._published < _PUBLISH
+        else:
+            known = self._watch.event
+            estimate = self._watch.update(sample, self._held)
+            if self._watch.event is not known:
+                self._noticed(sample.t)
+            if estimate is None or self._watch.settling:
+                return
+            run = self._watch.run
+            fresh = isinstance(run, StreamingIdentifier) and run.fresh
+        if (fresh or self._watch is None) and not np.isfinite(estimate.phi.sum()):
+            return
+        if fresh:
+            self._published = sample.t
+            self._judge(estimate)
+        self._estimate = estimate
+
+    def _noticed(self, now: float) -> None:
+        """A change: until its transient is over only what was known beforehand is."""
+        assert self._watch is not None
+        assert self._watch.event is not None
+        event, shift = self._watch.event, self._clock - now
+        self._event = replace(event, t=event.t + shift, began=event.began + shift)
+        if self._watch.settling:
+            self._since = self._clock
+            self._estimate = self._nothing()
+            self._determined, self._held, self._notes = np.zeros(10, dtype=bool), False, ("the payload has changed",)
+
+    def _nothing(self) -> Estimate:
+        """What is known beforehand."""
+        mean, std = (np.zeros(10), self._weak) if self.engine.known is None else self.engine.known
+        return Estimate(0.0, mean, np.diag(std**2), 0, str(self.arm.frame))
+
+    def _judge(self, estimate: Estimate) -> None:
+        """What the data determine, and whether anything is there."""
+        alone = self.engine.alone
+        self._determined = determined(estimate.std, self._before, alone, self._weak)
+        self._held = held(float(estimate.phi[0]), float(estimate.std[0]), bool(self._determined[0]))
+        notes = []
+        if not self._moving:
+            notes.append("not moving: inertia undetermined" if not self._determined[4:].all() else "not moving")
+        self._notes = tuple(notes)
+
+    @property
+    def _moving(self) -> bool:
+        return self._internal - self._moved < _RECENT
+
+    def _said(self) -> OnlineEstimate:
+        estimate = self._estimate
+        newest = getattr(self.engine, "data_t", self._internal)
+        return OnlineEstimate(
+            self._clock,
+            estimate.phi,
+            estimate.covariance,
+            estimate.n_samples,
+            estimate.frame,
+            age=float(self._internal - newest) if np.isfinite(newest) else 0.0,
+            since=self._clock if self._since is None else self._since,
+            relative_to=self.relative_to,
+            method=self.method,
+            determined=self._determined,
+            held=self._held,
+            calibrated=self.engine.calibrated,
+            moving=self._moving,
+            settling=self._watch is not None and self._watch.settling,
+            event=self.event,
+            health=self._gate.health,
+            notes=self._notes,
+        )

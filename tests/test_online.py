@@ -1,0 +1,235 @@
+"""An identifier beside a running robot: what a stream may do to it, and what it must not."""
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from armload.arms import arm
+from armload.errors import IdentificationError
+from armload.methods import METHODS
+from armload.motion import random_motion, taie2024
+from armload.online import OnlineIdentifier
+from armload.payloads import test_payload as make_payload
+from armload.recording import Sample
+from armload.simulate import World, simulate
+
+
+@pytest.fixture(scope="module")
+def panda():
+    return arm("panda")
+
+
+@pytest.fixture(scope="module")
+def log(panda):
+    payload = make_payload().parameters
+    return simulate(panda, taie2024(), payload=payload, world=World.real_like(panda, seed=3), rate=200.0)
+
+
+@pytest.fixture
+def online(panda):
+    identifier = OnlineIdentifier(panda)
+    yield identifier
+    identifier.close()
+
+
+def fed(identifier, samples):
+    estimate = None
+    for sample in samples:
+        estimate = identifier.update(*sample)
+    return estimate
+
+
+def clean(panda, samples):
+    identifier = OnlineIdentifier(panda)
+    estimate = fed(identifier, samples)
+    identifier.close()
+    return estimate
+
+
+def test_a_payload_is_found_and_said_with_all_that_a_controller_asks(online, log):
+    estimate = fed(online, log)
+    truth = make_payload().parameters.phi
+    assert np.mean((estimate.low <= truth) & (truth <= estimate.high)) >= 0.9
+    assert estimate.held
+    assert estimate.determined.all()
+    assert estimate.moving
+    assert estimate.age <= 0.0101
+    assert estimate.calibrated
+    said = json.loads(json.dumps(estimate.to_dict(), allow_nan=False))
+    assert said["mass"] == pytest.approx(truth[0], abs=0.15)
+    assert said["n_samples"] == len(log)
+
+
+def bad_samples(n=7):
+    numbers = st.floats(allow_nan=True, allow_infinity=True)
+    broken = st.one_of(
+        st.lists(numbers, max_size=12),
+        st.none(),
+        st.text(max_size=3),
+        st.just([np.nan] * n),
+        st.just([1e300] * n),
+        st.just([[0.0] * n]),
+        st.just({"q": 1}),
+    )
+    return st.lists(st.tuples(numbers, broken, broken, broken), max_size=6)
+
+
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(bad=bad_samples(), where=st.integers(1, 59))
+def test_samples_that_are_none_leave_no_trace(panda, log, bad, where):
+    """Bit for bit: the estimate after a stream with garbage in it is the one after the stream without."""
+    samples = list(log)[:60]
+    identifier = OnlineIdentifier(panda)
+    fed(identifier, samples[:where])
+    used = identifier.health.used
+    for sample in bad:
+        estimate = identifier.update(*sample)
+        assert np.isfinite(estimate.phi).all()
+    assert identifier.health.used == used
+    assert identifier.health.bad == len(bad)
+    after = fed(identifier, samples[where:])
+    identifier.close()
+    assert np.array_equal(after.phi, clean(panda, samples).phi)
+
+
+@pytest.mark.parametrize("column", range(3))
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e9])
+def test_one_wrong_number_is_counted_and_left_out(panda, online, log, column, value):
+    samples = list(log)[:40]
+    broken = [x.copy() for x in samples[20][1:]]
+    broken[column][3] = value
+    estimate = fed(online, [*samples[:20], (samples[20].t - 1e-4, *broken), *samples[20:]])
+    assert online.health.bad == 1
+    assert np.array_equal(estimate.phi, clean(panda, samples).phi)
+
+
+def test_swapped_joints_are_left_out(online, log):
+    samples = list(log)[:200]
+    order = [3, 1, 2, 0, 4, 5, 6]
+    stream = [
+        Sample(s.t, s.q[order], s.dq[order], s.tau[order]) if 100 <= k < 110 else s for k, s in enumerate(samples)
+    ]
+    fed(online, stream)
+    assert online.health.left_out["jump"] + online.health.left_out["implausible"] == 10
+    assert online.health.used == 190
+
+
+def test_an_arm_that_is_elsewhere_after_a_pause_is_believed(online, log):
+    samples = list(log)
+    later = [Sample(s.t + 5.0, s.q, s.dq, s.tau) for s in samples[600:900]]
+    fed(online, samples[:300])
+    estimate = fed(online, later)
+    assert online.health.used == 600
+    assert online.health.pauses == 1
+    assert np.isfinite(estimate.phi).all()
+
+
+def test_repeated_and_late_samples_count_once(panda, online, log):
+    samples = list(log)[:60]
+    stream = []
+    for k, sample in enumerate(samples):
+        stream += [sample, sample] + ([samples[k - 3]] if k > 5 else [])
+    estimate = fed(online, stream)
+    assert online.health.left_out["repeated"] == 60
+    assert online.health.left_out["late"] == 54
+    assert np.array_equal(estimate.phi, clean(panda, samples).phi)
+
+
+@pytest.mark.parametrize("jump", [-3600.0, -2.0, 1e9])
+def test_a_clock_that_is_set_anew_costs_nothing_but_a_pause(online, log, jump):
+    samples = list(log)
+    truth = make_payload().parameters.mass
+    fed(online, samples[:600])
+    estimate = fed(online, [Sample(s.t + jump, s.q, s.dq, s.tau) for s in samples[600:1100]])
+    assert estimate.t == pytest.approx(samples[1099].t + jump)
+    assert online.health.used == 1100
+    assert abs(estimate.phi[0] - truth) < 3.0 * estimate.std[0]
+
+
+def test_a_standing_arm_says_so_and_claims_no_inertia(panda, online):
+    pose = np.array([0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8])
+    tau = panda.with_payload(make_payload().parameters).torque(pose)
+    estimate = fed(online, [Sample(0.01 * k, pose, np.zeros(7), tau) for k in range(300)])
+    assert not estimate.moving
+    assert "not moving: inertia undetermined" in estimate.notes
+    assert not estimate.determined[4:].any()
+    assert abs(estimate.phi[0] - make_payload().parameters.mass) < 2.0 * estimate.std[0]
+
+
+@pytest.mark.parametrize("method", [name for name, entry in METHODS.items() if not entry.needs])
+def test_any_method_of_the_catalogue_runs_beside_a_robot(panda, log, method):
+    identifier = OnlineIdentifier(panda, method=method)
+    estimate = fed(identifier, list(log)[:60])
+    identifier.update(float("nan"), None, 1, "x")
+    json.dumps(estimate.to_dict(), allow_nan=False)
+    json.dumps(OnlineIdentifier(panda, method=method).update(0.0, None, None, None).to_dict(), allow_nan=False)
+    identifier.close()
+    assert estimate.method == method
+    assert np.isfinite(estimate.phi).all()
+    assert estimate.n_samples > 0
+
+
+@pytest.mark.parametrize("cut", [7, 30, 500])
+@pytest.mark.parametrize("method", [None, "map", "rls-filter"])
+def test_a_saved_state_goes_on_exactly(panda, log, tmp_path, method, cut):
+    samples = list(log)[:700]
+    identifier = OnlineIdentifier(panda, method=method)
+    fed(identifier, samples[:cut])
+    path = identifier.save(tmp_path / "state.npz")
+    restored = OnlineIdentifier.restore(path, panda, method)
+    here, there = fed(identifier, samples[cut:]), fed(restored, samples[cut:])
+    for each in (identifier, restored):
+        each.close()
+    assert np.array_equal(here.phi, there.phi)
+    assert np.array_equal(here.covariance, there.covariance)
+    assert str(restored.health) == str(identifier.health)
+
+
+def test_a_saved_state_keeps_its_tare(panda, log, tmp_path):
+    tare = simulate(panda, random_motion(panda, seed=5, duration=4.0), rate=100.0)
+    identifier = OnlineIdentifier(panda, tare)
+    fed(identifier, list(log)[:100])
+    restored = OnlineIdentifier.restore(identifier.save(tmp_path / "state.npz"), panda)
+    here, there = (fed(each, list(log)[100:300]) for each in (identifier, restored))
+    for each in (identifier, restored):
+        each.close()
+    assert there.relative_to == "tare"
+    assert np.array_equal(here.phi, there.phi)
+
+
+def test_a_state_does_not_grow(panda, online, tmp_path):
+    long = simulate(panda, taie2024(), rate=50.0)
+    sizes = []
+    for turn in range(3):  # of six seconds each
+        for sample in long:
+            online.update(sample.t + 10.0 * turn, *sample[1:])
+        sizes.append(online.save(tmp_path / f"{turn}.npz").stat().st_size)
+    assert sizes[2] <= sizes[1] + 200_000  # rows that wait to be handed over come and go
+
+
+def test_a_state_of_another_arm_or_no_state_is_refused(panda, online, log, tmp_path):
+    fed(online, list(log)[:50])
+    path = online.save(tmp_path / "state.npz")
+    with pytest.raises(IdentificationError, match="another arm"):
+        OnlineIdentifier.restore(path, arm("panda", gravity=(0.0, 3.0, -9.0)))
+    path.write_bytes(path.read_bytes()[:1000])
+    with pytest.raises(IdentificationError, match="no state"):
+        OnlineIdentifier.restore(path, panda)
+    with pytest.raises(IdentificationError, match="no saved state"):
+        OnlineIdentifier.restore(tmp_path / "none.npz", panda)
+
+
+def test_a_state_file_makes_nothing_that_is_not_armloads(panda, online, log, tmp_path):
+    fed(online, list(log)[:50])
+    path = online.save(tmp_path / "state.npz")
+    with np.load(path) as data:
+        arrays = dict(data)
+    text = arrays["tree"].tobytes().decode().replace("armload.online.gate.Health", "subprocess.Popen")
+    assert "subprocess" in text
+    arrays["tree"] = np.frombuffer(text.encode(), dtype=np.uint8)
+    np.savez(path, **arrays)
+    with pytest.raises(IdentificationError, match="it holds a subprocess"):
+        OnlineIdentifier.restore(path, panda)
