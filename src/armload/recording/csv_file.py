@@ -2,6 +2,9 @@
 
 A file without flaw is read at once (pyarrow). Any other is read again line by line, to say which line and column is
 wrong, or to find that a person would have read it the same way (blank lines, quotes, a plus sign).
+
+A last line that was cut off (no line end, and no row of numbers) is dropped with a note: that is how a log ends whose
+writer was killed or whose machine lost its power.
 """
 
 from __future__ import annotations
@@ -20,12 +23,13 @@ from armload.recording.columns import checked_recording, column_names, joint_cou
 from armload.recording.recording import Recording
 
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,5})?")
+_BEGINS_A_NUMBER = re.compile(r"[+-]?[0-9]*\.?[0-9]*([eE][+-]?[0-9]*)?")
 _NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)", re.IGNORECASE)
 
 
 def read_csv(path: Path, where: str, arm: Arm | None = None) -> Recording:
     """Read a CSV log; see `read_recording` for what it raises."""
-    data = path.read_bytes()
+    data, notes = _without_torn_end(path.read_bytes(), where)
     text = _text(data, where)
     names = _header(text, where)
     n = joint_count(names, where, arm)
@@ -35,9 +39,9 @@ def read_csv(path: Path, where: str, arm: Arm | None = None) -> Recording:
     if table is not None:
         table = np.ascontiguousarray(table[:, order])
         if len(table) > 1 and np.isfinite(table).all() and np.all(np.diff(table[:, 0]) > 0):
-            return checked_recording(table, where, lambda k: f"line {k + 2}", joint_names=joints)
+            return checked_recording(table, where, lambda k: f"line {k + 2}", joint_names=joints, notes=notes)
     table, lines = _read_slowly(text, names, where)
-    return checked_recording(table[:, order], where, lambda k: f"line {lines[k]}", joint_names=joints)
+    return checked_recording(table[:, order], where, lambda k: f"line {lines[k]}", joint_names=joints, notes=notes)
 
 
 def write_csv(path: Path, recording: Recording) -> None:
@@ -52,6 +56,19 @@ def write_csv(path: Path, recording: Recording) -> None:
         file.write((",".join(names) + "\n").encode())  # Arrow would put the names in quotes
         options = arrow_csv.WriteOptions(include_header=False, quoting_style="none")
         arrow_csv.write_csv(pa.Table.from_arrays(arrays, names=names), file, options)
+
+
+def _without_torn_end(data: bytes, where: str) -> tuple[bytes, tuple[str, ...]]:
+    """The file without a last line that was cut off, and a note if there was one."""
+    whole = data.rstrip(b"\0")  # a file system may have promised blocks that it never wrote
+    end = max(whole.rfind(b"\n"), whole.rfind(b"\r")) + 1
+    columns = re.split(rb"[\r\n]", whole, maxsplit=1)[0].count(b",") + 1
+    *cells, last = (cell.strip().decode("latin-1") for cell in whole[end:].split(b","))
+    complete = len(cells) + 1 == columns and _NUMBER.fullmatch(last) and whole == data
+    begins_a_row = len(cells) < columns and all(map(_NUMBER.fullmatch, cells)) and _BEGINS_A_NUMBER.fullmatch(last)
+    if end == 0 or complete or not begins_a_row or (not whole[end:].strip() and whole == data):
+        return data, ()
+    return whole[:end], (f"{where}: dropped the last line, which was cut off: {len(data) - end} bytes",)
 
 
 def _text(data: bytes, where: str) -> str:

@@ -1,0 +1,99 @@
+"""From sensor_msgs/JointState messages to samples of one arm, as they come.
+
+Joints are known by **name**: a message may list them in any order and others beside them (gripper fingers). Time is the
+header's stamp, counted from the first; where messages are not stamped (all zero) it is the time of receipt. `effort` is
+the joint torque. `armload.recording.ros_bag` does the same for whole logs, and refuses what is only suspicious here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm
+from armload.errors import SourceError
+from armload.recording import Sample
+
+_MOST_LAYOUTS = 64  # lists of names remembered; a publisher that invents names cannot fill the memory
+
+
+class JointStates:
+    """Reads one arm's samples out of JointState messages.
+
+    Args:
+        arm: whose joints, and in which order.
+        topic: what errors call the source.
+
+    Attributes:
+        others: names of joints seen in messages that did not have all of the arm's.
+    """
+
+    def __init__(self, arm: Arm, topic: str) -> None:
+        self.others: set[str] = set()
+        self._wanted, self._topic = arm.joint_names, topic
+        self._layouts: dict[tuple[str, ...], list[int] | None] = {}
+        self._first_received: int | None = None  # [ns] since 1970, as all times here
+        self._zero: int | None = None  # the stamp at t = 0, once a message was stamped
+        self._begun = False
+
+    def sample(self, message: Any, received: int) -> Sample | None:
+        """The message as a sample, with NaN where values are missing; None: it has not all joints of the arm.
+
+        Args:
+            message: a sensor_msgs/JointState of any ROS client.
+            received: when it was received, since 1970 [ns].
+
+        Raises:
+            SourceError: the very first sample lacks positions, velocities or efforts: the rest will, too.
+        """
+        names = tuple(message.name)
+        if names not in self._layouts:
+            if len(self._layouts) >= _MOST_LAYOUTS:
+                self._layouts.clear()
+                self.others.clear()
+            complete = set(self._wanted) <= set(names)
+            self._layouts[names] = [names.index(name) for name in self._wanted] if complete else None
+            self.others.update(() if complete else names)
+        order = self._layouts[names]
+        if order is None:
+            return None
+        if not self._begun:
+            self._check(message, len(names))
+            self._begun = True
+        rows = [_in_order(v, len(names), order) for v in (message.position, message.velocity, message.effort)]
+        return Sample(self._time(message.header.stamp, received), *rows)
+
+    def stamp(self, t: float) -> int:
+        """When t was on the robot's clock, since 1970 (or the start of simulated time) [ns]; 0 before any sample."""
+        zero = self._first_received if self._zero is None else self._zero
+        return 0 if zero is None else zero + round(t * 1e9)
+
+    def _time(self, stamp: Any, received: int) -> float:
+        """Seconds since the first sample: by the stamps from the first stamped message on."""
+        nanoseconds = int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+        if self._first_received is None:
+            self._first_received = received
+        since = received - self._first_received
+        if self._zero is None:
+            if nanoseconds == 0:
+                return since / 1e9
+            self._zero = nanoseconds - since  # a clock that starts late, as simulated time does, goes on from here
+        return (nanoseconds - self._zero) / 1e9 if nanoseconds else float("nan")
+
+    def _check(self, message: Any, n: int) -> None:
+        for what, values in (
+            ("position", message.position),
+            ("velocity", message.velocity),
+            ("effort", message.effort),
+        ):
+            if len(values) != n:
+                found = f"no {what}" if len(values) == 0 else f"{len(values)} values of {what}"
+                also = " (joint torque); name a topic that carries the torque" if what == "effort" else ""
+                raise SourceError(f"{self._topic} has {found} for its {n} joints: expected one per joint{also}")
+
+
+def _in_order(values: Sequence[float], n: int, order: list[int]) -> NDArray[np.float64]:
+    return np.asarray(values, dtype=float)[order] if len(values) == n else np.full(len(order), np.nan)

@@ -1,0 +1,45 @@
+"""An arm and payloads as JSON: what the reader's own process is told."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from armload.arms import Arm
+from armload.inertia import InertialParameters
+
+
+def arm_to_json(arm: Arm) -> dict[str, Any]:
+    """All that makes an arm, for another process."""
+    facts = {field.name: getattr(arm, field.name) for field in dataclasses.fields(arm)}
+    if arm.attached is not None:
+        facts["attached"] = {"phi": arm.attached.phi.tolist(), "frame": arm.attached.frame}
+    if arm.links is not None:
+        facts["links"] = np.asarray(arm.links).tolist()
+    return facts
+
+
+def arm_from_json(facts: dict[str, Any]) -> Arm:
+    """The arm again."""
+    facts = dict(facts)
+    if facts["attached"] is not None:
+        facts["attached"] = InertialParameters(np.array(facts["attached"]["phi"]), facts["attached"]["frame"])
+    if facts["links"] is not None:
+        facts["links"] = np.array(facts["links"])
+    for name in ("gravity", "acceleration", "jerk"):
+        facts[name] = None if facts[name] is None else tuple(facts[name])
+    return Arm(**facts)
+
+
+def payloads_to_json(payloads: Sequence[tuple[float, Any]]) -> list[list[Any]]:
+    """(time, payload) pairs, each payload as its ten parameters or None."""
+    held = [(t, getattr(payload, "parameters", payload)) for t, payload in payloads]
+    return [[float(t), None if parameters is None else parameters.phi.tolist()] for t, parameters in held]
+
+
+def payloads_from_json(pairs: list[list[Any]]) -> list[tuple[float, InertialParameters | None]]:
+    """The pairs again."""
+    return [(t, None if phi is None else InertialParameters(np.array(phi))) for t, phi in pairs]

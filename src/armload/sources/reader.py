@@ -1,0 +1,113 @@
+"""The reader's own process: takes samples from a source, keeps them, and puts them into the ring.
+
+Started by `Detached` as `python -m armload.sources.reader RING WAKE STATUS` (three inherited file descriptors). Its
+standard input brings one JSON object per line, first what to open, then commands; when it ends, so does the reader:
+that is how it learns that whoever started it has ended, in whatever way. RING is the ring, WAKE a pipe that gets one
+byte per sample, STATUS a pipe with one JSON object per event: ready, ended, error, or what became of a command.
+
+A sample is recorded first and handed on then: what anybody has seen is in the record.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import queue
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from armload.errors import ArmloadError, SourceError
+from armload.sources.open import open_source
+from armload.sources.order import arm_from_json, payloads_from_json
+from armload.sources.recorder import Recorder
+from armload.sources.ring import Ring
+from armload.sources.source import Source
+
+_CALLS = ("read_once", "set_load")  # what may be asked of the source from outside
+_PATIENCE = 1.0  # [s] a source may take to end before the process does
+
+
+class _Reader:
+    """One run of the process."""
+
+    def __init__(self, ring: int, wake: int, status: int) -> None:
+        self.ring = Ring(ring)
+        self.wake = wake
+        self.status = status
+        self.commands: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
+        os.set_blocking(wake, False)
+
+    def tell(self, **event: Any) -> None:
+        with contextlib.suppress(BrokenPipeError):
+            os.write(self.status, (json.dumps(event) + "\n").encode())
+
+    def run(self) -> None:
+        lines = _lines(sys.stdin.fileno())
+        order = json.loads(next(lines))
+        arm, options = arm_from_json(order["arm"]), order["options"]
+        if options.get("payloads"):
+            options["payloads"] = payloads_from_json(options["payloads"])
+        try:
+            with contextlib.ExitStack() as stack:
+                source = stack.enter_context(open_source(order["spec"], arm, detached=False, **options))
+                record = order["record"]
+                recorder = None if record is None else stack.enter_context(Recorder(record, source.n))
+                threading.Thread(target=self.listen, args=(source, lines), daemon=True).start()
+                self.tell(event="ready", name=source.name, n=source.n, rate=source.rate)
+                self.pass_on(source, recorder)
+            self.tell(event="ended")
+        except (ArmloadError, OSError) as error:
+            self.tell(event="error", message=str(error))
+
+    def pass_on(self, source: Source, recorder: Recorder | None) -> None:
+        row = np.empty(self.ring.columns)
+        for sample in source:
+            if recorder is not None:
+                recorder.append(sample)
+            row[0] = sample.t
+            row[1:] = np.concatenate(sample[1:])
+            self.ring.write(row)
+            with contextlib.suppress(BlockingIOError, BrokenPipeError):  # nobody is waiting, or nobody is there
+                os.write(self.wake, b".")
+            while not self.commands.empty():
+                self.obey(source, self.commands.get())
+
+    def obey(self, source: Source, command: dict[str, Any]) -> None:
+        method = command["call"]
+        try:
+            if method not in _CALLS or not hasattr(source, method):
+                raise SourceError(f"{source.name} has no {method}: only a Franka robot has")
+            self.tell(event="answer", value=getattr(source, method)(*command["arguments"]))
+        except ArmloadError as error:
+            self.tell(event="refused", message=str(error))
+
+    def listen(self, source: Source, lines: Iterator[bytes]) -> None:
+        """Take commands until standard input ends; then end the source, and if it does not, the process."""
+        for line in lines:
+            self.commands.put(json.loads(line))
+        watch = threading.Timer(_PATIENCE, os._exit, [0])  # the record needs no closing
+        watch.daemon = True
+        watch.start()
+        with contextlib.suppress(SourceError):
+            source.close()
+
+
+def _lines(descriptor: int) -> Iterator[bytes]:
+    """Lines of a pipe as they come, without the locks of a buffered file, which a thread may hold when all ends."""
+    heard = b""
+    while more := os.read(descriptor, 1 << 16):
+        heard += more
+        while b"\n" in heard:
+            line, heard = heard.split(b"\n", 1)
+            yield line
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to the whole group: the one who started us decides
+    _Reader(*map(int, sys.argv[1:4])).run()
