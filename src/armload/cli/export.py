@@ -1,0 +1,135 @@
+"""`armload export`: an identified payload in a controller's or simulator's own form."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from armload.cli.arguments import Parser, file_name, payload_of
+from armload.cli.printing import print_note
+
+if TYPE_CHECKING:
+    from armload.arms import Arm
+    from armload.sinks import Load
+
+# the names of armload.sinks.FORMS, so that --help need not import them; a test compares
+_FORMS = ("franka", "franka-desk", "ur", "ur-payload", "urdf", "mjcf", "sdf", "ros2")
+_CONTROLLERS = ("franka", "franka-desk", "ur", "ur-payload")
+_EXAMPLES = """\
+examples:
+  armload identify run.csv --robot panda --json > held.json
+  armload export held.json --to franka --minus franka-hand    (Desk counts the hand already)
+  armload export held.json --to urdf --out payload.urdf
+  armload export held.json --to ur --robot my_ur.urdf --frame tool0
+  armload export franka-hand --to mjcf
+
+forms:
+  franka       Python for libfranka's setLoad, on top of Desk's end effector
+  franka-desk  end effector for Franka's Desk (JSON)
+  ur           URScript set_target_payload, everything on the flange
+  ur-payload   URScript set_payload (before software 5.10), without inertia
+  urdf, mjcf, sdf   a link, body or model
+  ros2         geometry_msgs/msg/InertiaStamped as YAML
+
+Nothing is sent to a robot.
+"""
+
+
+def parser() -> Parser:
+    """The arguments of `armload export`."""
+    parser = Parser(
+        prog="armload export",
+        description="Write an identified payload in a controller's or simulator's own form.",
+        epilog=_EXAMPLES,
+    )
+    parser.add_argument(
+        "result",
+        type=file_name,
+        metavar="RESULT",
+        help="what `armload identify --json` printed, a payload file, or franka-hand",
+    )
+    parser.add_argument("--to", required=True, choices=_FORMS, metavar="FORM", help=", ".join(_FORMS))
+    parser.add_argument("--out", type=file_name, metavar="FILE", help="write a file instead of printing")
+    parser.add_argument(
+        "--minus",
+        type=file_name,
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="a known part to take off first (JSON, or franka-hand); may be given several times",
+    )
+    parser.add_argument(
+        "--plus",
+        type=file_name,
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="a known part to add first, likewise",
+    )
+    parser.add_argument(
+        "--frame", metavar="F", help="link to write it about (default: a controller's flange, else that of RESULT)"
+    )
+    parser.add_argument(
+        "--robot", metavar="NAME|FILE.urdf", help="the arm, where frames differ (default: that of RESULT)"
+    )
+    parser.add_argument(
+        "--name", default="payload", metavar="N", help="name of the link, body or model (default: payload)"
+    )
+    return parser
+
+
+def run(options: argparse.Namespace) -> None:
+    """Read, combine, move, write."""
+    from armload.sinks import about, export_load
+
+    load = _load_of(options.result)
+    arm = _arm_of(options, load)
+    for part in options.minus:
+        load = load - about(payload_of(part), load.frame, arm)
+    for part in options.plus:
+        load = load + about(payload_of(part), load.frame, arm)
+    frame = options.frame
+    if frame is None and arm is not None and (options.to in _CONTROLLERS or load.frame is None):
+        frame = arm.frame
+    load = load.about(frame, arm)
+    body = load.as_body()
+    if body is not load:
+        print_note(
+            "no body has the parameters that are left: the nearest one is written, with a mass of "
+            f"{body.parameters.mass:.4f} kg instead of {load.parameters.mass:.4f} kg"
+        )
+    text = export_load(body, options.to, options.out, options.name)
+    for note in _notes(body, options.to):
+        print_note(note)
+    if options.out is None:
+        print(text, end="")
+    else:
+        print_note(f"{options.out}: {'; '.join(body.said())}")
+
+
+def _load_of(name: str) -> Load:
+    from armload.sinks import Load, read_load
+
+    return Load(payload_of(name)) if name in ("franka-hand", "test") else read_load(name)
+
+
+def _arm_of(options: argparse.Namespace, load: Load) -> Arm | None:
+    """The arm that `--robot` or the result names; None where the result's is only known to whoever made it."""
+    from armload.arms import ARMS, arm
+
+    if options.robot is not None:
+        return arm(options.robot, options.frame)
+    return arm(load.robot) if load.robot in ARMS else None
+
+
+def _notes(load: Load, to: str) -> list[str]:
+    notes = []
+    if load.undetermined:
+        notes.append(f"not determined by the log: {', '.join(load.undetermined)}; written as known beforehand")
+    if to == "franka" and load.relative_to == "arm":
+        notes.append("this contains any hand that is mounted: take off what Desk counts already with --minus")
+    if to in ("ur", "ur-payload") and load.relative_to == "tool":
+        notes.append("a UR's payload is everything on the flange: add the tool with --plus")
+    if to in _CONTROLLERS and load.frame is None:
+        notes.append("the payload names no frame: it is taken to be about the flange")
+    return notes

@@ -1,0 +1,175 @@
+"""`armload export`: from a result or payload file to a controller's form, notes on stderr, nothing sent anywhere."""
+
+import ast
+import json
+import re
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+
+from armload.arms import arm
+from armload.cli import main
+from armload.cli.export import _EXAMPLES, _FORMS
+from armload.inertia import InertialParameters
+from armload.payloads import Payload, franka_hand, write_payload
+from armload.sinks import FORMS
+
+HELD = InertialParameters.from_com(
+    1.2, (0.02, -0.03, 0.08), [[5e-3, 4e-4, 0], [4e-4, 6e-3, -3e-4], [0, -3e-4, 4e-3]], "panda_link8"
+)
+
+
+def result_of(parameters, **changes):
+    """What `armload identify --json` prints for these numbers."""
+    phi = parameters.phi
+    return {
+        "method": "hybrid",
+        "robot": "panda",
+        "frame": parameters.frame,
+        "relative_to": "arm",
+        "phi": phi.tolist(),
+        "phi_low": (phi - 0.01).tolist(),
+        "phi_high": (phi + 0.01).tolist(),
+        "determined": [True] * 10,
+        "mass": parameters.mass,
+        "com": parameters.com.tolist(),
+        "inertia_com": parameters.inertia_com.tolist(),
+        "consistent": True,
+    } | changes
+
+
+@pytest.fixture
+def export(tmp_path, capsys):
+    """Run the command on a result: export(result, *arguments) -> (stdout, stderr)."""
+
+    def call(result, *arguments, code=0):
+        path = tmp_path / "held.json"
+        path.write_text(json.dumps(result))
+        assert main(["export", str(path), *arguments]) == code
+        return capsys.readouterr()
+
+    return call
+
+
+def mjcf_numbers(text):
+    inertial = ET.fromstring(text).find(".//inertial")
+    return np.array([float(x) for key in ("mass", "pos", "fullinertia") for x in inertial.get(key).split()])
+
+
+def test_the_forms_of_the_command_are_those_of_the_room():
+    assert tuple(FORMS) == _FORMS
+    listed = re.search(r"forms:\n(.*?)\n\n", _EXAMPLES, re.DOTALL).group(1)
+    assert all(form in listed for form in FORMS)
+
+
+@pytest.mark.parametrize("form", _FORMS)
+def test_every_form_is_printed_without_a_word_beside_it(export, form):
+    out, err = export(result_of(HELD, relative_to="tare"), "--to", form)
+    assert "1.2" in out
+    assert err == ""
+
+
+def test_a_file_is_written_and_stdout_stays_empty(export, tmp_path):
+    out, err = export(result_of(HELD), "--to", "urdf", "--out", str(tmp_path / "p.urdf"), "--name", "cup")
+    assert out == ""
+    assert "p.urdf" in err
+    assert ET.parse(tmp_path / "p.urdf").find("./link").get("name") == "cup"
+
+
+def test_minus_the_hand_in_the_hand_s_own_frame_or_the_flange_s(export, tmp_path):
+    both = HELD + franka_hand().parameters
+    alone = mjcf_numbers(export(result_of(HELD), "--to", "mjcf")[0])
+    np.testing.assert_allclose(
+        mjcf_numbers(export(result_of(both), "--to", "mjcf", "--minus", "franka-hand")[0]), alone, atol=1e-12
+    )
+    hand = franka_hand().parameters
+    at_link7 = hand.moved(np.eye(3), [0, 0, 0.107], "panda_link7")
+    write_payload(tmp_path / "hand.json", Payload("hand", at_link7))
+    text, _ = export(result_of(both), "--to", "mjcf", "--minus", str(tmp_path / "hand.json"))
+    np.testing.assert_allclose(mjcf_numbers(text), alone, atol=1e-12)
+    text, _ = export(result_of(HELD), "--to", "mjcf", "--plus", "franka-hand", "--minus", str(tmp_path / "hand.json"))
+    np.testing.assert_allclose(mjcf_numbers(text), alone, atol=1e-12)
+
+
+def test_a_controller_gets_its_flange_and_a_description_the_frame_of_the_result(export):
+    at_link7 = HELD.moved(np.eye(3), [0, 0, 0.107], "panda_link7")
+    script, _ = export(result_of(at_link7), "--to", "franka")
+    com = ast.literal_eval(re.search(r"F_x_Cload = (\[.*?\])", script).group(1))
+    np.testing.assert_allclose(com, HELD.com, atol=1e-12)
+    joint = ET.fromstring(export(result_of(at_link7), "--to", "urdf")[0]).find("./joint")
+    assert joint.find("parent").get("link") == "panda_link7"
+    joint = ET.fromstring(export(result_of(at_link7), "--to", "urdf", "--frame", "panda_link8")[0]).find("./joint")
+    assert joint.find("parent").get("link") == "panda_link8"
+
+
+def test_an_arm_that_is_not_built_in_is_named_by_its_file(export, tmp_path):
+    result = result_of(HELD, robot="mine", frame="panda_link7")
+    _, err = export(result, "--to", "urdf", "--frame", "panda_link8", code=2)
+    assert "about 'panda_link7' and wanted about 'panda_link8': name the robot" in err
+    (tmp_path / "mine.urdf").write_text(arm("panda").urdf)
+    out, _ = export(result, "--to", "mjcf", "--frame", "panda_link8", "--robot", str(tmp_path / "mine.urdf"))
+    np.testing.assert_allclose(mjcf_numbers(out)[1:4], HELD.com - [0, 0, 0.107], atol=1e-12)
+
+
+def test_what_the_log_did_not_determine_is_said_on_both_streams(export):
+    result = result_of(HELD, determined=[True] * 4 + [False] * 6)
+    out, err = export(result, "--to", "sdf")
+    assert "not determined by the log: Ixx, Ixy, Ixz, Iyy, Iyz, Izz" in out
+    assert "not determined by the log: Ixx, Ixy, Ixz, Iyy, Iyz, Izz" in err
+    out, err = export(result, "--to", "franka-desk")  # JSON has no comments
+    json.loads(out)
+    assert "not determined" in err
+
+
+@pytest.mark.parametrize(
+    ("to", "relative_to", "says"),
+    [("franka", "arm", "--minus"), ("franka", "tool", ""), ("ur", "tool", "--plus"), ("ur", "arm", "")],
+)
+def test_what_the_controller_counts_itself_is_said(export, to, relative_to, says):
+    err = export(result_of(HELD, relative_to=relative_to), "--to", to)[1]
+    assert says in err
+    assert (err == "") == (says == "")
+
+
+def test_the_rest_of_a_subtraction_is_made_a_body_and_that_is_said(export, tmp_path):
+    # a part whose inertia is larger than what was measured of the whole
+    part = InertialParameters.from_com(0.5, (0.02, -0.03, 0.08), np.diag([9e-3, 9e-3, 9e-3]), "panda_link8")
+    write_payload(tmp_path / "part.json", Payload("part", part))
+    out, err = export(result_of(HELD), "--to", "mjcf", "--minus", str(tmp_path / "part.json"))
+    assert "the nearest one is written" in err
+    mass, *_, xx, yy, zz, xy, xz, yz = mjcf_numbers(out)
+    assert 0 < mass < 1.2
+    moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    assert moments[0] > 0
+    assert moments[0] + moments[1] >= moments[2]
+
+
+@pytest.mark.parametrize(
+    ("result", "arguments", "says"),
+    [
+        (result_of(HELD), ["--to", "gazebo"], "'gazebo'"),
+        (result_of(HELD), [], "--to"),
+        (result_of(HELD), ["--to", "urdf", "--frame", "nowhere"], "unknown frame 'nowhere'"),
+        (result_of(HELD), ["--to", "urdf", "--minus", "none.json"], "none.json"),
+        (
+            result_of(HELD),
+            ["--to", "urdf", "--plus", "franka-hand", "--minus", "test", "--minus", "test"],
+            "mass of -",
+        ),
+        (result_of(HELD, frame=None, robot=None), ["--to", "urdf"], "does not name its frame"),
+        (result_of(HELD, determined="all"), ["--to", "urdf"], "expected 10 times true or false"),
+        ({"phi": [None] * 10}, ["--to", "urdf"], "undetermined"),
+        (result_of(HELD), ["--to", "urdf", "--out", "no/such/folder/p.urdf"], "cannot be written"),
+    ],
+)
+def test_refusals_are_one_sentence_and_nothing_is_printed(export, result, arguments, says):
+    out, err = export(result, *arguments, code=2)
+    assert out == ""
+    assert says in err
+    assert err.count("\n") == 1
+
+
+def test_the_hand_itself_can_be_exported(capsys):
+    assert main(["export", "franka-hand", "--to", "mjcf"]) == 0
+    np.testing.assert_allclose(mjcf_numbers(capsys.readouterr().out)[0], 0.73)
