@@ -76,7 +76,7 @@ def test_the_sound_log_is_answered(log_text, tmp_path, capsys):
         (lambda s: with_cell(s, 12, "q2", ""), ["line 12", "q2"]),
         (lambda s: s.replace("\n", ",1.0\n"), ["'1.0'"]),
         (lambda s: "\n".join(line.rsplit(",", 1)[0] for line in s.splitlines()), ["tau7"]),
-        (lambda s: "\n".join([*s.splitlines()[:20], s.splitlines()[20].rsplit(",", 1)[0]]), ["line 21"]),
+        (lambda s: "\n".join([*s.splitlines()[:20], s.splitlines()[20].rsplit(",", 1)[0], ""]), ["line 21"]),
         (lambda s: scaled(scaled(s, "q", 180 / np.pi), "dq", 180 / np.pi), ["degrees", "q"]),
         (lambda s: scaled(s, "dq", 180 / np.pi), ["dq1", "degrees"]),
         (lambda s: scaled(s, "tau", -1.0), ["tau", "sign"]),

@@ -98,7 +98,7 @@ def add_arm_arguments(parser: argparse.ArgumentParser, default: str | None = Non
         required=required and default is None,
         default=default,
         metavar="NAME|FILE.urdf",
-        help="panda, ur10e, or the path of a URDF file" + (f" (default: {default})" if default else ""),
+        help="panda, fr3, ur5e, ur10e, or the path of a URDF file" + (f" (default: {default})" if default else ""),
     )
     parser.add_argument(
         "--frame", metavar="F", help="link whose frame the payload is about (default: the flange; a URDF's last link)"

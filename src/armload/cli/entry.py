@@ -30,10 +30,13 @@ COMMANDS = {
     "dataset": "build a data set of simulated runs: the paper's table of position, velocity, torque and payload",
     "train": "train the hybrid for an arm, or an ensemble of trees or networks on a data set",
     "identify": "tell from a log what the robot holds: mass, centre of mass, inertia, with 95 % intervals",
+    "live": "identify while the robot runs, or a simulated one, or a log: a page in the browser, or lines of JSON",
+    "export": "write what was identified in a controller's or simulator's form: Franka, UR, URDF, MJCF, SDF, ROS 2",
     "methods": "list the methods of identification: when to use each, its source, and what is left out",
     "report": "write an HTML report: figures of the log and of every method's estimate over time",
     "benchmark": "measure every method on every population: errors over time, intervals, repeatability",
     "reproduce": "run the paper's study again and put a verdict beside each of its claims",
+    "ros2": "ROS 2: joint states in and the payload out; or a simulated robot that takes trajectories",
     "motion": "show, check, export or draw an excitation motion",
 }
 _EXAMPLES = """\

@@ -1,0 +1,144 @@
+"""`armload live`: identify while the robot runs, on a page or as lines of JSON."""
+
+from __future__ import annotations
+
+import argparse
+from urllib.parse import urlsplit
+
+from armload.cli.arguments import Parser, add_arm_arguments, arm_of, at_least, file_name
+from armload.cli.printing import print_note
+from armload.errors import UsageError
+
+_EXAMPLES = """\
+examples:
+  armload live                                            (a simulated Panda whose payload comes and goes)
+  armload live run.csv --robot panda --speed 2 --loop
+  armload live fr3://172.16.0.2 --record today.csv
+  armload live panda://172.16.0.2 --tare empty.csv --headless | tee estimates.jsonl
+  armload live 'ur://192.168.0.10?torque_constants=12,12,10,11,11,11' --robot ur10e
+  armload live ros2:///joint_states --robot my_arm.urdf --frame tool0
+
+The page is for this machine only (http://127.0.0.1:8080) unless --host says otherwise: whoever can open it can read
+everything on it, switch the method and tare. Nothing is written to the robot.
+"""
+_ROBOTS = {"sim": "panda", "fr3": "fr3", "panda": "panda"}  # whose arm is plain from the source
+
+
+def _speed(text: str) -> float | None:
+    return None if text == "max" else at_least(0.01, float)(text)
+
+
+def parser() -> Parser:
+    """The arguments of `armload live`."""
+    parser = Parser(
+        prog="armload live",
+        description="Identify what the robot holds while it moves, on a page in the browser or as lines of JSON.",
+        epilog=_EXAMPLES,
+    )
+    parser.add_argument(
+        "source",
+        nargs="?",
+        default="sim",
+        type=file_name,
+        metavar="SOURCE",
+        help="sim (default), a log, fr3://ADDRESS, panda://ADDRESS, ur://ADDRESS or ros2:///TOPIC",
+    )
+    add_arm_arguments(parser, required=False)
+    parser.add_argument(
+        "--tare",
+        type=file_name,
+        metavar="LOG0",
+        help="an earlier log of the same arm, on any motion; the answer is what was added since",
+    )
+    parser.add_argument(
+        "--method",
+        type=file_name,
+        metavar="M",
+        help="a name `armload methods` lists, or the path of a trained model (default: the most trustworthy)",
+    )
+    parser.add_argument("--headless", action="store_true", help="no page: one JSON object per line on stdout")
+    parser.add_argument(
+        "--every",
+        type=at_least(0.0, float),
+        default=0.1,
+        metavar="S",
+        help="with --headless: seconds between lines (0.1)",
+    )
+    parser.add_argument(
+        "--record", type=file_name, metavar="FILE.csv", help="keep every sample in a log that does not exist yet"
+    )
+    parser.add_argument(
+        "--speed", type=_speed, default=1.0, metavar="X|max", help="of a log or the simulator (1: real time)"
+    )
+    parser.add_argument("--loop", action="store_true", help="replay a log again and again")
+    parser.add_argument("--topic", metavar="T", help="JointState topic of a bag, where it has several")
+    parser.add_argument(
+        "--duration", type=at_least(0.0, float), metavar="S", help="end after so many seconds of samples"
+    )
+    parser.add_argument("--host", default="127.0.0.1", metavar="H", help="interface of the page (127.0.0.1)")
+    parser.add_argument(
+        "--port",
+        type=at_least(0, int, 65535),
+        default=8080,
+        metavar="P",
+        help="of the page (8080, or the next free one)",
+    )
+    return parser
+
+
+def run(options: argparse.Namespace) -> None:
+    """Identify until the source ends (--headless) or somebody interrupts."""
+    from armload.live import Session
+    from armload.recording import read_recording
+    from armload.sources import open_source
+
+    options.robot = options.robot or _robot_of(options.source)
+    arm = arm_of(options)
+    tare = None if options.tare is None else read_recording(options.tare, arm, topic=options.topic)
+    # the page takes time from its own process: what runs on the clock is read in another one
+    beside = True if not options.headless and options.speed is not None and options.speed <= 1.0 else None
+    source = open_source(
+        options.source,
+        arm,
+        record=options.record,
+        detached=beside,
+        speed=options.speed,
+        loop=options.loop,
+        topic=options.topic,
+    )
+    with source:
+        session = Session(source, arm, tare, options.method)
+        try:
+            _print_lines(session, options) if options.headless else _serve(session, options)
+        finally:
+            session.close()
+
+
+def _print_lines(session, options: argparse.Namespace) -> None:
+    from armload.live import lines
+
+    for line in lines(session, options.every, options.duration):
+        print(line, flush=True)
+
+
+def _serve(session, options: argparse.Namespace) -> None:
+    from armload.live.page import Page
+
+    page = Page(session, options.host, options.port)
+    try:
+        session.start(options.duration)
+        print_note(f"{session.source.name}: {page.url} (Ctrl-C ends it)")
+        page.serve()
+    except KeyboardInterrupt:  # the only way to end it
+        if session.error is not None:
+            raise session.error from None
+    finally:
+        page.close()
+
+
+def _robot_of(source: str) -> str:
+    """The robot where --robot does not name one."""
+    kind = urlsplit(source).scheme if "://" in source else source
+    if kind not in _ROBOTS:
+        raise UsageError(f"{source}: name the robot with --robot, such as --robot panda")
+    return _ROBOTS[kind]

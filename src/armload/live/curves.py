@@ -1,0 +1,97 @@
+"""The curves of the page: which parameters share a plot, in which colours, and what of their numbers is shown."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.inertia import NAMES, UNITS
+
+# Okabe & Ito, "Color Universal Design", 2008: told apart by the colour-blind
+COLOURS = ((0, 114, 178), (213, 94, 0), (0, 158, 115))
+_WIDER = 1.5  # times the present interval that is shown beyond the values
+
+
+class Group(NamedTuple):
+    """Parameters of one plot: their places in phi."""
+
+    title: str
+    places: tuple[int, ...]
+
+
+GROUPS = (
+    Group("mass", (0,)),
+    Group("first moments", (1, 2, 3)),
+    Group("moments of inertia", (4, 7, 9)),
+    Group("products of inertia", (5, 6, 8)),
+)
+
+
+def series_of(group: Group) -> tuple[dict[str, Any], ...]:
+    """uPlot's series: time, then for each parameter the ends of its interval, the value and the truth."""
+    out: list[dict[str, Any]] = [{"label": "t [s]"}]
+    for colour, place in zip(COLOURS, group.places, strict=False):
+        stroke, name = _css(colour), f"{NAMES[place]} [{UNITS[place]}]"
+        out += [
+            {"label": f"{name} high", "width": 0, "stroke": _css(colour, 0.0), "points": {"show": False}},
+            {"label": f"{name} low", "width": 0, "stroke": _css(colour, 0.0), "points": {"show": False}},
+            {"label": name, "width": 2, "stroke": stroke, "points": {"show": False}},
+            {"label": f"{name} truth", "width": 1.5, "stroke": stroke, "dash": (6, 5), "points": {"show": False}},
+        ]
+    return tuple(out)
+
+
+def bands_of(group: Group) -> tuple[dict[str, Any], ...]:
+    """uPlot's bands: the intervals."""
+    return tuple({"series": (4 * k + 1, 4 * k + 2), "fill": _css(COLOURS[k], 0.16)} for k in range(len(group.places)))
+
+
+def legend_of(group: Group) -> str:
+    """One line of HTML that says what the colours are, with units."""
+    keys = "".join(
+        f'<span style="color:{_css(colour)};margin-left:0.7em">&#9632;&nbsp;{NAMES[place]}</span>'
+        for colour, place in zip(COLOURS, group.places, strict=False)
+    )
+    return f"<b>{group.title}</b> [{UNITS[group.places[0]]}]{keys}"
+
+
+def data_of(group: Group, t: NDArray[np.float64], rows: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+    """uPlot's data for `series_of`, from a history of phi, half-widths and truth.
+
+    Intervals are cut to what leaves the curves readable: the range of the values and of the truth, and somewhat more
+    than the present interval.
+
+    Args:
+        t: (N,) [s]. rows: (N, 30).
+    """
+    if not len(t):
+        t, rows = np.array([0.0, 1.0]), np.full((2, 30), np.nan)
+    elif len(t) == 1:  # a scale needs two
+        t, rows = np.array([t[0] - 0.1, t[0]]), np.repeat(rows, 2, axis=0)
+    places = list(group.places)
+    phi, half, truth = rows[:, :10][:, places], rows[:, 10:20][:, places], rows[:, 20:][:, places]
+    half = np.where(np.isfinite(half), half, 1e9)
+    lowest, highest = _range(phi, half[-1], truth)
+    out = [t]
+    for k in range(len(places)):
+        ends = np.clip([phi[:, k] + half[:, k], phi[:, k] - half[:, k]], lowest, highest)
+        out += [ends[0], ends[1], np.clip(phi[:, k], lowest, highest), truth[:, k]]
+    return tuple(np.ascontiguousarray(x) for x in out)
+
+
+def _range(phi: NDArray, now: NDArray, truth: NDArray) -> tuple[float, float]:
+    """What a plot shows: the middle nine tenths of the values, the present ones, the truth and some room."""
+    if not np.isfinite(phi).any():
+        return -1.0, 1.0
+    seen = np.concatenate([np.nanquantile(phi, [0.05, 0.95], axis=0).ravel(), phi[-1], truth[np.isfinite(truth)]])
+    seen = seen[np.isfinite(seen)]
+    low, high = float(seen.min()), float(seen.max())
+    room = max(_WIDER * float(np.min(now)), 0.35 * (high - low), 1e-6)
+    room = min(room, max(3.0 * (high - low), 1e-2)) if np.min(now) > 1e8 else room
+    return low - room, high + room
+
+
+def _css(colour: tuple[int, int, int], alpha: float = 1.0) -> str:
+    return f"rgba({colour[0]},{colour[1]},{colour[2]},{alpha:g})"

@@ -1,0 +1,54 @@
+"""What the page offers to save: the newest estimate as a file of any form `armload.sinks` knows."""
+
+from __future__ import annotations
+
+import json
+
+from armload.arms import ARMS, Arm
+from armload.errors import SinkError
+from armload.live.headless import line_of
+from armload.online import OnlineEstimate
+from armload.sinks import Load, export_load, flange_of
+
+ENDINGS = {
+    "franka": ".py",
+    "franka-desk": ".json",
+    "ur": ".script",
+    "ur-payload": ".script",
+    "urdf": ".urdf",
+    "mjcf": ".xml",
+    "sdf": ".sdf",
+    "ros2": ".yaml",
+    "json": ".json",
+}
+_CONTROLLERS = ("franka", "franka-desk", "ur", "ur-payload")  # they count from the flange
+
+
+def file_of(estimate: OnlineEstimate | None, arm: Arm, form: str) -> tuple[str, str]:
+    """The name and the text of a file with the newest estimate.
+
+    Args:
+        estimate: None before the first sample.
+        arm: whose payload it is.
+        form: one of `FORMS`, or "json": what `armload export` reads.
+
+    Raises:
+        SinkError: an unknown form, nothing to write yet, or a mass that is not above zero.
+    """
+    if form not in ENDINGS:
+        raise SinkError(f"unknown form {form!r}: expected one of {', '.join(ENDINGS)}")
+    if estimate is None or not estimate.determined[0]:
+        raise SinkError("the mass is not determined yet: wait until the arm has moved with its payload")
+    name = f"payload-{form}{ENDINGS[form]}" if form != "json" else "payload.json"
+    load = Load(
+        estimate.parameters,
+        tuple(bool(x) for x in estimate.determined),
+        arm.name,
+        "tare" if estimate.relative_to == "before" else estimate.relative_to,
+        estimate.std,
+    )
+    if form == "json":
+        return name, json.dumps(line_of(estimate, arm.name)) + "\n"
+    if form in _CONTROLLERS and arm.name in ARMS:
+        load = load.about(flange_of(arm), arm)
+    return name, export_load(load.as_body(), form)

@@ -1,0 +1,227 @@
+"""From a source to the newest state: the loop that identifies, and what others may ask of it meanwhile.
+
+The loop runs in one thread and never waits for anybody. Whoever looks takes the newest estimate as it is; whoever wants
+something changed leaves an order, which is carried out between two samples.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from queue import SimpleQueue
+
+import numpy as np
+
+from armload.arms import Arm
+from armload.determined import Z95
+from armload.errors import IdentificationError, SourceError
+from armload.inertia import InertialParameters
+from armload.live.history import History
+from armload.live.recent import Recent
+from armload.online import Event, OnlineEstimate, OnlineIdentifier
+from armload.recording import Recording, Sample
+from armload.sources import Source
+
+_TARE_LONGEST, _TARE_SHORTEST = 30.0, 3.0  # [s] of what was just seen that a tare is made of
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A line of the log: what happened, and when on the stream's clock [s]; `event`, if it was a change of payload."""
+
+    t: float
+    text: str
+    event: Event | None = None
+
+
+class Session:
+    """A source and the identifier it feeds.
+
+    >>> from armload.arms import arm
+    >>> from armload.sources import open_source
+    >>> panda = arm("panda")
+    >>> session = Session(open_source("sim", panda, speed=None, duration=0.5), panda, method="map")
+    >>> session.run()
+    >>> session.estimate.n_samples > 400, session.estimate.method, session.log[-1].text
+    (True, 'map', 'the source has ended')
+
+    Args:
+        source: closed with the session.
+        arm: the bare arm. tare: an earlier log of it. method: see `OnlineIdentifier`.
+
+    Attributes:
+        sample, estimate: the newest ones; None before the first.
+        history: rows (30,) of phi, half-widths of the 95 % intervals and the truth, NaN where nobody knows it.
+        log: what happened, the last 200 entries.
+        ended: the source has ended. error: what it ended with, if that was one.
+
+    Raises:
+        ArmloadError: an unknown method, a model of another arm, or a tare that is none of this arm.
+    """
+
+    def __init__(
+        self, source: Source, arm: Arm, tare: Recording | None = None, method: str | Path | None = None
+    ) -> None:
+        self.source, self.arm, self.tare = source, arm, tare
+        # what was held while the tare was recorded; None: nobody knows
+        self._tared = InertialParameters.zero(arm.frame) if tare is None else None
+        self._identifier = self._made(tare, method)
+        self.sample: Sample | None = None
+        self.estimate: OnlineEstimate | None = None
+        self.history = History(30)
+        self.log: deque[Entry] = deque(maxlen=200)
+        self.ended = False
+        self.error: Exception | None = None
+        self._orders: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self._recent = Recent(arm.n)
+        self._thread: threading.Thread | None = None
+        self._stop = False
+
+    @property
+    def method(self) -> str:
+        """The name of the method at work."""
+        return self._identifier.method
+
+    @property
+    def lost(self) -> int:
+        """Samples the source had to drop because the identifier was too slow."""
+        return int(getattr(self.source, "lost", 0))
+
+    # ------------------------------------------------------------------ the loop
+
+    def estimates(self, duration: float | None = None) -> Iterator[OnlineEstimate]:
+        """One estimate per sample, until the source ends or has told of `duration` [s].
+
+        Raises:
+            SourceError: the connection was lost.
+        """
+        first: float | None = None
+        for sample in self.source:
+            while not self._orders.empty():
+                self._orders.get()()
+            estimate = self._take(sample)
+            yield estimate
+            first = sample.t if first is None else first
+            if self._stop or (duration is not None and sample.t - first >= duration):
+                break
+        self._say("the source has ended")
+        self.ended = True
+
+    def run(self, duration: float | None = None) -> None:
+        """The same to the end, for those who look at the newest estimate."""
+        for _ in self.estimates(duration):
+            pass
+
+    def start(self, duration: float | None = None) -> None:
+        """The same in a thread of its own; an error is kept in `error` and told in the log."""
+
+        def loop() -> None:
+            try:
+                self.run(duration)
+            except Exception as error:
+                self.error, self.ended = error, True
+                self._say(str(error))
+
+        self._thread = threading.Thread(target=loop, name="armload-session", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the loop and close source and identifier."""
+        self._stop = True
+        self.source.close()
+        if self._thread is not None:
+            self._thread.join(5.0)
+        self._identifier.close()
+
+    def _take(self, sample: Sample) -> OnlineEstimate:
+        before, used = self.estimate, self._identifier.health.used
+        estimate = self._identifier.update(*sample)
+        self.sample, self.estimate = sample, estimate
+        if estimate.event is not None and (before is None or estimate.event != before.event):
+            self._tell(estimate.event)
+        if estimate.health.used > used:
+            self._recent.append(sample)
+        if self.history.due(estimate.t):
+            truth = self.truth(estimate.t)
+            known = np.full(10, np.nan) if truth is None else truth.phi
+            self.history.append(estimate.t, np.concatenate([estimate.phi, Z95 * estimate.std, known]))
+        return estimate
+
+    def _tell(self, event: Event) -> None:
+        """Into the log; what a change was is known a little later, in place of the first guess."""
+        known = bool(self.log) and self.log[-1].event is not None and self.log[-1].event.t == event.t
+        if known:
+            self.log.pop()
+        else:
+            self._recent.clear()
+        self.log.append(Entry(event.t, str(event), event))
+
+    def truth(self, t: float) -> InertialParameters | None:
+        """What was added since the tare, or is held at all, at time t [s]; None where the source does not know."""
+        held, tared = self.source.truth(t), self._tared
+        return None if held is None or tared is None else held - tared
+
+    # ------------------------------------------------------------------ orders, from any thread
+
+    def use(self, method: str | Path) -> None:
+        """Go on with another method, from nothing.
+
+        Raises:
+            ArmloadError: the method cannot be used here; the present one goes on.
+        """
+        self._exchange(self.tare, method, f"method {method}", self._tared)
+
+    def reset(self) -> None:
+        """Forget the stream so far; the next sample is the first."""
+        self._running()
+
+        def order() -> None:
+            self._identifier.reset()
+            self._recent.clear()
+            self._say("started anew")
+
+        self._orders.put(order)
+
+    def take_tare(self) -> None:
+        """What is held now counts as nothing: the last half minute becomes the tare.
+
+        Raises:
+            ArmloadError: too little was seen since the payload last changed, or the method can use no tare.
+        """
+        self._running()
+        tare = self._recent.recording(_TARE_LONGEST)
+        seen = 0.0 if tare is None else tare.duration
+        if tare is None or seen < _TARE_SHORTEST:
+            raise IdentificationError(
+                f"{seen:.1f} s were seen since the payload changed: a tare needs at least {_TARE_SHORTEST:.0f} s of "
+                "motion; wait and try again"
+            )
+        self._exchange(tare, self.method, f"tared with the last {seen:.0f} s", self.source.truth(float(tare.t[-1])))
+
+    def _exchange(
+        self, tare: Recording | None, method: str | Path, text: str, tared: InertialParameters | None
+    ) -> None:
+        self._running()
+        identifier = self._made(tare, method)
+
+        def order() -> None:
+            self._identifier.close()
+            self._identifier, self.tare, self._tared = identifier, tare, tared
+            self._recent.clear()
+            self._say(text)
+
+        self._orders.put(order)
+
+    def _running(self) -> None:
+        if self.ended:
+            raise SourceError(f"{self.source.name} has ended: open it again")
+
+    def _made(self, tare: Recording | None, method: str | Path | None) -> OnlineIdentifier:
+        # an arm's model computes in a memory of its own, which two threads must not share
+        return OnlineIdentifier(replace(self.arm), tare, method)
+
+    def _say(self, text: str) -> None:
+        self.log.append(Entry(0.0 if self.estimate is None else self.estimate.t, text))
