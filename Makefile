@@ -2,17 +2,18 @@
 
 PYTHON ?= python3
 VENV := .venv
+VENV_ROS := .venv-ros
 BIN := $(VENV)/bin
 WORKERS ?= 2
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
 # One thread for each test worker: nested BLAS threads fight over the cores and make a test slower, never faster.
-test test-all: export OMP_NUM_THREADS = 1
-test test-all: export OPENBLAS_NUM_THREADS = 1
-test test-all: export MPLBACKEND = agg
+test test-all test-robots: export OMP_NUM_THREADS = 1
+test test-all test-robots: export OPENBLAS_NUM_THREADS = 1
+test test-all test-robots: export MPLBACKEND = agg
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all lint format lock clean
+.PHONY: help demo test test-all test-robots parts lint format lock clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -23,8 +24,15 @@ demo: $(VENV)/.stamp ## simulate, train small ensembles, identify an unseen payl
 test: lint ## lint, types and every test that needs nothing but Python (this is what CI runs)
 	$(BIN)/python -m pytest -n $(WORKERS) -m "not full"
 
-test-all: lint ## as test, and the tests marked full too (skipped with a reason where their program is missing)
+test-all: lint parts ## as test, and the tests marked full too (skipped with a reason where their program is missing)
 	$(BIN)/python -m pytest -n $(WORKERS) -m ""
+
+test-robots: $(VENV)/.stamp parts ## the makers' clients, ROS 2 and the page in a browser, each where it can be installed
+	$(BIN)/python -m pytest -m full tests/test_sources_vendors.py tests/test_sinks.py tests/test_ros2.py tests/test_live_browser.py
+
+parts: $(VENV)/.stamp
+	@$(MAKE) --no-print-directory $(VENV)/.vendors || echo "no makers' clients: their tests will be skipped" >&2
+	@$(MAKE) --no-print-directory $(VENV_ROS)/.stamp || echo "no ROS 2 environment: its tests will be skipped" >&2
 
 lint: $(VENV)/.stamp ## ruff (rules and format) and pyright
 	$(BIN)/ruff check .
@@ -44,7 +52,7 @@ lock: ## resolve requirements.lock anew from pyproject.toml (newest versions, Li
 	rm -rf build/lock
 
 clean: ## remove everything that can be made again, the virtual environment included
-	rm -rf $(VENV) build dist out .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) $(VENV_ROS) build dist out .ruff_cache .pytest_cache .hypothesis
 	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # The stamp is touched last: a set-up that was interrupted is taken up again by the next make.
@@ -56,4 +64,21 @@ $(VENV)/.stamp: requirements.lock pyproject.toml
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	@$(PIP) install --no-deps --requirement requirements.lock
 	@$(PIP) install --no-deps --no-build-isolation --editable .
+	@touch $@
+
+$(VENV)/.vendors: tests/vendors/requirements.txt | $(VENV)/.stamp
+	@$(PIP) install --only-binary :all: --requirement tests/vendors/requirements.txt
+	@touch $@
+
+# ROS 2 has an environment of its own: a start-up hook of these wheels runs every Python of it a second time. The rest of
+# what armload needs it finds where the project has it; the name puts the file after the hook.
+$(VENV_ROS)/.stamp: tests/ros/requirements.txt | $(VENV)/.stamp
+	@echo "setting up $(VENV_ROS) (once; a minute)"
+	@rm -rf $(VENV_ROS)
+	@$(BIN)/python -m venv $(VENV_ROS)
+	@$(VENV_ROS)/bin/python -m pip --disable-pip-version-check --quiet install --no-deps --only-binary :all: \
+		--requirement tests/ros/requirements.txt
+	@$(BIN)/python -c 'import site; print("import site; site.addsitedir(%r)" % site.getsitepackages()[0])' \
+		> "$$($(VENV_ROS)/bin/python -c 'import site; print(site.getsitepackages()[0])')/zz_armload.pth"
+	@$(VENV_ROS)/bin/python -c 'import armload.arms, rclpy; rclpy.init(); rclpy.create_node("armload"); rclpy.shutdown()'
 	@touch $@

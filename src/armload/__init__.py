@@ -32,9 +32,11 @@ if TYPE_CHECKING:
     )
     from armload.methods import METHODS
     from armload.motion import FourierMotion, Motion, check_motion, taie2024
+    from armload.online import OnlineIdentifier
     from armload.payloads import Payload, read_payload, write_payload
     from armload.recording import Recording, Sample, read_recording, write_recording
     from armload.simulate import Sensors, World
+    from armload.sources import open_source
 
 _ROOMS = {
     "ARMS": "arms",
@@ -54,6 +56,7 @@ _ROOMS = {
     "PosteriorLeastSquares": "least_squares",
     "RecursiveLeastSquares": "least_squares",
     "FourierMotion": "motion",
+    "OnlineIdentifier": "online",
     "Motion": "motion",
     "check_motion": "motion",
     "taie2024": "motion",
@@ -66,6 +69,7 @@ _ROOMS = {
     "write_recording": "recording",
     "Sensors": "simulate",
     "World": "simulate",
+    "open_source": "sources",
 }
 
 __all__ = [
@@ -82,6 +86,7 @@ __all__ = [
     "InertialParameters",
     "LearnedIdentifier",
     "Motion",
+    "OnlineIdentifier",
     "Payload",
     "PosteriorLeastSquares",
     "Recording",
@@ -93,6 +98,7 @@ __all__ = [
     "arm",
     "check_motion",
     "load_model",
+    "open_source",
     "read_payload",
     "read_recording",
     "save_model",
