@@ -7,8 +7,8 @@ libfranka's example stiffness). Every seed is another arm that differs from its 
 (`World.real_like`), with other motions. It runs empty for 20 s (the tare), then 6 s with a payload nobody declared;
 from these two logs the default method identifies it. A third motion is then followed with nothing declared, with what
 was identified, and with the truth. The residual is a momentum observer's of 20 1/s that knows the declared payload, on
-what the sensors show; nothing touches the arm. Writes benchmarks/results/closed_loop.json, docs/pictures/closed_loop.png
-and the table in docs/why.md.
+what the sensors show; nothing touches the arm. Writes benchmarks/results/closed_loop.json,
+docs/pictures/closed_loop.png and the table in docs/why.md.
 """
 
 from __future__ import annotations
