@@ -21,6 +21,7 @@ from armload.inertia import (
     inertia_matrix,
     is_consistent,
     log_cholesky,
+    near_consistent,
     nearest_consistent,
     phi_to_com,
     pseudo_inertia,
@@ -405,3 +406,20 @@ def test_errors_are_one_sentence(attempt, says):
         attempt()
     assert isinstance(caught.value, ArmloadError)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_near_body_is_a_body_and_hardly_farther_than_the_nearest(seed):
+    phi, information = an_estimate(seed)
+    x = near_consistent(phi, information)
+    assert is_consistent(x)
+    assert (
+        distance(x, phi, information) ** 2
+        <= distance(nearest_consistent(phi, information), phi, information) ** 2 + 2e-3
+    )
+
+
+@pytest.mark.parametrize("shift", [-1e-6, 1e-6])
+def test_what_is_a_body_already_is_its_own_near_body(shift):
+    phi = InertialParameters.from_com(1.0, (0.0, 0.1, 0.2), np.zeros((3, 3))).phi + shift * np.eye(10)[4]
+    assert np.array_equal(near_consistent(phi, np.eye(10)), phi) == is_consistent(phi)

@@ -13,10 +13,11 @@ Sources: Lei et al., JASA 2018 (split conformal, locally weighted); Breiman 1996
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from armload.determined import Z95
@@ -57,29 +58,23 @@ class Calibration:
 
     def width(self, t: float, kind: int) -> NDArray[np.float64]:
         """Quantile (10,) of |error|/std after t seconds: linear in log t, constant beyond the calibrated times."""
-        at = np.log(np.clip(t, self.times[0], self.times[-1]))
-        table = self.widths[kind]
-        logs = np.log(self.times)
-        k = int(np.clip(np.searchsorted(logs, at) - 1, 0, max(len(logs) - 2, 0)))
-        if len(logs) == 1:
-            return table[0]
-        share = (at - logs[k]) / (logs[k + 1] - logs[k])
-        return (1.0 - share) * table[k] + share * table[k + 1]
+        return _between(self.widths[kind], self.times, t)
+
+    def trusted(self, evidence: Evidence) -> Evidence:
+        """Evidence as far as it can be trusted: Λ/kappa, h/kappa."""
+        kappa = float(self.kappa(evidence.traits[None])[0])
+        return replace(evidence, information=evidence.information / kappa, vector=evidence.vector / kappa)
+
+    def widened(self, found: MixturePosterior, evidence: Evidence) -> NDArray[np.float64]:
+        """Covariance (10, 10) such that ±1.96 standard deviations are the calibrated 95 % interval."""
+        d = self.width(evidence.t, evidence.kind) / Z95
+        return _spread(found, evidence.gain_std) * np.outer(d, d)
 
     def answer(self, evidence: Evidence, prior: MixturePrior) -> MixturePosterior:
         """The posterior, its covariance such that ±1.96 standard deviations are the calibrated 95 % interval."""
-        return self.answers(evidence, prior)[0]
-
-    def answers(self, evidence: Evidence, prior: MixturePrior) -> list[MixturePosterior]:
-        """The same, and what it would be of −phi, which was taken off then."""
-        kappa = float(self.kappa(evidence.traits[None])[0])
-        d = self.width(evidence.t, evidence.kind) / Z95
-        vectors = np.stack([evidence.vector, -evidence.vector]) / kappa
-        out = []
-        for found in prior.posteriors(evidence.information / kappa, vectors):
-            gain = evidence.gain_std**2 * np.outer(found.mean, found.mean)
-            out.append(found._replace(covariance=(found.covariance + gain) * np.outer(d, d)))
-        return out
+        trusted = self.trusted(evidence)
+        found = prior.posterior(trusted.information, trusted.vector)
+        return found._replace(covariance=self.widened(found, trusted))
 
     @classmethod
     def fit(
@@ -133,20 +128,29 @@ def nearest(t: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.in
     return np.argmin(np.abs(np.log(t[:, None] / times)), axis=1)
 
 
-def posterior(evidence: Evidence, prior: MixturePrior, kappa: float) -> MixturePosterior:
-    """phi given evidence that counts only 1/kappa, its covariance widened by the torque's own calibration."""
-    found = prior.posterior(evidence.information / kappa, evidence.vector / kappa)
-    gain = evidence.gain_std**2 * np.outer(found.mean, found.mean)
-    return found._replace(covariance=found.covariance + gain)
+def _spread(found: MixturePosterior, gain_std: float) -> NDArray[np.float64]:
+    """Covariance (10, 10), widened by the torque's own calibration."""
+    return found.covariance + gain_std**2 * np.outer(found.mean, found.mean)
+
+
+@njit(cache=True, nogil=True)
+def _between(table, times, t):  # pragma: no cover - compiled
+    if t <= times[0]:
+        return table[0].copy()
+    for k in range(1, len(times)):
+        if t < times[k]:
+            share = np.log(t / times[k - 1]) / np.log(times[k] / times[k - 1])
+            return (1.0 - share) * table[k - 1] + share * table[k]
+    return table[-1].copy()
 
 
 def scores(records: Records, prior: MixturePrior, calibration: Calibration) -> NDArray[np.float64]:
     """|error|/std (N, 10) of the answers before their widths."""
-    kappa = calibration.kappa(records.traits)
     out = np.empty((len(records), 10))
     for k in range(len(records)):
-        found = posterior(records.evidence(k), prior, float(kappa[k]))
-        out[k] = np.abs(found.mean - records.truth[k]) / np.sqrt(np.diag(found.covariance))
+        trusted = calibration.trusted(records.evidence(k))
+        found = prior.posterior(trusted.information, trusted.vector)
+        out[k] = np.abs(found.mean - records.truth[k]) / np.sqrt(np.diag(_spread(found, trusted.gain_std)))
     return out
 
 

@@ -5,13 +5,14 @@ Traits are dimensionless and the same for every arm, so that what was learned of
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from armload.arms import Arm
-from armload.identifier import Estimate
+from armload.cholesky import factor
 from armload.least_squares import (
     DifferenceLeastSquares,
     JointFeatures,
@@ -21,12 +22,13 @@ from armload.least_squares import (
 from armload.least_squares.posterior import Posterior
 from armload.recording import Recording
 
+_RATIOS = ("noise", "pose", "velocity", "friction")
 TRAITS = (
     "log10 time",
     "tare",
     "log10 tare time",
     "motor side",
-    *(f"{what} of log10 {of}" for of in ("noise", "pose", "velocity", "friction") for what in ("mean", "largest")),
+    *(f"{what} of log10 {of}" for of in _RATIOS for what in ("mean", "largest")),
     "rms speed",
     *(f"log10 information {name}" for name in ("mass", "moment", "inertia")),
     "log10 volume",
@@ -54,55 +56,69 @@ class Evidence:
     t: float
     kind: int
 
-    @property
-    def mirrored(self) -> Evidence:
-        """The same of −phi."""
-        return replace(self, vector=-self.vector)
-
     @classmethod
     def of(
         cls,
+        information: NDArray[np.float64],
+        vector: NDArray[np.float64],
         posterior: Posterior,
-        arm: Arm,
         t: float,
         tare_time: float,
         speed: float,
-        difference: Estimate | None = None,
+        weak: NDArray[np.float64],
+        same_motion: bool = False,
     ) -> Evidence:
-        """From a solution of the physics.
+        """Of logs as they stand.
 
         Args:
-            posterior: of `SmoothPosteriorLeastSquares`.
-            arm: the arm, for the units in which information is measured.
+            information, vector: Λ (10, 10) and Λ·phi_ML (10,).
+            posterior: the solution they rest on, for its scales.
             t: seconds since the run began. tare_time: length of the tare [s], 0 without one.
             speed: rms of the run's joint velocities so far [rad/s].
-            difference: what the torque difference with a tare along the same motion says; it is taken instead.
+            weak: (10,) the arm's units of phi, `payload_prior_std`.
+            same_motion: whether Λ and h are those of the torque difference with a tare along the same motion.
         """
-        std = payload_prior_std(arm)
-        Λ, vector = 0.5 * (posterior.information + posterior.information.T), posterior.vector
-        if difference is not None:
-            Λ = np.linalg.inv(difference.covariance)
-            Λ = 0.5 * (Λ + Λ.T)
-            vector = Λ @ difference.phi
-        unit = std[:, None] * Λ * std
-        eigenvalues = np.maximum(np.linalg.eigvalsh(unit), 0.0)
-        gains = np.log10(1.0 + np.maximum(np.diag(unit), 0.0))
-        ratios = [posterior.ratios[name] for name in ("noise", "pose", "velocity", "friction")]
-        parts = [
-            np.log10(max(t, 1e-2)),
-            float(tare_time > 0),
-            np.log10(1.0 + tare_time),
-            float(posterior.torque == "motor"),
-            *(f(np.log10(np.maximum(r, 1e-6))) for r in ratios for f in (np.mean, np.max)),
-            speed,
-            gains[0],
-            gains[1:4].mean(),
-            gains[4:].mean(),
-            0.1 * np.log10(1.0 + eigenvalues).sum(),
-            float(difference is not None),
-        ]
-        kind = 2 if difference is not None else int(tare_time > 0)
-        return cls(Λ, vector, posterior.gain_std, np.array(parts, dtype=float), float(t), kind)
+        Λ = 0.5 * (information + information.T)
+        ratios = np.array([posterior.ratios[name] for name in _RATIOS])
+        known = np.array([t, tare_time, float(posterior.torque == "motor"), speed, float(same_motion)])
+        kind = 2 if same_motion else int(tare_time > 0)
+        return cls(Λ, vector, posterior.gain_std, _traits(Λ, weak, ratios, known), float(t), kind)
+
+
+@njit(cache=True, nogil=True)
+def _traits(information, weak, ratios, known):  # pragma: no cover - compiled
+    """`TRAITS`; known: time, tare's time, motor side, speed, same motion."""
+    out, A = np.empty(18), np.empty((10, 10))
+    out[0], out[1], out[2], out[3] = np.log10(max(known[0], 1e-2)), 1.0, np.log10(1.0 + known[1]), known[2]
+    if known[1] <= 0.0:
+        out[1] = 0.0
+    for k in range(4):
+        total, largest = 0.0, -np.inf
+        for x in ratios[k]:
+            log = np.log10(max(x, 1e-6))
+            total += log
+            largest = max(largest, log)
+        out[4 + 2 * k], out[5 + 2 * k] = total / ratios.shape[1], largest
+    out[12] = known[3]
+    out[13:16] = 0.0
+    for i in range(10):
+        for j in range(i + 1):
+            A[i, j] = weak[i] * information[i, j] * weak[j]
+        gain = np.log10(1.0 + max(A[i, i], 0.0))
+        if i == 0:
+            out[13] = gain
+        elif i < 4:
+            out[14] += gain / 3.0
+        else:
+            out[15] += gain / 6.0
+        A[i, i] += 1.0
+    L = np.empty((10, 10))
+    factor(A, L, 1.0)  # an eigenvalue of the information below nothing is rounding
+    out[16] = 0.0
+    for i in range(10):  # a tenth of log10 det(1 + Λ), in units
+        out[16] += 0.2 * np.log10(L[i, i])
+    out[17] = known[4]
+    return out
 
 
 class Physics(SmoothPosteriorLeastSquares):
@@ -156,4 +172,9 @@ class Physics(SmoothPosteriorLeastSquares):
             difference = self._difference._estimate(t)
             if np.any(np.diag(difference.covariance) > self.posterior.covariance.diagonal()):
                 difference = None  # too few rows yet
-        return Evidence.of(self.posterior, self.arm, t - self._began, self._tare_time, speed, difference)
+        found, Λ, vector = self.posterior, self.posterior.information, self.posterior.vector
+        if difference is not None:
+            Λ = np.asarray(np.linalg.inv(difference.covariance), dtype=float)
+            vector = Λ @ difference.phi
+        seconds, weak = t - self._began, payload_prior_std(self.arm)
+        return Evidence.of(Λ, vector, found, seconds, self._tare_time, speed, weak, difference is not None)

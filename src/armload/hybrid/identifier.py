@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
+from armload.cholesky import inverse
 from armload.errors import ModelError
 from armload.hybrid.calibration import Calibration
 from armload.hybrid.evidence import Evidence, Physics
@@ -58,18 +59,18 @@ class HybridIdentifier(Physics):
         """Forget the run (not the tare); the next sample is the first."""
         super().reset()
         self._phi, self._covariance = self._payloads.mean, np.diag(self._payloads.std**2)
-        self._evidence: Evidence | None = None
+        self._trusted: Evidence | None = None
 
     def _estimate(self, t: float) -> Estimate:
         super()._estimate(t)
-        self._evidence = self.evidence(t)
-        self._phi, self._covariance = answer(self._evidence, self.model.calibration, self._payloads)
+        self._trusted = self.model.calibration.trusted(self.evidence(t))
+        self._phi, self._covariance = answer(self._trusted, self.model.calibration, self._payloads)
         return self._last(t)
 
     @property
     def alone(self) -> NDArray[np.float64]:
         """Standard deviation (10,) of the last estimate under the weak prior of `payload_prior_std` instead."""
-        return std_alone(self._evidence, self.model.calibration, payload_prior_std(self.arm))
+        return std_alone(self._trusted, payload_prior_std(self.arm))
 
     def _last(self, t: float) -> Estimate:
         seen = self._count + len(self._waiting)
@@ -77,26 +78,29 @@ class HybridIdentifier(Physics):
 
 
 def answer(
-    evidence: Evidence, calibration: Calibration, payloads: MixturePrior, quick: bool = False
+    trusted: Evidence, calibration: Calibration, payloads: MixturePrior, quick: bool = False
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """phi (10,), a body that can exist or what such a body left behind, and its covariance with calibrated widths.
 
-    `quick`: the body is found in bounded time, to a hundredth of a standard deviation.
+    `trusted`: evidence as far as it can be trusted (`Calibration.trusted`). `quick`: the body is found in bounded time,
+    to a hundredth of a standard deviation.
     """
-    found, removed = calibration.answers(evidence, payloads)
-    if evidence.kind and removed.log_evidence + np.log(_REMOVED) > found.log_evidence:
-        return -removed.mean, removed.covariance  # the payload was taken off since the tare: −phi is a body
+    found, removed = payloads.posteriors(trusted.information, np.stack([trusted.vector, -trusted.vector]))
+    if trusted.kind and removed.log_evidence + np.log(_REMOVED) > found.log_evidence:
+        return -removed.mean, calibration.widened(removed, trusted)  # it was taken off since the tare: −phi is a body
+    covariance = calibration.widened(found, trusted)
     if quick:
-        return near_consistent(found.mean, np.linalg.inv(found.covariance)), found.covariance
-    return body(found.mean, found.covariance), found.covariance
+        return near_consistent(found.mean, inverse(covariance)), covariance
+    return body(found.mean, covariance), covariance
 
 
-def std_alone(evidence: Evidence | None, calibration: Calibration, weak: NDArray[np.float64]) -> NDArray[np.float64]:
+def std_alone(trusted: Evidence | None, weak: NDArray[np.float64]) -> NDArray[np.float64]:
     """Standard deviation (10,) under a weak prior of standard deviations `weak`, evidence trusted as far as it is."""
-    if evidence is None:
+    if trusted is None:
         return weak
-    trusted = evidence.information / calibration.kappa(evidence.traits[None])[0]
-    return weak * np.sqrt(np.diag(np.linalg.inv(np.eye(10) + weak[:, None] * trusted * weak)))
+    unit = weak[:, None] * trusted.information * weak
+    unit.flat[::11] += 1.0
+    return weak * np.sqrt(inverse(unit).diagonal())
 
 
 def body(phi: NDArray[np.float64], covariance: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -48,7 +46,7 @@ class StreamingHybrid(StreamingIdentifier):
     def reset(self) -> None:
         """Forget the run (not the tare); the next sample is the first."""
         super().reset()
-        self._evidence: Evidence | None = None
+        self._trusted: Evidence | None = None
         self._squares, self._values = 0.0, 0
 
     def update(self, sample: Sample) -> Estimate:
@@ -62,15 +60,17 @@ class StreamingHybrid(StreamingIdentifier):
 
     def _answer(self, seconds: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         assert self.stream is not None
-        solved = replace(self.stream.posterior, information=self.stream.information, vector=self.stream.vector)
-        speed = float(np.sqrt(self._squares / self._values))
+        stream, speed = self.stream, float(np.sqrt(self._squares / self._values))
         tare_time = self._tare_time
-        if self.stream.tare is not None and self.reference is not None and self.reference.stream is not None:
+        if stream.tare is not None and self.reference is not None and self.reference.stream is not None:
             tare_time = tare_time or self.reference.stream.seconds
-        self._evidence = Evidence.of(solved, self.arm, seconds, tare_time, speed)
-        return answer(self._evidence, self.model.calibration, self._payloads, quick=True)
+        evidence = Evidence.of(
+            stream.information, stream.vector, stream.posterior, seconds, tare_time, speed, self._weak
+        )
+        self._trusted = self.model.calibration.trusted(evidence)
+        return answer(self._trusted, self.model.calibration, self._payloads, quick=True)
 
     @property
     def alone(self) -> NDArray[np.float64]:
         """Standard deviation (10,) of the last estimate under the weak prior of `payload_prior_std` instead."""
-        return std_alone(self._evidence, self.model.calibration, self._weak)
+        return std_alone(self._trusted, self._weak)

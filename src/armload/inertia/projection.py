@@ -14,9 +14,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from armload.inertia.consistency import is_consistent, nearest_consistent, pseudo_inertia
+from armload.cholesky import factor, invert, solve
+from armload.inertia.consistency import nearest_consistent, pseudo_inertia
 
 _BASIS = np.ascontiguousarray(pseudo_inertia(np.eye(10)))  # J is linear in phi
+_LENGTH, _TOLERANCE = 0.1, 1e-9  # [m] and [kg] of `is_consistent`
 _BARRIERS = np.array([0.3, 1e-2, 1e-4])
 _SIZE, _FARTHEST, _LIGHTEST = 0.05, 0.3, 1e-3  # [m], [m], [kg] of the body that the search begins with
 
@@ -27,13 +29,13 @@ def near_consistent(phi: ArrayLike, precision: ArrayLike) -> NDArray[np.float64]
     Raises:
         InertiaError: numbers that are not finite.
     """
-    phi = np.asarray(phi, dtype=float)
-    if is_consistent(phi):
-        return phi
+    phi = np.ascontiguousarray(phi, dtype=float)
     P = np.ascontiguousarray(precision, dtype=float)
-    if np.all(np.isfinite(phi)) and np.all(np.isfinite(P)):
+    if np.isfinite(phi.sum() + P.sum()):
+        if _is_body(phi, _BASIS):
+            return phi
         x, converged = _central_path(phi, P, _start(phi), _BARRIERS, _BASIS)
-        if converged and np.all(np.isfinite(x)) and is_consistent(x):
+        if converged and np.isfinite(x.sum()):
             return x
     return nearest_consistent(phi, P)
 
@@ -48,18 +50,35 @@ def _start(phi: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @njit(cache=True, nogil=True)
+def _is_body(phi, basis):  # pragma: no cover - compiled
+    """What `is_consistent` says, its tolerance included."""
+    J = np.empty((4, 4))
+    _pseudo(phi, basis, J)
+    for k in range(4):
+        J[k, k] += _TOLERANCE * max(1.0, phi[0]) * (1.0 if k == 3 else _LENGTH**2)
+    return phi[0] > 0.0 and factor(J, np.empty((4, 4)))
+
+
+@njit(cache=True, nogil=True)
 def _central_path(phi, P, x, barriers, basis):  # pragma: no cover - compiled
-    J, inverse = np.empty((4, 4)), np.empty((4, 4))
-    M = np.empty((10, 4, 4))
+    J, L, inverse, work = np.empty((4, 4)), np.empty((4, 4)), np.empty((4, 4)), np.empty((4, 4))
+    M, H, root = np.empty((10, 4, 4)), np.empty((10, 10)), np.empty((10, 10))
+    g, step, new, pull = np.empty(10), np.empty(10), np.empty(10), np.empty(10)
     converged = False
-    _pseudo(x, basis, J)
     for nu in barriers:
         for _ in range(25):
-            inverse[:] = np.linalg.inv(J)
-            g = P @ (x - phi)
-            H = P.copy()
+            _pseudo(x, basis, J)
+            if not factor(J, L):
+                return x, False
+            invert(L, work, inverse)
+            before = _value(x, phi, P, L, nu, g)
             for i in range(10):
-                M[i] = inverse @ basis[i]
+                for a in range(4):
+                    for b in range(4):
+                        total = 0.0
+                        for k in range(4):
+                            total += inverse[a, k] * basis[i, k, b]
+                        M[i, a, b] = total
                 g[i] -= nu * (M[i, 0, 0] + M[i, 1, 1] + M[i, 2, 2] + M[i, 3, 3])
             for i in range(10):
                 for j in range(i + 1):
@@ -67,29 +86,42 @@ def _central_path(phi, P, x, barriers, basis):  # pragma: no cover - compiled
                     for a in range(4):
                         for b in range(4):
                             total += M[i, a, b] * M[j, b, a]
-                    H[i, j] += nu * total
-                    if i != j:
-                        H[j, i] += nu * total
-            step = -np.linalg.solve(H, g)
-            decrease = -(g @ step)
-            before = 0.5 * (x - phi) @ P @ (x - phi) - nu * np.log(np.linalg.det(J))
-            length = 1.0
-            moved = False
+                    H[i, j] = P[i, j] + nu * total
+            if not factor(H, root):
+                return x, False
+            solve(root, g, step)  # against the direction of the step
+            decrease = 0.0
+            for i in range(10):
+                decrease += g[i] * step[i]
+            length, moved = 1.0, False
             while length > 1e-6:
-                new = x + length * step
+                for i in range(10):
+                    new[i] = x[i] - length * step[i]
                 _pseudo(new, basis, J)
-                if _positive(J):
-                    value = 0.5 * (new - phi) @ P @ (new - phi) - nu * np.log(np.linalg.det(J))
-                    if value <= before - 0.1 * length * decrease:
-                        x, moved = new, True
-                        break
+                if factor(J, L) and _value(new, phi, P, L, nu, pull) <= before - 0.1 * length * decrease:
+                    x[:] = new
+                    moved = True
+                    break
                 length *= 0.5
-            if not moved:
-                _pseudo(x, basis, J)
-            converged = decrease < 0.05 * nu
+            converged = decrease < (0.05 if nu == barriers[-1] else 1.0) * nu
             if converged or not moved:
                 break
     return x, converged
+
+
+@njit(cache=True, nogil=True)
+def _value(x, phi, P, L, nu, pull):  # pragma: no cover - compiled
+    """½·(x − phi)ᵀ·P·(x − phi) − ν·ln det J, J = L·Lᵀ, and P·(x − phi)."""
+    total = 0.0
+    for i in range(10):
+        Pd = 0.0
+        for k in range(10):
+            Pd += P[i, k] * (x[k] - phi[k])
+        pull[i] = Pd
+        total += 0.5 * (x[i] - phi[i]) * Pd
+    for a in range(4):
+        total -= 2.0 * nu * np.log(L[a, a])
+    return total
 
 
 @njit(cache=True, nogil=True)
@@ -99,21 +131,3 @@ def _pseudo(x, basis, J):  # pragma: no cover - compiled
         for a in range(4):
             for b in range(4):
                 J[a, b] += x[k] * basis[k, a, b]
-
-
-@njit(cache=True, nogil=True)
-def _positive(J):  # pragma: no cover - compiled
-    """Whether a 4×4 matrix is positive definite, by its Cholesky factor."""
-    L = np.zeros((4, 4))
-    for j in range(4):
-        for i in range(j, 4):
-            total = J[i, j]
-            for k in range(j):
-                total -= L[i, k] * L[j, k]
-            if i == j:
-                if total <= 0.0:
-                    return False
-                L[j, j] = np.sqrt(total)
-            else:
-                L[i, j] = total / L[j, j]
-    return True

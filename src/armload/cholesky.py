@@ -1,0 +1,80 @@
+"""Small positive definite systems inside compiled loops, where a call of LAPACK costs more than the arithmetic.
+
+    A = L·Lᵀ
+
+The functions are compiled and write into arrays they are given; sizes are those of the arrays. They read the lower
+triangle of A only.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True, nogil=True)
+def factor(A, L, floor=0.0):  # pragma: no cover - compiled
+    """L (n, n), its lower triangle, of A (n, n); False where a pivot is not positive.
+
+    With a floor > 0 a smaller pivot is taken to be the floor.
+    """
+    n = A.shape[0]
+    for j in range(n):
+        for i in range(j, n):
+            total = A[i, j]
+            for k in range(j):
+                total -= L[i, k] * L[j, k]
+            if i > j:
+                L[i, j] = total / L[j, j]
+            elif total > floor:
+                L[j, j] = np.sqrt(total)
+            elif floor > 0.0:
+                L[j, j] = np.sqrt(floor)
+            else:  # not a number, too
+                return False
+    return True
+
+
+@njit(cache=True, nogil=True)
+def solve(L, b, x):  # pragma: no cover - compiled
+    """x (n,) with L·Lᵀ·x = b (n,); x may be b."""
+    n = L.shape[0]
+    for i in range(n):
+        total = b[i]
+        for k in range(i):
+            total -= L[i, k] * x[k]
+        x[i] = total / L[i, i]
+    for i in range(n - 1, -1, -1):
+        total = x[i]
+        for k in range(i + 1, n):
+            total -= L[k, i] * x[k]
+        x[i] = total / L[i, i]
+
+
+@njit(cache=True, nogil=True)
+def invert(L, work, out):  # pragma: no cover - compiled
+    """out (n, n) = (L·Lᵀ)⁻¹; work (n, n) becomes L⁻¹, its lower triangle."""
+    n = L.shape[0]
+    for j in range(n):
+        work[j, j] = 1.0 / L[j, j]
+        for i in range(j + 1, n):
+            total = 0.0
+            for k in range(j, i):
+                total -= L[i, k] * work[k, j]
+            work[i, j] = total / L[i, i]
+    for i in range(n):
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(i, n):
+                total += work[k, i] * work[k, j]
+            out[i, j] = total
+            out[j, i] = total
+
+
+@njit(cache=True, nogil=True)
+def inverse(A):  # pragma: no cover - compiled
+    """A⁻¹ (n, n); nan where A is not positive definite."""
+    L, out = np.empty(A.shape), np.full(A.shape, np.nan)
+    if factor(A, L):
+        invert(L, np.empty(A.shape), out)
+    return out
