@@ -110,17 +110,36 @@ def test_a_log_needs_its_robot_named(log, capsys):
     assert "--robot" in capsys.readouterr().err
 
 
-def live(*arguments, **settings):
-    return subprocess.Popen(
-        [sys.executable, "-m", "armload", "live", *map(str, arguments)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        **settings,
-    )
+@pytest.fixture
+def live():
+    """Starts `armload live`, and ends what a failing test has left."""
+    started = []
+
+    def start(*arguments):
+        process = subprocess.Popen(
+            [sys.executable, "-m", "armload", "live", *map(str, arguments)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            preexec_fn=hear_ctrl_c,
+        )
+        started.append(process)
+        return process
+
+    yield start
+    for process in started:
+        process.kill()
+        process.wait()
+        for pipe in (process.stdout, process.stderr):
+            pipe.close()
 
 
-def test_ctrl_c_and_a_reader_that_has_gone_end_it_in_one_line():
+def hear_ctrl_c():
+    """What was started in the background of a shell is deaf to it, and so are its children."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def test_ctrl_c_and_a_reader_that_has_gone_end_it_in_one_line(live):
     process = live("--headless", "--method", "map", "--every", "0.01")
     assert process.stdout is not None
     finite_json(process.stdout.readline())
@@ -134,10 +153,9 @@ def test_ctrl_c_and_a_reader_that_has_gone_end_it_in_one_line():
     process.stdout.close()
     assert process.wait(timeout=60) == 141
     assert process.stderr.read() == ""
-    process.stderr.close()
 
 
-def test_kill_9_loses_nothing_of_the_record(tmp_path):
+def test_kill_9_loses_nothing_of_the_record(live, tmp_path):
     record = tmp_path / "record.csv"
     process = live("--headless", "--method", "map", "--every", "0", "--record", record)
     seen = [finite_json(process.stdout.readline())["t"] for _ in range(300)]

@@ -293,7 +293,9 @@ def ros(ros_python, tmp_path):
     def start(*words):
         where = tmp_path / f"process{next(count)}"
         with where.with_suffix(".out").open("w") as out, where.with_suffix(".err").open("w") as err:
-            process = subprocess.Popen([ros_python, *map(str, words)], stdout=out, stderr=err, env=env)
+            process = subprocess.Popen(
+                [ros_python, *map(str, words)], stdout=out, stderr=err, env=env, preexec_fn=hear_ctrl_c
+            )
         process.said = lambda: where.with_suffix(".out").read_text().splitlines()
         process.noted = lambda: where.with_suffix(".err").read_text()
         try:
@@ -308,6 +310,11 @@ def ros(ros_python, tmp_path):
                 process.wait()
 
     return start
+
+
+def hear_ctrl_c():
+    """What was started in the background of a shell is deaf to it, and so are its children."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def wait_until(true, seconds, *processes):
