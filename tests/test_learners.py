@@ -10,6 +10,7 @@ from armload.errors import ModelError
 from armload.learners import BaggingEnsemble, MixedEnsemble, NetworkLearner, TreeLearner, TwoStage
 from armload.learners.bag import INITIAL_WEIGHTS, SHUFFLE, Scaling, draw_bag
 from armload.learners.checkpoint import Weights
+from armload.learners.compiled import CompiledNetworks
 from armload.learners.network import _fold, plateaued
 from armload.learners.tree import compile_trees
 
@@ -68,6 +69,22 @@ def test_one_row_alone_equals_the_row_in_a_batch(fitted):
     batch = fitted.predict(X)
     alone = np.concatenate([fitted.predict(X[k : k + 1]) for k in range(len(X))])
     np.testing.assert_allclose(alone, batch, rtol=1e-11, atol=1e-14)
+
+
+def test_the_path_for_one_row_equals_the_batch(fitted):
+    """To rounding, for every learner, with any number of features and of units."""
+    X, _ = rows(2, 9)
+    alone = np.stack([fitted.compiled_.row(x) for x in X], axis=1)
+    together = fitted.compiled_.members(X)
+    np.testing.assert_allclose(alone, together, rtol=0, atol=1e-12 * np.abs(together).max())
+
+
+@pytest.mark.parametrize(("d", "h"), [(1, 1), (5, 8), (22, 13), (4, 500)])
+def test_one_row_of_networks_of_any_size(d, h):
+    rng = np.random.default_rng(d)
+    networks = CompiledNetworks(*(rng.normal(size=s) for s in [(3, d, h), (3, h), (3, h, 4), (3, 4)]))
+    x = rng.normal(size=d)
+    np.testing.assert_allclose(networks.row(x), networks.members(x[None])[:, 0], rtol=0, atol=1e-12)
 
 
 def test_the_same_seed_gives_the_same_ensemble_bit_for_bit(fitted):

@@ -24,6 +24,7 @@ from armload.learners import (
 )
 from armload.learners.artefact import _digest
 from armload.motion import MotionFingerprint, random_motion, taie2024
+from armload.online import OnlineIdentifier
 from armload.recording import Recording, Sample
 
 SMALL = NetworkLearner(hidden=8, max_epochs=2, batch=64)
@@ -330,6 +331,26 @@ def test_the_stream_passes_over_what_is_not_a_number(tree, panda, log):
     after = identifier.update(bad)
     np.testing.assert_array_equal(after.phi, estimate.phi)
     assert (after.n_samples, after.t) == (1, estimate.t)
+
+
+def test_the_stream_refuses_a_sample_of_another_size(tree, panda):
+    with pytest.raises(ValueError, match="another number of joints"):
+        LearnedIdentifier(tree[1], panda).update(Sample(0.0, np.zeros(6), np.zeros(7), np.zeros(7)))
+
+
+def test_a_live_identifier_answers_as_the_stream_and_goes_on_from_a_file(saved, panda, log, tmp_path):
+    model, samples = saved[1], list(log)[:80]
+    expected = LearnedIdentifier(saved[2], panda).trace(log)[79]
+    online = OnlineIdentifier(panda, method=model)
+    for sample in samples[:50]:
+        online.update(*sample)
+    restored = OnlineIdentifier.restore(online.save(tmp_path / "state.npz"), panda, model)
+    for each in (online, restored):
+        for sample in samples[50:]:
+            estimate = each.update(*sample)
+        np.testing.assert_array_equal(estimate.phi, expected.phi)
+        np.testing.assert_array_equal(estimate.covariance, expected.covariance)
+        assert estimate.n_samples == 80
 
 
 def test_the_stream_refuses_another_arm_at_once_and_another_motion_on_a_recording(tree, panda):

@@ -1,6 +1,7 @@
 """An identifier beside a running robot: what a stream may do to it, and what it must not."""
 
 import json
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from armload.errors import IdentificationError
 from armload.methods import METHODS
 from armload.motion import random_motion, taie2024
 from armload.online import OnlineIdentifier
+from armload.online.estimate import OnlineEstimate
 from armload.payloads import test_payload as make_payload
 from armload.recording import Sample
 from armload.simulate import World, simulate
@@ -104,6 +106,26 @@ def test_one_wrong_number_is_counted_and_left_out(panda, online, log, column, va
     estimate = fed(online, [*samples[:20], (samples[20].t - 1e-4, *broken), *samples[20:]])
     assert online.health.bad == 1
     assert np.array_equal(estimate.phi, clean(panda, samples).phi)
+
+
+def test_a_callers_buffers_may_be_used_again(panda, online, log):
+    samples = list(log)[:60]
+    buffers = [np.empty(7) for _ in range(3)]
+    for sample in samples:
+        for buffer, values in zip(buffers, sample[1:], strict=True):
+            buffer[:] = values
+        estimate = online.update(sample.t, *buffers)
+        for buffer in buffers:
+            buffer[:] = 1e6
+    assert np.array_equal(estimate.phi, clean(panda, samples).phi)
+
+
+def test_an_estimate_says_all_that_one_is_made_of(online, log):
+    """It is made past the constructor, which would see to that."""
+    for estimate in (online.update(None, None, None, None), fed(online, list(log)[:60])):
+        said = {field.name: getattr(estimate, field.name) for field in fields(OnlineEstimate)}
+        assert said == vars(estimate)
+        assert vars(OnlineEstimate(**said)) == said
 
 
 def test_swapped_joints_are_left_out(online, log):

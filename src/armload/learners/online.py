@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numba import njit
 
 from armload.arms import Arm
 from armload.identifier import Estimate, Identifier
-from armload.learners.compiled import member_spread
 from armload.learners.model import LearnedModel
 from armload.recording import Recording, Sample
 
@@ -40,30 +39,31 @@ class LearnedIdentifier(Identifier):
         model.check(arm)
         self.model, self.arm, self.single, self.any_motion = model, arm, single, any_motion
         self.name = f"{model.kind} ensemble" + (", single sample" if single else "")
+        self._own = np.zeros(10) if model.error_std is None else model.error_std**2  # variance beside the members'
+        if model.error_std is None and model.compiled.n_members == 1:
+            self._own = np.full(10, np.inf)
         self.reset()
 
     def reset(self) -> None:
         """Forget everything; the next sample is the start of a motion."""
         self._start: float | None = None
-        self._t = float("nan")
         self._count = 0
-        self._averages: NDArray[np.float64] | None = None  # (M, 10) each member's average so far
+        self._averages = np.zeros((self.model.compiled.n_members, 10))  # each member's, so far
+        self._last = Estimate(float("nan"), self.model.phi_mean, np.diag(np.full(10, np.inf)), 0, self.model.frame)
 
     def update(self, sample: Sample) -> Estimate:
         """Take one sample and return the average, or with `single` its own prediction."""
         t, q, dq, tau = sample
         if self._start is None:
             self._start = t
-        row = np.concatenate([[t - self._start], q, dq, tau])
-        if np.isfinite(row).all():
-            said = self.model.compiled.members(row[None])[:, 0]
-            self._t = t
+        row = np.empty(1 + 3 * self.arm.n)
+        if _fill(row, t - self._start, q, dq, tau):
             self._count += 1
-            if self._averages is None or self.single:
-                self._averages = said
-            else:
-                self._averages = self._averages + (said - self._averages) / self._count
-        return self._estimate()
+            phi, covariance = np.zeros(10), np.zeros((10, 10))
+            said, count = self.model.compiled.row(row), 1 if self.single else self._count
+            _average(self._averages, said, count, self._own, phi, covariance)
+            self._last = Estimate(t, phi, covariance, self._count, self.model.frame)
+        return self._last
 
     def trace(self, recording: Recording, every: int = 1) -> list[Estimate]:
         """The estimates along a recording of a motion the model knows.
@@ -75,11 +75,37 @@ class LearnedIdentifier(Identifier):
             self.model.check(self.arm, recording)
         return super().trace(recording, every)
 
-    def _estimate(self) -> Estimate:
-        if self._averages is None:
-            phi, spread = self.model.phi_mean, np.full(10, np.inf)
-        else:
-            phi, spread = self._averages.mean(axis=0), member_spread(self._averages)
-            if self.model.error_std is not None:
-                spread = np.hypot(np.where(np.isfinite(spread), spread, 0.0), self.model.error_std)
-        return Estimate(self._t, phi, np.diag(spread**2), self._count, self.model.frame)
+
+@njit(cache=True, nogil=True)
+def _fill(row, t, q, dq, tau):  # pragma: no cover - compiled
+    """Write a sample into a row (1 + 3n,) of features; whether all of it is finite."""
+    n = (row.shape[0] - 1) // 3
+    if not (q.shape[0] == n and dq.shape[0] == n and tau.shape[0] == n):
+        raise ValueError("the sample is of an arm with another number of joints")
+    row[0] = t
+    for k in range(n):
+        row[1 + k], row[1 + n + k], row[1 + 2 * n + k] = q[k], dq[k], tau[k]
+    for value in row:  # noqa: SIM110 - numba knows no all() of a generator
+        if not np.isfinite(value):
+            return False
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _average(averages, said, count, own, mean, covariance):  # pragma: no cover - compiled
+    """Make what each member said (M, k) the last of so many in its average (M, k), which is changed.
+
+    own: (k,) variance there is beside the members' disagreement. mean, covariance: zeros (k,) and (k, k), filled in.
+    """
+    M, k = averages.shape
+    for m in range(M):
+        for j in range(k):
+            before = averages[m, j] if count > 1 else 0.0
+            averages[m, j] = before + (said[m, j] - before) / count
+            mean[j] += averages[m, j]
+    for j in range(k):
+        mean[j] /= M
+        square = 0.0
+        for m in range(M):
+            square += (averages[m, j] - mean[j]) ** 2
+        covariance[j, j] = own[j] + (square / (M - 1) if M > 1 else 0.0)

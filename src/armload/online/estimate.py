@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,16 @@ class OnlineEstimate(Estimate):
     event: Event | None
     health: Health
     notes: tuple[str, ...]
+
+    @classmethod
+    def of(cls, estimate: Estimate, **said: Any) -> Self:
+        """What an identifier estimates, with all other fields; `said` goes before the estimate's own.
+
+        The same as the constructor, which sets frozen fields one by one: 2 µs that a stream would pay for each sample.
+        """
+        made = object.__new__(cls)
+        object.__setattr__(made, "__dict__", vars(estimate) | said)
+        return made
 
     @property
     def low(self) -> NDArray[np.float64]:

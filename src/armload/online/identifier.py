@@ -7,6 +7,7 @@ for sample in source:
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -24,7 +25,7 @@ from armload.methods import METHODS
 from armload.online.engines import engine
 from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
-from armload.online.gate import Gate, Health
+from armload.online.gate import Gate, Health, all_finite
 from armload.online.state import load_state, save_state
 from armload.online.watch import PayloadWatch
 from armload.recording import Recording, Sample
@@ -112,10 +113,9 @@ class OnlineIdentifier:
         Args:
             t: [s], on any clock. q, dq, tau: (n,) [rad, rad/s, N·m]; tau = rigid body + friction, gravity in it.
         """
-        passed = self._gate.take(t, q, dq, tau)
-        if passed is None:
+        sample = self._gate.take(t, q, dq, tau)
+        if sample is None:
             return self._said()
-        sample = passed.sample
         self._clock, self._internal = float(t), sample.t
         if self._since is None:
             self._since = self._clock
@@ -180,7 +180,7 @@ class OnlineIdentifier:
                 return
             run = self._watch.run
             fresh = isinstance(run, StreamingIdentifier) and run.fresh
-        if (fresh or self._watch is None) and not np.isfinite(estimate.phi.sum()):
+        if (fresh or self._watch is None) and not all_finite(estimate.phi):
             return
         if fresh:
             self._published = sample.t
@@ -218,24 +218,21 @@ class OnlineIdentifier:
         return self._internal - self._moved < _RECENT
 
     def _said(self) -> OnlineEstimate:
-        estimate = self._estimate
-        newest = getattr(self.engine, "data_t", self._internal)
-        return OnlineEstimate(
-            self._clock,
-            estimate.phi,
-            estimate.covariance,
-            estimate.n_samples,
-            estimate.frame,
-            age=float(self._internal - newest) if np.isfinite(newest) else 0.0,
+        engine, watch = self.engine, self._watch
+        age = self._internal - getattr(engine, "data_t", self._internal)
+        return OnlineEstimate.of(
+            self._estimate,
+            t=self._clock,
+            age=float(age) if math.isfinite(age) else 0.0,
             since=self._clock if self._since is None else self._since,
             relative_to=self.relative_to,
             method=self.method,
             determined=self._determined,
             held=self._held,
-            calibrated=self.engine.calibrated,
+            calibrated=engine.calibrated,
             moving=self._moving,
-            settling=self._watch is not None and self._watch.settling,
-            event=self.event,
+            settling=watch is not None and watch.settling,
+            event=self._event,
             health=self._gate.health,
             notes=self._notes,
         )
