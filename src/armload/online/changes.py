@@ -124,6 +124,13 @@ class ChangeDetector:
         self.uneasy = most[1] > _ALARM or (self.uneasy and most[0] > _CALM)
         return best if self._alarmed >= _ROWS else None
 
+    def ratio(self, shift: NDArray[np.float64]) -> float:
+        """ln of the likelihood ratio, over nothing, of phi having changed by just this (10,), in the short window."""
+        rows = min(self._count, _WINDOWS[0])
+        last = (self._count - 1 - np.arange(rows)) % max(_WINDOWS)
+        x = np.linalg.solve(self.root, shift)
+        return float(self._b[last].sum(axis=0) @ x - 0.5 * x @ self._A[last].sum(axis=0) @ x) / self.level
+
 
 def foresee(state: SequentialPosterior, row: Row) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """`seen` and `scale` of a row as `SequentialPosterior.take` would leave them, but the row is not believed.

@@ -36,7 +36,8 @@ _JUDGED = (0.25, 1.5, 6.0)  # [s] of a new run: kinds are told from, at the late
 _KNOWN, _SURE = 0.033, 0.01  # standard deviation of the mass, in a payload's own, for a kind and for an old run
 _SAME = float(chi2.ppf(0.9, 4))  # of mass and first moments against an earlier run's
 _DECIDED = 0.6  # [s] of rows that do not fit, in which a change shows
-_AGAIN = 0.05  # [s] of such rows shortly after a change, after which it is taken to be over: a push has ended
+_AGAIN = 0.05  # [s] of such rows shortly after a change, after which it may be over: a push has ended,
+_BACK = 6.0  # if ln of the likelihood ratio of what was held before, over what is held now, is above this
 _LEARNT, _PATIENCE = 10.0, 4.0  # [s] of a run that knows its arm; what it leaves out at most, others leave _DECIDED out
 _REFERENCE = 3.0  # [s] an empty run must have lasted to be a tare
 _FAST, _ROW = 2.5e-3, 0.9 / REGRESSOR_RATE  # [s] between samples of a fast stream, and between rows
@@ -171,12 +172,18 @@ class PayloadWatch:
         since = sample.t - self._aside
         if found is not None and since < _DECIDED:
             self._begin(sample, found, held)
-        elif self._unresolved and self._short < _MOST_SHORT and since > _AGAIN:
+        elif self._unresolved and self._short < _MOST_SHORT and since > _AGAIN and self._back():
             self._begin(sample, detector.last, held)
         sure = stream.tare is not None or stream.seconds > _LEARNT
         self._enough = since > (_PATIENCE if sure else _DECIDED)
         if self.settling or self._enough or not detector.uneasy:
             self._aside = np.inf
+
+    def _back(self) -> bool:
+        """Whether what was held before the last change explains the last rows better than what is held now."""
+        before = self._before_that(self._previous)
+        assert self._detector is not None
+        return before is not None and self._detector.ratio(before[0] - self._mean[0]) > _BACK
 
     @property
     def _mean(self) -> tuple[NDArray, NDArray]:
@@ -233,13 +240,21 @@ class PayloadWatch:
 
     def _fits(self, estimate: Estimate, earlier: StreamingIdentifier) -> bool:
         """Whether a new run's mass and first moments are an earlier run's."""
-        phi, covariance = estimate.phi[:4], estimate.covariance[:4, :4]
-        if self.run.reference is not earlier:
-            if self.run.reference is not earlier.reference:
-                return False
-            last = earlier.last
-            phi, covariance = phi - last.phi[:4], covariance + last.covariance[:4, :4]
+        last = self._before_that(earlier)
+        if last is None:
+            return False
+        phi, covariance = (estimate.phi - last[0])[:4], (estimate.covariance + last[1])[:4, :4]
         return bool(phi @ np.linalg.solve(covariance, phi) < _SAME)
+
+    def _before_that(self, earlier: StreamingIdentifier | None) -> tuple[NDArray, NDArray] | None:
+        """phi (10,) and covariance of an earlier run, relative to what the current one is relative to, if it can be."""
+        if earlier is None:
+            return None
+        if self.run.reference is earlier:
+            return np.zeros(10), np.zeros((10, 10))
+        if self.run.reference is not earlier.reference:
+            return None
+        return earlier.last.phi, earlier.last.covariance
 
     @property
     def runs(self) -> list[StreamingIdentifier]:
