@@ -162,3 +162,9 @@ def test_threads_do_not_pile_up_with_the_changes():
     identifier.close()
     assert len(seen) > 8
     assert most <= 6  # the runs kept, and the watch's own
+
+
+def test_a_pose_first_seen_shortly_after_a_change_is_not_another_change():
+    log = stream(5001, [(-1.0, None), (5.217, box(1.0))], 14.0, motion=taie2024())
+    _, events = said(log, "map-gp")  # the empty arm was not seen in all poses of the round before it took hold
+    assert [event.kind for event in events] == ["grasp"]
