@@ -46,13 +46,13 @@ class OnlineEstimate(Estimate):
     notes: tuple[str, ...]
 
     @classmethod
-    def of(cls, estimate: Estimate, **said: Any) -> Self:
-        """What an identifier estimates, with all other fields; `said` goes before the estimate's own.
+    def of(cls, said: dict[str, Any]) -> Self:
+        """The same as the constructor, from all fields by name; `said` becomes the estimate's own.
 
-        The same as the constructor, which sets frozen fields one by one: 2 µs that a stream would pay for each sample.
+        The constructor sets frozen fields one by one: 2 µs that a stream would pay for each sample.
         """
         made = object.__new__(cls)
-        object.__setattr__(made, "__dict__", vars(estimate) | said)
+        object.__setattr__(made, "__dict__", said)
         return made
 
     @property

@@ -95,7 +95,7 @@ class Gate:
         if q.shape != self._shape or dq.shape != self._shape or tau.shape != self._shape:
             return self._leave_out("wrong size")
         found = _look(now, q, dq, tau, self._limits, self._t, self._q)
-        if found not in (_NOTHING, _JUMPED):
+        if _NOTHING < found < _JUMPED:
             return self._leave_out(REASONS[found])
         step = now - self._t
         set_back = step < 0.0  # far enough not to be late

@@ -221,18 +221,20 @@ class OnlineIdentifier:
         engine, watch = self.engine, self._watch
         age = self._internal - getattr(engine, "data_t", self._internal)
         return OnlineEstimate.of(
-            self._estimate,
-            t=self._clock,
-            age=float(age) if math.isfinite(age) else 0.0,
-            since=self._clock if self._since is None else self._since,
-            relative_to=self.relative_to,
-            method=self.method,
-            determined=self._determined,
-            held=self._held,
-            calibrated=engine.calibrated,
-            moving=self._moving,
-            settling=watch is not None and watch.settling,
-            event=self._event,
-            health=self._gate.health,
-            notes=self._notes,
+            {
+                **vars(self._estimate),
+                "t": self._clock,
+                "age": float(age) if math.isfinite(age) else 0.0,
+                "since": self._clock if self._since is None else self._since,
+                "relative_to": self.relative_to,
+                "method": self.method,
+                "determined": self._determined,
+                "held": self._held,
+                "calibrated": engine.calibrated,
+                "moving": self._moving,
+                "settling": watch is not None and watch.settling,
+                "event": self._event,
+                "health": self._gate.health,
+                "notes": self._notes,
+            }
         )
