@@ -13,7 +13,7 @@ Sources: Lei et al., JASA 2018 (split conformal, locally weighted); Breiman 1996
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -62,13 +62,17 @@ class Calibration:
 
     def trusted(self, evidence: Evidence) -> Evidence:
         """Evidence as far as it can be trusted: Λ/kappa, h/kappa."""
-        kappa = float(self.kappa(evidence.traits[None])[0])
-        return replace(evidence, information=evidence.information / kappa, vector=evidence.vector / kappa)
+        kappa = self.level
+        if self.bag is not None:  # `kappa` of one log, without what many rows need
+            said = float(self.bag.row(evidence.traits).mean())
+            kappa = min(max(self.level * 10.0**said, _KAPPA[0]), _KAPPA[1])
+        Λ, h = evidence.information / kappa, evidence.vector / kappa
+        return Evidence(Λ, h, evidence.gain_std, evidence.traits, evidence.t, evidence.kind)
 
     def widened(self, found: MixturePosterior, evidence: Evidence) -> NDArray[np.float64]:
         """Covariance (10, 10) such that ±1.96 standard deviations are the calibrated 95 % interval."""
-        d = self.width(evidence.t, evidence.kind) / Z95
-        return _spread(found, evidence.gain_std) * np.outer(d, d)
+        width = self.width(evidence.t, evidence.kind)
+        return _spread(found.covariance, found.mean, evidence.gain_std, width / Z95)
 
     def answer(self, evidence: Evidence, prior: MixturePrior) -> MixturePosterior:
         """The posterior, its covariance such that ±1.96 standard deviations are the calibrated 95 % interval."""
@@ -128,9 +132,14 @@ def nearest(t: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.in
     return np.argmin(np.abs(np.log(t[:, None] / times)), axis=1)
 
 
-def _spread(found: MixturePosterior, gain_std: float) -> NDArray[np.float64]:
-    """Covariance (10, 10), widened by the torque's own calibration."""
-    return found.covariance + gain_std**2 * np.outer(found.mean, found.mean)
+@njit(cache=True, nogil=True)
+def _spread(covariance, mean, gain_std, d):  # pragma: no cover - compiled
+    """Covariance (10, 10), widened by the torque's own calibration, in units of 1/d (10,)."""
+    out = np.empty((10, 10))
+    for i in range(10):
+        for j in range(10):
+            out[i, j] = (covariance[i, j] + gain_std**2 * mean[i] * mean[j]) * d[i] * d[j]
+    return out
 
 
 @njit(cache=True, nogil=True)
@@ -150,7 +159,9 @@ def scores(records: Records, prior: MixturePrior, calibration: Calibration) -> N
     for k in range(len(records)):
         trusted = calibration.trusted(records.evidence(k))
         found = prior.posterior(trusted.information, trusted.vector)
-        out[k] = np.abs(found.mean - records.truth[k]) / np.sqrt(np.diag(_spread(found, trusted.gain_std)))
+        out[k] = np.abs(found.mean - records.truth[k]) / np.sqrt(
+            np.diag(_spread(found.covariance, found.mean, trusted.gain_std, np.ones(10)))
+        )
     return out
 
 

@@ -85,9 +85,10 @@ def answer(
     `trusted`: evidence as far as it can be trusted (`Calibration.trusted`). `quick`: the body is found in bounded time,
     to a hundredth of a standard deviation.
     """
-    found, removed = payloads.posteriors(trusted.information, np.stack([trusted.vector, -trusted.vector]))
-    if trusted.kind and removed.log_evidence + np.log(_REMOVED) > found.log_evidence:
-        return -removed.mean, calibration.widened(removed, trusted)  # it was taken off since the tare: −phi is a body
+    vectors = np.stack([trusted.vector, -trusted.vector][: 2 if trusted.kind else 1])
+    found, *removed = payloads.posteriors(trusted.information, vectors)
+    if removed and removed[0].log_evidence + np.log(_REMOVED) > found.log_evidence:  # it was taken off since the tare
+        return -removed[0].mean, calibration.widened(removed[0], trusted)  # −phi is a body
     covariance = calibration.widened(found, trusted)
     if quick:
         return near_consistent(found.mean, inverse(covariance)), covariance

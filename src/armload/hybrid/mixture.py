@@ -179,17 +179,16 @@ def _posteriors(precisions, pulls, constants, information, vectors):  # pragma: 
                 for m in range(j):
                     total -= L[i, m] * L[j, m]
                 if i == j:
-                    L[j, j] = np.sqrt(max(total, 1e-12))
-                    half += np.log(L[j, j])
+                    inverse[j, j] = 1.0 / np.sqrt(max(total, 1e-12))  # a product is sooner had than a quotient
+                    half -= np.log(inverse[j, j])
                 else:
-                    L[i, j] = total / L[j, j]
+                    L[i, j] = total * inverse[j, j]
         for j in range(d):  # inverse of L, by columns
-            inverse[j, j] = 1.0 / L[j, j]
             for i in range(j + 1, d):
                 total = 0.0
                 for m in range(j, i):
                     total -= L[i, m] * inverse[m, j]
-                inverse[i, j] = total / L[i, i]
+                inverse[i, j] = total * inverse[i, i]
         for i in range(d):
             for j in range(i + 1):
                 total = 0.0

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 _LENGTH_SCALES = (0.7, 0.9, 1.1, 1.3, 1.5)  # [rad]
@@ -71,3 +72,25 @@ class JointFeatures:
         """g (N, n, velocity) at velocities (N, n); the mean square of a weighted sum is the weights'."""
         angle = np.arcsinh(np.atleast_2d(dq) / _SLOW)[:, :, None] * self._velocity_waves
         return np.concatenate([np.cos(angle), np.sin(angle)], axis=2) / np.sqrt(max(self.velocity // 2, 1))
+
+    def of_sample(self, q: NDArray[np.float64], dq: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
+        """f (pose,) and g (n, velocity) of one sample (n,): for a live stream, at its pace."""
+        return _of_sample(q, dq, self.waves, self._velocity_waves)
+
+
+@njit(cache=True, nogil=True)
+def _of_sample(q, dq, waves, velocity_waves):  # pragma: no cover - compiled
+    half, few, n = waves.shape[0], velocity_waves.shape[0], q.shape[0]
+    pose, velocity = np.empty(2 * half), np.empty((n, 2 * few))
+    for i in range(half):
+        angle = 0.0
+        for k in range(n):
+            angle += waves[i, k] * q[k]
+        pose[i], pose[half + i] = np.cos(angle) / np.sqrt(half), np.sin(angle) / np.sqrt(half)
+    for j in range(n):
+        stretched = np.arcsinh(dq[j] / _SLOW)
+        for i in range(few):
+            angle = stretched * velocity_waves[i]
+            velocity[j, i] = np.cos(angle) / np.sqrt(few)
+            velocity[j, few + i] = np.sin(angle) / np.sqrt(few)
+    return pose, velocity

@@ -73,7 +73,7 @@ class RowStream:
             return None
         h = 0.0 if self._fresh else t - self._row_t
         momentum, drift = self._momentum(q, dq)
-        pose, velocity = self.features.of_pose(q)[0], self.features.of_velocity(dq)[0]
+        pose, velocity = self.features.of_sample(q, dq)
         arrays = [array for pair in self._states for array in pair]
         X, r = _row(momentum, drift, self._links, dq, pose, velocity, self._torque, self.gain, h, self._fresh, *arrays)
         self._row_t, self._fresh = t, False
