@@ -209,12 +209,12 @@ class Arm:
         """
         q, dq, _ = self._samples(q, dq, None)
         p, drift = np.empty_like(q), np.empty_like(q)
-        model, data = self._model, self._data
+        model, data, rest = self._model, self._data, np.zeros(self.n)
         for k in range(len(q)):
+            gravity = pin.computeGeneralizedGravity(model, data, q[k])
             C = pin.computeCoriolisMatrix(model, data, q[k], dq[k])
-            drift[k] = pin.computeGeneralizedGravity(model, data, q[k]) - C.T @ dq[k]
-            M = pin.crba(model, data, q[k])
-            p[k] = np.triu(M) @ dq[k] + np.triu(M, 1).T @ dq[k]
+            drift[k] = gravity - C.T @ dq[k]
+            p[k] = pin.rnea(model, data, q[k], rest, dq[k]) - gravity  # M·dq, sooner than by M
         return p, drift
 
     def frame_motion(self, q: ArrayLike) -> BodyMotion:
@@ -298,18 +298,18 @@ class Arm:
         q = self._samples(q, None, None)[0]
         N, n, model, data = len(q), self.n, self._model, self._data
         J = np.empty((N, 6, n))  # world frame, linear rows first
-        R, p = np.empty((len(bodies), N, 3, 3)), np.empty((len(bodies), N, 3))
+        joints = {joint: (np.empty((N, 3, 3)), np.empty((N, 3))) for joint, _, _ in bodies}
         for k in range(N):
             J[k] = pin.computeJointJacobians(model, data, q[k]).reshape(6, n)  # one joint: pin gives a vector
-            for b, (joint, rotation, translation) in enumerate(bodies):
+            for joint, (R, p) in joints.items():
                 placement = data.oMi[joint]
-                R[b, k] = placement.rotation @ rotation
-                p[b, k] = placement.translation + placement.rotation @ translation
+                R[k], p[k] = placement.rotation, placement.translation
         linear, angular = J[:, :3], J[:, 3:]
         out = []
-        for b, (joint, _, _) in enumerate(bodies):
-            at_body = linear + np.cross(angular, p[b][:, :, None], axis=1)  # v_p = v_0 + omega × p
-            Rt = np.swapaxes(R[b], 1, 2)
+        for joint, rotation, translation in bodies:
+            R, p = joints[joint][0] @ rotation, joints[joint][1] + joints[joint][0] @ translation
+            at_body = linear + np.cross(angular, p[:, :, None], axis=1)  # v_p = v_0 + omega × p
+            Rt = np.swapaxes(R, 1, 2)
             jacobian = np.concatenate([Rt @ angular, Rt @ at_body], axis=1)  # (N, 6, n)
             jacobian[:, :, joint:] = 0.0  # joints beyond the body do not move it
             out.append(BodyMotion(jacobian, Rt @ np.array(self.gravity)))

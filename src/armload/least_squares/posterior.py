@@ -17,11 +17,12 @@ Sources: information form and EM: Bishop 2006, ch. 3 and 9; arm and load togethe
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dpotrf, dpotri
 from threadpoolctl import ThreadpoolController
 
 from armload.least_squares.correction import Correction
@@ -167,6 +168,15 @@ def share_of_noise(seconds: float) -> float:
     return min(1.0, max(seconds, 1.0 / REGRESSOR_RATE) / _MOMENT)
 
 
+def _inverse(A: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A⁻¹ of a positive definite A, by its Cholesky factor: half the work of `numpy.linalg.inv`, and symmetric."""
+    factor, failed = dpotrf(A, lower=1)
+    if failed:
+        raise np.linalg.LinAlgError("not positive definite")
+    inverse, _ = dpotri(factor, lower=1)
+    return np.tril(inverse) + np.tril(inverse, -1).T
+
+
 @dataclass(frozen=True, eq=False)
 class _Gaussian:
     """z ~ N(mean, covariance); g_j | z ~ N(own − slope·z, rest)."""
@@ -181,6 +191,11 @@ class _Gaussian:
     def weights(self) -> NDArray:
         """Mean of g (n, R)."""
         return self.own - self.slope @ self.mean
+
+    def spread(self, E: NDArray, j: int, X: NDArray) -> NDArray[np.float64]:
+        """Variance (B,) of X·[E·z, g_j], X (B, ·)."""
+        shared, own = X[:, : len(E)] @ E - X[:, len(E) :] @ self.slope[j], X[:, len(E) :]
+        return ((shared @ self.covariance) * shared).sum(axis=1) + ((own @ self.rest[j]) * own).sum(axis=1)
 
 
 class _Eliminated(NamedTuple):
@@ -218,6 +233,7 @@ class _Problem:
             E[10:, self.payloads :] = np.eye(p)
             self.selections.append(E)
         self.parts = [run.selected(E) for run, E in zip(runs, self.selections, strict=True)]
+        self.crossed = [run.A[:, 10 + p :, : 10 + p] @ E for run, E in zip(runs, self.selections, strict=True)]
         group = np.repeat([_POSE, _VELOCITY], [self.features.pose, self.features.velocity])
         self.feature_variance = (np.outer(self.correction.effort, group)) ** 2
 
@@ -250,11 +266,10 @@ class _Problem:
         own, slope, rest = np.zeros((n, R)), np.zeros((n, R, self.size)), np.zeros((n, R, R))
         for j in range(n if R else 0):
             Agg = sum(run.A[j, c:, c:] / s[j] for run, s in zip(self.runs, S, strict=True))
-            Agz = sum(run.A[j, c:, :c] @ E / s[j] for run, E, s in zip(self.runs, self.selections, S, strict=True))
+            Agz = sum(crossed[j] / s[j] for crossed, s in zip(self.crossed, S, strict=True))
             bg = sum(run.b[j, c:] / s[j] for run, s in zip(self.runs, S, strict=True))
             root = np.sqrt(scales.features[j])
-            M = np.linalg.inv(root[:, None] * Agg * root + np.eye(R))
-            rest[j] = root[:, None] * (0.5 * (M + M.T)) * root
+            rest[j] = root[:, None] * _inverse(root[:, None] * Agg * root + np.eye(R)) * root
             own[j], slope[j] = rest[j] @ bg, rest[j] @ Agz
             A, b = A - Agz.T @ slope[j], b - Agz.T @ own[j]
         return _Eliminated(0.5 * (A + A.T), b, own, slope, rest)
@@ -308,15 +323,8 @@ class _Problem:
         """S of each run."""
         model, out = self.noise_model, []
         for run, E, expected in zip(self.runs, self.selections, self.expected, strict=True):
-            covariance = None
-            if self.features.size:
-                turned = found.slope @ found.covariance  # (n, R, z)
-                cross = -(E @ turned.swapaxes(1, 2))
-                own = found.rest + turned @ found.slope.swapaxes(1, 2)
-                shared = np.broadcast_to(E @ found.covariance @ E.T, (len(own), len(E), len(E)))
-                upper = np.concatenate([shared, cross], axis=2)
-                covariance = np.concatenate([upper, np.concatenate([cross.swapaxes(1, 2), own], axis=2)], axis=1)
-            S = run.residual_variance(E @ found.mean, expected, np.inf, found.weights, covariance)
+            spread = partial(found.spread, E) if self.features.size else None
+            S = run.residual_variance(E @ found.mean, expected, np.inf, found.weights, spread)
             S = np.maximum(S, expected) if model.floor else S
             out.append(S * max(1.0, run.blocks.duration / model.novelty))
         return np.array(out)

@@ -8,6 +8,8 @@ r, W, Z, G are the acceleration-free filtered regression (`arms.filtered`); eta 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -140,7 +142,7 @@ class RegressionData:
         prior: NDArray,
         novelty: float = NOVELTY,
         weights: NDArray | None = None,
-        covariance: NDArray | None = None,
+        spread: Callable[[int, NDArray], NDArray] | None = None,
     ) -> NDArray[np.float64]:
         """Long-run variance S (n,) of the residual, pulled towards the prior by `_PRIOR_COUNT` blocks.
 
@@ -149,17 +151,17 @@ class RegressionData:
             prior: S as expected before (n,).
             novelty: [s] beyond which more time on similar motions counts no more.
             weights: (n, R) of the features.
-            covariance: (n, size, size) of [x, weights] for each joint: what a fit with many unknowns leaves is smaller
-                than the noise, by this much.
+            spread: spread(j, X) is the variance (B,) of X·[x, weights_j], X (B, size): what a fit with many unknowns
+                leaves is smaller than the noise, by this much.
         """
         means, times = self.blocks.means()
         total = np.zeros(len(self.b))
         for j in range(len(total)):
             X, full = means[:, j, :-1], x if weights is None else np.concatenate([x, weights[j]])
             squared = (means[:, j, -1] - X[:, : len(full)] @ full) ** 2
-            if covariance is not None:
-                squared += np.einsum("ba,ba->b", X @ covariance[j], X)
+            if spread is not None:
+                squared += spread(j, X)
             total[j] = times @ squared
-        free = len(times) if covariance is not None else max(len(times) - 2, 0)
+        free = len(times) if spread is not None else max(len(times) - 2, 0)
         S = (_PRIOR_COUNT * prior + total) / (_PRIOR_COUNT + free)
         return S * max(1.0, self.blocks.duration / novelty)
