@@ -65,7 +65,7 @@ def test_the_forms_of_the_command_are_those_of_the_room():
 
 @pytest.mark.parametrize("form", _FORMS)
 def test_every_form_is_printed_without_a_word_beside_it(export, form):
-    out, err = export(result_of(HELD, relative_to="tare"), "--to", form)
+    out, err = export(result_of(HELD, relative_to="arm" if form in ("ur", "ur-payload") else "tare"), "--to", form)
     assert "1.2" in out
     assert err == ""
 
@@ -124,7 +124,13 @@ def test_what_the_log_did_not_determine_is_said_on_both_streams(export):
 
 @pytest.mark.parametrize(
     ("to", "relative_to", "says"),
-    [("franka", "arm", "--minus"), ("franka", "tool", ""), ("ur", "tool", "--plus"), ("ur", "arm", "")],
+    [
+        ("franka", "arm", "--minus"),
+        ("franka", "tool", ""),
+        ("ur", "tool", "--plus"),
+        ("ur-payload", "tare", "at the tare, if any, with --plus"),
+        ("ur", "arm", ""),
+    ],
 )
 def test_what_the_controller_counts_itself_is_said(export, to, relative_to, says):
     err = export(result_of(HELD, relative_to=relative_to), "--to", to)[1]

@@ -544,8 +544,11 @@ class Franka:
 class UR:
     """ur-rtde's two interfaces, as far as they are used."""
 
-    def __init__(self, qd=(0.0,) * 6, answer=True):
-        self.qd, self.answer, self.told = list(qd), answer, []
+    def __init__(self, qd=(0.0,) * 6, answer=True, connected=True):
+        self.qd, self.answer, self.connected, self.told = list(qd), answer, connected, []
+
+    def isConnected(self):
+        return self.connected
 
     def getActualQd(self):
         return self.qd
@@ -594,6 +597,10 @@ def test_a_ur_is_told_the_payload():
             {"write": True},
             "refused the load: command rej",
         ),
+        (Franka(), identification(skew_body(), relative_to="tool"), {"write": True}, "add the tool"),
+        (Franka(), identification(skew_body(), relative_to="tare"), {"write": True}, "add what was mounted then"),
+        (Franka(m_ee=np.nan), identification(skew_body()), {"write": True}, "an end effector of nan kg"),
+        (Franka(m_ee=None), identification(skew_body()), {"write": True}, "state cannot be read"),
     ],
 )
 def test_a_franka_robot_is_told_nothing_it_should_not_be(robot, result, settings, says):
@@ -610,6 +617,15 @@ def test_a_franka_robot_with_its_hand_counted_is_told_the_rest():
     assert_is_the_body(robot.told[0][0], robot.told[0][1], np.reshape(robot.told[0][2], (3, 3)))
 
 
+def test_a_ur_is_told_what_was_mounted_at_the_tare_and_what_was_added_since():
+    gripper, robot = skew_body("tool0"), UR()
+    result = identification(InertialParameters(0.5 * gripper.phi, "tool0"), "ur5e", relative_to="tare")
+    ur_robot.set_load(robot, robot, Load.of(result) + gripper, arm("ur5e"), write=True)
+    assert robot.told[0][0] == pytest.approx(1.5 * gripper.mass, rel=1e-12)
+    ur_robot.set_load(robot, robot, Load.of(result) + InertialParameters.zero("tool0"), arm("ur5e"), write=True)
+    assert robot.told[1][0] == pytest.approx(0.5 * gripper.mass, rel=1e-12)
+
+
 def test_a_robot_that_is_lost_is_told_nothing():
     robot = Franka()
     robot.state = None
@@ -624,6 +640,9 @@ def test_a_ur_is_told_nothing_it_should_not_be():
         (UR(), result, {}, "not asked for"),
         (UR(qd=[0, 0, 0, 0, 0, -0.5]), result, {"write": True}, "the robot moves"),
         (UR(), replace(result, relative_to="tool"), {"write": True}, "relative to a tool"),
+        (UR(), replace(result, relative_to="tare"), {"write": True}, "add what was mounted then"),
+        (UR(), replace(Load.of(result), relative_to="before"), {"write": True}, "since its last change"),
+        (UR(connected=False), result, {"write": True}, "no payload is written: the connection is lost"),
     ]:
         with pytest.raises(SinkError, match=says):
             ur_robot.set_load(robot, robot, load, ur5e, **settings)

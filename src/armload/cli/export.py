@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 
 # the names of armload.sinks.FORMS, so that --help need not import them; a test compares
 _FORMS = ("franka", "franka-desk", "ur", "ur-payload", "urdf", "mjcf", "sdf", "ros2")
-_CONTROLLERS = ("franka", "franka-desk", "ur", "ur-payload")
 _EXAMPLES = """\
 examples:
   armload identify run.csv --robot panda --json > held.json
@@ -80,7 +79,7 @@ def parser() -> Parser:
 
 def run(options: argparse.Namespace) -> None:
     """Read, combine, move, write."""
-    from armload.sinks import about, export_load
+    from armload.sinks import CONTROLLERS, about, export_load
 
     load = _load_of(options.result)
     arm = _arm_of(options, load)
@@ -89,7 +88,7 @@ def run(options: argparse.Namespace) -> None:
     for part in options.plus:
         load = load + about(payload_of(part), load.frame, arm)
     frame = options.frame
-    if frame is None and arm is not None and (options.to in _CONTROLLERS or load.frame is None):
+    if frame is None and arm is not None and (options.to in CONTROLLERS or load.frame is None):
         frame = arm.frame
     load = load.about(frame, arm)
     body = load.as_body()
@@ -123,6 +122,8 @@ def _arm_of(options: argparse.Namespace, load: Load) -> Arm | None:
 
 
 def _notes(load: Load, to: str) -> list[str]:
+    from armload.sinks import CONTROLLERS
+
     notes = []
     if load.undetermined:
         notes.append(f"not determined by the log: {', '.join(load.undetermined)}; written as known beforehand")
@@ -130,6 +131,10 @@ def _notes(load: Load, to: str) -> list[str]:
         notes.append("this contains any hand that is mounted: take off what Desk counts already with --minus")
     if to in ("ur", "ur-payload") and load.relative_to == "tool":
         notes.append("a UR's payload is everything on the flange: add the tool with --plus")
-    if to in _CONTROLLERS and load.frame is None:
+    if to in ("ur", "ur-payload") and load.relative_to in ("tare", "before"):
+        notes.append(
+            "a UR's payload is everything on the flange: add what was mounted at the tare, if any, with --plus"
+        )
+    if to in CONTROLLERS and load.frame is None:
         notes.append("the payload names no frame: it is taken to be about the flange")
     return notes

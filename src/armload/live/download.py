@@ -8,7 +8,7 @@ from armload.arms import ARMS, Arm
 from armload.errors import SinkError
 from armload.live.headless import line_of
 from armload.online import OnlineEstimate
-from armload.sinks import Load, export_load, flange_of
+from armload.sinks import CONTROLLERS, Load, export_load, flange_of
 
 ENDINGS = {
     "franka": ".py",
@@ -21,7 +21,6 @@ ENDINGS = {
     "ros2": ".yaml",
     "json": ".json",
 }
-_CONTROLLERS = ("franka", "franka-desk", "ur", "ur-payload")  # they count from the flange
 
 
 def file_of(estimate: OnlineEstimate | None, arm: Arm, form: str) -> tuple[str, str]:
@@ -40,15 +39,9 @@ def file_of(estimate: OnlineEstimate | None, arm: Arm, form: str) -> tuple[str, 
     if estimate is None or not estimate.determined[0]:
         raise SinkError("the mass is not determined yet: wait until the arm has moved with its payload")
     name = f"payload-{form}{ENDINGS[form]}" if form != "json" else "payload.json"
-    load = Load(
-        estimate.parameters,
-        tuple(bool(x) for x in estimate.determined),
-        arm.name,
-        "tare" if estimate.relative_to == "before" else estimate.relative_to,
-        estimate.std,
-    )
     if form == "json":
         return name, json.dumps(line_of(estimate, arm.name)) + "\n"
-    if form in _CONTROLLERS and arm.name in ARMS:
+    load = Load.of(estimate, arm)
+    if form in CONTROLLERS and arm.name in ARMS:
         load = load.about(flange_of(arm), arm)
     return name, export_load(load.as_body(), form)

@@ -3,13 +3,14 @@
 `franka_robot.set_load` and `ur_robot.set_load` write; everything else makes text.
 """
 
-from armload.sinks.forms import FORMS, Form, export_load
+from armload.sinks.forms import CONTROLLERS, FORMS, Form, export_load
 from armload.sinks.franka import FrankaLoad, franka_load
 from armload.sinks.guard import check_writable, flange_of, is_moving
 from armload.sinks.load import Load, about, read_load
 from armload.sinks.ur import URPayload, ur_payload
 
 __all__ = [
+    "CONTROLLERS",
     "FORMS",
     "Form",
     "FrankaLoad",

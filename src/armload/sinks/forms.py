@@ -32,6 +32,7 @@ FORMS = {
     "sdf": Form("SDF: a model with one link", sdf_text),
     "ros2": Form("ROS 2 geometry_msgs/msg/InertiaStamped (YAML)", lambda a, _: inertia_stamped_text(a)),
 }
+CONTROLLERS = ("franka", "franka-desk", "ur", "ur-payload")  # their forms are about the flange
 
 
 def export_load(load: Load, to: str, path: str | Path | None = None, name: str = "payload") -> str:

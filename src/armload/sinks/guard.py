@@ -26,12 +26,6 @@ def is_moving(dq: ArrayLike) -> bool:
     return not (speeds.size and np.all(speeds <= STANDSTILL))
 
 
-def require_standstill(dq: ArrayLike) -> None:
-    """Raise `SinkError` if `is_moving`."""
-    if is_moving(dq):
-        raise SinkError(f"the robot moves: a load is written at standstill only, all joints below {STANDSTILL} rad/s")
-
-
 def reason_of(error: Exception) -> str:
     """What a vendor's exception says, on one line."""
     return " ".join(str(error).split()) or type(error).__name__
@@ -53,6 +47,7 @@ def check_writable(
     arm: Arm,
     *,
     moving: bool,
+    end_effector: float = 0.0,
     write: bool = False,
     flange: str | None = None,
     allow_undetermined_inertia: bool = False,
@@ -63,13 +58,15 @@ def check_writable(
         result: what was identified.
         arm: the arm it is written to; its rated payload is the limit.
         moving: whether the robot moves at this moment, from `is_moving`.
+        end_effector: mass the controller counts on the flange beside the load [kg]; 0: the load is all it knows of.
         write: must be True: writing is asked for, never a side effect.
         flange: the frame the controller counts from; default: the built-in arm's.
         allow_undetermined_inertia: write the reported inertia though the log did not determine all of it.
 
     Raises:
         SinkError: writing was not asked for, the robot moves, the load is another arm's, it is no body, its mass or
-            first moments (or inertia) are undetermined, or it is heavier than the arm is rated for.
+            first moments (or inertia) are undetermined, it contains what the controller counts already or lacks what
+            nobody counts, or it is heavier than the arm is rated for.
     """
     load = Load.of(result)
     if write is not True:
@@ -93,9 +90,35 @@ def check_writable(
     consistent = load.consistent and (not isinstance(result, Identification) or result.consistent)
     if not consistent:
         raise SinkError("the load is inconsistent: no body can have these parameters; identify again before writing it")
+    _check_counted_once(load, end_effector)
     if arm.rated_payload is None:
         raise SinkError(f"what {arm.name} is rated for is not known: give it as Arm(…, rated_payload=…) in kilograms")
-    if mass > arm.rated_payload:
-        raise SinkError(f"the load weighs {mass:.3f} kg: {arm.name} is rated for {arm.rated_payload:g} kg")
+    if mass + end_effector > arm.rated_payload:
+        also, together = (f" and the end effector {end_effector:.3f} kg", " together") if end_effector else ("", "")
+        raise SinkError(
+            f"the load weighs {mass:.3f} kg{also}: {arm.name} is rated for {arm.rated_payload:g} kg{together}"
+        )
     flange = flange or flange_of(arm)
     return replace(arm, frame=flange, attached=None).in_frame(load.parameters)
+
+
+def _check_counted_once(load: Load, end_effector: float) -> None:
+    """Refuse a load that contains what the controller counts already, or lacks what it does not count."""
+    if not (np.isfinite(end_effector) and end_effector >= 0):
+        raise SinkError(f"the robot counts an end effector of {end_effector} kg: expected a mass, 0 for none")
+    if end_effector > 0 and load.relative_to == "arm":
+        raise SinkError(
+            f"the robot counts an end effector of {end_effector:.3g} kg already, and the load, relative to the bare "
+            "arm, contains it: take it off (Load.of(result) - hand), or identify with it as the tool"
+        )
+    if end_effector == 0 and load.relative_to == "tool":
+        raise SinkError(
+            "the load is relative to a tool, and the robot counts nothing on the flange but the load: add the tool "
+            "(Load.of(result) + tool)"
+        )
+    if end_effector == 0 and load.relative_to in ("tare", "before"):
+        raise SinkError(
+            f"the load is what was added since {'the tare' if load.relative_to == 'tare' else 'its last change'}, and "
+            "the robot counts nothing on the flange but the load: add what was mounted then (Load.of(result) + "
+            "gripper; InertialParameters.zero() if nothing was)"
+        )

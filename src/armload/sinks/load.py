@@ -19,6 +19,7 @@ from armload.online import OnlineEstimate
 from armload.payloads import read_payload
 
 _KNOWN = (True,) * 10
+_RELATIVE = {"before": "empty arm before"}  # what reads otherwise than it is called
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +116,7 @@ class Load:
         if self.frame:
             what += f" about {self.frame}"
         if self.relative_to:
-            what += f", relative to the {self.relative_to}"
+            what += f", relative to the {_RELATIVE.get(self.relative_to, self.relative_to)}"
         lines = [_line(what)]
         if self.undetermined:
             lines.append(f"not determined by the log: {', '.join(self.undetermined)}; known beforehand, not measured")

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from armload.arms import Arm
 from armload.errors import SinkError
 from armload.identify import Identification
-from armload.sinks.guard import check_writable, reason_of, require_standstill
+from armload.sinks.guard import check_writable, is_moving, reason_of
 from armload.sinks.load import Load
 from armload.sinks.ur import URPayload, ur_payload
 
@@ -28,6 +28,10 @@ class URReceive(Protocol):
         """Measured joint velocities [rad/s]."""
         ...
 
+    def isConnected(self) -> bool:
+        """Whether they are new ones."""
+        ...
+
 
 def set_load(
     control: URControl,
@@ -41,7 +45,8 @@ def set_load(
 ) -> URPayload:
     """Tell a Universal Robots arm what is on its flange, and return what was told.
 
-    Its controller knows of no tool beside the payload: a load relative to a tool or a tare lacks what was mounted then.
+    Its controller knows of no tool beside the payload: a load relative to a tool or a tare lacks what was mounted then,
+    and is refused until that is added.
 
     Args:
         control, receive: the vendor's clients.
@@ -52,25 +57,22 @@ def set_load(
     Raises:
         SinkError: the load must not be written (see `check_writable`), or the robot refused it.
     """
-    parameters = check_writable(
-        result,
-        arm,
-        moving=False,
-        write=write,
-        flange=flange,
-        allow_undetermined_inertia=allow_undetermined_inertia,
-    )
-    if Load.of(result).relative_to == "tool":
-        raise SinkError(
-            "the load is relative to a tool, and the controller's payload is everything on the flange: add the tool "
-            "(Load.of(result) + tool)"
-        )
     try:
-        speed = receive.getActualQd()
+        if not receive.isConnected():  # the client would go on giving its last values
+            raise ConnectionError("the connection is lost")
+        moving = is_moving(receive.getActualQd())
     except Exception as error:  # the vendor's own exceptions have no common base
         raise SinkError(f"the robot's state cannot be read, so no payload is written: {reason_of(error)}") from error
-    require_standstill(speed)
-    told = ur_payload(parameters)
+    told = ur_payload(
+        check_writable(
+            result,
+            arm,
+            moving=moving,
+            write=write,
+            flange=flange,
+            allow_undetermined_inertia=allow_undetermined_inertia,
+        )
+    )
     try:
         taken = control.setTargetPayload(*told)
     except Exception as error:
