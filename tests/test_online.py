@@ -14,6 +14,7 @@ from armload.methods import METHODS
 from armload.motion import random_motion, taie2024
 from armload.online import OnlineIdentifier
 from armload.online.estimate import OnlineEstimate
+from armload.payloads import franka_hand
 from armload.payloads import test_payload as make_payload
 from armload.recording import Sample
 from armload.simulate import World, simulate
@@ -63,6 +64,33 @@ def test_a_payload_is_found_and_said_with_all_that_a_controller_asks(online, log
     said = json.loads(json.dumps(estimate.to_dict(), allow_nan=False))
     assert said["mass"] == pytest.approx(truth[0], abs=0.15)
     assert said["n_samples"] == len(log)
+
+
+def test_an_arm_with_a_known_tool_answers_relative_to_it(panda, log):
+    """Whoever writes the answer to a controller must be told that the tool is not in it."""
+    identifier = OnlineIdentifier(panda.with_payload(franka_hand().parameters), method="map")
+    assert fed(identifier, list(log)[:20]).relative_to == "tool"
+    identifier.close()
+
+
+def test_methods_that_cannot_run_live_are_not_offered(panda):
+    with pytest.raises(IdentificationError, match="unknown method 'tree'") as raised:
+        OnlineIdentifier(panda, method="tree")
+    offered = str(raised.value).split("expected one of ")[1].split(", or the file")[0].split(", ")
+    assert not {"tree", "network", "commanded"} & set(offered)
+    assert {"hybrid", "map", "rls"} <= set(offered)
+
+
+class Foreign:
+    """An array of another library, which does not let itself be read (as a tensor that still has a gradient)."""
+
+    def __array__(self, *_, **__):
+        raise RuntimeError("call detach() first")
+
+
+def test_values_that_refuse_to_be_read_are_counted(online, log):
+    first = next(iter(log))
+    assert online.update(first.t, Foreign(), first.dq, first.tau).health.bad == 1
 
 
 def bad_samples(n=7):

@@ -12,6 +12,9 @@ from armload.least_squares import PosteriorLeastSquares, SmoothPosteriorLeastSqu
 from armload.methods import METHODS, default_for
 from armload.recording import Recording
 
+# names of the catalogue that need neither a motion known beforehand nor a model of their own
+LIVE = tuple(name for name, method in METHODS.items() if method.needs not in ("training", "motion"))
+
 
 def engine(arm: Arm, tare: Recording | None = None, method: str | Path | None = None) -> Identifier:
     """An identifier for a live stream.
@@ -30,11 +33,11 @@ def engine(arm: Arm, tare: Recording | None = None, method: str | Path | None = 
         return StreamingIdentifier(SmoothPosteriorLeastSquares(arm, tare))
     if name == "map":
         return StreamingIdentifier(PosteriorLeastSquares(arm, tare))
-    if name in METHODS and METHODS[name].needs not in ("training", "motion"):
+    if name in LIVE:
         return METHODS[name].make(arm, tare)
     if not Path(name).is_file():
         raise IdentificationError(
-            f"unknown method {name!r} for a live stream: expected one of {', '.join(METHODS)}, or the file of a model"
+            f"unknown method {name!r} for a live stream: expected one of {', '.join(LIVE)}, or the file of a model"
         )
     if HybridModel.wrote(name):
         return StreamingHybrid(arm, tare, HybridModel.load(name))

@@ -22,7 +22,8 @@ class OnlineEstimate(Estimate):
     t: time of the last sample, on the stream's clock [s]. n_samples: samples of this payload so far.
     age: how much older the newest sample in phi is than the last one [s].
     since: when this payload was taken up, on the stream's clock [s].
-    relative_to: "arm", "tare", or "before": the run before the last change was taken for a tare. method: its name.
+    relative_to: "arm", "tool" (which the arm was given with), "tare", or "before": the run of the empty arm before the
+        last change was taken for a tare. method: its name.
     determined: which parameters (10,) the data determine. held: whether anything is there at all.
     calibrated: whether ±1.96 std were checked to be 95 % intervals.
     moving: whether the arm has moved in the last half second: a standing arm cannot tell an inertia.

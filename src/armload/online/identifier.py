@@ -45,7 +45,7 @@ class OnlineIdentifier:
     (False, False, 1)
 
     Args:
-        arm: the bare arm, with the frame and gravity wanted.
+        arm: the bare arm (or with a tool that is known), with the frame and gravity wanted.
         tare: an earlier log of the same arm, on any motion, with whatever was mounted then: estimates are of what was
             added since.
         method: a name of the catalogue, or a trained model's file; None: the most trustworthy for the arm.
@@ -76,10 +76,15 @@ class OnlineIdentifier:
 
     @property
     def relative_to(self) -> str:
-        """What the answer is relative to: the bare "arm", the "tare", or what was held "before" the last change."""
+        """What the answer is relative to: the bare "arm", the "tool" it was given with, the "tare", or "before".
+
+        That is the empty arm before the last change, taken for a tare.
+        """
         if self._tared:
             return "tare"
-        return "arm" if getattr(self.engine, "reference", None) is None else "before"
+        if getattr(self.engine, "reference", None) is not None:
+            return "before"
+        return "arm" if self.arm.attached is None else "tool"
 
     @property
     def event(self) -> Event | None:
