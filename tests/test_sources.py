@@ -3,6 +3,7 @@
 import itertools
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -243,6 +244,14 @@ def test_a_record_is_never_written_over(tmp_path):
         Recorder(tmp_path / "run.npz", 7)
     with pytest.raises(RecordingError, match="cannot be written"):
         Recorder(tmp_path / "nowhere" / "run.csv", 7)
+
+
+@pytest.mark.parametrize("name", ["run.2.csv", "run.bad.jsonl"])
+def test_what_an_earlier_record_left_is_told_before_the_first_sample_not_at_a_bad_one(tmp_path, name):
+    (tmp_path / name).write_text("mine")
+    with pytest.raises(RecordingError, match=rf"{re.escape(name)} exists.*choose another name"):
+        Recorder(tmp_path / "run.csv", 7)
+    assert [path.name for path in tmp_path.iterdir()] == [name]
 
 
 def test_a_full_disk_leaves_whole_lines(tmp_path):
@@ -505,6 +514,29 @@ def test_closing_from_another_thread_ends_an_iteration(tmp_path, panda):
     source = Detached(str(tmp_path / "slow.csv"), panda)
     threading.Timer(0.3, source.close).start()
     assert len(list(source)) == 1
+
+
+def test_closing_a_reader_that_hangs_ends_an_iteration_without_an_error(panda, path, monkeypatch):
+    monkeypatch.setattr("armload.sources.detached._TO_END", 0.2)
+    source = Detached(str(path), panda, loop=True)
+    os.kill(source.process.pid, signal.SIGSTOP)
+    threading.Timer(0.3, source.close).start()
+    for sample in source:
+        assert len(sample.q) == 7
+    assert gone(source.process)
+
+
+def test_a_late_answer_is_not_taken_for_that_of_the_next_call(panda, path, monkeypatch):
+    """Else a robot that refused a load could seem to have taken it."""
+    with Detached(str(path), panda, loop=True) as source:
+        os.kill(source.process.pid, signal.SIGSTOP)
+        with monkeypatch.context() as patch:
+            patch.setattr("armload.sources.detached._TO_OBEY", 0.1)
+            with pytest.raises(SourceError, match="did not answer"):
+                source.set_load(1.0, np.zeros(3), np.eye(3))
+        os.kill(source.process.pid, signal.SIGCONT)
+        with pytest.raises(SourceError, match="no read_once"):
+            source.read_once()
 
 
 def test_the_reader_s_reason_is_the_listener_s(tmp_path, panda):

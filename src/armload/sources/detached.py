@@ -81,6 +81,9 @@ class Detached(Source):
         self._wake, wake = os.pipe()
         self._status, status = os.pipe()
         self._heard = b""
+        self._listening = threading.Lock()  # held while events are read
+        self._last: dict[str, Any] | None = None  # how it ended
+        self._calls = 0
         command = [sys.executable, "-P", "-m", "armload.sources.reader"]
         theirs = (self._ring.descriptor, wake, status)
         try:
@@ -100,11 +103,11 @@ class Detached(Source):
             event = self._event(_TO_START)
             if event["event"] != "ready":
                 raise SourceError(event.get("message", f"{spec} ended before its first sample"))
-        except SourceError:
+        except BaseException:
             self.close()
             raise
         self.name, self.n, self.rate = event["name"], event["n"], event["rate"]
-        if spec.startswith("sim"):
+        if spec == "sim":
             from armload.sources.open import open_source
 
             self._twin = open_source(spec, arm, detached=False, **options)  # never run: it knows the truth
@@ -166,15 +169,23 @@ class Detached(Source):
             self._ring.close()
 
     def _say_how_it_ended(self) -> None:
-        event = {"event": ""}
-        while event["event"] not in ("ended", "error"):
-            event = self._event(_TO_END)
-        if event["event"] == "error" and not self._closed:
-            raise SourceError(event["message"])
+        try:
+            while self._last is None:
+                self._event(_TO_END)
+        except SourceError:
+            if self._closed:  # it was made to end
+                return
+            raise
+        if self._last["event"] == "error" and not self._closed:
+            raise SourceError(self._last["message"])
 
     def _call(self, method: str, *arguments: Any) -> Any:
-        self._send({"call": method, "arguments": arguments})
+        self._calls += 1
+        number = self._calls
+        self._send({"call": method, "number": number, "arguments": arguments})
         event = self._event(_TO_OBEY)
+        while event is not self._last and event.get("number") != number:  # a call that was given up is answered late
+            event = self._event(_TO_OBEY)
         if event["event"] != "answer":
             raise SourceError(event.get("message", f"{self.name} ended before it answered"))
         return event["value"]
@@ -189,17 +200,23 @@ class Detached(Source):
             raise SourceError(f"the reader of {self.name} has ended: open the source again") from None
 
     def _event(self, seconds: float) -> dict[str, Any]:
-        """The reader's next event; "ended" without one if the process is gone."""
+        """The reader's next event; how it ended, again and again, once it has told."""
         until = time.monotonic() + seconds
-        while b"\n" not in self._heard:
-            left = until - time.monotonic()
-            if left <= 0 or not select.select([self._status], [], [], left)[0]:
-                raise SourceError(f"the reader of {self.name} did not answer within {seconds:.0f} s")
-            heard = os.read(self._status, 1 << 16)
-            if not heard:
-                how = self.process.wait()
-                ended = f"was killed by signal {-how}" if how < 0 else f"ended with exit code {how}"
-                raise SourceError(f"the reader of {self.name} {ended}: open the source again")
-            self._heard += heard
-        line, self._heard = self._heard.split(b"\n", 1)
-        return json.loads(line)
+        with self._listening:
+            if self._last is not None:
+                return self._last
+            while b"\n" not in self._heard:
+                left = until - time.monotonic()
+                if left <= 0 or not select.select([self._status], [], [], left)[0]:
+                    raise SourceError(f"the reader of {self.name} did not answer within {seconds:.0f} s")
+                heard = os.read(self._status, 1 << 16)
+                if not heard:
+                    how = self.process.wait()
+                    ended = f"was killed by signal {-how}" if how < 0 else f"ended with exit code {how}"
+                    raise SourceError(f"the reader of {self.name} {ended}: open the source again")
+                self._heard += heard
+            line, self._heard = self._heard.split(b"\n", 1)
+            event = json.loads(line)
+            if event["event"] in ("ended", "error"):
+                self._last = event
+            return event

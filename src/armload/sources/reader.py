@@ -83,9 +83,10 @@ class _Reader:
         try:
             if method not in _CALLS or not hasattr(source, method):
                 raise SourceError(f"{source.name} has no {method}: only a Franka robot has")
-            self.tell(event="answer", value=getattr(source, method)(*command["arguments"]))
+            value = getattr(source, method)(*command["arguments"])
+            self.tell(event="answer", number=command["number"], value=value)
         except ArmloadError as error:
-            self.tell(event="refused", message=str(error))
+            self.tell(event="refused", number=command["number"], message=str(error))
 
     def listen(self, source: Source, lines: Iterator[bytes]) -> None:
         """Take commands until standard input ends; then end the source, and if it does not, the process."""

@@ -32,7 +32,7 @@ class Recorder:
     """A log that can be read at any moment, whatever becomes of the process that writes it.
 
     Args:
-        path: a `.csv` file that does not exist yet: nothing is ever written over.
+        path: a `.csv` file that does not exist yet, nor what may come beside it: nothing is ever written over.
         n: joints.
 
     Attributes:
@@ -55,6 +55,9 @@ class Recorder:
         self._bad_lines: _Lines | None = None
         self._last = -math.inf
         self._late = math.inf  # time of the sample before, if it was a late one
+        for beside in (self._path_of_part(2), self._path_of_bad()):  # not known only when it is needed
+            if beside.exists():
+                raise RecordingError(f"{beside} exists, and belongs to another record: choose another name than {path}")
         self._lines = self._next_part()
 
     def append(self, sample: Sample) -> None:
@@ -95,16 +98,21 @@ class Recorder:
         self.close()
 
     def _next_part(self) -> _Lines:
-        part = len(self.paths) + 1
-        path = self.path if part == 1 else self.path.with_name(f"{self.path.stem}.{part}{self.path.suffix}")
+        path = self._path_of_part(len(self.paths) + 1)
         lines = _Lines(path)
         lines.append(",".join(column_names(self.n)))
         self.paths.append(path)
         return lines
 
+    def _path_of_part(self, part: int) -> Path:
+        return self.path if part == 1 else self.path.with_name(f"{self.path.stem}.{part}{self.path.suffix}")
+
+    def _path_of_bad(self) -> Path:
+        return self.path.with_name(f"{self.path.stem}.bad.jsonl")
+
     def _refuse(self, sample: Sample, why: str) -> None:
         if self._bad_lines is None:
-            self._bad_lines = _Lines(self.path.with_name(f"{self.path.stem}.bad.jsonl"))
+            self._bad_lines = _Lines(self._path_of_bad())
         values = {name: np.asarray(value).tolist() for name, value in sample._asdict().items()}
         self._bad_lines.append(json.dumps({"why": why, **values}))
         self.bad += 1
