@@ -299,6 +299,14 @@ def test_a_tare_of_another_motion_is_refused_in_one_sentence_and_a_stream_learns
     assert np.all(estimate.std > UNITS)
 
 
+def test_two_copies_of_one_log_say_no_more_than_the_torque_is_known(panda, analytic_log):
+    log = analytic_log(panda, CAMERA, extra=unmodelled)
+    found = DifferenceLeastSquares(panda, log).run(log)
+    assert found.phi == pytest.approx(np.zeros(10), abs=1e-12)
+    # a thousand rows of 1e-3 N·m each, with lever arms of a metre at most and 9.81 m/s², tell no mass below 3e-6 kg
+    assert found.std[0] > 1e-3 / np.sqrt(1e3) / 9.81
+
+
 def test_the_intervals_of_the_difference_cover_the_truth_under_correlated_noise(panda, analytic_log):
     clean, tare = analytic_log(panda, CAMERA, rate=100.0, duration=10.0), analytic_log(panda, rate=100.0, duration=10.0)
     inside = []

@@ -97,6 +97,8 @@ def test_what_was_taken_off_since_the_tare_is_negative_and_said_so(real_like):
     assert answer.mass == pytest.approx(-BOX.mass, abs=0.05)
     assert (answer.held, answer.consistent) == (False, False)
     assert "taken off" in answer.notes[0]
+    assert "below zero" in str(answer)
+    assert "within three standard deviations" not in str(answer)
 
 
 def test_an_empty_arm_holds_nothing_and_a_light_payload_is_held_with_a_tare(real_like):
@@ -107,6 +109,17 @@ def test_an_empty_arm_holds_nothing_and_a_light_payload_is_held_with_a_tare(real
     assert not identify(empty, panda).held
     assert not identify(empty, panda, tare=tare).held
     assert identify(simulate(panda, taie2024(), light, seed=7, **how), panda, tare=tare).held
+
+
+@pytest.mark.parametrize("method", [None, "difference"])
+def test_a_log_that_is_its_own_tare_holds_nothing_and_the_intervals_hold_zero(loaded, real_like, method):
+    panda, _ = real_like
+    answer = identify(loaded, panda, tare=loaded, method=method)
+    assert not answer.held
+    assert np.all(np.array(answer.phi_low) < 0)
+    assert np.all(np.array(answer.phi_high) > 0)
+    assert np.all(np.isfinite(answer.com))
+    assert "nothing seems to be held" in str(answer)
 
 
 def test_another_frame_moves_the_same_body(loaded):
@@ -125,6 +138,8 @@ def test_only_measured_torque_at_a_useful_rate_is_taken(panda, analytic_log):
         identify(log.select(slice(None, None, 20)), panda)
     with pytest.raises(IdentificationError, match="unknown method 'magic'"):
         identify(log, panda, method="magic")
+    with pytest.raises(IdentificationError, match="did you mean 'hybrid'"):
+        identify(log, panda, method="hybird")
 
 
 def test_a_tool_mounted_after_the_tare_is_taken_off_the_answer(real_like):
@@ -157,4 +172,5 @@ def test_an_undetermined_interval_of_a_method_without_a_prior_holds_its_own(real
     log = simulate(panda, taie2024(), heavy, seed=3, **how).between(0.0, 1.0)
     answer = identify(log, panda, method="rls")
     assert not answer.determined[0]
+    assert "does not tell whether anything is held" in str(answer)
     assert answer.phi_high[0] >= answer.phi[0] > Z95 * payload_prior_std(panda)[0]

@@ -148,6 +148,10 @@ def cell(line, column, value):
         (lambda _: " \n\n", r"is empty"),
         (lambda s: s.splitlines()[0], r"holds no rows of data: expected at least 2"),
         (lambda s: "\n".join(s.splitlines()[:2]), r"holds only 1 row of data: expected at least 2"),
+        (
+            lambda s: "\n".join([*s.splitlines()[:2], s.splitlines()[1]]) + "\n",
+            r"only 1 row of data, 2 times: expected",
+        ),
         (cell(4, "q2", "fast"), r", line 4: q2 is 'fast': expected a number"),
         (cell(4, "q2", "1_0"), r", line 4: q2 is '1_0'"),
         (cell(4, "q2", "0x10"), r", line 4: q2 is '0x10'"),

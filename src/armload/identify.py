@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -70,6 +71,17 @@ class Identification:
         """phi with its frame, ready to move, add, subtract or reorder."""
         return InertialParameters(np.array(self.phi), self.frame)
 
+    @property
+    def why_not_held(self) -> str:
+        """Why `held` is false, in a sentence; "" where it is true."""
+        if self.held:
+            return ""
+        if not self.determined[0]:
+            return "the log does not tell whether anything is held"
+        if self.phi_high[0] < 0:
+            return "nothing is held: the mass is below zero"
+        return "nothing seems to be held: the mass is within three standard deviations of zero"
+
     def __str__(self) -> str:
         lines = [
             f"{self.robot}: payload about {self.frame}, relative to the {self.relative_to}, "
@@ -83,7 +95,7 @@ class Identification:
         com = ", ".join(f"{x:+.4f}" for x in self.com)
         lines.append(f" mass {self.mass:.4f} kg, centre of mass ({com}) m, intervals {self.interval}")
         if not self.held:
-            lines.append(" nothing seems to be held: the mass is within three standard deviations of zero")
+            lines.append(f" {self.why_not_held}")
         return "\n".join(lines)
 
 
@@ -203,8 +215,10 @@ def _run(recording: Recording, arm: Arm, tare: Recording | None, method: str | P
         return _found(entry.make(arm, tare), recording, weak, entry.prior, why)
     assert method is not None
     if not Path(method).is_file():
+        near = get_close_matches(str(method), METHODS, 1)
         raise IdentificationError(
             f"unknown method {str(method)!r}: expected one of {', '.join(METHODS)}, or the path of a trained model"
+            + (f"; did you mean {near[0]!r}?" if near else "")
         )
     from armload.hybrid import HybridIdentifier, HybridModel
     from armload.learners import LearnedIdentifier, load_model

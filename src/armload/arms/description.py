@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
+from difflib import get_close_matches
 from math import isfinite
 
 from armload.errors import ArmError
@@ -91,7 +92,11 @@ def read_chain(xml: str, frame: str | None, where: str) -> Chain:
 
         frame = max(leaves, key=rank)
     elif frame not in links:
-        raise ArmError(f"unknown frame {frame!r} in {where}: expected one of {', '.join(links)}")
+        near = get_close_matches(frame, links, 1, cutoff=0.7)  # the links of an arm are called alike
+        raise ArmError(
+            f"unknown frame {frame!r} in {where}: expected one of {', '.join(links)}"
+            + (f"; did you mean {near[0]!r}?" if near else "")
+        )
 
     chain = path(frame)
     moving = [j for j in chain if j.get("type") in _MOVING]

@@ -94,7 +94,7 @@ def print_identification(result: Identification) -> None:
     if not result.consistent:
         lines.append("no body can have these parameters")
     if not result.held:
-        lines.append("nothing seems to be held: the mass is within three standard deviations of zero")
+        lines.append(result.why_not_held)
     lines.append(
         f"method {result.method}: {result.why}; intervals are {result.interval}; {result.n_samples} samples, "
         f"{result.duration:.2f} s"

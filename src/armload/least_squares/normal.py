@@ -113,6 +113,7 @@ class NormalLeastSquares(BatchIdentifier):
         residual = means[..., 10] - means[..., :10] @ phi
         freedom = max(1.0 - 10.0 / residual.size, 0.2)  # ten of the residual's degrees of freedom went into phi
         S = np.mean(residual**2 * times[:, None], axis=0) / freedom * self._blocks.rate
+        S = np.maximum(S, _RESOLUTION**2)  # two copies of one log leave no residual at all
         noise = np.einsum("j,jab->ab", w**2 * S, self._A) + np.diag(UNKNOWN**-2)
         C = G @ noise @ G
         return 0.5 * (C + C.T)

@@ -90,7 +90,7 @@ def checked_recording(
         raise RecordingError(
             f"{where}, {row_name(row)}: {names[column]} is {kind}: expected a finite number; remove or repair the row"
         )
-    step = np.diff(table[:, 0])
+    step, given = np.diff(table[:, 0]), len(table)
     if np.any(step <= 0):
         repeated = np.r_[False, (step == 0) & (table[1:] == table[:-1]).all(axis=1)]
         late = np.flatnonzero((step <= 0) & ~repeated[1:])
@@ -109,6 +109,8 @@ def checked_recording(
         table = table[~repeated]
     if len(table) < 2:
         rows = "no rows of data" if len(table) == 0 else "only 1 row of data"
+        if given > 1:
+            rows += f", {given} times"
         raise RecordingError(f"{where} holds {rows}: expected at least 2, one per sample")
     q, dq, tau = np.split(table[:, 1:], 3, axis=1)
     return Recording(table[:, 0], q, dq, tau, channel, joint_names, where, notes)
