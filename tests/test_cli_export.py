@@ -2,7 +2,9 @@
 
 import ast
 import json
+import os
 import re
+import threading
 import xml.etree.ElementTree as ET
 
 import numpy as np
@@ -68,6 +70,24 @@ def test_every_form_is_printed_without_a_word_beside_it(export, form):
     out, err = export(result_of(HELD, relative_to="arm" if form in ("ur", "ur-payload") else "tare"), "--to", form)
     assert "1.2" in out
     assert err == ""
+
+
+def test_a_result_may_come_through_a_pipe(export, tmp_path, capsys):
+    filed = export(result_of(HELD), "--to", "ur").out
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    text = json.dumps(result_of(HELD))
+    writer = threading.Thread(target=pipe.write_text, args=(text,), daemon=True)  # waits for its reader
+    writer.start()
+    assert main(["export", str(pipe), "--to", "ur"]) == 0
+    assert capsys.readouterr().out == filed
+
+
+def test_a_result_that_holds_nothing_is_written_and_said_to_hold_nothing(export):
+    light = InertialParameters.from_com(4e-3, (0.0, 0.0, 0.05), np.diag([1e-5] * 3), "panda_link8")
+    out, err = export(result_of(light, relative_to="tare", held=False), "--to", "urdf")
+    assert "0.004" in out
+    assert "nothing seems to be held" in err
 
 
 def test_a_file_is_written_and_stdout_stays_empty(export, tmp_path):

@@ -79,6 +79,7 @@ def parser() -> Parser:
 
 def run(options: argparse.Namespace) -> None:
     """Read, combine, move, write."""
+    from armload.determined import held
     from armload.sinks import CONTROLLERS, about, export_load
 
     load = _load_of(options.result)
@@ -87,6 +88,7 @@ def run(options: argparse.Namespace) -> None:
         load = load - about(payload_of(part), load.frame, arm)
     for part in options.plus:
         load = load + about(payload_of(part), load.frame, arm)
+    nothing = load.std is not None and load.determined[0] and not held(load.parameters.mass, load.std[0], True)
     frame = options.frame
     if frame is None and arm is not None and (options.to in CONTROLLERS or load.frame is None):
         frame = arm.frame
@@ -98,6 +100,8 @@ def run(options: argparse.Namespace) -> None:
             f"{body.parameters.mass:.4f} kg instead of {load.parameters.mass:.4f} kg"
         )
     text = export_load(body, options.to, options.out, options.name)
+    if nothing:
+        print_note("nothing seems to be held: the mass is within three standard deviations of zero")
     for note in _notes(body, options.to):
         print_note(note)
     if options.out is None:

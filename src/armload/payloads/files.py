@@ -38,8 +38,12 @@ def read_payload(path: str | Path) -> Payload:
         PayloadError: the file is missing or not JSON, lacks the parameters, gives them twice and differently, or holds
             parameters that no body can have.
     """
+    return payload_from(read_content(path), path)
+
+
+def payload_from(content: dict[str, Any], path: str | Path) -> Payload:
+    """The payload in the content of a file (`read_content`), for those who read more of it; path: for the errors."""
     path = Path(path)
-    content = _read_json(path)
     try:
         parameters = _parameters(content, path)
         require_consistent(parameters, f"the payload in {path}")
@@ -75,7 +79,13 @@ def write_payload(path: str | Path, payload: Payload) -> None:
         raise PayloadError(f"payload file {path} cannot be written: {error.strerror or error}") from None
 
 
-def _read_json(path: Path) -> dict[str, Any]:
+def read_content(path: str | Path) -> dict[str, Any]:
+    """The JSON object in a payload file, which is read once: it may be a pipe.
+
+    Raises:
+        PayloadError: the file is missing, or holds no JSON object.
+    """
+    path = Path(path)
     if path.is_dir():
         raise PayloadError(f"payload file {path} is a folder: expected a JSON file")
     try:

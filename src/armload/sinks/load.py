@@ -16,7 +16,7 @@ from armload.errors import SinkError
 from armload.identify import Identification
 from armload.inertia import NAMES, InertialParameters, is_consistent, nearest_consistent, to_order
 from armload.online import OnlineEstimate
-from armload.payloads import read_payload
+from armload.payloads.files import payload_from, read_content
 
 _KNOWN = (True,) * 10
 _RELATIVE = {"before": "empty arm before"}  # what reads otherwise than it is called
@@ -162,8 +162,8 @@ def read_load(path: str | Path) -> Load:
         PayloadError: the file is missing or malformed, or no body can have its parameters.
         SinkError: the fields of an identification in it are malformed.
     """
-    parameters = read_payload(path).parameters
-    content: dict[str, Any] = json.loads(Path(path).read_text(encoding="utf-8"))
+    content = read_content(path)
+    parameters = payload_from(content, path).parameters
     determined = content.get("determined")
     if determined is None:
         return Load(parameters, robot=_text(content, "robot", path), relative_to=_text(content, "relative_to", path))
