@@ -1,6 +1,7 @@
 """An exported payload is the same body in the tool that reads it, and nothing doubtful reaches a robot."""
 
 import ast
+import itertools
 import json
 import re
 import xml.etree.ElementTree as ET
@@ -615,6 +616,21 @@ def test_a_franka_robot_with_its_hand_counted_is_told_the_rest():
     result = identification(skew_body() + hand)
     franka_robot.set_load(robot, Load.of(result) - hand, arm("panda"), write=True)
     assert_is_the_body(robot.told[0][0], robot.told[0][1], np.reshape(robot.told[0][2], (3, 3)))
+
+
+def test_a_robot_that_turns_round_does_not_stand_still():
+    """All its joints are slow at once for an instant: at 0.5 rad/s², below 0.01 rad/s for 20 ms."""
+    franka, ur = Franka(), UR()
+    since = itertools.count()  # looks since then, each of some milliseconds
+    franka.read_once = lambda: SimpleNamespace(dq=[0.004 * next(since)] * 7, m_ee=0.0)
+    with pytest.raises(SinkError, match="the robot moves"):
+        franka_robot.set_load(franka, identification(skew_body()), arm("panda"), write=True)
+    assert next(since) == 4  # the first looks found it slow
+    again = itertools.count()
+    ur.getActualQd = lambda: [0.004 * next(again)] * 6
+    with pytest.raises(SinkError, match="the robot moves"):
+        ur_robot.set_load(ur, ur, identification(skew_body("tool0"), "ur5e"), arm("ur5e"), write=True)
+    assert franka.told == ur.told == []
 
 
 def test_a_ur_is_told_what_was_mounted_at_the_tare_and_what_was_added_since():

@@ -147,9 +147,9 @@ def test_a_payload_goes_from_the_vendor_s_stream_into_the_robot_s_own_load(syste
     """The whole way: the maker's client streams a simulated robot, armload identifies, the robot is told at rest."""
     name, version = system
     robot = arm(name)
-    with franka(robot, version, address, tmp_path, seconds=4.0, rest=1.5) as (_, _, events):
+    with franka(robot, version, address, tmp_path, seconds=4.0, rest=20.0) as (_, _, events):
+        online = OnlineIdentifier(robot)
         with open_source(f"{name}://{address}", robot) as source:
-            online = OnlineIdentifier(robot)
             for sample in source:
                 estimate = online.update(*sample)
                 if not np.any(sample.dq):

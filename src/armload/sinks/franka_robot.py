@@ -8,7 +8,7 @@ from armload.arms import Arm
 from armload.errors import SinkError
 from armload.identify import Identification
 from armload.sinks.franka import FrankaLoad, franka_load
-from armload.sinks.guard import check_writable, is_moving, reason_of
+from armload.sinks.guard import check_writable, reason_of, stands_still
 from armload.sinks.load import Load
 
 
@@ -46,8 +46,8 @@ def set_load(
         SinkError: the load must not be written (see `check_writable`), or the robot refused it.
     """
     try:
-        state = robot.read_once()
-        moving, end_effector = is_moving(state.dq), float(state.m_ee)
+        end_effector = float(robot.read_once().m_ee)
+        moving = not stands_still(lambda: robot.read_once().dq)
     except Exception as error:  # the vendor's own exceptions have no common base
         raise SinkError(f"the robot's state cannot be read, so no load is written: {reason_of(error)}") from error
     told = franka_load(

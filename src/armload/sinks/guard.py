@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +16,8 @@ from armload.inertia import NAMES, InertialParameters
 from armload.sinks.load import Load
 
 STANDSTILL = 0.01  # [rad/s] a joint that is faster moves
+_STILL = 0.1  # [s] for which an arm must have stood: one that turns round is slow for an instant, too
+_LOOK = 0.01  # [s] between two looks meanwhile
 
 
 def is_moving(dq: ArrayLike) -> bool:
@@ -24,6 +28,20 @@ def is_moving(dq: ArrayLike) -> bool:
     """
     speeds = np.abs(np.asarray(dq, dtype=float))
     return not (speeds.size and np.all(speeds <= STANDSTILL))
+
+
+def stands_still(velocity: Callable[[], ArrayLike]) -> bool:
+    """Whether no joint moves for a tenth of a second, which is waited for.
+
+    Args:
+        velocity: measures the joint velocities (n,) [rad/s].
+    """
+    until = time.monotonic() + _STILL
+    while not is_moving(velocity()):
+        if time.monotonic() >= until:
+            return True
+        time.sleep(_LOOK)
+    return False
 
 
 def reason_of(error: Exception) -> str:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from armload.arms import Arm
 from armload.errors import SinkError
 from armload.identify import Identification
-from armload.sinks.guard import check_writable, is_moving, reason_of
+from armload.sinks.guard import check_writable, reason_of, stands_still
 from armload.sinks.load import Load
 from armload.sinks.ur import URPayload, ur_payload
 
@@ -60,7 +60,7 @@ def set_load(
     try:
         if not receive.isConnected():  # the client would go on giving its last values
             raise ConnectionError("the connection is lost")
-        moving = is_moving(receive.getActualQd())
+        moving = not stands_still(receive.getActualQd)
     except Exception as error:  # the vendor's own exceptions have no common base
         raise SinkError(f"the robot's state cannot be read, so no payload is written: {reason_of(error)}") from error
     told = ur_payload(
