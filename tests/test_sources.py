@@ -602,6 +602,14 @@ def test_a_source_that_cannot_be_opened_says_why(panda, spec, said):
         open_source(spec, panda, detached=False)
 
 
+@pytest.mark.parametrize("spec", ["ros2:///arm/joint_states", "ros2://arm/joint_states"])
+def test_a_topic_may_be_written_with_two_slashes_or_three(panda, monkeypatch, spec):
+    asked = []
+    monkeypatch.setattr("armload.sources.open.Ros2Source", lambda topic, _: asked.append(topic))
+    open_source(spec, panda)
+    assert [topic.lstrip("/") for topic in asked] == ["arm/joint_states"]
+
+
 def test_a_ur_without_torque_constants_asks_for_them():
     unknown = arm("ur5e")
     with pytest.raises(SourceError, match="give six numbers"):

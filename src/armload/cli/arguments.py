@@ -111,6 +111,22 @@ def add_arm_arguments(parser: argparse.ArgumentParser, default: str | None = Non
     )
 
 
+def add_identifier_arguments(parser: argparse.ArgumentParser) -> None:
+    """`--tare` and `--method`."""
+    parser.add_argument(
+        "--tare",
+        type=file_name,
+        metavar="LOG0",
+        help="an earlier log of the same arm, on any motion; the answer is what was added since",
+    )
+    parser.add_argument(
+        "--method",
+        type=file_name,
+        metavar="M",
+        help="a name `armload methods` lists, or the path of a trained model (default: the most trustworthy)",
+    )
+
+
 def arm_of(options: argparse.Namespace) -> Arm:
     """The arm that `--robot`, `--frame` and `--gravity` name."""
     from armload.arms import arm

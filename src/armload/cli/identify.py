@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import argparse
 
-from armload.cli.arguments import Parser, add_arm_arguments, arm_of, file_name, payload_of
+from armload.cli.arguments import (
+    Parser,
+    add_arm_arguments,
+    add_identifier_arguments,
+    arm_of,
+    file_name,
+    payload_of,
+)
 from armload.cli.printing import print_identification, print_json, print_note, working
 
 _EXAMPLES = """\
@@ -29,23 +36,12 @@ def parser() -> Parser:
     )
     parser.add_argument("log", type=file_name, metavar="LOG", help="log of a motion with the payload")
     add_arm_arguments(parser)
-    parser.add_argument(
-        "--tare",
-        type=file_name,
-        metavar="LOG0",
-        help="an earlier log of the same arm, on any motion; the answer is what was added since",
-    )
+    add_identifier_arguments(parser)
     parser.add_argument(
         "--tool",
         type=file_name,
         metavar="FILE",
         help="a mounted tool that is known (JSON, or franka-hand); the answer is what it carries",
-    )
-    parser.add_argument(
-        "--method",
-        type=file_name,
-        metavar="M",
-        help="a name `armload methods` lists, or the path of a trained model (default: the most trustworthy)",
     )
     parser.add_argument("--topic", metavar="T", help="JointState topic of a bag, where it has several")
     parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from urllib.parse import urlsplit
 
-from armload.cli.arguments import Parser, add_arm_arguments, arm_of, at_least, file_name
+from armload.cli.arguments import Parser, add_arm_arguments, add_identifier_arguments, arm_of, at_least, file_name
 from armload.cli.printing import print_note
 from armload.errors import UsageError
 
@@ -44,18 +44,7 @@ def parser() -> Parser:
         help="sim (default), a log, fr3://ADDRESS, panda://ADDRESS, ur://ADDRESS or ros2:///TOPIC",
     )
     add_arm_arguments(parser, required=False)
-    parser.add_argument(
-        "--tare",
-        type=file_name,
-        metavar="LOG0",
-        help="an earlier log of the same arm, on any motion; the answer is what was added since",
-    )
-    parser.add_argument(
-        "--method",
-        type=file_name,
-        metavar="M",
-        help="a name `armload methods` lists, or the path of a trained model (default: the most trustworthy)",
-    )
+    add_identifier_arguments(parser)
     parser.add_argument("--headless", action="store_true", help="no page: one JSON object per line on stdout")
     parser.add_argument(
         "--every",

@@ -7,6 +7,7 @@ import argparse
 from armload.cli.arguments import (
     Parser,
     add_arm_arguments,
+    add_identifier_arguments,
     arm_of,
     at_least,
     file_name,
@@ -51,18 +52,7 @@ def parser() -> Parser:
     node.add_argument(
         "--publish", type=file_name, default="/payload/inertia", metavar="T", help="of the payload (/payload/inertia)"
     )
-    node.add_argument(
-        "--tare",
-        type=file_name,
-        metavar="LOG0",
-        help="an earlier log of the same arm, on any motion; the answer is what was added since",
-    )
-    node.add_argument(
-        "--method",
-        type=file_name,
-        metavar="M",
-        help="a name `armload methods` lists, or the path of a trained model (default: the most trustworthy)",
-    )
+    add_identifier_arguments(node)
     node.add_argument(
         "--rate", type=at_least(0.01, float, 1000.0), default=10.0, metavar="HZ", help="messages per second (10)"
     )

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from armload.determined import HELD
 from armload.errors import InertiaError
 from armload.identifier import Estimate
 from armload.inertia import InertialParameters, is_consistent, nearest_consistent
 from armload.online import OnlineEstimate
 
 _KNOWN = 0.15  # [kg] standard deviation of the mass above which nothing is said, if it is a tenth of the mass, too
-_HELD = 3.0  # standard deviations of mass above zero before something counts as held, as in `identify`
 _MARGIN = 1e-5  # as in `identify`
 
 
@@ -28,9 +28,9 @@ def announced(estimate: Estimate) -> InertialParameters | None:
     if not (np.isfinite(estimate.t) and np.all(np.isfinite(phi)) and np.all(np.isfinite(covariance))):
         return None
     mass, spread = float(phi[0]), float(np.sqrt(max(covariance[0, 0], 0.0)))
-    if spread > max(_KNOWN, 0.1 * mass) or mass < -_HELD * spread:
+    if spread > max(_KNOWN, 0.1 * mass) or mass < -HELD * spread:
         return None
-    if mass <= _HELD * spread:
+    if mass <= HELD * spread:
         return InertialParameters.zero(estimate.frame)
     if is_consistent(phi):
         return estimate.parameters

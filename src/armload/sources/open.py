@@ -115,7 +115,7 @@ def open_source(
 def _robot(name: str, arm: Arm, torque_constants: Sequence[float] | None) -> Source:
     parts = urlsplit(name)
     if parts.scheme == "ros2":
-        return Ros2Source(parts.path, arm)
+        return Ros2Source(parts.netloc + parts.path, arm)  # ros2://joint_states is meant well
     if not parts.hostname:
         raise SourceError(
             f"{name} names no robot: expected {parts.scheme}://ADDRESS, such as {parts.scheme}://172.16.0.2"
