@@ -11,7 +11,9 @@ from armload.bound import advise, bound, efficiency, scales_of
 from armload.cli import main
 from armload.errors import IdentificationError
 from armload.least_squares import Correction, GaussianPrior, JointFeatures, payload_prior_std
-from armload.least_squares.posterior import RIGID, SMOOTH, Scales, solve
+from armload.least_squares.noise import RIGID, SMOOTH
+from armload.least_squares.posterior import solve
+from armload.least_squares.problem import Scales
 from armload.least_squares.regression import RegressionData
 from armload.motion import random_motion, taie2024
 from armload.recording import Recording, write_recording

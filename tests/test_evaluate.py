@@ -24,7 +24,9 @@ from armload.evaluate import (
 from armload.identifier import Estimate, Identifier
 from armload.inertia import NAMES, InertialParameters
 from armload.least_squares import Correction, effort_scale
-from armload.least_squares.posterior import RIGID, RegressionData, solve
+from armload.least_squares.noise import RIGID
+from armload.least_squares.posterior import solve
+from armload.least_squares.regression import RegressionData
 from armload.recording import Recording
 
 CAMERA = InertialParameters.from_com(1.3, (0.03, -0.02, 0.06), np.diag([4e-3, 5e-3, 3e-3]))

@@ -8,7 +8,8 @@ from armload.arms.rows import MomentumRow
 from armload.hybrid import HybridIdentifier, StreamingHybrid
 from armload.least_squares import JointFeatures, PosteriorLeastSquares, StreamingIdentifier, payload_prior_std
 from armload.least_squares.correction import Correction
-from armload.least_squares.posterior import SMOOTH, advance
+from armload.least_squares.noise import SMOOTH
+from armload.least_squares.posterior import advance
 from armload.least_squares.regression import RegressionData
 from armload.least_squares.rows import RowStream
 from armload.motion import random_motion, taie2024

@@ -27,8 +27,10 @@ from armload.errors import IdentificationError
 from armload.inertia import NAMES, UNITS
 from armload.least_squares.correction import Correction, effort_scale
 from armload.least_squares.features import JointFeatures
-from armload.least_squares.posterior import SMOOTH, NoiseModel, Scales, solve
+from armload.least_squares.noise import SMOOTH, NoiseModel
+from armload.least_squares.posterior import solve
 from armload.least_squares.prior import GaussianPrior, payload_prior_std
+from armload.least_squares.problem import Scales
 from armload.least_squares.regression import REGRESSOR_RATE, RegressionData
 from armload.motion import Motion
 from armload.recording import Recording

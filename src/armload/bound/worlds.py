@@ -15,7 +15,7 @@ from armload.arms import Arm
 from armload.errors import IdentificationError
 from armload.least_squares.correction import FRICTION_WIDTH
 from armload.least_squares.features import JointFeatures
-from armload.least_squares.posterior import Scales
+from armload.least_squares.problem import Scales
 from armload.simulate import Sensors, World
 
 _SPEEDS = np.concatenate([-np.geomspace(1.5, 0.01, 60), np.geomspace(0.01, 1.5, 60)])  # [rad/s]

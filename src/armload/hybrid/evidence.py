@@ -19,7 +19,7 @@ from armload.least_squares import (
     SmoothPosteriorLeastSquares,
     payload_prior_std,
 )
-from armload.least_squares.posterior import Posterior
+from armload.least_squares.problem import Posterior
 from armload.recording import Recording
 
 _RATIOS = ("noise", "pose", "velocity", "friction")

@@ -14,7 +14,7 @@ needs no acceleration either:
 | links    | errors of the links' inertial parameters      | Y_p(links) | Y_g(links) − Y_c(links) |
 
 Prior standard deviations are fractions of the joint's effort limit, the same for every arm (two Pandas and a UR10e lie
-within a factor of 3 of each other so); `posterior.py` rescales all blocks but `links` from the data.
+within a factor of 3 of each other so); `problem.py` rescales all blocks but `links` from the data.
 """
 
 from __future__ import annotations

@@ -24,8 +24,8 @@ from armload.arms import Arm
 from armload.identifier import BatchIdentifier, Estimate
 from armload.least_squares.correction import Correction, effort_scale
 from armload.least_squares.normal import UNKNOWN
-from armload.least_squares.posterior import RegressionData
 from armload.least_squares.prior import payload_prior_std
+from armload.least_squares.regression import RegressionData
 from armload.recording import Recording, Sample
 
 _STATES = 200  # random states that show which directions of eta ever act

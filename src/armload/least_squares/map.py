@@ -9,8 +9,10 @@ from armload.arms import Arm
 from armload.identifier import BatchIdentifier, Estimate
 from armload.least_squares.correction import Correction, effort_scale
 from armload.least_squares.features import JointFeatures
-from armload.least_squares.posterior import RIGID, SMOOTH, NoiseModel, Posterior, Scales, solve
+from armload.least_squares.noise import RIGID, SMOOTH, NoiseModel
+from armload.least_squares.posterior import solve
 from armload.least_squares.prior import GaussianPrior, payload_prior_std
+from armload.least_squares.problem import Posterior, Scales
 from armload.least_squares.regression import RegressionData
 from armload.least_squares.streaming import StreamingPosterior
 from armload.recording import Recording, Sample

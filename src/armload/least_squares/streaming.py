@@ -22,7 +22,9 @@ from numpy.typing import NDArray
 
 from armload.least_squares.correction import Correction
 from armload.least_squares.features import JointFeatures
-from armload.least_squares.posterior import NoiseModel, Posterior, Scales, advance, share_of_noise, whole_noise
+from armload.least_squares.noise import NoiseModel, share_of_noise, whole_noise
+from armload.least_squares.posterior import advance
+from armload.least_squares.problem import Posterior, Scales
 from armload.least_squares.regression import RegressionData
 from armload.least_squares.rows import Row, RowStream
 from armload.least_squares.sequential import SequentialPosterior
