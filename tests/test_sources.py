@@ -592,6 +592,8 @@ def test_an_arm_with_a_tool_other_links_and_a_tilted_base_too(panda):
         ("http://robot", "unknown kind of source 'http'"),
         ("fr3://", "names no robot"),
         ("ur://", "names no robot"),
+        ("ur://127.0.0.1?torque_constant=1,2,3,4,5,6", "unknown option 'torque_constant'"),
+        ("panda://127.0.0.1?torque_constants=1,2,3,4,5,6,7", "unknown option 'torque_constants'"),
         ("no/such/file.csv", "does not exist"),
         ("simulator", "unsupported suffix|does not exist"),
         ("ur://127.0.0.1", "a UR arm has 6"),

@@ -120,8 +120,12 @@ def _robot(name: str, arm: Arm, torque_constants: Sequence[float] | None) -> Sou
         raise SourceError(
             f"{name} names no robot: expected {parts.scheme}://ADDRESS, such as {parts.scheme}://172.16.0.2"
         )
+    asked = parse_qs(parts.query, keep_blank_values=True)
+    stray = [key for key in asked if (parts.scheme, key) != ("ur", "torque_constants")]
+    if stray:
+        raise SourceError(f"{name}: unknown option {stray[0]!r}: expected the address, with ur:// ?torque_constants=…")
     if parts.scheme == "ur":
-        given = parse_qs(parts.query).get("torque_constants")
+        given = asked.get("torque_constants")
         if given:
             try:
                 torque_constants = [float(x) for x in given[-1].split(",")]
