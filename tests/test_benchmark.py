@@ -23,6 +23,12 @@ from armload.methods import METHODS
 # ---------------------------------------------------------------------------- populations
 
 
+def test_the_help_of_the_command_names_every_population(capsys):
+    assert main(["benchmark", "--help"]) == 0
+    listed = capsys.readouterr().out.split("Populations: ")[1].split(". ")[0]
+    assert listed.split(", ") == list(ALL)
+
+
 def test_the_repeated_payload_is_on_one_arm_and_everything_else_changes(panda):
     first, second = population("repeat").episodes(panda, 3, 2)
     assert first.payload is second.payload
