@@ -171,3 +171,23 @@ def test_every_public_name_is_there():
         assert name in dir(armload)
     with pytest.raises(AttributeError, match="no_such_name"):
         _ = armload.no_such_name
+
+
+def test_numba_keeps_what_it_compiles_in_a_folder_of_the_user_s_own_where_nothing_else_can_be_written(tmp_path):
+    code = "import os; os.access = lambda *_: False; import armload; print(os.environ['NUMBA_CACHE_DIR'])"
+    env = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"} | {"TMPDIR": str(tmp_path)}
+
+    def folder():
+        return Path(
+            subprocess.run([sys.executable, "-c", code], env=env, check=True, capture_output=True, text=True).stdout[
+                :-1
+            ]
+        )
+
+    kept = folder()
+    assert kept == folder() == tmp_path / f"armload-{os.getuid()}"
+    assert kept.stat().st_mode & 0o777 == 0o700
+    kept.chmod(0o777)  # anybody could put code there
+    other = folder()
+    assert other != kept
+    assert other.stat().st_mode & 0o777 == 0o700

@@ -13,6 +13,9 @@ The names below are imported when they are first used, so that `import armload` 
 from __future__ import annotations
 
 import importlib
+import os
+import tempfile
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
@@ -106,6 +109,33 @@ __all__ = [
     "write_payload",
     "write_recording",
 ]
+
+
+def _let_numba_keep_what_it_compiles() -> None:
+    """Where neither the package nor the home can be written, as in a container, numba would refuse to compile at all.
+
+    The folder must be the user's own: what numba reads from it, it executes.
+    """
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser())
+    if "NUMBA_CACHE_DIR" in os.environ or any(_writable(place) for place in (Path(__file__).parent, home)):
+        return
+    folder = Path(tempfile.gettempdir()) / f"armload-{os.getuid()}"
+    try:
+        folder.mkdir(mode=0o700, exist_ok=True)
+        found = folder.lstat()
+        own = folder.is_dir() and not folder.is_symlink() and found.st_uid == os.getuid() and not found.st_mode & 0o077
+        os.environ["NUMBA_CACHE_DIR"] = str(folder if own else tempfile.mkdtemp(prefix="armload-"))
+    except OSError:
+        return  # nothing can be written anywhere; numba says so
+
+
+def _writable(folder: Path) -> bool:
+    """Whether something can be written there, the folder made first if need be."""
+    there = next(place for place in (folder, *folder.parents) if place.exists())
+    return os.access(there, os.W_OK)
+
+
+_let_numba_keep_what_it_compiles()
 
 
 def __getattr__(name: str) -> Any:
