@@ -26,7 +26,7 @@ from armload.inertia import InertialParameters, is_consistent
 from armload.least_squares import JointFeatures, PosteriorLeastSquares
 from armload.least_squares import SmoothPosteriorLeastSquares as Smooth
 from armload.motion import random_motion
-from armload.payloads import random_payloads
+from armload.payloads import draw_payload, random_payloads
 from armload.simulate import Sensors, World, simulate
 
 UNIT = np.array([0.5] + [0.05] * 3 + [5e-3] * 6)
@@ -119,6 +119,14 @@ def test_fitting_finds_the_moments_of_the_draws():
 def test_a_covariance_that_is_none_is_refused():
     with pytest.raises(ModelError, match="not positive definite"):
         MixturePrior(np.ones(1), np.zeros((1, 10)), -np.eye(10)[None], ("x",))
+
+
+@pytest.mark.parametrize("mass", [0.01, 0.04, 0.15])
+def test_what_is_light_is_not_taken_for_nothing(panda, mass):
+    body = draw_payload("boxes", 3, mass).parameters.phi
+    std = np.array([mass / 6.0] + [1e-3] * 9)  # a log that tells three standard deviations of mass
+    found = shipped_model(panda).prior.posterior(np.diag(std**-2.0), body / std**2)
+    assert abs(found.mean[0] - body[0]) < 2.0 * np.sqrt(found.covariance[0, 0])
 
 
 # ---------------------------------------------------------------------------- the physics
