@@ -67,9 +67,24 @@ def test_the_forms_of_the_command_are_those_of_the_room():
 
 @pytest.mark.parametrize("form", _FORMS)
 def test_every_form_is_printed_without_a_word_beside_it(export, form):
-    out, err = export(result_of(HELD, relative_to="arm" if form in ("ur", "ur-payload") else "tare"), "--to", form)
+    out, err = export(
+        of_arm("ur10e") if form in ("ur", "ur-payload") else result_of(HELD, relative_to="tare"), "--to", form
+    )
     assert "1.2" in out
     assert err == ""
+
+
+def of_arm(name, **changes):
+    """The same identified on another arm, about its last link."""
+    return result_of(InertialParameters(HELD.phi, str(arm(name).frame)), robot=name, **changes)
+
+
+@pytest.mark.parametrize(
+    ("name", "to"), [("panda", "ur"), ("ur10e", "franka-desk"), ("ur5e", "franka"), ("fr3", "ur-payload")]
+)
+def test_a_load_for_another_maker_s_arm_is_said_to_be_one(export, name, to):
+    assert f"identified on a {name}" in export(of_arm(name), "--to", to)[1]
+    assert "identified on" not in export(of_arm(name), "--to", "urdf")[1]
 
 
 def test_a_result_may_come_through_a_pipe(export, tmp_path, capsys):
@@ -153,7 +168,8 @@ def test_what_the_log_did_not_determine_is_said_on_both_streams(export):
     ],
 )
 def test_what_the_controller_counts_itself_is_said(export, to, relative_to, says):
-    err = export(result_of(HELD, relative_to=relative_to), "--to", to)[1]
+    robot = "panda" if to == "franka" else "ur5e"
+    err = export(of_arm(robot, relative_to=relative_to), "--to", to)[1]
     assert says in err
     assert (err == "") == (says == "")
 

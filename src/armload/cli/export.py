@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 # the names of armload.sinks.FORMS, so that --help need not import them; a test compares
 _FORMS = ("franka", "franka-desk", "ur", "ur-payload", "urdf", "mjcf", "sdf", "ros2")
+_MAKERS = {"franka": ("panda", "fr3"), "ur": ("ur5e", "ur10e")}
 _EXAMPLES = """\
 examples:
   armload identify run.csv --robot panda --json > held.json
@@ -131,6 +132,9 @@ def _notes(load: Load, to: str) -> list[str]:
     notes = []
     if load.undetermined:
         notes.append(f"not determined by the log: {', '.join(load.undetermined)}; written as known beforehand")
+    maker = next((maker for maker, arms in _MAKERS.items() if load.robot in arms), None)
+    if maker is not None and to in CONTROLLERS and not to.startswith(maker):
+        notes.append(f"it was identified on a {load.robot}: another maker's flange may have other axes")
     if to == "franka" and load.relative_to == "arm":
         notes.append("this contains any hand that is mounted: take off what Desk counts already with --minus")
     if to in ("ur", "ur-payload") and load.relative_to == "tool":
