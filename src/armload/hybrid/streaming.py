@@ -10,6 +10,7 @@ from armload.hybrid.evidence import Evidence
 from armload.hybrid.identifier import answer, shipped_model, std_alone
 from armload.hybrid.model import HybridModel
 from armload.identifier import Estimate
+from armload.inertia import near_consistent, nearest_consistent
 from armload.least_squares import SmoothPosteriorLeastSquares, payload_prior_std
 from armload.least_squares.live import StreamingIdentifier
 from armload.recording import Recording, Sample
@@ -42,6 +43,8 @@ class StreamingHybrid(StreamingIdentifier):
         self._weak = payload_prior_std(arm)
         self._tare_time = 0.0 if tare is None else tare.duration
         super().__init__(SmoothPosteriorLeastSquares(arm, tare), publish)
+        for nearest in (near_consistent, nearest_consistent):  # their first call loads a solver: not in mid-stream
+            nearest(-self._weak, np.diag(self._weak**-2.0))
 
     def reset(self) -> None:
         """Forget the run (not the tare); the next sample is the first."""

@@ -66,7 +66,7 @@ def _central_path(phi, P, x, barriers, basis):  # pragma: no cover - compiled
     g, step, new, pull = np.empty(10), np.empty(10), np.empty(10), np.empty(10)
     converged = False
     for nu in barriers:
-        for _ in range(25):
+        for _ in range(60):
             _pseudo(x, basis, J)
             if not factor(J, L):
                 return x, False
