@@ -98,6 +98,9 @@ def test_what_is_put_down_is_gone_and_what_is_taken_up_again_is_recognised():
     for estimate, phi in ((first, truth), (empty, 0.0 * truth), (again, truth)):
         assert covers(estimate, phi)[:4].all()
     assert again.n_samples > 1.5 * first.n_samples  # the earlier run went on
+    assert (
+        max(estimate.age for estimate in estimates) < 0.05
+    )  # samples get lost; an answer of seconds ago never returns
     assert np.all(again.std[:4] < first.std[:4])
 
 

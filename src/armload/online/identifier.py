@@ -82,7 +82,7 @@ class OnlineIdentifier:
         """
         if self._tared:
             return "tare"
-        if getattr(self.engine, "reference", None) is not None:
+        if getattr(self._source or self.engine, "reference", None) is not None:
             return "before"
         return "arm" if self.arm.attached is None else "tool"
 
@@ -109,6 +109,7 @@ class OnlineIdentifier:
         self._published = -np.inf
         self._event: Event | None = None
         self._estimate = self._nothing()
+        self._source: Identifier | None = None  # the run it is of
         self._determined, self._held = np.zeros(10, dtype=bool), False
         self._notes: tuple[str, ...] = ()
 
@@ -174,8 +175,9 @@ class OnlineIdentifier:
         return {"arm": self.arm, **parts}
 
     def _identify(self, sample: Sample) -> None:
+        run: Identifier = self._engine
         if self._watch is None:
-            estimate, fresh = self._engine.update(sample), not 0.0 <= sample.t - self._published < _PUBLISH
+            estimate, fresh = run.update(sample), not 0.0 <= sample.t - self._published < _PUBLISH
         else:
             known = self._watch.event
             estimate = self._watch.update(sample, self._held)
@@ -183,14 +185,16 @@ class OnlineIdentifier:
                 self._noticed(sample.t)
             if estimate is None or self._watch.settling:
                 return
-            run = self._watch.run
-            fresh = isinstance(run, StreamingIdentifier) and run.fresh
+            run = self._watch.answered
+            fresh = run.fresh
+            if not fresh and run is not self._source and math.isfinite(run.data_t):
+                return  # a run just taken up again: until it answers anew, its answer is of long ago
         if (fresh or self._watch is None) and not all_finite(estimate.phi):
             return
         if fresh:
             self._published = sample.t
-            self._judge(estimate)
-        self._estimate = estimate
+            self._judge(estimate, run)
+        self._estimate, self._source = estimate, run
 
     def _noticed(self, now: float) -> None:
         """A change: until its transient is over only what was known beforehand is."""
@@ -200,7 +204,7 @@ class OnlineIdentifier:
         self._event = replace(event, t=event.t + shift, began=event.began + shift)
         if self._watch.settling:
             self._since = self._clock
-            self._estimate = self._nothing()
+            self._estimate, self._source = self._nothing(), None
             self._determined, self._held, self._notes = np.zeros(10, dtype=bool), False, ("the payload has changed",)
 
     def _nothing(self) -> Estimate:
@@ -208,10 +212,9 @@ class OnlineIdentifier:
         mean, std = (np.zeros(10), self._weak) if self.engine.known is None else self.engine.known
         return Estimate(0.0, mean, np.diag(std**2), 0, str(self.arm.frame))
 
-    def _judge(self, estimate: Estimate) -> None:
+    def _judge(self, estimate: Estimate, run: Identifier) -> None:
         """What the data determine, and whether anything is there."""
-        alone = self.engine.alone
-        self._determined = determined(estimate.std, self._before, alone, self._weak)
+        self._determined = determined(estimate.std, self._before, run.alone, self._weak)
         self._held = held(float(estimate.phi[0]), float(estimate.std[0]), bool(self._determined[0]))
         notes = []
         if not self._moving:
@@ -224,7 +227,7 @@ class OnlineIdentifier:
 
     def _said(self) -> OnlineEstimate:
         engine, watch = self.engine, self._watch
-        age = self._internal - getattr(engine, "data_t", self._internal)
+        age = self._internal - getattr(self._source, "data_t", self._internal)
         return OnlineEstimate.of(
             {
                 **vars(self._estimate),

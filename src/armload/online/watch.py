@@ -50,11 +50,12 @@ class PayloadWatch:
         first: the identifier of the first run.
 
     Attributes:
-        run: the identifier of the current run. event: the last change noticed. settling: whether its transient lasts.
+        run: the identifier of the current run; answered: of the run the last estimate is of. event: the last change
+            noticed. settling: whether its transient lasts.
     """
 
     def __init__(self, first: StreamingIdentifier) -> None:
-        self.run, self._first = first, first
+        self.run, self.answered, self._first = first, first, first
         self._worker: Worker | None = None
         self._dropped: Future[None] | None = None
         self.reset()
@@ -114,6 +115,7 @@ class PayloadWatch:
                     return None
         slow, self._last_t = sample.t - self._last_t > _FAST, sample.t
         before = 0 if self.run.stream is None else self.run.stream.rows
+        self.answered = self.run
         estimate = self.run.update(sample)
         stream = self.run.stream
         if stream is not None and stream.rows > before:
