@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -53,3 +54,82 @@ def test_the_width_of_the_shipped_hybrid_is_that_of_its_training_s_report():
     ratio = np.array(json.loads((RESULTS / "hybrid_panda.json").read_text())["ratio"], dtype=float)
     assert f"mean half-width is {np.nanmean(ratio[:2]):.1f} times" in page
     assert f"up to {np.nanmax(ratio):.1f} in the first tenth" in page
+
+
+def rows_of_events(result):
+    """The rows of the table of changes in docs/online.md."""
+    parts, out = result["parts"], []
+    streams = {
+        "`map-gp`, 200 Hz": parts["steps"],
+        "`map-gp`, 200 Hz, nothing changes": parts["quiet"],
+        "`hybrid`, 1 kHz": parts["hybrid"],
+        "real Panda, payloads' torque added, `hybrid`": parts["real"]["hybrid"]["panda_steps_added"],
+    }
+    for name, part in streams.items():
+        alarms, noticed, known = part["false_alarms"], "– | – | – | –", "– | –"
+        if "changes" in part:
+            delay, after = part["delay_s"], [part[f"mass_after_{s}_s"] for s in ("0.5", "1", "2")]
+            noticed = (
+                f"{part['changes']} | {delay['50 %']:.2f} s, {delay['90 %']:.2f} s | {part['missed_count']} | "
+                f"{100 * part['right_kind']:.0f} %"
+            )
+            known = (
+                " · ".join(f"{100 * a['inside_95']:.0f} %" for a in after)
+                + " | "
+                + " · ".join(f"{1e3 * a['median_error_kg']:.0f} ± {1e3 * a['median_half_width_kg']:.0f}" for a in after)
+            )
+        false = f"{alarms['count']} in {alarms['hours']:.2f} h (below {alarms['bound_95_per_hour']:.1f} an hour)"
+        out.append(f"| {name} | {noticed} | {false} | {known} |")
+    return out
+
+
+def rows_of_pushes(result):
+    """The rows of the table of pushes."""
+    out = []
+    for name, part in (
+        ("`map-gp`, 200 Hz", result["parts"]["pushes"]),
+        ("`hybrid`, 1 kHz", result["parts"]["hybrid_pushes"]),
+    ):
+        called, hand = part["called"], part["called_by_link"]
+        back = 100 * part["of_those_followed_by_return"]
+        out.append(
+            f"| {name} | {part['pushes']} | {part['called_a_change']} ({hand['panda_link8']} at the flange, "
+            f"{hand['panda_link4']} at the forearm) | {back:.0f} % | {called['wrong_after_s']['50 %']:.1f} s, "
+            f"{called['wrong_after_s']['100 %']:.1f} s | {1e3 * called['error_2s_after_kg']['50 %']:.0f} g |"
+        )
+    return out
+
+
+def rows_of_speed(result):
+    """The rows of the table of an update's cost."""
+    out = []
+    for name, times in result["thread_cpu_us"].items():
+        ordinary = times["ordinary"]
+        other = " · ".join(f"{times[kind]['p50']:.0f}" for kind in ("adopted", "early", "change") if kind in times)
+        ratio = result["ordinary_p50_to_sklearn_row"][name]
+        out.append(
+            f"| {name} | {ordinary['p50']:.0f} | {ordinary['p99']:.0f} | {ordinary['p99.9']:.0f} | {other or '–'} | "
+            f"{times['mean_us']:.0f} | {ratio:.3f} |"
+        )
+    return out
+
+
+def test_the_readme_s_changes_are_those_of_the_committed_benchmark():
+    parts = json.loads((RESULTS / "events.json").read_text())["parts"]
+    live, alarms = (parts["steps"], parts["hybrid"]), parts["false_alarms_in_all"]
+    delay = {f"{part['delay_s']['50 %']:.2f}" for part in live}
+    words = " ".join(README.split())
+    assert f"of {sum(part['changes'] for part in live)} simulated changes of 0.2 kg and more" in words
+    assert (
+        f"{sum(part['missed_count'] for part in live)} were missed, the median delay was {'–'.join(delay)} s" in words
+    )
+    assert f"with {alarms['count']} false alarm in {alarms['hours']:.1f} hours" in words
+
+
+@pytest.mark.parametrize(
+    ("name", "rows"), [("events", rows_of_events), ("events", rows_of_pushes), ("online_speed", rows_of_speed)]
+)
+def test_the_tables_of_the_live_form_are_those_of_the_committed_benchmarks(name, rows):
+    page = (ROOT / "docs" / "online.md").read_text(encoding="utf-8")
+    for row in rows(json.loads((RESULTS / f"{name}.json").read_text())):
+        assert row in page
