@@ -35,6 +35,8 @@ from armload.sinks import FORMS, read_load
 from armload.sources import Replay, Simulator, Source
 
 HELD = test_payload().parameters
+# what was started in the background of a shell is deaf to Ctrl-C, and so are its children
+HEARS_CTRL_C = ("env", "--default-signal=INT")
 
 
 def finite_json(line):
@@ -117,11 +119,10 @@ def live():
 
     def start(*arguments):
         process = subprocess.Popen(
-            [sys.executable, "-m", "armload", "live", *map(str, arguments)],
+            [*HEARS_CTRL_C, sys.executable, "-m", "armload", "live", *map(str, arguments)],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
-            preexec_fn=hear_ctrl_c,
         )
         started.append(process)
         return process
@@ -132,11 +133,6 @@ def live():
         process.wait()
         for pipe in (process.stdout, process.stderr):
             pipe.close()
-
-
-def hear_ctrl_c():
-    """What was started in the background of a shell is deaf to it, and so are its children."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def test_ctrl_c_and_a_reader_that_has_gone_end_it_in_one_line(live):

@@ -31,6 +31,8 @@ from armload.sources.joint_states import JointStates
 ROOT = Path(__file__).resolve().parents[1]
 TYPES = get_typestore(Stores.ROS2_JAZZY).types  # the messages' definitions, without ROS
 SECOND = 1_000_000_000
+# what was started in the background of a shell is deaf to Ctrl-C, and so are its children
+HEARS_CTRL_C = ("env", "--default-signal=INT")
 
 
 def ros_type(name):
@@ -293,9 +295,8 @@ def ros(ros_python, tmp_path):
     def start(*words):
         where = tmp_path / f"process{next(count)}"
         with where.with_suffix(".out").open("w") as out, where.with_suffix(".err").open("w") as err:
-            process = subprocess.Popen(
-                [ros_python, *map(str, words)], stdout=out, stderr=err, env=env, preexec_fn=hear_ctrl_c
-            )
+            command = [*HEARS_CTRL_C, ros_python, *map(str, words)]
+            process = subprocess.Popen(command, stdout=out, stderr=err, env=env)
         process.said = lambda: where.with_suffix(".out").read_text().splitlines()
         process.noted = lambda: where.with_suffix(".err").read_text()
         try:
@@ -310,11 +311,6 @@ def ros(ros_python, tmp_path):
                 process.wait()
 
     return start
-
-
-def hear_ctrl_c():
-    """What was started in the background of a shell is deaf to it, and so are its children."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def wait_until(true, seconds, *processes):
