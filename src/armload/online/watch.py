@@ -150,6 +150,7 @@ class PayloadWatch:
             return
         if self._detector is None:
             self._detector = ChangeDetector(float(payload_prior_std(self.run.arm)[0]), stream.correction.effort)
+            foresee(state, row)  # loaded now, not in the middle of a change
         found = self._detector.take(state.seen, row.X, state.scale, *self._mean)
         self._mean = stream.answer()
         if stream.seconds <= _FIRST[stream.tare is None]:
