@@ -50,11 +50,11 @@ class Calibration:
     times: NDArray[np.float64]
     widths: NDArray[np.float64]
 
-    def kappa(self, traits: NDArray[np.float64]) -> NDArray[np.float64]:
-        """By which factor the physics overrates its evidence (N,), for traits (N, T)."""
+    def kappa(self, traits: NDArray[np.float64]) -> float:
+        """By which factor the physics overrates the evidence of a log with these traits (T,)."""
         if self.bag is None:
-            return np.full(len(traits), self.level)
-        return np.clip(self.level * 10.0 ** self.bag.predict(traits)[:, 0], *_KAPPA)
+            return self.level
+        return min(max(self.level * 10.0 ** float(self.bag.row(traits).mean()), _KAPPA[0]), _KAPPA[1])
 
     def width(self, t: float, kind: int) -> NDArray[np.float64]:
         """Quantile (10,) of |error|/std after t seconds: linear in log t, constant beyond the calibrated times."""
@@ -62,10 +62,7 @@ class Calibration:
 
     def trusted(self, evidence: Evidence) -> Evidence:
         """Evidence as far as it can be trusted: Λ/kappa, h/kappa."""
-        kappa = self.level
-        if self.bag is not None:  # `kappa` of one log, without what many rows need
-            said = float(self.bag.row(evidence.traits).mean())
-            kappa = min(max(self.level * 10.0**said, _KAPPA[0]), _KAPPA[1])
+        kappa = self.kappa(evidence.traits)
         Λ, h = evidence.information / kappa, evidence.vector / kappa
         return Evidence(Λ, h, evidence.gain_std, evidence.traits, evidence.t, evidence.kind)
 
