@@ -111,7 +111,8 @@ class _Draw:
             return made
         if chance[2] < recipe.same_motion:
             return replace(made, tare_motion=made.motion, tare_duration=made.duration)
-        lasts = float(rng.uniform(*recipe.tare_duration))
+        shortest, longest = recipe.tare_duration
+        lasts = shortest + (longest - shortest) * float(rng.random()) ** 2
         tare = self._tare_motion(slot, elsewhere=chance[3] < recipe.elsewhere)
         return replace(made, tare_motion=tare, tare_duration=lasts)
 

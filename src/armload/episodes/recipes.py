@@ -37,7 +37,7 @@ class Recipe:
     """What to draw episodes from; one of a tuple of names is taken with equal chance, repeat one to favour it.
 
     worlds: of `WORLDS`; payloads: of `payloads.FAMILIES`; motions, tares: of `episodes.motions.KINDS`.
-    duration: of the run [s]; tare_duration: from, to [s].
+    duration: of the run [s]; tare_duration: from, to [s]; the shorter the likelier.
     untared: share of the episodes with no tare; same_motion: of those with one, share on the run's own motion;
         elsewhere: share of the tares about any mean pose; the others are about the run's.
     near: how near, standard deviation of each joint's mean pose [rad].
@@ -91,10 +91,10 @@ POPULATIONS: dict[str, Recipe] = {
     "tool": replace(REFERENCE, tool=1.0),
     "broad": Recipe(
         worlds=WORLDS,
-        payloads=("boxes", "boxes", "shapes", "shapes", "shapes", "tools", "container", "container", "nothing"),
+        payloads=("boxes", "boxes", "shapes", "shapes", "shapes", "tools", "container", "container", "nothing", "light"),
         motions=("reference", "reference", *KINDS),
         tares=("long", "long", *KINDS),
-        tare_duration=(8.0, 30.0),
+        tare_duration=(2.0, 30.0),
         untared=0.3,
         same_motion=0.15,
         elsewhere=0.3,

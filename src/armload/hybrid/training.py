@@ -30,7 +30,7 @@ _FIRST_SEED = 11  # of the first chunk; other seeds of a training begin far from
 _LIGHTEST = 0.25  # of the rated payload
 _TOOL_SHARE = 0.6  # of the rated payload, which a tool is drawn for
 _DRAWS = 1500  # payloads of each family
-# how often a family is expected; nothing at all is one, too
+# how often a family is expected; nothing at all is one, and without `light` a screw or a phone is taken for it
 FAMILIES = {
     "boxes": 0.2,
     "shapes": 0.25,
@@ -40,8 +40,6 @@ FAMILIES = {
     "light": 0.05,
     "tool and payload": 0.1,
 }
-# a screw or a phone is a payload, too: without them, what is light is taken to be nothing
-_LIGHT = 0.003, 0.15  # of the rated payload, from, to
 FOLDS = 4
 # a payload unlike all families must not be pulled to one of them: a wide component, in units of the weak prior
 _ANYTHING, _ANYTHING_SHARE = 2.0, 0.03
@@ -118,18 +116,16 @@ def payload_mixture(arm: Arm, seed: int = 0) -> MixturePrior:
     rng = np.random.default_rng([seed, 7])
     rated = rated_mass(arm)
 
-    def drawn(family: str, count: int, most: float, least: float = _LIGHTEST) -> NDArray[np.float64]:
-        sizes = most * np.exp(rng.uniform(np.log(least), 0.0, size=count))
+    def drawn(family: str, count: int, most: float) -> NDArray[np.float64]:
+        sizes = most * np.exp(rng.uniform(np.log(_LIGHTEST), 0.0, size=count))
         seeds = rng.integers(1 << 30, size=count)
         return np.array([draw_payload(family, int(s), m).parameters.phi for s, m in zip(seeds, sizes, strict=True)])
 
-    samples = {f: drawn(f, _DRAWS, rated) for f in ("boxes", "shapes", "tools", "container")}
+    samples = {f: drawn(f, _DRAWS, rated) for f in ("boxes", "shapes", "tools", "container", "light")}
     samples["nothing"] = np.zeros((20, 10))
     tools = drawn("tools", _DRAWS, _TOOL_SHARE * rated)
     others = np.concatenate([samples["boxes"], samples["shapes"]])
     samples["tool and payload"] = tools + (1.0 - _TOOL_SHARE) * others[rng.permutation(len(others))[:_DRAWS]]
-    low, high = _LIGHT
-    samples["light"] = drawn("shapes", _DRAWS, high * rated, low / high)
     fitted = MixturePrior.fit(samples, FAMILIES, seed)
     wide = np.diag((_ANYTHING * payload_prior_std(arm)) ** 2)
     return fitted.joined(MixturePrior(np.ones(1), np.zeros((1, 10)), wide[None], ("anything",)), _ANYTHING_SHARE)

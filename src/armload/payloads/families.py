@@ -8,6 +8,7 @@
 | `container` | the paper's container with any filling, by its own rules                                 |
 | `nothing`   | no payload                                                                               |
 | `odd`       | dumbbells, poles, panes, rings far off the flange's axis: unlike all of the others       |
+| `light`     | the `shapes` at 0.3–15 % of the weight and of the same density: a screw, a phone, a box   |
 
 No prior is fitted on `odd`: it is there to see what happens with a payload that nobody expected. Figures are those
 of an arm rated for 3 kg. For another, masses grow with its rating and lengths with the cube root.
@@ -31,6 +32,7 @@ RATED = 3.0  # [kg] of the arm that all figures are for
 
 _SHAPE_MASS, _TOOL_MASS = (0.1, 2.9), (0.2, 1.8)  # [kg]
 _ODD_MASS = (0.45, 3.0)  # [kg] 0.15 to 1 of what the arm is rated for
+_LIGHT = (0.003, 0.15)  # of the weight of the shapes
 _MOST_WEIGHTS, _HEAVIEST_FILLING = 5, 2.163  # [1, kg] paper
 _ODD_WEIGHT = (0.05, 0.36)  # [kg]
 _SHIFT = 0.005  # [m] how far an odd weight may lie off its slot's axis
@@ -76,6 +78,9 @@ def draw_payload(family: str, seed: int, rated: float = RATED) -> Payload:
     if family == "boxes":
         return _scaled(_draw(np.random.default_rng(_seed(seed)), f"random {seed}"), scale)
     rng = np.random.default_rng([_seed(seed), FAMILIES.index(family)])
+    if family == "light":
+        scale *= float(np.exp(rng.uniform(*np.log(_LIGHT))))
+        family = "shapes"
     if family == "container":
         # a small arm carries a small container; a large one the same as everybody
         return _scaled(_filling(rng, name), min(1.0, scale))
@@ -83,7 +88,7 @@ def draw_payload(family: str, seed: int, rated: float = RATED) -> Payload:
     return _shaped(shapes, rng.uniform(*masses) * scale, float(np.cbrt(scale)), rng, name)
 
 
-FAMILIES = ("boxes", "shapes", "tools", "container", "nothing", "odd")
+FAMILIES = ("boxes", "shapes", "tools", "container", "nothing", "odd", "light")
 
 
 def _shaped(shapes: dict[str, Shape], mass: float, scale: float, rng: np.random.Generator, name: str) -> Payload:
