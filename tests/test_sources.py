@@ -7,6 +7,7 @@ import re
 import signal
 import subprocess
 import sys
+import textwrap
 import threading
 from pathlib import Path
 
@@ -566,6 +567,50 @@ def test_a_detached_simulator_knows_the_truth(panda):
         truth = one.truth(0.07)
         assert truth is not None
         np.testing.assert_array_equal(truth.phi, heavy_payload().parameters.phi)
+
+
+# ---------------------------------------------------------------- a maker's client, stood in for
+
+
+@pytest.fixture
+def client(tmp_path, monkeypatch):
+    """Makes `pylibfranka` a module of the code given, in whatever process imports it."""
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "client"), prepend=os.pathsep)
+
+    def write(code):
+        (tmp_path / "client").mkdir()
+        kinds = "class RealtimeConfig:\n    kIgnore = None\n"
+        (tmp_path / "client" / "pylibfranka.py").write_text(f"import os, time\n{kinds}{textwrap.dedent(code)}")
+
+    return write
+
+
+def test_a_robot_that_does_not_answer_is_an_error_and_its_client_is_ended(client, monkeypatch, tmp_path):
+    client("""
+        def Robot(*_):
+            open(os.environ["ASKED"], "w").write(str(os.getpid()))
+            while True:
+                time.sleep(3600)
+        """)
+    monkeypatch.setenv("ASKED", str(tmp_path / "asked"))
+    monkeypatch.setattr("armload.sources.detached._TO_CONNECT", 1.0)
+    before = set(os.listdir("/proc/self/fd"))
+    with pytest.raises(SourceError, match=r"the FR3 at 192\.0\.2\.9 cannot be reached \(it does not answer\): check"):
+        open_source("fr3://192.0.2.9", arm("fr3"), record=tmp_path / "run.csv")
+    assert not Path("/proc", (tmp_path / "asked").read_text()).exists()
+    assert set(os.listdir("/proc/self/fd")) == before
+    assert not (tmp_path / "run.csv").exists()
+
+
+def test_a_client_that_takes_long_to_load_is_not_a_robot_that_does_not_answer(client, monkeypatch):
+    client("""
+        time.sleep(1.5)
+        def Robot(*_):
+            raise RuntimeError("no robot here")
+        """)
+    monkeypatch.setattr("armload.sources.detached._TO_CONNECT", 1.0)
+    with pytest.raises(SourceError, match="no robot here"):
+        open_source("fr3://192.0.2.9", arm("fr3"))
 
 
 # ---------------------------------------------------------------- by name

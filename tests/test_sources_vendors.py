@@ -4,6 +4,7 @@ import contextlib
 import json
 import os
 import re
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -182,6 +183,26 @@ def test_a_server_that_dies_is_a_source_that_is_lost(system, address, tmp_path):
             list(samples)
     with pytest.raises(SourceError, match="cannot be reached"):
         open_source(f"{name}://{address}", arm(name))
+
+
+@pytest.mark.parametrize("backlog", [0, 8], ids=["packets are dropped", "nothing is said"])
+@pytest.mark.parametrize(
+    ("name", "package", "port"),
+    [("panda", "panda_py", 1337), ("fr3", "pylibfranka", 1337), ("ur", "rtde_receive", 30004)],
+)
+def test_an_address_that_does_not_answer_is_given_up_before_the_client_does(name, package, port, backlog, address):
+    """A listener that accepts nobody: with its queue full the kernel drops packets, as a wrong address does."""
+    pytest.importorskip(package, reason=f"{package} has no wheel for this Python")
+    with socket.create_server((address, port), backlog=backlog), contextlib.ExitStack() as stack:
+        if not backlog:
+            for _ in range(3):
+                waiting = stack.enter_context(socket.socket())
+                waiting.setblocking(False)
+                waiting.connect_ex((address, port))
+        # the FR3's client gives up an unanswered connection after a second itself
+        said = "Connection timeout" if name == "fr3" and not backlog else "it does not answer"
+        with pytest.raises(SourceError, match=rf"at {address} cannot be reached \(.*{said}.*\): check its address"):
+            open_source(f"{name}://{address}", arm("ur10e" if name == "ur" else name))
 
 
 def test_the_wrong_client_for_a_robot_says_which_is_the_right_one(system, address, tmp_path):

@@ -33,7 +33,12 @@ from armload.sources.order import arm_to_json, payloads_to_json
 from armload.sources.ring import Ring, RingReader
 from armload.sources.source import Source
 
-_TO_START = 60.0  # [s] to import, connect and read the robot's model
+_TO_START = 60.0  # [s] to import what is needed, and to open what is no robot
+# [s] until a robot has taken the connection: it needs milliseconds, two lost packets cost three seconds. The clients
+# wait a minute and longer. The limit is here, and nothing tries the robot's port beforehand, because a Franka takes one
+# connection at a time: it would still be busy with the trial when the client comes. What is broken off is the client's
+# own connection, as when any client is ended.
+_TO_CONNECT = 5.0
 _TO_OBEY = 10.0  # [s]
 _TO_END = 3.0  # [s]
 
@@ -99,11 +104,16 @@ class Detached(Source):
         told = {**options, "payloads": payloads_to_json(options["payloads"])} if options.get("payloads") else options
         order = {"spec": spec, "arm": arm_to_json(arm), "options": told}
         self._send({**order, "record": None if record is None else str(record)})
+        connecting = False
         try:
             event = self._event(_TO_START)
+            if connecting := event["event"] == "connecting":
+                event = self._event(_TO_CONNECT, event["message"])
             if event["event"] != "ready":
                 raise SourceError(event.get("message", f"{spec} ended before its first sample"))
         except BaseException:
+            if connecting:  # the client holds the reader's interpreter: it cannot hear that it should end
+                self.process.kill()
             self.close()
             raise
         self.name, self.n, self.rate = event["name"], event["n"], event["rate"]
@@ -199,8 +209,8 @@ class Detached(Source):
         except (OSError, ValueError):
             raise SourceError(f"the reader of {self.name} has ended: open the source again") from None
 
-    def _event(self, seconds: float) -> dict[str, Any]:
-        """The reader's next event; how it ended, again and again, once it has told."""
+    def _event(self, seconds: float, silent: str | None = None) -> dict[str, Any]:
+        """The reader's next event; how it ended, again and again, once it has told. silent: the error if none comes."""
         until = time.monotonic() + seconds
         with self._listening:
             if self._last is not None:
@@ -208,7 +218,7 @@ class Detached(Source):
             while b"\n" not in self._heard:
                 left = until - time.monotonic()
                 if left <= 0 or not select.select([self._status], [], [], left)[0]:
-                    raise SourceError(f"the reader of {self.name} did not answer within {seconds:.0f} s")
+                    raise SourceError(silent or f"the reader of {self.name} did not answer within {seconds:.0f} s")
                 heard = os.read(self._status, 1 << 16)
                 if not heard:
                     how = self.process.wait()

@@ -47,6 +47,8 @@ class FrankaStatus(NamedTuple):
 class FrankaSource(Source):
     """A Franka robot at 1 kHz; the robot takes one connection at a time.
 
+    An address that does not answer holds up the client for a minute or longer: `Detached` waits less.
+
     Args:
         address: host name or IP address of the robot.
         arm: an arm of 7 joints.
@@ -67,15 +69,11 @@ class FrankaSource(Source):
             raise SourceError(f"{arm.name} has {arm.n} joints: a {facts.called} has 7; name the arm that is there")
         self.name, self.n = f"{system}://{address}", arm.n
         self._closed = False
-        client = _client(facts)
+        client = load_client(system)
         try:
             self.robot: Any = client.Robot(address, client.RealtimeConfig.kIgnore)
         except Exception as error:  # the maker's errors have no common base in Python
-            raise SourceError(
-                f"the {facts.called} at {address} cannot be reached ({_said(error)}): check its address, that its "
-                "joints are unlocked and FCI is activated in Desk, and that no other client is connected; "
-                f"{facts.other}"
-            ) from None
+            raise SourceError(unreachable(address, _said(error), system)) from None
 
     def __iter__(self) -> Iterator[Sample]:
         while not self._closed:
@@ -122,7 +120,13 @@ class FrankaSource(Source):
             raise SourceError(f"{self.name} was lost: {_said(error)}") from None
 
 
-def _client(facts: _System) -> Any:
+def load_client(system: str) -> Any:
+    """The maker's client for "fr3" or "panda".
+
+    Raises:
+        SourceError: it is not installed.
+    """
+    facts = SYSTEMS[system]
     try:
         return importlib.import_module(facts.module)
     except ImportError as error:
@@ -130,6 +134,15 @@ def _client(facts: _System) -> Any:
             f"a {facts.called} is read through {facts.package}, which cannot be imported ({error}): "
             f"pip install 'armload[{facts.extra}]'"
         ) from None
+
+
+def unreachable(address: str, why: str, system: str) -> str:
+    """What to say of a robot that cannot be connected to."""
+    facts = SYSTEMS[system]
+    return (
+        f"the {facts.called} at {address} cannot be reached ({why}): check its address, that its joints are unlocked "
+        f"and FCI is activated in Desk, and that no other client is connected; {facts.other}"
+    )
 
 
 def _said(error: Exception) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from armload.arms import Arm
 from armload.errors import SourceError
 from armload.payloads import draw_payload
 from armload.simulate import Sensors, World
+from armload.sources import franka, ur
 from armload.sources.detached import Detached
 from armload.sources.franka import FrankaSource
 from armload.sources.recorder import Recorded
@@ -110,6 +112,25 @@ def open_source(
     except BaseException:
         source.close()
         raise
+
+
+def prepare(spec: str) -> str | None:
+    """Load the client a robot is read through, ahead of `open_source`: loading may take seconds, an answer does not.
+
+    Returns:
+        What to say of a robot that then does not answer; None: a source that may take its time, or has no client here.
+    """
+    parts = urlsplit(spec if "://" in spec else "")
+    if parts.scheme not in _ALONE or not parts.hostname:
+        return None
+    silent = "it does not answer"
+    with contextlib.suppress(SourceError):  # said again when it is opened, after what else may be wrong
+        if parts.scheme == "ur":
+            ur.load_client()
+            return ur.unreachable(parts.hostname, silent)
+        franka.load_client(parts.scheme)
+        return franka.unreachable(parts.hostname, silent, parts.scheme)
+    return None
 
 
 def _robot(name: str, arm: Arm, torque_constants: Sequence[float] | None) -> Source:

@@ -3,7 +3,8 @@
 Started by `Detached` as `python -m armload.sources.reader RING WAKE STATUS` (three inherited file descriptors). Its
 standard input brings one JSON object per line, first what to open, then commands; when it ends, so does the reader:
 that is how it learns that whoever started it has ended, in whatever way. RING is the ring, WAKE a pipe that gets one
-byte per sample, STATUS a pipe with one JSON object per event: ready, ended, error, or what became of a command.
+byte per sample, STATUS a pipe with one JSON object per event: connecting (to a robot; with what to say if nothing
+follows), ready, ended, error, or what became of a command.
 
 A sample is recorded first and handed on then: what anybody has seen is in the record.
 """
@@ -23,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from armload.errors import ArmloadError, SourceError
-from armload.sources.open import open_source
+from armload.sources.open import open_source, prepare
 from armload.sources.order import arm_from_json, payloads_from_json
 from armload.sources.recorder import Recorder
 from armload.sources.ring import Ring
@@ -54,6 +55,8 @@ class _Reader:
         if options.get("payloads"):
             options["payloads"] = payloads_from_json(options["payloads"])
         try:
+            if (silent := prepare(order["spec"])) is not None:
+                self.tell(event="connecting", message=silent)
             with contextlib.ExitStack() as stack:
                 source = stack.enter_context(open_source(order["spec"], arm, detached=False, **options))
                 record = order["record"]

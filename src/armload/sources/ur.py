@@ -35,6 +35,8 @@ _SILENCE = 1.0  # [s] after which the arm counts as lost
 class URSource(Source):
     """A UR arm of the e-series.
 
+    An address that does not answer holds up the client for minutes: `Detached` waits less.
+
     Args:
         address: host name or IP address of the robot.
         arm: an arm of 6 joints.
@@ -85,17 +87,32 @@ class URSource(Source):
             self._client.disconnect()
 
 
-def _connect(address: str) -> Any:
+def load_client() -> Any:
+    """The receiving side of ur-rtde.
+
+    Raises:
+        SourceError: it is not installed.
+    """
     try:
         from rtde_receive import RTDEReceiveInterface  # type: ignore[import-not-found]
     except ImportError as error:
         raise SourceError(
             f"a UR arm is read through ur-rtde, which cannot be imported ({error}): pip install 'armload[ur]'"
         ) from None
+    return RTDEReceiveInterface
+
+
+def unreachable(address: str, why: str) -> str:
+    """What to say of a robot that cannot be connected to."""
+    return (
+        f"the UR arm at {address} cannot be reached ({why}): check its address, that it is switched on, and that RTDE "
+        "is enabled in its security settings"
+    )
+
+
+def _connect(address: str) -> Any:
+    client = load_client()
     try:
-        return RTDEReceiveInterface(address, -1.0, _FIELDS)  # −1: the fastest the controller has
+        return client(address, -1.0, _FIELDS)  # −1: the fastest the controller has
     except Exception as error:
-        raise SourceError(
-            f"the UR arm at {address} cannot be reached ({' '.join(str(error).split())}): check its address, that it "
-            "is switched on, and that RTDE is enabled in its security settings"
-        ) from None
+        raise SourceError(unreachable(address, " ".join(str(error).split()))) from None
