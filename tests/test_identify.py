@@ -5,6 +5,8 @@ import pytest
 
 from armload.arms import arm
 from armload.errors import IdentificationError
+from armload.episodes import Recipe, draw_episodes, simulate_episodes
+from armload.hybrid import shipped_model
 from armload.identify import Z95, identify
 from armload.inertia import InertialParameters, is_consistent
 from armload.least_squares import PosteriorLeastSquares, payload_prior_std
@@ -75,6 +77,10 @@ def test_an_arm_that_does_not_move_determines_the_mass_and_not_the_inertia(panda
 def test_undetermined_parameters_carry_the_interval_of_what_was_known_before(panda, still):
     before = Z95 * payload_prior_std(panda)
     assert np.array(identify(still, panda, method="map-gp").phi_high)[4:] == pytest.approx(before[4:])
+    prior, answer = shipped_model(panda).prior, identify(still, panda)
+    assert answer.method == "hybrid"
+    expected = [prior.mean[4:] - Z95 * prior.std[4:], prior.mean[4:] + Z95 * prior.std[4:]]
+    assert [answer.phi_low[4:], answer.phi_high[4:]] == [pytest.approx(x) for x in expected]
 
 
 def test_a_tare_with_a_tool_leaves_what_was_added_and_a_known_tool_what_it_carries(real_like):
@@ -158,12 +164,20 @@ def test_a_tool_in_grams_is_refused(panda, analytic_log):
         identify(analytic_log(panda, BOX), panda, tool=InertialParameters(1e3 * np.array([0.73] + [0.0] * 9)))
 
 
-def test_a_log_that_no_body_explains_is_said_to_be_so(real_like):
+@pytest.mark.parametrize("gravity", [(5.0, 0.0, -8.44), (0.0, -4.0, -8.96)])
+def test_a_base_that_stands_otherwise_than_was_said_is_noticed(real_like, gravity):
     panda, how = real_like
-    tilted = arm("panda", gravity=(5.0, 0.0, -8.44))
-    log = simulate(tilted, taie2024(), BOX, seed=3, **how)
-    assert not any("no body fits" in note for note in identify(log, tilted).notes)
-    assert any("no body fits" in note for note in identify(log, panda).notes)  # the base's tilt is not told
+    true = arm("panda", gravity=gravity)
+    log = simulate(true, taie2024(), BOX, seed=3, **how)
+    assert not any("--gravity" in note for note in identify(log, true).notes)
+    assert any("--gravity" in note for note in identify(log, panda).notes)
+
+
+def test_arms_as_they_are_are_not_called_strange(panda):
+    """Half a minute of slow motion, on arms further from their description than most."""
+    recipe = Recipe(worlds=("beyond",), motions=("slow",), untared=1.0, duration=30.0)
+    for logs in simulate_episodes(draw_episodes(panda, recipe, 4, seed=5)):
+        assert not any("check the robot" in note for note in identify(logs.run, panda).notes)
 
 
 def test_an_undetermined_interval_of_a_method_without_a_prior_holds_its_own(real_like):

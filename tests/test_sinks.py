@@ -15,9 +15,9 @@ import pytest
 from rosbags.typesys import Stores, get_typestore
 from ruamel.yaml import YAML
 
+from armload.answer import Identification
 from armload.arms import ARMS, Arm, arm, momentum_regressor
 from armload.errors import ArmError, ArmloadError, InertiaError, PayloadError, SinkError
-from armload.identify import Identification
 from armload.inertia import InertialParameters, is_consistent
 from armload.payloads import franka_hand, random_payload, test_payload, write_payload
 from armload.sinks import (

@@ -21,11 +21,11 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from armload.answer import Identification
     from armload.arms import ARMS, Arm, arm
     from armload.errors import ArmloadError
     from armload.hybrid import HybridIdentifier
     from armload.identifier import Estimate, Identifier
-    from armload.identify import Identification
     from armload.inertia import InertialParameters
     from armload.learners import LearnedIdentifier, load_model, save_model
     from armload.least_squares import (
@@ -50,7 +50,7 @@ _ROOMS = {
     "Estimate": "identifier",
     "Identifier": "identifier",
     "METHODS": "methods",
-    "Identification": "identify",
+    "Identification": "answer",
     "InertialParameters": "inertia",
     "LearnedIdentifier": "learners",
     "load_model": "learners",

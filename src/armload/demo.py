@@ -21,13 +21,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from armload.answer import Identification
 from armload.arms import Arm, arm
 from armload.atomic import replacing
 from armload.dataset import Dataset, Split, build_dataset, split_payloads
 from armload.errors import DatasetError
 from armload.evaluate import Comparison, EvaluationRun, Table, compare
 from armload.identifier import Identifier
-from armload.identify import Identification, identify
+from armload.identify import identify
 from armload.inertia import InertialParameters
 from armload.least_squares import FilteredRecursiveLeastSquares, PosteriorLeastSquares, RecursiveLeastSquares
 from armload.methods import METHODS, default_for

@@ -3,100 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from armload.answer import Identification
 from armload.arms import Arm
 from armload.determined import SMALL, Z95, held
 from armload.determined import determined as told
 from armload.errors import IdentificationError
 from armload.identifier import Estimate, Identifier
-from armload.inertia import NAMES, UNITS, InertialParameters, is_consistent, nearest_consistent, phi_to_com
+from armload.inertia import NAMES, InertialParameters, is_consistent, nearest_consistent, phi_to_com
 from armload.least_squares import PosteriorLeastSquares, payload_prior_std
 from armload.methods import METHODS, default_for
 from armload.recording import Recording, check_plausible
 
 LOWEST_RATE = 20.0  # [Hz]
 _MISFIT = 3.0  # standard deviations between the estimate and the nearest body, beyond which something is wrong
-
-
-@dataclass(frozen=True, eq=False)
-class Identification:
-    """What the arm holds, with 95 % intervals; the fields are those of `armload identify --json`.
-
-    method: the method's name; robot, frame: whose payload, about which frame's origin and axes.
-    relative_to: "arm" (the bare arm), "tool" (what `--tool` describes) or "tare" (what was mounted at the tare).
-    n_samples, duration: samples used and the time they span [s].
-    phi, phi_low, phi_high: ten parameters in the paper's order, and their 95 % interval.
-    interval: "calibrated" or "approximate".
-    determined: for each parameter, whether the log itself says more than was known before.
-    mass, com, inertia_com: the same payload about its centre of mass [kg, m, kg·m²], in the frame's axes.
-    consistent: whether a body with these parameters can exist.
-    held: whether anything is there at all (the mass lies at least three standard deviations above zero).
-    why: why this method, in a sentence; notes: what else the user should know. Neither is in the JSON.
-    """
-
-    method: str
-    robot: str
-    frame: str
-    relative_to: str
-    n_samples: int
-    duration: float
-    phi: list[float]
-    phi_low: list[float]
-    phi_high: list[float]
-    interval: str
-    determined: list[bool]
-    mass: float
-    com: list[float]
-    inertia_com: list[list[float]]
-    consistent: bool
-    held: bool
-    why: str = field(default="", repr=False)
-    notes: tuple[str, ...] = field(default=(), repr=False)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The contract's fields, ready for JSON; every number is finite."""
-        out = asdict(self)
-        del out["why"], out["notes"]
-        return out
-
-    @property
-    def parameters(self) -> InertialParameters:
-        """phi with its frame, ready to move, add, subtract or reorder."""
-        return InertialParameters(np.array(self.phi), self.frame)
-
-    @property
-    def why_not_held(self) -> str:
-        """Why `held` is false, in a sentence; "" where it is true."""
-        if self.held:
-            return ""
-        if not self.determined[0]:
-            return "the log does not tell whether anything is held"
-        if self.phi_high[0] < 0:
-            return "nothing is held: the mass is below zero"
-        return "nothing seems to be held: the mass is within three standard deviations of zero"
-
-    def __str__(self) -> str:
-        lines = [
-            f"{self.robot}: payload about {self.frame}, relative to the {self.relative_to}, "
-            f"method {self.method}, {self.n_samples} samples, {self.duration:.2f} s"
-        ]
-        rows = zip(NAMES, self.phi, self.phi_low, self.phi_high, UNITS, self.determined, strict=True)
-        for name, value, low, high, unit, known in rows:
-            lines.append(
-                f"{name:>5} = {value:+.5f} [{low:+.5f}, {high:+.5f}] {unit}" + ("" if known else "  undetermined")
-            )
-        com = ", ".join(f"{x:+.4f}" for x in self.com)
-        lines.append(f" mass {self.mass:.4f} kg, centre of mass ({com}) m, intervals {self.interval}")
-        if not self.held:
-            lines.append(f" {self.why_not_held}")
-        return "\n".join(lines)
+_STRANGE = (
+    5.0  # rms over the joints of torque offsets over what is expected: 1 or less of most simulated arms, 5 of none
+)
+_CHECK = "check the robot, the base (--gravity), what is mounted and the torques' signs"
 
 
 def identify(
@@ -166,7 +97,7 @@ class _Found(NamedTuple):
 
     calibrated: whether its error bars were checked on held-out episodes.
     alone: standard deviation (10,) without a learned prior, of a method that has one.
-    physics: the estimate before a learned prior, of such a method.
+    offset: the arm's torque offsets over what is expected of them (rms), of a method that asks.
     """
 
     estimate: Estimate
@@ -177,16 +108,11 @@ class _Found(NamedTuple):
     why: str
     calibrated: bool = False
     alone: NDArray[np.float64] | None = None
-    physics: Estimate | None = None
+    offset: float = 0.0
 
     def less(self, tool: NDArray[np.float64]) -> _Found:
         """The same without a tool (10,)."""
-        parts = {
-            name: replace(value, phi=value.phi - tool)
-            for name in ("estimate", "physics")
-            if (value := getattr(self, name)) is not None
-        }
-        return self._replace(**parts)
+        return self._replace(estimate=replace(self.estimate, phi=self.estimate.phi - tool))
 
 
 def _check(log: Recording, arm: Arm) -> None:
@@ -244,13 +170,9 @@ def _run(recording: Recording, arm: Arm, tare: Recording | None, method: str | P
 def _found(identifier: Identifier, recording: Recording, weak: NDArray, prior: bool, why: str) -> _Found:
     known, std = (np.zeros(10), weak) if identifier.known is None else identifier.known
     estimate = identifier.run(recording)
-    physics = None
-    if identifier.known is not None and isinstance(identifier, PosteriorLeastSquares):
-        solved = identifier.posterior  # as its information stands, whatever error bars were made of it
-        unit = np.outer(weak, weak)
-        covariance = unit * np.linalg.inv(np.eye(10) + unit * solved.information)
-        physics = replace(estimate, phi=covariance @ solved.vector, covariance=0.5 * (covariance + covariance.T))
-    return _Found(estimate, known, std, prior, identifier.name, why, identifier.calibrated, identifier.alone, physics)
+    asks = isinstance(identifier, PosteriorLeastSquares)
+    offset = float(np.sqrt(identifier.posterior.ratios["offset"].mean())) if asks else 0.0
+    return _Found(estimate, known, std, prior, identifier.name, why, identifier.calibrated, identifier.alone, offset)
 
 
 def _body(estimate: Estimate) -> NDArray[np.float64]:
@@ -273,12 +195,10 @@ def _answer(
     phi, half, half_before = estimate.phi.copy(), Z95 * estimate.std, Z95 * found.before_std
     determined = told(estimate.std, found.before_std if found.prior else None, found.alone, payload_prior_std(arm))
     is_held = held(phi[0], estimate.std[0], determined[0])
-    low_before, high_before = before - half_before, before + half_before
-    if not found.prior:  # the method knew nothing of what was known before: its own interval counts too
-        low_before, high_before = np.minimum(low_before, phi - half), np.maximum(high_before, phi + half)
-    own = determined | found.calibrated  # intervals that were checked to hold are reported as they are
-    low = np.where(own, phi - half, low_before)
-    high = np.where(own, phi + half, high_before)
+    # what the log does not tell keeps the interval of what was known before, stretched to an estimate that lies beyond
+    reach = np.minimum(half, half_before) if found.prior else half
+    low = np.where(determined, phi - half, np.minimum(before - half_before, phi - reach))
+    high = np.where(determined, phi + half, np.maximum(before + half_before, phi + reach))
     removed = determined[0] and phi[0] < -half[0]
     said = list(notes)
     if removed:
@@ -290,11 +210,10 @@ def _answer(
         )
     else:
         phi = _body(estimate)
-        if _misfit(found.physics or estimate) > _MISFIT:
-            said.append(
-                "no body fits within the error bars: check the robot, the base (--gravity), what is mounted and the "
-                "torques' signs"
-            )
+        if _misfit(estimate) > _MISFIT:
+            said.append(f"no body fits within the error bars: {_CHECK}")
+        elif found.offset > _STRANGE:
+            said.append(f"the torques are {found.offset:.0f} times as far off as those of an arm should be: {_CHECK}")
     low, high = np.minimum(low, phi), np.maximum(high, phi)
     if not determined.all():
         missing = ", ".join(n for n, known in zip(NAMES, determined, strict=True) if not known)

@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table as RichTable
 
+    from armload.answer import Identification
     from armload.evaluate import Table
-    from armload.identify import Identification
 
 
 def print_json(value: dict[str, Any]) -> None:

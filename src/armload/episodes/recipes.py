@@ -91,7 +91,7 @@ POPULATIONS: dict[str, Recipe] = {
     "tool": replace(REFERENCE, tool=1.0),
     "broad": Recipe(
         worlds=WORLDS,
-        payloads=("boxes", "boxes", "shapes", "shapes", "shapes", "tools", "container", "container", "nothing", "light"),
+        payloads=(*2 * ("boxes",), *3 * ("shapes",), "tools", *2 * ("container",), "nothing", "light"),
         motions=("reference", "reference", *KINDS),
         tares=("long", "long", *KINDS),
         tare_duration=(2.0, 30.0),

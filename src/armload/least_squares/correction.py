@@ -66,7 +66,14 @@ class Correction:
 
     def coulomb(self, eta: ArrayLike) -> NDArray[np.float64]:
         """The Coulomb friction (n,) [N·m] among the unknowns."""
-        n, block = self.arm.n, list(_PER_JOINT).index("coulomb")
+        return self._of_joints("coulomb", eta)
+
+    def offset(self, eta: ArrayLike) -> NDArray[np.float64]:
+        """The torque offsets (n,) [N·m] among the unknowns."""
+        return self._of_joints("offset", eta)
+
+    def _of_joints(self, what: str, eta: ArrayLike) -> NDArray[np.float64]:
+        n, block = self.arm.n, list(_PER_JOINT).index(what)
         return np.asarray(eta)[block * n : (block + 1) * n]
 
     def regressor(self, q: ArrayLike, dq: ArrayLike) -> MomentumRegressor:

@@ -54,7 +54,8 @@ class Posterior:
     torque: "link" or "motor", the side the torque seems to be measured on.
     gain_std: relative standard deviation of the torque's calibration.
     scales: what expectation–maximisation found; another solution may start there.
-    ratios: the scales (n,) of "noise", "pose", "velocity" and "friction" over what was expected of them, as variances.
+    ratios: the scales (n,) of "noise", "pose", "velocity" and "friction", and the squared offsets ("offset"), over what
+        was expected of them, as variances.
     """
 
     phi: NDArray[np.float64]
@@ -262,13 +263,17 @@ class Problem:
             torque=torque,
             gain_std=gain,
             scales=scales,
-            ratios=self._ratios(scales),
+            ratios=self._ratios(scales, eta),
         )
 
-    def _ratios(self, scales: Scales) -> dict[str, NDArray[np.float64]]:
-        friction = self.correction.coulomb(scales.eta) / self.correction.coulomb(self.correction.prior_std**2)
+    def _ratios(self, scales: Scales, eta: NDArray) -> dict[str, NDArray[np.float64]]:
+        stated = self.correction.prior_std**2
         repeated = max(1.0, self.runs[-1].blocks.duration / self.noise_model.novelty)
-        out = {"noise": scales.noise[-1] / (repeated * self.expected[-1]), "friction": friction}
+        out = {
+            "noise": scales.noise[-1] / (repeated * self.expected[-1]),
+            "friction": self.correction.coulomb(scales.eta) / self.correction.coulomb(stated),
+            "offset": self.correction.offset(eta**2) / self.correction.offset(stated),
+        }
         for name, k in (("pose", 0), ("velocity", self.features.pose)):
             if self.features.size > k:
                 out[name] = scales.features[:, k] / self.feature_variance[:, k]

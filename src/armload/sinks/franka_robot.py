@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
+from armload.answer import Identification
 from armload.arms import Arm
 from armload.errors import SinkError
-from armload.identify import Identification
 from armload.sinks.franka import FrankaLoad, franka_load
 from armload.sinks.guard import check_writable, reason_of, stands_still
 from armload.sinks.load import Load

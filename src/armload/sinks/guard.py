@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from armload.answer import Identification
 from armload.arms import ARMS, Arm
 from armload.errors import SinkError
-from armload.identify import Identification
 from armload.inertia import NAMES, InertialParameters
 from armload.sinks.load import Load
 

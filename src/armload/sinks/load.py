@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armload.answer import Identification
 from armload.arms import Arm
 from armload.determined import Z95
 from armload.errors import SinkError
-from armload.identify import Identification
 from armload.inertia import NAMES, InertialParameters, is_consistent, nearest_consistent, to_order
 from armload.online import OnlineEstimate
 from armload.payloads.files import payload_from, read_content

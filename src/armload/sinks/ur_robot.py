@@ -6,9 +6,9 @@ from typing import Any, Protocol
 
 from numpy.typing import ArrayLike
 
+from armload.answer import Identification
 from armload.arms import Arm
 from armload.errors import SinkError
-from armload.identify import Identification
 from armload.sinks.guard import check_writable, reason_of, stands_still
 from armload.sinks.load import Load
 from armload.sinks.ur import URPayload, ur_payload
