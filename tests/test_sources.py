@@ -613,6 +613,35 @@ def test_a_client_that_takes_long_to_load_is_not_a_robot_that_does_not_answer(cl
         open_source("fr3://192.0.2.9", arm("fr3"))
 
 
+@pytest.mark.parametrize("asked", [False, True])
+def test_what_a_client_prints_is_kept_apart_unless_asked_for(client, monkeypatch, capfd, asked):
+    client("""
+        def Robot(*_):
+            os.write(1, b"from the client, out")
+            os.write(2, b"from the client, err")
+            raise RuntimeError("no robot here")
+        """)
+    monkeypatch.setenv("ARMLOAD_TRACEBACK", "1" if asked else "")
+    with pytest.raises(SourceError, match="no robot here"):
+        open_source("fr3://192.0.2.9", arm("fr3"))
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert err == ("from the client, outfrom the client, err" if asked else "")
+
+
+def test_a_bug_in_the_reader_still_says_where_it_is(client, capfd):
+    client("""
+        def Robot(*_):
+            return Robot
+        Robot.read_once = lambda: "no state"
+        """)
+    with open_source("fr3://192.0.2.9", arm("fr3")) as source, pytest.raises(SourceError, match="exit code 1"):
+        next(iter(source))
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert "AttributeError: 'str' object has no attribute 'time'" in err
+
+
 # ---------------------------------------------------------------- by name
 
 

@@ -234,7 +234,7 @@ def test_the_maker_s_model_means_by_a_load_what_we_mean(address, tmp_path):
         assert np.abs(loaded.torque(q) - robot.torque(q)).max() > 1.0
 
 
-def test_a_ur_arm_gives_positions_velocities_and_currents_as_torque(address, tmp_path):
+def test_a_ur_arm_gives_positions_velocities_and_currents_as_torque(address, tmp_path, capfd):
     pytest.importorskip("rtde_receive", reason="ur-rtde has no wheel for this Python")
     robot = arm("ur10e")
     run = simulate(robot, random_motion(robot, 1), heavy_payload(), rate=500.0, duration=2.2)
@@ -248,6 +248,9 @@ def test_a_ur_arm_gives_positions_velocities_and_currents_as_torque(address, tmp
         asked = next(event for event in events if event["event"] == "fields")
     assert asked["rate"] == 500.0
     assert "was lost" in said
+    with pytest.raises(SourceError, match="cannot be reached"):
+        open_source(f"ur://{address}", robot)
+    assert capfd.readouterr() == ("", "")  # the client prints a line of its own at either end
     place = np.round(500 * (rows[:, 0] - t[0])).astype(int)
     assert np.all(np.diff(place) > 0)
     np.testing.assert_array_equal(rows[:, :13], np.column_stack([t, run.q, run.dq])[place])

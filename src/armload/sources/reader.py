@@ -7,6 +7,9 @@ byte per sample, STATUS a pipe with one JSON object per event: connecting (to a 
 follows), ready, ended, error, or what became of a command.
 
 A sample is recorded first and handed on then: what anybody has seen is in the record.
+
+Clients print of their own accord: what goes to the descriptors of standard output and standard error goes nowhere here,
+unless ARMLOAD_TRACEBACK=1. What Python has to say, such as where a bug is, goes to the starter's standard error.
 """
 
 from __future__ import annotations
@@ -102,6 +105,16 @@ class _Reader:
             source.close()
 
 
+def _silence_clients() -> None:
+    """Keep Python's own standard error, and let the descriptors that compiled clients print to lead nowhere."""
+    if os.environ.get("ARMLOAD_TRACEBACK", "") not in ("", "0"):
+        return
+    sys.stderr = os.fdopen(os.dup(2), "w", buffering=1, errors="backslashreplace")
+    with open(os.devnull, "wb") as nowhere:
+        os.dup2(nowhere.fileno(), 1)
+        os.dup2(nowhere.fileno(), 2)
+
+
 def _lines(descriptor: int) -> Iterator[bytes]:
     """Lines of a pipe as they come, without the locks of a buffered file, which a thread may hold when all ends."""
     heard = b""
@@ -114,4 +127,5 @@ def _lines(descriptor: int) -> Iterator[bytes]:
 
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to the whole group: the one who started us decides
+    _silence_clients()
     _Reader(*map(int, sys.argv[1:4])).run()
