@@ -36,6 +36,15 @@ def numbers(recording):
     return np.column_stack([recording.t, recording.q, recording.dq, recording.tau])
 
 
+def strict_json_lines(path):
+    """One object per line, read as any other program would: Python alone takes bare NaN and Infinity."""
+
+    def refuse(token):
+        raise ValueError(f"{token} is no JSON")
+
+    return [json.loads(line, parse_constant=refuse) for line in path.read_text().splitlines()]
+
+
 @pytest.fixture(scope="module")
 def log():
     rng = np.random.default_rng(0)
@@ -207,7 +216,7 @@ def test_bad_samples_go_beside_the_record_with_the_reason(tmp_path):
         for s in [*good[:2], *bad, good[2]]:
             recorder.append(s)
     np.testing.assert_array_equal(numbers(read_recording(tmp_path / "run.csv")), table(good))
-    lines = [json.loads(line) for line in (tmp_path / "run.bad.jsonl").read_text().splitlines()]
+    lines = strict_json_lines(tmp_path / "run.bad.jsonl")
     assert [line["why"].split()[0:2] for line in lines] == [
         ["not", "finite"],
         ["not", "finite"],
@@ -215,10 +224,22 @@ def test_bad_samples_go_beside_the_record_with_the_reason(tmp_path):
         ["not", "after"],
         ["not", "after"],
     ]
-    assert np.isnan(lines[0]["q"]).all()
+    assert lines[0]["q"] == ["NaN", "NaN"]
     assert lines[3]["t"] == 0.2
     assert recorder.bad == 5
     assert recorder.kept == 3
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_a_bad_sample_is_strict_json_that_loses_nothing(tmp_path, n):
+    """Every double, the odd ones too, whether the sample is bad for its numbers or for how many there are."""
+    odd = [np.nan, np.inf, -np.inf, -0.0, 0.1 + 0.2, 5e-324, 1.7976931348623157e308, -1.0, 1.0]
+    sample = Sample(-np.inf, *np.array(odd[: 3 * n]).reshape(3, n))
+    with Recorder(tmp_path / "run.csv", 2) as recorder:
+        recorder.append(sample)
+    (line,) = strict_json_lines(tmp_path / "run.bad.jsonl")
+    for name, value in sample._asdict().items():
+        assert np.array(line[name], dtype=float).tobytes() == np.asarray(value).tobytes(), name
 
 
 def test_a_clock_that_starts_anew_starts_a_new_part(tmp_path):
@@ -232,7 +253,7 @@ def test_a_clock_that_starts_anew_starts_a_new_part(tmp_path):
     assert [path.name for path in recorder.paths] == ["run.csv", "run.2.csv"]
     assert read_recording(tmp_path / "run.csv").t.tolist() == [7.0, 7.1, 7.2]
     assert read_recording(tmp_path / "run.2.csv").t.tolist() == [0.2, 0.3, 0.4]
-    bad = [json.loads(line)["t"] for line in (tmp_path / "run.bad.jsonl").read_text().splitlines()]
+    bad = [line["t"] for line in strict_json_lines(tmp_path / "run.bad.jsonl")]
     assert bad == [0.1, 0.1]
 
 

@@ -5,8 +5,9 @@ over by itself, so that a process killed at any moment loses nothing that it had
 loses what its disk had not written, and the reader drops a last line that was cut off.
 
 A log must be finite and strictly increasing in time. What is not goes to a file beside it: `run.csv` keeps its bad
-samples in `run.bad.jsonl`, one JSON object per line with the reason. If the robot's clock starts anew (two samples
-running before the last one kept), the log goes on in `run.2.csv`, `run.3.csv`, …
+samples in `run.bad.jsonl`, one JSON object per line: `why`, and t, q, dq and tau as they came. JSON has no numbers that
+are not finite: they are the strings "NaN", "Infinity" and "-Infinity", which `float` understands. If the robot's clock
+starts anew (two samples running before the last one kept), the log goes on in `run.2.csv`, `run.3.csv`, …
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -113,8 +114,8 @@ class Recorder:
     def _refuse(self, sample: Sample, why: str) -> None:
         if self._bad_lines is None:
             self._bad_lines = _Lines(self._path_of_bad())
-        values = {name: np.asarray(value).tolist() for name, value in sample._asdict().items()}
-        self._bad_lines.append(json.dumps({"why": why, **values}))
+        values = {name: _strict(np.asarray(value).tolist()) for name, value in sample._asdict().items()}
+        self._bad_lines.append(json.dumps({"why": why, **values}, allow_nan=False))
         self.bad += 1
 
 
@@ -144,6 +145,15 @@ class Recorded(Source):
     def truth(self, t: float) -> InertialParameters | None:
         """What the source knows."""
         return self.source.truth(t)
+
+
+def _strict(value: Any) -> Any:
+    """Numbers, however nested, as strict JSON can hold them."""
+    if isinstance(value, list):
+        return [_strict(each) for each in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
+    return value
 
 
 class _Lines:
