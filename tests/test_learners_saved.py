@@ -11,7 +11,7 @@ from safetensors import safe_open
 from safetensors.numpy import save_file
 
 from armload.arms import arm as named_arm
-from armload.errors import ArmloadError, ModelError
+from armload.errors import ArmloadError, IdentificationError, ModelError
 from armload.inertia import InertialParameters
 from armload.learners import (
     BaggingEnsemble,
@@ -351,6 +351,21 @@ def test_a_live_identifier_answers_as_the_stream_and_goes_on_from_a_file(saved, 
         np.testing.assert_array_equal(estimate.phi, expected.phi)
         np.testing.assert_array_equal(estimate.covariance, expected.covariance)
         assert estimate.n_samples == 80
+
+
+def test_a_live_identifier_s_state_is_refused_with_another_ensemble_or_the_hybrid(saved, panda, log, tmp_path):
+    online = OnlineIdentifier(panda, method=saved[1])
+    for sample in list(log)[:20]:
+        online.update(*sample)
+    path = online.save(tmp_path / "state.npz")
+
+    def change(_, tensors):
+        array = next(array for array in tensors.values() if array.dtype.kind == "f")
+        array.flat[0] += 1.0
+
+    for method in (rewritten(saved[1], change, tmp_path / "other.safetensors"), None):
+        with pytest.raises(IdentificationError, match="its trained model"):
+            OnlineIdentifier.restore(path, panda, method)
 
 
 def test_the_stream_refuses_another_arm_at_once_and_another_motion_on_a_recording(tree, panda):

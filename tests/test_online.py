@@ -1,7 +1,7 @@
 """An identifier beside a running robot: what a stream may do to it, and what it must not."""
 
 import json
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 
 from armload.arms import arm
 from armload.errors import IdentificationError
+from armload.hybrid import shipped_model
+from armload.learners.compiled import Together
 from armload.methods import METHODS
 from armload.motion import random_motion, taie2024
 from armload.online import OnlineIdentifier
@@ -270,6 +272,58 @@ def test_a_state_of_another_arm_or_no_state_is_refused(panda, online, log, tmp_p
         OnlineIdentifier.restore(path, panda)
     with pytest.raises(IdentificationError, match="no saved state"):
         OnlineIdentifier.restore(tmp_path / "none.npz", panda)
+
+
+def retrained(model, change):
+    """A hybrid model of which one number is another."""
+    if change == "prior":
+        means = model.prior.means.copy()
+        means[0, 0] += 1e-9
+        return replace(model, prior=replace(model.prior, means=means))
+    if change == "bag":
+        trees, *others = model.calibration.bag.parts
+        bag = Together((replace(trees, values=trees.values + 1e-9), *others))
+        return replace(model, calibration=replace(model.calibration, bag=bag))
+    return replace(model, calibration=replace(model.calibration, level=1.001 * model.calibration.level))
+
+
+@pytest.mark.parametrize("change", ["prior", "bag", "level"])
+def test_a_state_of_another_trained_model_is_refused(panda, online, log, tmp_path, change):
+    fed(online, list(log)[:50])
+    path = online.save(tmp_path / "state.npz")
+    model = shipped_model(panda)
+    other = retrained(model, change).save(tmp_path / "other.safetensors")
+    with pytest.raises(IdentificationError, match=r"saved with .* trained model .*: found .*; give .* or begin anew"):
+        OnlineIdentifier.restore(path, panda, other)
+    with pytest.raises(IdentificationError, match="found the method map, which has no trained model"):
+        OnlineIdentifier.restore(path, panda, "map")
+
+
+def test_a_state_goes_on_with_its_model_whatever_the_file_is_called_and_says_of_itself(panda, online, log, tmp_path):
+    samples = list(log)[:120]
+    fed(online, samples[:50])
+    model = shipped_model(panda)
+    same = replace(model, provenance={**model.provenance, "note": "copied"}).save(tmp_path / "same.safetensors")
+    restored = OnlineIdentifier.restore(online.save(tmp_path / "state.npz"), panda, same)
+    again = OnlineIdentifier.restore(restored.save(tmp_path / "again.npz"), panda)  # from one that was restored
+    phis = [fed(each, samples[50:]).phi for each in (online, restored, again)]
+    for each in (restored, again):
+        each.close()
+    np.testing.assert_array_equal(phis[0], phis[1])
+    np.testing.assert_array_equal(phis[0], phis[2])
+
+
+def test_a_state_of_an_earlier_format_is_refused(panda, online, log, tmp_path):
+    fed(online, list(log)[:50])
+    path = online.save(tmp_path / "state.npz")
+    with np.load(path) as data:
+        arrays = dict(data)
+    text = json.loads(arrays["tree"].tobytes().decode())
+    del text["origin"]  # where format 1 had none
+    arrays["tree"] = np.frombuffer(json.dumps({**text, "format": 1}).encode(), dtype=np.uint8)
+    np.savez(path, **arrays)
+    with pytest.raises(IdentificationError, match="another version of armload: begin anew"):
+        OnlineIdentifier.restore(path, panda)
 
 
 def test_a_state_file_makes_nothing_that_is_not_armloads(panda, online, log, tmp_path):

@@ -8,6 +8,7 @@ for sample in source:
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -26,7 +27,7 @@ from armload.online.engines import engine
 from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
 from armload.online.gate import Gate, Health, all_finite
-from armload.online.state import load_state, save_state
+from armload.online.state import load_state, model_fingerprint, save_state
 from armload.online.watch import PayloadWatch
 from armload.recording import Recording, Sample
 
@@ -144,8 +145,7 @@ class OnlineIdentifier:
         if self._watch is not None:
             self._watch.hold()
         state = {k: v for k, v in vars(self).items() if k not in ("arm", "tare")}
-        origin = {"arm": self.arm.fingerprint, "name": self.arm.name}
-        return save_state({"origin": origin, "state": state, "tared": self._tared}, self._known(), path)
+        return save_state({"state": state, "tared": self._tared}, self._known(), path, self._origin())
 
     @classmethod
     def restore(cls, path: str | PathLike[str], arm: Arm, method: str | Path | None = None) -> Self:
@@ -155,16 +155,29 @@ class OnlineIdentifier:
             path: what `save` wrote. arm, method: what the identifier was made with; a tare is in the state.
 
         Raises:
-            IdentificationError: the file is none, or of another arm.
+            IdentificationError: the file is none, or of another arm or trained model.
         """
         new = cls(arm, method=method)
-        saved = load_state(path, new._known())
-        if saved["origin"]["arm"] != arm.fingerprint:
-            raise IdentificationError(
-                f"{path} was saved for {saved['origin']['name']}: {arm.name} is another arm, or has another frame, "
-                "gravity or tool"
-            )
-        new.close()
+        own = new._origin()
+
+        def check(origin: Mapping[str, Any]) -> None:
+            if origin["arm"] != own["arm"]:
+                raise IdentificationError(
+                    f"{path} was saved for {origin['name']}: {arm.name} is another arm, or has another frame, gravity "
+                    "or tool"
+                )
+            if origin["model"] not in (None, own["model"]):  # its numbers and this model's would be mixed
+                there = "which has no trained model" if own["model"] is None else f"whose model is {own['model'][:12]}"
+                raise IdentificationError(
+                    f"{path} was saved with the method {origin['method']} and its trained model "
+                    f"{origin['model'][:12]} (SHA-256): found the method {own['method']}, {there}; give the method or "
+                    "the model's file that it was saved with, or begin anew"
+                )
+
+        try:
+            saved = load_state(path, new._known(), check)
+        finally:
+            new.close()
         new.__dict__.update(saved["state"])
         new._tared = saved["tared"]
         return new
@@ -173,6 +186,16 @@ class OnlineIdentifier:
         """What a new identifier for the same arm has already: the arm and the trained parts."""
         parts = {name: value for name in ("model", "_payloads") if (value := getattr(self._engine, name, None))}
         return {"arm": self.arm, **parts}
+
+    def _origin(self) -> dict[str, Any]:
+        """What a state holds for: it refers to the arm and the trained model, and has neither in it."""
+        model = self._known().get("model")
+        return {
+            "arm": self.arm.fingerprint,
+            "name": self.arm.name,
+            "method": self.method,
+            "model": None if model is None else model_fingerprint(model),
+        }
 
     def _identify(self, sample: Sample) -> None:
         run: Identifier = self._engine
@@ -214,8 +237,9 @@ class OnlineIdentifier:
 
     def _judge(self, estimate: Estimate, run: Identifier) -> None:
         """What the data determine, and whether anything is there."""
-        self._determined = determined(estimate.std, self._before, run.alone, self._weak)
-        self._held = held(float(estimate.phi[0]), float(estimate.std[0]), bool(self._determined[0]))
+        std = estimate.std
+        self._determined = determined(std, self._before, run.alone, self._weak)
+        self._held = held(float(estimate.phi[0]), float(std[0]), bool(self._determined[0]))
         notes = []
         if not self._moving:
             notes.append("not moving: inertia undetermined" if not self._determined[4:].all() else "not moving")

@@ -6,11 +6,13 @@ is read: only classes of armload are made again, without calling anything of the
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import io
 import json
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import fields, is_dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -20,23 +22,24 @@ import numpy as np
 from armload.atomic import replacing
 from armload.errors import IdentificationError
 
-FORMAT = 1
+FORMAT = 2
 _PACKAGE = "armload."
 _NOT_SAVED = ("_worker", "_data", "_model", "_catching_up")  # threads, and what Pinocchio makes anew
 _MADE_ANEW = ("armload.arms.rows.MomentumRow", "armload.arms.forward.ForwardDynamics")  # of the arm alone
 
 
-def save_state(state: Any, known: Mapping[str, Any], path: str | PathLike[str]) -> Path:
+def save_state(state: Any, known: Mapping[str, Any], path: str | PathLike[str], origin: Mapping[str, Any]) -> Path:
     """Write an object to a file; it appears whole or not at all.
 
     Args:
         state: lists, dicts, numbers, arrays and objects of armload, shared or in circles.
         known: objects that whoever loads the state has already, by name; they are not written.
+        origin: JSON that tells whether these are the same.
     """
     packed = _Packer(known)
     tree = packed.node(state)
     arrays = {f"a{k}": array for k, array in enumerate(packed.arrays)}
-    text = json.dumps({"format": FORMAT, "tree": tree, "objects": packed.objects})
+    text = json.dumps({"format": FORMAT, "origin": origin, "tree": tree, "objects": packed.objects})
     path = Path(path)
     with replacing(path) as part:
         buffer = io.BytesIO()
@@ -45,8 +48,13 @@ def save_state(state: Any, known: Mapping[str, Any], path: str | PathLike[str]) 
     return path
 
 
-def load_state(path: str | PathLike[str], known: Mapping[str, Any]) -> Any:
+def load_state(path: str | PathLike[str], known: Mapping[str, Any], check: Callable[[Mapping[str, Any]], None]) -> Any:
     """Read what `save_state` wrote.
+
+    Args:
+        path: the file.
+        known: as it was saved with.
+        check: raises if the origin it is given does not fit; nothing has been made yet then.
 
     Raises:
         IdentificationError: missing, damaged or foreign file, or one of another armload.
@@ -56,6 +64,7 @@ def load_state(path: str | PathLike[str], known: Mapping[str, Any]) -> Any:
             text = json.loads(data["tree"].tobytes().decode())
             if text["format"] != FORMAT:
                 raise IdentificationError(f"{path} belongs to another version of armload: begin anew")
+            check(text["origin"])
             arrays = [data[f"a{k}"] for k in range(len(data.files) - 1)]
         return _Unpacker(text["objects"], arrays, known).node(text["tree"])
     except FileNotFoundError:
@@ -64,6 +73,25 @@ def load_state(path: str | PathLike[str], known: Mapping[str, Any]) -> Any:
         raise
     except Exception as error:
         raise IdentificationError(f"{path} is no state of a live identifier ({error}): begin without it") from None
+
+
+def model_fingerprint(model: Any) -> str:
+    """SHA-256 of a trained model: of all arrays and numbers in its fields, whatever its file and its provenance say."""
+    digest = hashlib.sha256()
+
+    def take(name: str, value: Any) -> None:
+        if is_dataclass(value):  # its fields alone: what it has worked out since is no part of it
+            for field in fields(value):
+                take(f"{name}.{field.name}", getattr(value, field.name))
+        elif isinstance(value, tuple):
+            for k, part in enumerate(value):
+                take(f"{name}.{k}", part)
+        elif isinstance(value, np.ndarray | int | float):
+            array = np.asarray(value)
+            digest.update(f"{name} {array.dtype.str} {array.shape} ".encode() + array.tobytes())
+
+    take(type(model).__name__, model)
+    return digest.hexdigest()
 
 
 class _Packer:
