@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from armload.arms import arm, full_arm_regressor, momentum_regressor
+from armload.arms import Arm, arm, full_arm_regressor, momentum_regressor
 from armload.arms.rows import MomentumRow
 from armload.hybrid import HybridIdentifier, StreamingHybrid
 from armload.least_squares import JointFeatures, PosteriorLeastSquares, StreamingIdentifier, payload_prior_std
@@ -13,6 +13,7 @@ from armload.least_squares.posterior import advance
 from armload.least_squares.regression import RegressionData
 from armload.least_squares.rows import RowStream
 from armload.motion import random_motion, taie2024
+from armload.online.changes import foresee
 from armload.payloads import test_payload as make_payload
 from armload.simulate import World, simulate
 
@@ -67,6 +68,24 @@ def test_a_row_of_the_momentum_form_is_what_the_arrays_give(name):
         assert drift == pytest.approx(np.concatenate([payload.drift, links.drift], axis=2)[0], abs=1e-12)
 
 
+def test_a_row_knows_slanted_and_sliding_joints():
+    inertial = '<inertial><origin xyz="0.02 0.1 -0.03"/><mass value="2"/><inertia ixx="0.1" iyy="0.2" izz="0.15" '
+    inertial += 'ixy="0.01" ixz="0" iyz="0"/></inertial>'
+    joint = (
+        '<joint name="j{0}" type="{1}"><parent link="l{0}"/><child link="l{2}"/><origin xyz="0.1 0.2 0.3" '
+        'rpy="0.1 0.2 0.3"/><axis xyz="{3}"/><limit lower="-2" upper="2" effort="10" velocity="2"/></joint>'
+    )
+    kinds = (("revolute", "0.3 0.5 -0.6"), ("prismatic", "0.3 -0.5 0.6"), ("continuous", "0 -1 0"), ("fixed", "1 0 0"))
+    bodies = [f'<link name="l{k}">{inertial}</link>' for k in range(len(kinds) + 1)]
+    joints = [joint.format(k, kind, k + 1, axis) for k, (kind, axis) in enumerate(kinds)]
+    robot = Arm("slanted", f'<robot name="slanted">{"".join([*bodies, *joints])}</robot>')
+    q, dq = np.random.default_rng(3).normal(size=(2, robot.n))
+    momentum, drift = MomentumRow(robot)(q, dq)
+    payload, links = momentum_regressor(robot.frame_motion(q), dq), full_arm_regressor(robot, q, dq)
+    assert momentum == pytest.approx(np.concatenate([payload.momentum, links.momentum], axis=2)[0], abs=1e-12)
+    assert drift == pytest.approx(np.concatenate([payload.drift, links.drift], axis=2)[0], abs=1e-12)
+
+
 def test_the_links_rows_give_the_arms_own_momentum(panda):
     rng = np.random.default_rng(2)
     q, dq = rng.normal(size=(2, 7))
@@ -107,6 +126,15 @@ def test_an_innovation_is_what_the_rows_before_did_not_say(panda, rows):
     w, e, v = state.seen[:, :10], state.seen[:, 10], state.seen[:, 11]
     assert state.information - Λ == pytest.approx(w.T @ (w / v[:, None]), abs=1e-6 * np.abs(w).max() ** 2)
     assert state.vector - h == pytest.approx(w.T @ (e / v), abs=1e-6 * np.abs(w.T @ (e / v)).max())
+
+
+def test_what_is_foreseen_of_a_row_is_the_innovation_of_its_first_joint_if_it_is_taken(panda, rows):
+    _, state = advance([regression(panda, rows[:-1])], payload_prior_std(panda), steps=0)
+    state.take(rows[-2])  # no longer the state that the solution left
+    seen, scale = foresee(state, rows[-1])
+    state.take(rows[-1])
+    assert scale == pytest.approx(state.scale)
+    assert seen[0] == pytest.approx(state.seen[0], rel=1e-9, abs=1e-12)
 
 
 @pytest.mark.parametrize("tared", [False, True])

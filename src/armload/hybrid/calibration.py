@@ -54,7 +54,8 @@ class Calibration:
         """By which factor the physics overrates the evidence of a log with these traits (T,)."""
         if self.bag is None:
             return self.level
-        return min(max(self.level * 10.0 ** float(self.bag.row(traits).mean()), _KAPPA[0]), _KAPPA[1])
+        said = self.bag.row(traits)
+        return min(max(self.level * 10.0 ** float(said.sum() / said.size), _KAPPA[0]), _KAPPA[1])
 
     def width(self, t: float, kind: int) -> NDArray[np.float64]:
         """Quantile (10,) of |error|/std after t seconds: linear in log t, constant beyond the calibrated times."""

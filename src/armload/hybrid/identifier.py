@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from armload.arms import Arm
@@ -85,7 +86,7 @@ def answer(
     `trusted`: evidence as far as it can be trusted (`Calibration.trusted`). `quick`: the body is found in bounded time,
     to a hundredth of a standard deviation.
     """
-    vectors = np.stack([trusted.vector, -trusted.vector][: 2 if trusted.kind else 1])
+    vectors = np.array([trusted.vector, -trusted.vector] if trusted.kind else [trusted.vector])
     found, *removed = payloads.posteriors(trusted.information, vectors)
     if removed and removed[0].log_evidence + np.log(_REMOVED) > found.log_evidence:  # it was taken off since the tare
         return -removed[0].mean, calibration.widened(removed[0], trusted)  # −phi is a body
@@ -99,9 +100,19 @@ def std_alone(trusted: Evidence | None, weak: NDArray[np.float64]) -> NDArray[np
     """Standard deviation (10,) under a weak prior of standard deviations `weak`, evidence trusted as far as it is."""
     if trusted is None:
         return weak
-    unit = weak[:, None] * trusted.information * weak
-    unit.flat[::11] += 1.0
-    return weak * np.sqrt(inverse(unit).diagonal())
+    return _std_alone(trusted.information, weak)
+
+
+@njit(cache=True, nogil=True)
+def _std_alone(information, weak):  # pragma: no cover - compiled
+    unit, out = np.eye(10), np.empty(10)
+    for i in range(10):
+        for j in range(10):
+            unit[i, j] += weak[i] * information[i, j] * weak[j]
+    P = inverse(unit)
+    for i in range(10):
+        out[i] = weak[i] * np.sqrt(P[i, i])
+    return out
 
 
 def body(phi: NDArray[np.float64], covariance: NDArray[np.float64]) -> NDArray[np.float64]:

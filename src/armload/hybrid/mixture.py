@@ -136,17 +136,16 @@ class MixturePrior:
         return self.covariances / np.outer(self._scale, self._scale)
 
     @cached_property
-    def _precisions(self) -> NDArray[np.float64]:
-        return np.asarray(np.linalg.inv(self._scaled), dtype=float)
-
-    @cached_property
-    def _pulls(self) -> NDArray[np.float64]:
-        return np.einsum("kij,kj->ki", self._precisions, self.means / self._scale)
-
-    @cached_property
-    def _constants(self) -> NDArray[np.float64]:
-        quadratic = np.einsum("ki,ki->k", self._pulls, self.means / self._scale)
-        return np.log(np.maximum(self.weights, 1e-300)) - 0.5 * quadratic - 0.5 * np.linalg.slogdet(self._scaled)[1]
+    def _tables(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Of the components, in units of `_scale` and beside each other: precisions (10, 10, K), pulls C_k⁻¹·mu_k
+        (10, K), and what else is in ln w_k' (K,).
+        """
+        precisions, means = np.asarray(np.linalg.inv(self._scaled), dtype=float), self.means / self._scale
+        pulls = np.einsum("kij,kj->ki", precisions, means)
+        constants = np.log(np.maximum(self.weights, 1e-300)) - 0.5 * np.einsum("ki,ki->k", pulls, means)
+        constants -= 0.5 * np.linalg.slogdet(self._scaled)[1]
+        symmetric = 0.5 * (precisions + np.swapaxes(precisions, 1, 2))
+        return np.ascontiguousarray(np.moveaxis(symmetric, 0, 2)), np.ascontiguousarray(pulls.T), constants
 
     def posterior(self, information: NDArray, vector: NDArray) -> MixturePosterior:
         """phi given Λ (10, 10) and h (10,), moments matched."""
@@ -154,77 +153,104 @@ class MixturePrior:
 
     def posteriors(self, information: NDArray, vectors: NDArray) -> list[MixturePosterior]:
         """phi given Λ (10, 10) and each of several h (V, 10): one factorisation serves them all."""
-        s = self._scale
-        unit = np.outer(s, s)
-        means, covariances, weights, totals = _posteriors(
-            self._precisions, self._pulls, self._constants, information * unit, vectors * s
-        )
-        return [
-            MixturePosterior(m * s, c * unit, w, float(total))
-            for m, c, w, total in zip(means, covariances, weights, totals, strict=True)
-        ]
+        found = _posteriors(*self._tables, self._scale, information, vectors)
+        return [MixturePosterior(m, P, w, float(total)) for m, P, w, total in zip(*found, strict=True)]
 
 
-@njit(cache=True, nogil=True)
-def _posteriors(precisions, pulls, constants, information, vectors):  # pragma: no cover - compiled
-    K, V, d = len(precisions), len(vectors), 10
-    means, covariances = np.zeros((V, K, d)), np.empty((K, d, d))
-    log = np.empty((V, K))
-    L, inverse = np.empty((d, d)), np.empty((d, d))
-    for k in range(K):
-        half = 0.0  # ½·ln|precision|
+# Several components are computed at once: they lie beside each other, each innermost loop runs over them, and the order
+# of sums is left to the compiler.
+@njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz"})
+def _components(precisions, pulls, constants, information, vectors):  # pragma: no cover - compiled
+    """P_k (10, 10, K), its lower triangle, m_k (V, 10, K) and ln w_k' (V, K)."""
+    V, d, K = len(vectors), len(pulls), len(constants)
+    L, y, root = np.empty((d, d, K)), np.empty((d, K)), np.ones(K)
+    P, means, log = np.empty((d, d, K)), np.zeros((V, d, K)), np.empty((V, K))
+    for j in range(d):  # L·Lᵀ = Λ + C_k⁻¹, the diagonal inverted: a product is sooner had than a quotient
+        for i in range(j, d):
+            out, one, known = L[i, j], precisions[i, j], 0.5 * (information[i, j] + information[j, i])
+            for k in range(K):
+                out[k] = one[k] + known
+            for m in range(j):
+                one, other = L[i, m], L[j, m]
+                for k in range(K):
+                    out[k] -= one[k] * other[k]
+            if i > j:
+                one = L[j, j]
+                for k in range(K):
+                    out[k] *= one[k]
+            else:
+                for k in range(K):
+                    pivot = np.sqrt(max(out[k], 1e-12))
+                    root[k] *= pivot
+                    out[k] = 1.0 / pivot
+    for i in range(d):  # L⁻¹ in its place
+        for j in range(i):
+            total, last, out = y[0], L[i, i], L[i, j]
+            total[:] = 0.0
+            for m in range(j, i):
+                one, other = L[i, m], L[m, j]
+                for k in range(K):
+                    total[k] -= one[k] * other[k]
+            for k in range(K):
+                out[k] = total[k] * last[k]
+    for i in range(d):
+        for j in range(i + 1):
+            out = P[i, j]
+            out[:] = 0.0
+            for m in range(i, d):
+                one, other = L[m, i], L[m, j]
+                for k in range(K):
+                    out[k] += one[k] * other[k]
+    for v in range(V):
+        weight = log[v]
+        for k in range(K):
+            weight[k] = constants[k] - np.log(root[k])
+        for i in range(d):
+            total = y[i]
+            total[:] = 0.0
+            for j in range(i + 1):
+                one, pull, known = L[i, j], pulls[j], vectors[v, j]
+                for k in range(K):
+                    total[k] += one[k] * (pull[k] + known)
+            for k in range(K):
+                weight[k] += 0.5 * total[k] * total[k]
+            for j in range(i + 1):
+                out, one = means[v, j], L[i, j]
+                for k in range(K):
+                    out[k] += one[k] * total[k]
+    return P, means, log
+
+
+@njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz"})
+def _posteriors(precisions, pulls, constants, scale, information, vectors):  # pragma: no cover - compiled
+    """Means (V, 10), covariances (V, 10, 10), weights (V, K) and ln p(evidence) + const (V,)."""
+    (V, d), K = vectors.shape, len(constants)
+    Λ, h = np.empty((d, d)), np.empty((V, d))
+    for i in range(d):
         for j in range(d):
-            for i in range(j, d):
-                total = 0.5 * (precisions[k, i, j] + precisions[k, j, i] + information[i, j] + information[j, i])
-                for m in range(j):
-                    total -= L[i, m] * L[j, m]
-                if i == j:
-                    inverse[j, j] = 1.0 / np.sqrt(max(total, 1e-12))  # a product is sooner had than a quotient
-                    half -= np.log(inverse[j, j])
-                else:
-                    L[i, j] = total * inverse[j, j]
-        for j in range(d):  # inverse of L, by columns
-            for i in range(j + 1, d):
-                total = 0.0
-                for m in range(j, i):
-                    total -= L[i, m] * inverse[m, j]
-                inverse[i, j] = total * inverse[i, i]
+            Λ[i, j] = scale[i] * information[i, j] * scale[j]
+        for v in range(V):
+            h[v, i] = scale[i] * vectors[v, i]
+    P, m, weights = _components(precisions, pulls, constants, Λ, h)
+    mean, covariance, totals = np.empty((V, d)), np.empty((V, d, d)), np.empty(V)
+    for v in range(V):
+        w, largest = weights[v], weights[v].max()
+        total = 0.0
+        for k in range(K):
+            w[k] = np.exp(w[k] - largest)
+            total += w[k]
+        totals[v] = largest + np.log(total)
+        w /= total
+        for i in range(d):
+            away, total = m[v, i], 0.0
+            for k in range(K):
+                total += w[k] * away[k]
+            away -= total
+            mean[v, i] = total * scale[i]
         for i in range(d):
             for j in range(i + 1):
-                total = 0.0
-                for m in range(i, d):
-                    total += inverse[m, i] * inverse[m, j]
-                covariances[k, i, j] = covariances[k, j, i] = total
-        for v in range(V):
-            quadratic = 0.0
-            for i in range(d):
-                total = 0.0
-                for j in range(d):
-                    total += covariances[k, i, j] * (pulls[k, j] + vectors[v, j])
-                means[v, k, i] = total
-                quadratic += total * (pulls[k, i] + vectors[v, i])
-            log[v, k] = constants[k] + 0.5 * quadratic - half
-    mean, covariance, totals = np.zeros((V, d)), np.zeros((V, d, d)), np.empty(V)
-    weights = np.empty((V, K))
-    for v in range(V):
-        largest = log[v].max()
-        weights[v] = np.exp(log[v] - largest)
-        total = weights[v].sum()
-        totals[v] = largest + np.log(total)
-        weights[v] /= total
-        for k in range(K):
-            w = weights[v, k]
-            for i in range(d):
-                mean[v, i] += w * means[v, k, i]
-        for k in range(K):
-            w = weights[v, k]
-            if w < 1e-12:
-                continue
-            for i in range(d):
-                away = means[v, k, i] - mean[v, i]
-                for j in range(i + 1):
-                    covariance[v, i, j] += w * (covariances[k, i, j] + away * (means[v, k, j] - mean[v, j]))
-        for i in range(d):
-            for j in range(i):
-                covariance[v, j, i] = covariance[v, i, j]
+                one, other, own, total = m[v, i], m[v, j], P[i, j], 0.0
+                for k in range(K):
+                    total += w[k] * (own[k] + one[k] * other[k])
+                covariance[v, i, j] = covariance[v, j, i] = total * scale[i] * scale[j]
     return mean, covariance, weights, totals

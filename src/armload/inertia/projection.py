@@ -31,20 +31,27 @@ def near_consistent(phi: ArrayLike, precision: ArrayLike) -> NDArray[np.float64]
     """
     phi = np.ascontiguousarray(phi, dtype=float)
     P = np.ascontiguousarray(precision, dtype=float)
-    if np.isfinite(phi.sum() + P.sum()):
-        if _is_body(phi, _BASIS):
-            return phi
-        x, converged = _central_path(phi, P, _start(phi), _BARRIERS, _BASIS)
-        if converged and np.isfinite(x.sum()):
-            return x
-    return nearest_consistent(phi, P)
+    x, found = _near(phi, P, _BARRIERS, _BASIS)
+    return x if found else nearest_consistent(phi, P)
 
 
-def _start(phi: NDArray[np.float64]) -> NDArray[np.float64]:
-    m = max(float(phi[0]), _LIGHTEST)
-    r = phi[1:4] / m
-    r = r * min(1.0, _FARTHEST / max(float(np.linalg.norm(r)), 1e-12))
-    x, y, z = r
+@njit(cache=True, nogil=True)
+def _near(phi, P, barriers, basis):  # pragma: no cover - compiled
+    """phi, if it is a body, or the end of the central path; and whether that is anything."""
+    if not np.isfinite(phi.sum() + P.sum()):
+        return phi, False
+    if _is_body(phi, basis):
+        return phi, True
+    x, converged = _central_path(phi, P, _start(phi), barriers, basis)
+    return x, converged and np.isfinite(x.sum())
+
+
+@njit(cache=True, nogil=True)
+def _start(phi):  # pragma: no cover - compiled
+    m = max(phi[0], _LIGHTEST)
+    far = np.sqrt(phi[1] * phi[1] + phi[2] * phi[2] + phi[3] * phi[3]) / m
+    shrink = min(1.0, _FARTHEST / max(far, 1e-12)) / m
+    x, y, z = phi[1] * shrink, phi[2] * shrink, phi[3] * shrink
     k = _SIZE**2
     return m * np.array([1.0, x, y, z, y * y + z * z + k, -x * y, -x * z, x * x + z * z + k, -y * z, x * x + y * y + k])
 

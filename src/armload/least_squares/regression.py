@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numba import vectorize
 from numpy.typing import NDArray
 
 from armload.arms import momentum_regressor
@@ -49,7 +50,8 @@ class Stiction:
         return t - self._rest[0] > self.settling
 
 
-def presliding(dq: NDArray) -> NDArray[np.float64]:
+@vectorize(cache=True)
+def presliding(dq):
     """Weight of a joint's row at velocity dq [rad/s]: 1 in motion, less where friction is anything below stiction."""
     return 1.0 / (1.0 + _PRESLIDING * (1.0 - np.tanh(np.abs(dq) / FRICTION_WIDTH) ** 2))
 

@@ -55,7 +55,7 @@ class RowStream:
         self._torque, self._tau = np.zeros(n), np.zeros(n)
         # lag of the regressor, of the bare arm, of the pose's and of the velocities' features: states, last inputs
         shapes = ((n, wide), (n,), (self.features.pose,), (n, self.features.velocity))
-        self._states = tuple((np.zeros(shape), np.zeros(shape)) for shape in shapes)
+        self._states = tuple(np.zeros(shape) for shape in shapes for _ in range(2))
 
     def feed(self, t: float, q: NDArray, dq: NDArray, tau: NDArray) -> Row | None:
         """The row that a sample (n,) completes, if it does; times rise."""
@@ -74,8 +74,8 @@ class RowStream:
         h = 0.0 if self._fresh else t - self._row_t
         momentum, drift = self._momentum(q, dq)
         pose, velocity = self.features.of_sample(q, dq)
-        arrays = [array for pair in self._states for array in pair]
-        X, r = _row(momentum, drift, self._links, dq, pose, velocity, self._torque, self.gain, h, self._fresh, *arrays)
+        inputs = (momentum, drift, self._links, dq, pose, velocity, self._torque)
+        X, r = _row(*inputs, self.gain, h, self._fresh, *self._states)
         self._row_t, self._fresh = t, False
         counted = 0.0 if self._stiction.known(t, q.copy()) else h
         return Row(counted, X, r, presliding(dq))

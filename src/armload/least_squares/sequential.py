@@ -36,7 +36,8 @@ class SequentialPosterior:
     """The state of the recursion; `take` changes it in place.
 
     C (n, R, R), own (n, R), slope (n, R, 10 + m): of the joints' own weights. shared_C (m, m), shared_own (m,),
-    shared_slope (m, 10): of what the joints share, s = [tares' payloads, eta]. information Λ (10, 10), vector h (10,).
+    shared_slope (m, 10): of what the joints share, s = [tares' payloads, eta]. Of C and shared_C only the lower
+    triangles count: half of what a row reads and writes. information Λ (10, 10), vector h (10,).
     noise: S (n,) [N²·m²·s]. tares: runs before this one, whose payloads the rows carry too.
     seen: (n, 12) of each joint's last row, given all before: w (10,), e' and v', so that e' ~ N(w·phi, v').
     scale: (n,) what the last row was multiplied by.
@@ -97,11 +98,11 @@ def _take(X, r, scale, tares, C, own, slope, shared_C, shared_own, shared_slope,
         for i in range(R):
             x[i] = a * X[j, known + i]
         for i in range(R):
-            total = 0.0
-            row = C[j, i]
-            for k in range(R):
+            total, row, xi = 0.0, C[j, i], x[i]
+            for k in range(i):
                 total += row[k] * x[k]
-            c[i] = total
+                c[k] += row[k] * xi
+            c[i] = total + row[i] * xi
         for i in range(R):
             v += x[i] * c[i]
             e -= own[j, i] * x[i]
@@ -116,14 +117,14 @@ def _take(X, r, scale, tares, C, own, slope, shared_C, shared_own, shared_slope,
             for k in range(Z):
                 row[k] += g * z[k]
             row = C[j, i]
-            for k in range(R):
+            for k in range(i + 1):
                 row[k] -= g * c[k]
         for i in range(m):
-            total = 0.0
-            row = shared_C[i]
-            for k in range(m):
+            total, row, u = 0.0, shared_C[i], z[10 + i]
+            for k in range(i):
                 total += row[k] * z[10 + k]
-            c[i] = total
+                c[k] += row[k] * u
+            c[i] = total + row[i] * u
         for k in range(10):
             w[k] = z[k]
         for i in range(m):
@@ -138,7 +139,7 @@ def _take(X, r, scale, tares, C, own, slope, shared_C, shared_own, shared_slope,
             for k in range(10):
                 shared_slope[i, k] += g * w[k]
             row = shared_C[i]
-            for k in range(m):
+            for k in range(i + 1):
                 row[k] -= g * c[k]
         seen[j, 10], seen[j, 11] = e, v
         for i in range(10):

@@ -159,18 +159,18 @@ def _foresee(
             z[10 * tares + k] = a * X[j, k]
         e, v = a * r[j], 1.0
         for i in range(R):
-            x, total = a * X[j, known + i], 0.0
-            for k in range(R):
-                total += C[j, i, k] * X[j, known + k]
-            v += x * a * total
+            x, total = a * X[j, known + i], 0.0  # of C the lower triangle
+            for k in range(i):
+                total += 2.0 * C[j, i, k] * X[j, known + k]
+            v += x * a * (total + C[j, i, i] * X[j, known + i])
             e -= own[j, i] * x
             for k in range(Z):
                 z[k] -= slope[j, i, k] * x
         for i in range(m):
             u, total = z[10 + i], 0.0
-            for k in range(m):
-                total += shared_C[i, k] * z[10 + k]
-            v += u * total
+            for k in range(i):
+                total += 2.0 * shared_C[i, k] * z[10 + k]
+            v += u * (total + shared_C[i, i] * u)
             e -= shared_own[i] * u
         for k in range(10):
             w = z[k]
