@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy.special import digamma
 
 from armload.determined import Z95
 from armload.hybrid.evidence import KINDS, Evidence
@@ -163,14 +164,14 @@ def scores(records: Records, prior: MixturePrior, calibration: Calibration) -> N
     return out
 
 
-def overrating(records: Records, prior: MixturePrior) -> NDArray[np.float64]:
+def overrating(records: Records, prior: MixturePrior) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """By which factor each row's evidence was overrated: squared error over variance, where the log tells something.
 
     In the coordinates in which the prior's covariance is the identity, Λ = V·diag(l)·Vᵀ; over the directions with
-    l ≥ 9 the mean of l·(vᵀ·(phi − phi_ML))²; NaN where there is no such direction.
+    l ≥ 9 the mean of l·(vᵀ·(phi − phi_ML))²; NaN where there is no such direction. Beside it, how many there are.
     """
     s = prior.std
-    out = np.full(len(records), np.nan)
+    out, count = np.full(len(records), np.nan), np.zeros(len(records), dtype=np.int64)
     for k in range(len(records)):
         values, V = np.linalg.eigh(records.information[k] * np.outer(s, s))
         seen = values > _INFORMATIVE
@@ -178,18 +179,21 @@ def overrating(records: Records, prior: MixturePrior) -> NDArray[np.float64]:
             V, values = V[:, seen], values[seen]
             found = (V.T @ (records.vector[k] * s)) / values
             out[k] = np.mean(values * (V.T @ (records.truth[k] / s) - found) ** 2)
-    return out
+            count[k] = len(values)
+    return out, count
 
 
 def _fit_kappa(
     records: Records, prior: MixturePrior, learned: tuple[str, ...], seed: int
 ) -> tuple[Compiled | None, float]:
-    target = overrating(records, prior)
+    target, directions = overrating(records, prior)
     keep = np.isfinite(target)
     target, traits, episode = target[keep], records.traits[keep], records.episode[keep]
+    half = 0.5 * directions[keep]
     if not learned:
         return None, float(np.mean(target))
-    log = np.log10(np.maximum(target, 1e-3))[:, None]
+    # the mean of ln(χ²_m / m) is ψ(m/2) − ln(m/2): −1.27 of one direction, −0.1 of ten; no sign of good evidence
+    log = (np.log10(np.maximum(target, 1e-3)) - (digamma(half) - np.log(half)) / np.log(10.0))[:, None]
     rng = np.random.default_rng(seed + 1)
     episodes = rng.permutation(np.unique(episode))
     checked = np.isin(episode, episodes[: len(episodes) // 5])
