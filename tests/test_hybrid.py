@@ -209,6 +209,18 @@ def test_evidence_that_claims_too_much_is_found_to_do_so_by_its_own_factor(synth
     assert np.nanmean(overrating(synthetic, mixture)[0] / claimed) == pytest.approx(1.0, abs=0.05)
 
 
+def test_evidence_about_one_direction_is_trusted_as_much_as_evidence_about_all(synthetic, mixture):
+    rng, rows = np.random.default_rng(7), synthetic.select(synthetic.t == 0.1)
+    rows.traits[:, 1] = np.arange(len(rows)) % 2  # every other row tells of the mass alone; all are as good as they claim
+    for k, truth in enumerate(rows.truth):
+        std = 0.02 * mixture.std * np.where(np.arange(10) < 1 + 9 * rows.traits[k, 1], 1.0, 1e6)
+        rows.information[k] = np.diag(std**-2.0)
+        rows.vector[k] = rng.normal(truth, std) / std**2
+    calibration = Calibration.fit(rows, mixture)
+    one, all_ten = (calibration.kappa(rows.traits[k]) for k in (0, 1))
+    assert one == pytest.approx(all_ten, rel=0.4)  # the mean logarithm of a single square is less by a factor of 3.2
+
+
 def test_kappa_follows_the_trait_that_carries_it(synthetic, mixture):
     calibration = Calibration.fit(synthetic, mixture)
     traits = np.zeros((2, len(TRAITS)))
