@@ -69,7 +69,9 @@ class URSource(Source):
         while not self._stop.is_set():
             t = client.getTimestamp()
             if t == last:
-                if time.monotonic() - heard > _SILENCE or not client.isConnected():
+                if not client.isConnected():
+                    raise SourceError(f"{self.name} was lost: the connection was closed")
+                if time.monotonic() - heard > _SILENCE:
                     raise SourceError(f"{self.name} was lost: no sample for {time.monotonic() - heard:.1f} s")
                 self._stop.wait(_LOOK)
                 continue
