@@ -69,8 +69,9 @@ class OnlineEstimate(Estimate):
     def to_dict(self) -> dict[str, Any]:
         """One JSON object, its names those of `armload identify --json` where they mean the same.
 
-        Numbers are finite: the end of an interval of which the method knows nothing is null, and so are the centre of
-        mass and the inertia about it where there is no mass.
+        Intervals are the method's own, also of what is not determined: there `identify` gives the prior's. Numbers are
+        finite: the end of an interval of which the method knows nothing is null, and so are the centre of mass and the
+        inertia about it where there is no mass.
         """
         mass = float(self.phi[0])
         com, inertia_com = (None, None) if mass == 0.0 else (x.tolist() for x in phi_to_com(self.phi)[1:])
