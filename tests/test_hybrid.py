@@ -211,7 +211,7 @@ def test_evidence_that_claims_too_much_is_found_to_do_so_by_its_own_factor(synth
 
 def test_evidence_about_one_direction_is_trusted_as_much_as_evidence_about_all(synthetic, mixture):
     rng, rows = np.random.default_rng(7), synthetic.select(synthetic.t == 0.1)
-    rows.traits[:, 1] = np.arange(len(rows)) % 2  # every other row tells of the mass alone; all are as good as they claim
+    rows.traits[:, 1] = np.arange(len(rows)) % 2  # every other row tells of the mass alone, all as well as they claim
     for k, truth in enumerate(rows.truth):
         std = 0.02 * mixture.std * np.where(np.arange(10) < 1 + 9 * rows.traits[k, 1], 1.0, 1e6)
         rows.information[k] = np.diag(std**-2.0)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from armload.arms import arm
-from armload.errors import IdentificationError
 from armload.episodes import Recipe, draw_episodes, simulate_episodes
+from armload.errors import IdentificationError
 from armload.hybrid import shipped_model
 from armload.identify import Z95, identify
 from armload.inertia import InertialParameters, is_consistent
