@@ -625,11 +625,11 @@ def test_a_robot_that_does_not_answer_is_an_error_and_its_client_is_ended(client
 
 def test_a_client_that_takes_long_to_load_is_not_a_robot_that_does_not_answer(client, monkeypatch):
     client("""
-        time.sleep(1.5)
+        time.sleep(3.5)
         def Robot(*_):
             raise RuntimeError("no robot here")
         """)
-    monkeypatch.setattr("armload.sources.detached._TO_CONNECT", 1.0)
+    monkeypatch.setattr("armload.sources.detached._TO_CONNECT", 3.0)
     with pytest.raises(SourceError, match="no robot here"):
         open_source("fr3://192.0.2.9", arm("fr3"))
 

@@ -38,7 +38,7 @@ _TO_START = 60.0  # [s] to import what is needed, and to open what is no robot
 # wait a minute and longer. The limit is here, and nothing tries the robot's port beforehand, because a Franka takes one
 # connection at a time: it may still be busy with the trial when the client comes. What is broken off is the client's
 # own connection, as when any client is ended.
-_TO_CONNECT = 5.0
+_TO_CONNECT = 10.0
 _TO_OBEY = 10.0  # [s]
 _TO_END = 3.0  # [s]
 
