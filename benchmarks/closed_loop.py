@@ -13,17 +13,12 @@ docs/pictures/closed_loop.png and the table in docs/why.md.
 
 from __future__ import annotations
 
-import argparse
-import json
-import re
-import time
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from study_of_arms import ROOT, Study
 
-from armload import __version__, arm
 from armload.arms import Arm, FilteredRegression
 from armload.hybrid import HybridIdentifier
 from armload.inertia import InertialParameters
@@ -32,10 +27,8 @@ from armload.recording import Recording
 from armload.report.style import COLOURS, look, new_figure
 from armload.simulate import JointImpedance, Sensors, World, torque_controlled
 
-ROOT = Path(__file__).resolve().parents[1]
 RESULT = ROOT / "benchmarks" / "results" / "closed_loop.json"
 FIGURE = ROOT / "docs" / "pictures" / "closed_loop.png"
-PAGE = ROOT / "docs" / "why.md"
 COMMAND = "python benchmarks/closed_loop.py"
 DECLARED = ("nothing", "identified", "truth")
 SETTLE = 1.0  # [s] before a log begins
@@ -169,18 +162,6 @@ def table(summary: list[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def write_table(page: Path, name: str, text: str) -> None:
-    """Put a table between its marks on a page."""
-    marks = f"<!-- {name} -->", f"<!-- /{name} -->"
-    old = page.read_text(encoding="utf-8")
-    new, count = re.subn(
-        f"{re.escape(marks[0])}.*?{re.escape(marks[1])}", f"{marks[0]}\n{text}\n{marks[1]}", old, flags=re.DOTALL
-    )
-    if count != 1:
-        raise SystemExit(f"{page} has {count} places {marks[0]} … {marks[1]}: expected one")
-    page.write_text(new, encoding="utf-8")
-
-
 def draw(summary: list[dict[str, Any]], curves: dict[str, dict[str, NDArray[np.float64]]]) -> None:
     """One run over time, and all runs."""
     styles = dict(zip(DECLARED, ((COLOURS[3], "-"), (COLOURS[0], "-"), ("black", (0, (2, 1)))), strict=True))
@@ -219,37 +200,24 @@ def draw(summary: list[dict[str, Any]], curves: dict[str, dict[str, NDArray[np.f
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, default=8)
-    parser.add_argument("--quick", action="store_true", help="two seeds, printed and not written")
-    arguments = parser.parse_args()
-    seeds = 2 if arguments.quick else arguments.seeds
-    started, robot, rows, first = time.process_time(), arm("panda"), [], {}
-    for seed in range(seeds):
-        mine, curves = measure(robot, seed)
-        rows += mine
-        first = first or curves
-        print(f"arm {seed + 1} of {seeds}, {time.process_time() - started:.0f} s of CPU", flush=True)
-    summary = summarise(rows)
-    print(table(summary))
-    if arguments.quick:
-        return
-    draw(summary, first)
-    result = {
-        "command": f"{COMMAND} --seeds {seeds}",
-        "version": __version__,
-        "cpu_s": round(time.process_time() - started, 1),
-        "conditions": {
+    assert __doc__ is not None
+    Study(
+        about=__doc__,
+        command=COMMAND,
+        result=RESULT,
+        mark="closed loop",
+        seeds=8,
+        conditions={
             "arm": "panda, World.real_like, one per seed; Sensors.panda",
             "controller": "joint impedance with inverse dynamics, moderate_stiffness, 1 kHz, effort limits",
             "identification": "hybrid: 6 s of log with nothing declared, 20 s of tare on another motion",
             "observer_1_per_s": OBSERVER,
         },
-        "summary_mean_and_standard_deviation": summary,
-        "rows": rows,
-    }
-    RESULT.write_text(json.dumps(result, indent=1, default=float) + "\n")
-    write_table(PAGE, "closed loop", table(summary))
+        measure=measure,
+        summarise=summarise,
+        table=table,
+        draw=lambda summary, _, curves: draw(summary, curves),
+    ).run()
 
 
 if __name__ == "__main__":

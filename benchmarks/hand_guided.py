@@ -18,18 +18,14 @@ Writes benchmarks/results/hand_guided.json, docs/pictures/hand_guided.png and th
 
 from __future__ import annotations
 
-import argparse
-import json
-import time
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from closed_loop import PAGE, PAYLOADS, SETTLE, rounded, tare_of, write_table
+from closed_loop import PAYLOADS, SETTLE, rounded, tare_of
 from numpy.typing import NDArray
+from study_of_arms import ROOT, Study
 
-from armload import __version__, arm
 from armload.arms import Arm
 from armload.identifier import Identifier
 from armload.inertia import InertialParameters
@@ -39,7 +35,6 @@ from armload.recording import Recording
 from armload.report.style import COLOURS, look, new_figure
 from armload.simulate import GravityCompensation, JointImpedance, Sensors, World, torque_controlled
 
-ROOT = Path(__file__).resolve().parents[1]
 RESULT = ROOT / "benchmarks" / "results" / "hand_guided.json"
 FIGURE = ROOT / "docs" / "pictures" / "hand_guided.png"
 COMMAND = "python benchmarks/hand_guided.py"
@@ -345,36 +340,23 @@ def draw(rows: list[dict[str, Any]], curves: dict[str, Any]) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, default=6)
-    parser.add_argument("--quick", action="store_true", help="two seeds, printed and not written")
-    arguments = parser.parse_args()
-    seeds = 2 if arguments.quick else arguments.seeds
-    started, robot, rows, shown = time.process_time(), arm("panda"), [], {}
-    for seed in range(seeds):
-        mine, curves = measure(robot, seed)
-        rows += mine
-        shown = curves or shown
-        print(f"arm {seed + 1} of {seeds}, {time.process_time() - started:.0f} s of CPU", flush=True)
-    summary = summarise(rows)
-    print(table(summary))
-    if arguments.quick:
-        return
-    draw(rows, shown)
-    result = {
-        "command": f"{COMMAND} --seeds {seeds}",
-        "version": __version__,
-        "cpu_s": round(time.process_time() - started, 1),
-        "conditions": {
+    assert __doc__ is not None
+    Study(
+        about=__doc__,
+        command=COMMAND,
+        result=RESULT,
+        mark="hand guided",
+        seeds=6,
+        conditions={
             "arm": "panda, World.real_like, one per seed; Sensors.panda; 20 s of tare on another motion",
             "schedule": f"{ROUNDS} times {GUIDED:g} s guided, {HELD:g} s held; {ROUNDS * GUIDED:g} s led",
             "hands": f"{STIFFNESS:g} N/m, {DAMPING:g} N·s/m, wander {1e3 * WANDER:g} mm rms; flange and {ELBOW}",
         },
-        "summary_mean_and_standard_deviation": summary,
-        "rows": rows,
-    }
-    RESULT.write_text(json.dumps(result, indent=1, default=float) + "\n")
-    write_table(PAGE, "hand guided", table(summary))
+        measure=measure,
+        summarise=summarise,
+        table=table,
+        draw=lambda _, rows, curves: draw(rows, curves),
+    ).run()
 
 
 if __name__ == "__main__":
