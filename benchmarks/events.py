@@ -20,7 +20,8 @@ event 1 to 3 s after a change not noticed before is a late one. The time in whic
 the first second after each change; 95 % bounds are Poisson's, one-sided above.
 
 Scenes are cells in out/events: what was measured once is not measured again while `online/watch.py` and
-`online/changes.py` stay as they are. Written to benchmarks/results/events.json. In full about 80 minutes of CPU time.
+`online/changes.py` stay as they are. Written to benchmarks/results/events.json, where a part that was not asked for
+keeps what was measured of it before. In full about 80 minutes of CPU time.
 """
 
 from __future__ import annotations
@@ -478,10 +479,13 @@ def summary(cells: dict[str, list[dict]]) -> dict[str, Any]:
             out[part] = {cell["method"]: of_real(cell) for cell in found}
         elif found:
             out[part] = of_pushes(found) if "pushes" in part else of_part(found)
-    quiet = [out[part]["false_alarms"] for part in ("steps", "quiet", "hybrid") if part in out]
-    if quiet:
-        out["false_alarms_in_all"] = poisson(sum(x["count"] for x in quiet), sum(x["hours"] for x in quiet))
     return out
+
+
+def in_all(parts: dict[str, Any]) -> dict[str, Any]:
+    """False alarms of all parts in which nobody pushes."""
+    quiet = [parts[part]["false_alarms"] for part in ("steps", "quiet", "hybrid") if part in parts]
+    return poisson(sum(x["count"] for x in quiet), sum(x["hours"] for x in quiet)) if quiet else {}
 
 
 def main() -> None:
@@ -516,16 +520,18 @@ def main() -> None:
                 cell = {"name": name, "key": key, "method": method} | real(method)
                 save_cell(asked.cells, cell, indent=None)
             cells["real"].append(cell)
+    full = not asked.quick and not asked.seed and asked.scenes >= 1000
+    path = HERE / "results" / "events.json" if full else asked.cells / "summary.txt"
+    before = json.loads(path.read_text())["parts"] if full and path.is_file() else {}
+    found = before | summary(cells)
     result = {
         "command": "python benchmarks/events.py" + (" --quick" if asked.quick else ""),
         "version": __version__,
         "seeds_from": FIRST_SEED + asked.seed,
         "targets": {"median_delay_s": 0.3, "missed": 0.01, "false_alarms_per_hour": 1.0},
-        "parts": summary(cells),
+        "parts": found | {"false_alarms_in_all": in_all(found)},
     }
     text = json.dumps(result, indent=1)
-    full = not asked.quick and not asked.seed and asked.scenes >= 1000
-    path = HERE / "results" / "events.json" if full else asked.cells / "summary.txt"
     path.write_text(text + "\n")
     print(text)
 
