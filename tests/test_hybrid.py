@@ -121,6 +121,23 @@ def test_a_covariance_that_is_none_is_refused():
         MixturePrior(np.ones(1), np.zeros((1, 10)), -np.eye(10)[None], ("x",))
 
 
+@pytest.mark.parametrize(("family", "heaviest"), [("boxes", 2.8), ("shapes", 2.9), ("container", 2.2)])
+def test_error_bars_hold_for_heavy_bodies_as_for_light_ones(panda, family, heaviest):
+    """Fair evidence of 15 g, 3 g·m, 4 g·m²: what the prior makes of it holds in each third of the family's weights."""
+    rng, prior = np.random.default_rng(8), shipped_model(panda).prior
+    std = np.repeat([0.015, 3e-3, 4e-3], [1, 3, 6])
+    inside = [[], [], []]
+    for seed in range(600):
+        phi = draw_payload(family, 100_000 + seed).parameters.phi
+        found = prior.posterior(np.diag(std**-2.0), (phi + std * rng.normal(size=10)) / std**2)
+        inside[min(int(3.0 * phi[0] / heaviest), 2)].append(
+            np.abs(found.mean - phi) <= 1.96 * np.sqrt(np.diag(found.covariance))
+        )
+    for third in inside:
+        if len(third) > 50:
+            assert np.mean(np.array(third)[:, 4:]) > 0.89  # before half of the draws were as heavy as they come: 0.84
+
+
 @pytest.mark.parametrize("mass", [0.01, 0.04, 0.15])
 def test_what_is_light_is_not_taken_for_nothing(panda, mass):
     body = draw_payload("boxes", 3, mass).parameters.phi

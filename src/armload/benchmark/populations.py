@@ -106,7 +106,7 @@ def prior_of(recipe: Recipe, arm: Arm) -> GaussianPrior:
         if rng.random() < recipe.tool:
             tool = draw_payload("tools", int(rng.integers(1 << 30)), _TOOL_SHARE * rated).parameters.phi
             left -= tool[0]
-        if recipe.lighter:
+        if recipe.lighter and rng.random() < recipe.lighter:
             left *= float(np.exp(rng.uniform(np.log(_LIGHTEST), 0.0)))
         phi = draw_payload(str(rng.choice(recipe.payloads)), int(rng.integers(1 << 30)), left).parameters.phi
         shown = tool is not None and rng.random() < recipe.untared  # without a tare the tool is part of the answer

@@ -91,7 +91,7 @@ class _Draw:
         if chance[0] < recipe.tool:
             tool = draw_payload("tools", payload, _TOOL_SHARE * rated)
             rated -= tool.parameters.mass  # together they stay within what the arm may carry
-        if recipe.lighter:
+        if recipe.lighter and rng.random() < recipe.lighter:
             rated *= float(np.exp(rng.uniform(np.log(_LIGHTEST), 0.0)))
         made = Episode(
             arm,

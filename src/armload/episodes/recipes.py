@@ -46,7 +46,7 @@ class Recipe:
     rates: of the logs [Hz].
     stiffness: factor on the controller's, from, to.
     vary_sensors: whether noise, lag, jitter and losses vary.
-    lighter: whether payloads scale down to a quarter of what the arm is rated for.
+    lighter: share of the episodes whose payload is scaled down, to a quarter of what the arm is rated for at least.
 
     Raises:
         ArmError: a name that is not known, or nothing to choose from.
@@ -67,7 +67,7 @@ class Recipe:
     rates: tuple[float, ...] = (200.0,)
     stiffness: tuple[float, float] = (1.0, 1.0)
     vary_sensors: bool = False
-    lighter: bool = False
+    lighter: float = 0.0
 
     def __post_init__(self) -> None:
         known = {"worlds": WORLDS, "payloads": FAMILIES, "motions": KINDS, "tares": KINDS}
@@ -103,6 +103,6 @@ POPULATIONS: dict[str, Recipe] = {
         rates=(100.0, 200.0, 200.0, 500.0, 1000.0),
         stiffness=(0.5, 2.0),
         vary_sensors=True,
-        lighter=True,
+        lighter=0.5,
     ),
 }

@@ -27,7 +27,7 @@ EPISODES = 2400
 _CHUNK = 300  # episodes that are kept together: what an interruption can lose
 _MOTIONS = 120  # of a chunk
 _FIRST_SEED = 11  # of the first chunk; other seeds of a training begin far from it
-_LIGHTEST = 0.25  # of the rated payload
+_LIGHTEST, _LIGHTER = 0.25, 0.5  # of the rated payload; share of the payloads that are scaled down, at most so far
 _TOOL_SHARE = 0.6  # of the rated payload, which a tool is drawn for
 _DRAWS = 1500  # payloads of each family
 # how often a family is expected; nothing at all is one, and without `light` a screw or a phone is taken for it
@@ -117,7 +117,8 @@ def payload_mixture(arm: Arm, seed: int = 0) -> MixturePrior:
     rated = rated_mass(arm)
 
     def drawn(family: str, count: int, most: float) -> NDArray[np.float64]:
-        sizes = most * np.exp(rng.uniform(np.log(_LIGHTEST), 0.0, size=count))
+        smaller = np.exp(rng.uniform(np.log(_LIGHTEST), 0.0, size=count))
+        sizes = most * np.where(rng.random(count) < _LIGHTER, smaller, 1.0)
         seeds = rng.integers(1 << 30, size=count)
         return np.array([draw_payload(family, int(s), m).parameters.phi for s, m in zip(seeds, sizes, strict=True)])
 
