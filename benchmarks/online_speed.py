@@ -50,7 +50,7 @@ from armload.recording import Sample
 from armload.simulate import Sensors, World, simulate
 from armload.sources import Replay, Simulator
 
-HERE = Path(__file__).resolve().parent
+RESULT = Path(__file__).resolve().parent / "results" / "online_speed.json"
 SAMPLE = 1e-3  # [s]
 KINDS = ("ordinary", "adopted", "early", "change")
 SEED = 60_001
@@ -199,7 +199,9 @@ def ensembles(robot: Arm, folder: Path) -> dict[str, Path]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="20 s of each, a soak of 1 minute; printed only")
-    parser.add_argument("--soak", type=float, default=60.0, help="minutes of simulated time")
+    parser.add_argument(
+        "--soak", type=float, default=60.0, help="minutes of simulated time; 0: keep what was measured before"
+    )
     asked = parser.parse_args()
     robot = arm("panda")
     timed, paced, minutes = (20.0, 5.0, 1.0) if asked.quick else (300.0, 60.0, asked.soak)
@@ -243,7 +245,7 @@ def main() -> None:
             identifier.close()
             print(name, json.dumps(real_time[name]), flush=True)
         after = sklearn_row()
-        soaked = soak(log, minutes)
+        soaked = soak(log, minutes) if minutes > 0 else json.loads(RESULT.read_text())["soak"]
     result = {
         "command": "python benchmarks/online_speed.py" + (" --quick" if asked.quick else ""),
         "version": __version__,
@@ -262,7 +264,7 @@ def main() -> None:
     }
     text = json.dumps(result, indent=1)
     if not asked.quick:
-        (HERE / "results" / "online_speed.json").write_text(text + "\n")
+        RESULT.write_text(text + "\n")
     print(text)
 
 
