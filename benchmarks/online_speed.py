@@ -247,7 +247,7 @@ def main() -> None:
         after = sklearn_row()
         soaked = soak(log, minutes) if minutes > 0 else json.loads(RESULT.read_text())["soak"]
     result = {
-        "command": "python benchmarks/online_speed.py" + (" --quick" if asked.quick else ""),
+        "command": "python benchmarks/online_speed.py" + (" --quick" if asked.quick else f" --soak {asked.soak:g}"),
         "version": __version__,
         "machine": f"{platform.machine()}, {os.cpu_count()} cores",
         "load": [round(x, 2) for x in os.getloadavg()],
