@@ -25,6 +25,15 @@ def test_the_readme_s_table_is_that_of_the_committed_benchmark():
         assert f"| {method} | {' | '.join(cell(p, method, k) for p, k in columns)} |" in README
 
 
+def test_how_often_intervals_held_is_that_of_the_committed_benchmark():
+    populations = json.loads((RESULTS / "benchmark.json").read_text())["populations"]
+    held = {name: 100 * np.mean(found["methods"]["hybrid"]["coverage"]) for name, found in populations.items()}
+    repeat, page = held.pop("repeat"), (ROOT / "docs" / "hybrid.md").read_text(encoding="utf-8")
+    span = f"{min(held.values()):.0f}–{max(held.values()):.0f} %"
+    assert f"({span} on the benchmark's populations)" in README
+    assert f"{span} held on the ten populations of the [benchmark](benchmark.md), {repeat:.0f} % where" in page
+
+
 def test_the_readme_s_real_logs_are_those_of_the_committed_benchmark():
     result = json.loads((RESULTS / "real_logs.json").read_text())
     pair, semi = result["ur10e_pair"]["map-gp"], result["panda_semi_real"]
