@@ -24,9 +24,7 @@ from armload.recording import Recording, check_plausible
 
 LOWEST_RATE = 20.0  # [Hz]
 _MISFIT = 3.0  # standard deviations between the estimate and the nearest body, beyond which something is wrong
-_STRANGE = (
-    5.0  # rms over the joints of torque offsets over what is expected: 1 or less of most simulated arms, 5 of none
-)
+_STRANGE = 5.0  # rms of torque offsets over what is expected: about 1 of most simulated arms, so much of none tried
 _CHECK = "check the robot, the base (--gravity), what is mounted and the torques' signs"
 
 

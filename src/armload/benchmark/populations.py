@@ -8,7 +8,7 @@ import numpy as np
 
 from armload.arms import Arm
 from armload.cells import key_of
-from armload.episodes import POPULATIONS, Episode, Recipe, draw_episodes, simulate_episodes
+from armload.episodes import LIGHTEST, POPULATIONS, TOOL_SHARE, Episode, Recipe, draw_episodes, simulate_episodes
 from armload.errors import ArmError
 from armload.inertia import InertialParameters
 from armload.least_squares import GaussianPrior
@@ -19,7 +19,6 @@ REPEAT = "repeat"
 _PAYLOADS = 400  # that the baselines are told of
 PRIOR = f"{_PAYLOADS} payloads of the population's family, of other seeds"
 _PRIOR_SEED = 20_000_003  # no episode's payload is drawn from it
-_LIGHTEST, _TOOL_SHARE = 0.25, 0.6  # as `draw_episodes` has them
 _PROBE_RATE, _PROBE_DURATION = 50.0, 0.5  # [Hz], [s]
 
 
@@ -104,10 +103,10 @@ def prior_of(recipe: Recipe, arm: Arm) -> GaussianPrior:
     for _ in range(_PAYLOADS):
         left, tool = rated, None
         if rng.random() < recipe.tool:
-            tool = draw_payload("tools", int(rng.integers(1 << 30)), _TOOL_SHARE * rated).parameters.phi
+            tool = draw_payload("tools", int(rng.integers(1 << 30)), TOOL_SHARE * rated).parameters.phi
             left -= tool[0]
         if recipe.lighter and rng.random() < recipe.lighter:
-            left *= float(np.exp(rng.uniform(np.log(_LIGHTEST), 0.0)))
+            left *= float(np.exp(rng.uniform(np.log(LIGHTEST), 0.0)))
         phi = draw_payload(str(rng.choice(recipe.payloads)), int(rng.integers(1 << 30)), left).parameters.phi
         shown = tool is not None and rng.random() < recipe.untared  # without a tare the tool is part of the answer
         drawn.append(InertialParameters(phi + tool if shown and tool is not None else phi, arm.frame))

@@ -2,6 +2,15 @@
 
 from armload.episodes.draw import draw_episodes
 from armload.episodes.episode import Episode, EpisodeLogs, simulate_episodes
-from armload.episodes.recipes import POPULATIONS, Recipe
+from armload.episodes.recipes import LIGHTEST, POPULATIONS, TOOL_SHARE, Recipe
 
-__all__ = ["POPULATIONS", "Episode", "EpisodeLogs", "Recipe", "draw_episodes", "simulate_episodes"]
+__all__ = [
+    "LIGHTEST",
+    "POPULATIONS",
+    "TOOL_SHARE",
+    "Episode",
+    "EpisodeLogs",
+    "Recipe",
+    "draw_episodes",
+    "simulate_episodes",
+]

@@ -10,15 +10,13 @@ from numpy.typing import NDArray
 from armload.arms import Arm
 from armload.episodes.episode import Episode
 from armload.episodes.motions import MotionSource
-from armload.episodes.recipes import POPULATIONS, Recipe
+from armload.episodes.recipes import LIGHTEST, POPULATIONS, TOOL_SHARE, Recipe
 from armload.errors import ArmError
 from armload.motion import Motion
 from armload.payloads import draw_payload
 from armload.simulate import Gains, Sensors, World, rated_mass
 
 POOL = 200  # motions drawn for one seed; beyond, they are used again
-_LIGHTEST = 0.25  # of the rated payload, where a recipe scales payloads down
-_TOOL_SHARE = 0.6  # of the rated payload, which a tool is drawn for
 _JITTER = (1e-5, 5e-4)  # [s]
 _LAG = 6e-3  # [s] at most
 
@@ -89,10 +87,10 @@ class _Draw:
         chance = rng.random(4)
         rated, tool = rated_mass(arm), None
         if chance[0] < recipe.tool:
-            tool = draw_payload("tools", payload, _TOOL_SHARE * rated)
+            tool = draw_payload("tools", payload, TOOL_SHARE * rated)
             rated -= tool.parameters.mass  # together they stay within what the arm may carry
         if recipe.lighter and rng.random() < recipe.lighter:
-            rated *= float(np.exp(rng.uniform(np.log(_LIGHTEST), 0.0)))
+            rated *= float(np.exp(rng.uniform(np.log(LIGHTEST), 0.0)))
         made = Episode(
             arm,
             getattr(World, str(rng.choice(recipe.worlds)))(arm, world),

@@ -30,6 +30,8 @@ from armload.errors import ArmError
 from armload.payloads import FAMILIES
 
 WORLDS = ("real_like", "beyond")
+LIGHTEST = 0.25  # of the rated payload, where payloads are scaled down
+TOOL_SHARE = 0.6  # of the rated payload, which a tool is drawn for
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.determined import Z95
-from armload.episodes import draw_episodes
+from armload.episodes import LIGHTEST, POPULATIONS, TOOL_SHARE, draw_episodes
 from armload.errors import ModelError
 from armload.hybrid.calibration import Calibration, nearest
 from armload.hybrid.evidence import KINDS
@@ -27,8 +27,6 @@ EPISODES = 2400
 _CHUNK = 300  # episodes that are kept together: what an interruption can lose
 _MOTIONS = 120  # of a chunk
 _FIRST_SEED = 11  # of the first chunk; other seeds of a training begin far from it
-_LIGHTEST, _LIGHTER = 0.25, 0.5  # of the rated payload; share of the payloads that are scaled down, at most so far
-_TOOL_SHARE = 0.6  # of the rated payload, which a tool is drawn for
 _DRAWS = 1500  # payloads of each family
 # how often a family is expected; nothing at all is one, and without `light` a screw or a phone is taken for it
 FAMILIES = {
@@ -117,16 +115,16 @@ def payload_mixture(arm: Arm, seed: int = 0) -> MixturePrior:
     rated = rated_mass(arm)
 
     def drawn(family: str, count: int, most: float) -> NDArray[np.float64]:
-        smaller = np.exp(rng.uniform(np.log(_LIGHTEST), 0.0, size=count))
-        sizes = most * np.where(rng.random(count) < _LIGHTER, smaller, 1.0)
+        smaller = np.exp(rng.uniform(np.log(LIGHTEST), 0.0, size=count))
+        sizes = most * np.where(rng.random(count) < POPULATIONS["broad"].lighter, smaller, 1.0)
         seeds = rng.integers(1 << 30, size=count)
         return np.array([draw_payload(family, int(s), m).parameters.phi for s, m in zip(seeds, sizes, strict=True)])
 
     samples = {f: drawn(f, _DRAWS, rated) for f in ("boxes", "shapes", "tools", "container", "light")}
     samples["nothing"] = np.zeros((20, 10))
-    tools = drawn("tools", _DRAWS, _TOOL_SHARE * rated)
+    tools = drawn("tools", _DRAWS, TOOL_SHARE * rated)
     others = np.concatenate([samples["boxes"], samples["shapes"]])
-    samples["tool and payload"] = tools + (1.0 - _TOOL_SHARE) * others[rng.permutation(len(others))[:_DRAWS]]
+    samples["tool and payload"] = tools + (1.0 - TOOL_SHARE) * others[rng.permutation(len(others))[:_DRAWS]]
     fitted = MixturePrior.fit(samples, FAMILIES, seed)
     wide = np.diag((_ANYTHING * payload_prior_std(arm)) ** 2)
     return fitted.joined(MixturePrior(np.ones(1), np.zeros((1, 10)), wide[None], ("anything",)), _ANYTHING_SHARE)
