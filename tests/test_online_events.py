@@ -133,6 +133,10 @@ def test_a_push_that_ends_gives_the_estimate_back(force):
     J, R = panda.frame_motion(log.q).jacobian[:, 3:], panda.frame_pose(log.q)[0]
     pushed = size[:, None] * np.einsum("nij,ni->nj", J, np.einsum("nji,j->ni", R, np.array(force)))
     estimates, _ = said(Recording(log.t, log.q, log.dq, log.tau - pushed), "map-gp")
+    old = [estimate for estimate in estimates if estimate.age > 0.02]
+    assert old
+    assert all(any("do not fit" in note for note in estimate.notes) for estimate in old)
+    assert not estimates[-1].notes
     before, after = at(estimates, start), estimates[-1]
     assert covers(before, HALF_KILO.phi)[0]
     assert after.held

@@ -34,6 +34,7 @@ from armload.recording import Recording, Sample
 _MOVING = 0.01  # [rad/s] of any joint, within the last so many seconds
 _RECENT = 0.5  # [s]
 _PUBLISH = 0.01  # [s] intervals and judgements are made anew at most this often
+_DOUBT = "samples that do not fit are left out: something pulls at the arm, or the payload is changing"
 
 
 class OnlineIdentifier:
@@ -207,6 +208,8 @@ class OnlineIdentifier:
             if self._watch.event is not known:
                 self._noticed(sample.t)
             if estimate is None or self._watch.settling:
+                if self._watch.doubting and sample.t - self._published > _PUBLISH and _DOUBT not in self._notes:
+                    self._notes = (*self._notes, _DOUBT)
                 return
             run = self._watch.answered
             fresh = run.fresh

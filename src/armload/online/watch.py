@@ -91,6 +91,11 @@ class PayloadWatch:
         """Whether samples are left out because the payload has just changed."""
         return self._next is not None or self._ready is not None
 
+    @property
+    def doubting(self) -> bool:
+        """Whether samples are left out because they do not fit: a push, or a change not yet sure."""
+        return self._aside < np.inf
+
     def update(self, sample: Sample, held: bool) -> Estimate | None:
         """Take one sample; None while a change settles. `held`: whether anything was, by the last estimate."""
         if self.settling:
