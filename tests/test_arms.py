@@ -607,6 +607,25 @@ def test_any_frame_can_carry_the_payload():
         np.testing.assert_allclose(Y @ PAYLOAD.phi, load_torque(chosen, q, dq, ddq), atol=1e-10)
 
 
+@pytest.mark.parametrize("name", sorted(ARMS))
+def test_a_file_with_the_links_of_a_known_arm_is_that_arm(tmp_path, name):
+    known = arm(name)
+    (tmp_path / "cell.urdf").write_text(known.urdf)
+    found = arm(tmp_path / "cell.urdf", known.frame, gravity=(0.0, 9.81, 0.0))
+    facts = ("rated_payload", "link_spread", "motor_torque", "acceleration", "jerk")
+    assert [getattr(found, fact) for fact in facts] == [getattr(known, fact) for fact in facts]
+    assert (found.name, found.gravity) == ("cell", (0.0, 9.81, 0.0))
+
+
+def test_a_file_with_other_links_is_no_known_arm(tmp_path):
+    known = arm("ur10e")
+    heavier = known.urdf.replace('<mass value="', '<mass value="1')
+    assert heavier != known.urdf
+    (tmp_path / "ur10e.urdf").write_text(heavier)
+    found = arm(tmp_path / "ur10e.urdf")
+    assert (found.rated_payload, found.motor_torque, found.link_spread) == (None, False, 10.0)
+
+
 def test_an_arm_loads_from_a_urdf_file(tmp_path, panda):
     path = tmp_path / "mine.urdf"
     path.write_text(panda.urdf, encoding="utf-8")

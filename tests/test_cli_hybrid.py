@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from armload.arms import arm
+from armload.arms import arm, kinship
 from armload.cli import main
 from armload.cli.train_hybrid import cells_table, said, summary
 from armload.hybrid import Calibration, Coverage, HybridModel, MixturePrior
 from armload.hybrid.evidence import KINDS
-from armload.hybrid.model import POOLED, kinship
+from armload.hybrid.model import POOLED
 from armload.hybrid.records import TIMES
 from armload.hybrid.training import EPISODES
 from armload.inertia import InertialParameters

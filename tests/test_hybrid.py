@@ -1,12 +1,15 @@
 """The hybrid: closed forms of its prior, coverage of its error bars on data of known law, its file, its answers."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from armload.arms import arm
+import armload
+from armload.arms import ARMS, arm
+from armload.determined import Z95
 from armload.episodes import draw_episodes, simulate_episodes
 from armload.errors import ModelError
 from armload.hybrid import (
@@ -29,6 +32,7 @@ from armload.motion import random_motion
 from armload.payloads import draw_payload, random_payloads
 from armload.simulate import Sensors, World, simulate
 
+SHIPPED = sorted((Path(armload.__file__).parent / "hybrid" / "models").glob("*.safetensors"))
 UNIT = np.array([0.5] + [0.05] * 3 + [5e-3] * 6)
 BODY = InertialParameters.from_com(1.2, (0.02, -0.03, 0.07), np.diag([4e-3, 3e-3, 2e-3]))
 
@@ -211,6 +215,30 @@ def test_intervals_hold_on_episodes_that_were_not_trained_on(synthetic, mixture,
     assert np.mean(error <= half) == pytest.approx(0.95, abs=0.025)
 
 
+def test_the_torques_gain_widens_an_interval_by_its_own_share(synthetic, mixture):
+    evidence = replace(synthetic.evidence(3), gain_std=0.02)
+    calibration = Calibration(None, 1.0, np.array([0.1]), np.full((3, 1, 10), 3.0))
+    found = mixture.posterior(evidence.information, evidence.vector)
+    half = Z95 * np.sqrt(np.diag(calibration.answer(evidence, mixture).covariance))
+    np.testing.assert_allclose(half**2, (3.0**2) * np.diag(found.covariance) + (Z95 * 0.02 * found.mean) ** 2)
+
+
+def test_intervals_hold_and_are_no_wider_than_they_must_where_only_the_gain_is_wrong(synthetic, mixture):
+    rng = np.random.default_rng(3)
+    gain = 1.0 + rng.uniform(-0.03, 0.03, size=len(synthetic))[:, None]
+    sharp = 1e-4 * mixture.std
+    rows = replace(
+        synthetic,
+        information=np.tile(np.diag(sharp**-2.0), (len(synthetic), 1, 1)),
+        vector=gain * synthetic.truth / sharp**2,
+        gain_std=np.full(len(synthetic), 0.02),
+    )
+    train, test = rows.select(rows.episode < 500), rows.select(rows.episode >= 500)
+    half, error = half_widths(Calibration.fit(train, mixture, learned=()), test, mixture)
+    assert np.mean(error <= half) > 0.93
+    assert np.mean(half[:, 0]) < 0.05 * np.mean(np.abs(test.truth[:, 0]))
+
+
 def test_learning_how_far_evidence_is_overrated_makes_answers_and_intervals_better(synthetic, mixture):
     train, test = synthetic.select(synthetic.episode < 500), synthetic.select(synthetic.episode >= 500)
     (with_bag, error), (without, plain) = (
@@ -307,14 +335,17 @@ def logs(panda):
     return list(simulate_episodes(draw_episodes(panda, "reference", 3, seed=77, motions=3)))
 
 
-def test_the_shipped_model_is_small_and_belongs_to_the_panda(panda):
-    path = HybridModel.shipped("panda")
-    assert path is not None
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_a_shipped_model_is_small_and_calibrated_and_belongs_to_its_arm(path):
+    own, model = arm(path.stem), HybridModel.load(path)
+    assert path == HybridModel.shipped(own.name)
     assert path.stat().st_size < 5e6
-    assert shipped_model(panda).calibrated
-    assert shipped_model(panda).prior_for(panda).mean[0] > 0.0
-    with pytest.raises(ModelError, match=r"trained for panda: ur10e"):
-        shipped_model(panda).prior_for(arm("ur10e"))
+    assert model.calibrated
+    assert model.provenance["episodes"] >= 1000
+    assert model.prior_for(own).mean[0] > 0.0
+    for other in (other for other in ARMS if other != own.name):
+        with pytest.raises(ModelError, match=f"trained for {own.name}: {other} "):
+            model.prior_for(arm(other))
 
 
 def test_errors_on_real_like_arms_stay_near_their_error_bars(panda, logs):

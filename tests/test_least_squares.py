@@ -1,11 +1,12 @@
 """Least squares: the recursion, the observer, the MAP posterior, and error bars for correlated residuals."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from armload.arms import payload_regressor
+from armload.arms import arm, payload_regressor
 from armload.errors import IdentificationError
 from armload.identifier import Tared
 from armload.inertia import InertialParameters
@@ -215,6 +216,16 @@ def test_motor_side_friction_is_recognised_and_widens_the_interval(panda, analyt
     assert (link.posterior.torque, motor.posterior.torque) == ("link", "motor")
     assert wide.std[0] > narrow.std[0]
     assert wide.phi[0] == pytest.approx(CAMERA.mass, abs=0.05)
+
+
+def test_where_torque_is_known_to_be_the_motors_a_log_at_rest_says_less(analytic_log):
+    ur = arm("ur10e")
+    link = replace(ur, motor_torque=False)
+    log = analytic_log(ur, CAMERA, rate=100.0)
+    still = replace(log, q=np.tile(log.q[:1], (len(log), 1)), dq=0.0 * log.dq, tau=np.tile(log.tau[:1], (len(log), 1)))
+    known, unknown = PosteriorLeastSquares(ur), PosteriorLeastSquares(link)
+    assert known.run(still).std[0] > 2.0 * unknown.run(still).std[0]
+    assert (known.posterior.torque, unknown.posterior.torque) == ("motor", "link")
 
 
 def test_rows_are_bounded_at_high_rates_so_that_a_minute_at_1_khz_is_light(panda, analytic_log):

@@ -31,7 +31,18 @@ def test_how_often_intervals_held_is_that_of_the_committed_benchmark():
     repeat, page = held.pop("repeat"), (ROOT / "docs" / "hybrid.md").read_text(encoding="utf-8")
     span = f"{min(held.values()):.0f}–{max(held.values()):.0f} %"
     assert f"({span} on the benchmark's populations, {repeat:.0f} % where" in README
-    assert f"{span} held on the ten populations of the [benchmark](benchmark.md), {repeat:.0f} % where" in page
+    assert f"{span} held on the eleven populations of the [benchmark](benchmark.md), {repeat:.0f} % where" in " ".join(
+        page.split()
+    )
+
+
+def test_what_a_tare_is_worth_is_that_of_the_committed_benchmark():
+    result, page = json.loads((RESULTS / "benchmark.json").read_text()), (ROOT / "docs" / "hybrid.md").read_text()
+    rows = [line for line in page.split("## A tare, and which one")[1].splitlines() if line.startswith("| ")][1:]
+    for row, name in zip(rows, ("untared", "elsewhere", "reference", "same-place", "same-motion"), strict=False):
+        mae = result["populations"][name]["methods"]["hybrid"]["mae"]
+        errors = (f"{1e3 * mae[result['times'].index(t)][0]:.2g}" for t in (1.0, 6.0))
+        assert row.endswith(f"| {' · '.join(errors)} |")
 
 
 def test_the_readme_s_real_logs_are_those_of_the_committed_benchmark():

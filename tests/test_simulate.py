@@ -153,7 +153,7 @@ def test_attached_hand_is_known_to_the_controller(panda):
 @pytest.mark.parametrize("gravity", [(0.0, 0.0, -9.81), (3.0, -2.0, -9.1)], ids=["upright", "tilted"])
 @pytest.mark.parametrize("real", [False, True], ids=["nominal", "real-like"])
 def test_a_run_starts_settled(any_arm, gravity, real):
-    arm = replace(any_arm, gravity=gravity)
+    arm = replace(any_arm, gravity=gravity, motor_torque=False)
     world = World.real_like(arm, seed=2) if real else World.nominal(arm)
     log = simulate(arm, hold(arm), PAYLOAD, world=world, rate=100.0)
     assert np.abs(log.q - log.q[0]).max() < (1e-7 if real else 1e-12)
@@ -194,7 +194,7 @@ def test_clock_divides_the_period_of_the_log(rate):
 
 
 def test_real_like_log_is_actual_links_plus_friction_residual_and_offset(any_arm):
-    world = World.real_like(any_arm, seed=5)
+    world = World.real_like(replace(any_arm, motor_torque=False), seed=5)
     log = simulate(any_arm, motion_of(any_arm), PAYLOAD, world=world)
     actual = any_arm.with_links(world.links).with_payload(PAYLOAD)
     beyond = world.offset + world.friction(log.dq) + world.residual(log.q)
@@ -209,7 +209,7 @@ def replace_tau(log, tau):
 
 def test_friction_and_residual_converge_to_the_motion_that_comes_out(any_arm):
     gains, clock, motion = Gains.of(any_arm), rollout.Clock.at(500.0, 3000), motion_of(any_arm)
-    world = World.real_like(any_arm, seed=1)
+    world = World.real_like(replace(any_arm, motor_torque=False), seed=1)
     command = Command.along(any_arm, motion, clock.step, clock.steps)
     prepared = runs.prepare(world.arm(any_arm), gains, Run(motion, PAYLOAD, world), world, command, clock)
     left = {}
@@ -219,6 +219,16 @@ def test_friction_and_residual_converge_to_the_motion_that_comes_out(any_arm):
     assert left[2] < 0.25 * left[1]
     assert left[4] < 0.1 * left[2]
     assert left[2] < 0.01
+
+
+def test_with_the_friction_of_a_motors_side_the_controller_misreads_its_torque_by_a_few_percent_at_most():
+    ur = arm("ur10e")
+    gains, clock, motion = Gains.of(ur), rollout.Clock.at(500.0, 3000), motion_of(ur)
+    world = World.real_like(ur, seed=1)
+    command = Command.along(ur, motion, clock.step, clock.steps)
+    prepared = runs.prepare(world.arm(ur), gains, Run(motion, PAYLOAD, world), world, command, clock)
+    left = rms(rollout.iteration_error([prepared], clock, 1)[0])
+    assert np.all(left < 0.05 * ur.limits.effort)
 
 
 def test_friction_disturbs_the_motion(panda):

@@ -74,11 +74,25 @@ def test_a_log_beyond_is_the_sum_of_the_world_s_parts(any_arm, motor_side, resol
         rigid = any_arm.with_links(world.links).with_payload(PAYLOAD).torque(log.q, log.dq, ddq)
         if motor_side:
             rigid = rigid + world.rotor_inertia * ddq
-        joint = rigid + world.friction(log.dq, rigid) + world.residual(log.q)
+        joint = rigid + world.friction(log.dq, rigid) + world.residual(log.q) + world.stuck(log.dq, run.seed)
         expected = world.gain * joint + world.offset + drift(50.0 + log.t)
         left = rms(log.tau - expected)
         assert np.all(left < 2e-4 * rated_effort(any_arm))
         assert np.all(rms(log.tau - rigid) > 5e-3 * rms(log.tau - log.tau.mean(axis=0)))
+
+
+def test_stiction_holds_any_torque_at_rest_another_at_each_rest_and_none_in_motion():
+    world = World.real_like(arm("ur10e"), 3)
+    dq = np.repeat([0.0, 1.0, 0.0, -1.0, 0.0], 100)[:, None] * np.ones(6)
+    stuck = world.stuck(dq, seed=4)
+    rests = stuck.reshape(5, 100, 6)[::2]
+    assert np.all(rests == rests[:, :1])
+    assert np.all(np.abs(rests) <= world.stiction)
+    assert len(np.unique(rests[:, 0])) == 18
+    assert np.all(np.abs(stuck[np.abs(dq[:, 0]) > 0.5]) < 1e-3 * world.stiction)
+    np.testing.assert_array_equal(stuck, world.stuck(dq, seed=4))
+    assert np.all(stuck[0] != world.stuck(dq, seed=5)[0])
+    assert not World.real_like(arm("panda"), 3).stuck(np.zeros((5, 7)), seed=4).any()
 
 
 def test_a_drift_starts_at_nothing_and_ends_at_its_size():
@@ -132,6 +146,26 @@ def test_motor_side_friction_is_a_tenth_of_the_rated_torque():
     levels = np.array([World.beyond(ur, seed, motor_side=True).friction.level for seed in range(60)])
     share = np.median(levels / rated_effort(ur), axis=0)
     assert np.all((share > 0.06) & (share < 0.12))
+
+
+def test_an_arm_known_to_measure_motor_current_is_simulated_so(panda):
+    ur, seeds = arm("ur10e"), range(40)
+    for drawn in (World.real_like, World.beyond):
+        worlds = [drawn(ur, seed) for seed in seeds]
+        share = np.array([world.friction.level / rated_effort(ur) for world in worlds])
+        assert 0.05 * 0.1 < share.min() < 0.06
+        assert 0.06 < np.median(share) < 0.12
+        assert all(world.rotor_inertia is not None and np.all(world.gain != 1.0) for world in worlds)
+    assert all(World.real_like(panda, seed).rotor_inertia is None for seed in seeds)
+
+
+def test_links_scatter_as_far_as_the_description_of_the_arm_may_be_off(panda):
+    def scatter(robot):
+        worlds = [World.real_like(robot, seed) for seed in range(100)]
+        return np.std([world.links[:, 0] / robot.link_parameters[:, 0] for world in worlds])
+
+    assert scatter(panda) == pytest.approx(0.02, rel=0.15)
+    assert scatter(replace(panda, link_spread=5.0)) == pytest.approx(0.1, rel=0.15)
 
 
 def test_what_existing_seeds_give_stays(panda):

@@ -3,6 +3,7 @@
 from armload.arms.catalogue import ARMS, arm
 from armload.arms.filtered import FilteredRegression, first_order_lag
 from armload.arms.forward import ForwardDerivatives, ForwardDynamics
+from armload.arms.kinship import kinship
 from armload.arms.model import Arm, BodyMotion, Limits
 from armload.arms.regressors import (
     MomentumRegressor,
@@ -23,6 +24,7 @@ __all__ = [
     "arm",
     "first_order_lag",
     "full_arm_regressor",
+    "kinship",
     "momentum_regressor",
     "payload_regressor",
 ]

@@ -12,10 +12,12 @@ Each description says more in its head. A Panda with its hand is `arm("panda").w
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from armload.arms.kinship import kinship
 from armload.arms.model import STANDARD_GRAVITY, Arm
 from armload.errors import ArmError
 
@@ -36,8 +38,9 @@ ARMS: dict[str, dict[str, Any]] = {
         "acceleration": (10.0,) * 7,  # [rad/s²]
         "jerk": (5000.0,) * 7,  # [rad/s³]
     },
-    "ur5e": {"frame": "tool0", "rated_payload": 5.0},
-    "ur10e": {"frame": "tool0", "rated_payload": 12.5},
+    # no torque sensors in the joints: motor currents times a constant
+    "ur5e": {"frame": "tool0", "rated_payload": 5.0, "motor_torque": True},
+    "ur10e": {"frame": "tool0", "rated_payload": 12.5, "motor_torque": True},
 }
 
 
@@ -48,7 +51,8 @@ def arm(robot: str | Path, frame: str | None = None, gravity: tuple[float, float
     'elbow_joint'
 
     Args:
-        robot: a name in `ARMS`, or the path of a URDF file.
+        robot: a name in `ARMS`, or the path of a URDF file. A file with the links of an arm in `ARMS` is that arm:
+            what is known of it and no URDF says (rated payload, where torque is measured) holds.
         frame: link whose frame the payload is about. Default: the catalogue's; for a URDF its last link.
         gravity: gravity in the axes of the base [m/s²].
 
@@ -71,4 +75,14 @@ def arm(robot: str | Path, frame: str | None = None, gravity: tuple[float, float
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise ArmError(f"robot description {name} cannot be read as text: {error}") from None
-    return Arm(path.stem, text, frame, gravity)
+    return _as_known(Arm(path.stem, text, frame, gravity))
+
+
+def _as_known(found: Arm) -> Arm:
+    """The arm with the catalogue's facts, if it is one of the catalogue's."""
+    for name, facts in ARMS.items():
+        if facts["frame"] in found.frames:
+            known = arm(name)
+            if known.n == found.n and kinship(replace(found, frame=known.frame)) == kinship(known):
+                return replace(found, **{fact: value for fact, value in facts.items() if fact != "frame"})
+    return found

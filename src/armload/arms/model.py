@@ -65,6 +65,8 @@ class Arm:
         acceleration, jerk: limits (n,) that a URDF cannot hold.
         link_spread: how far the description's link parameters may be off, in units of 2 % of mass, 2 mm of CoM and 5 %
             of inertia (1 sigma): 1 for an identified model, 10 for nominal figures of unknown quality.
+        motor_torque: whether the torque is known to be motor current times a constant, with all of the gear's friction
+            in it; where it is not known, each log tells.
     """
 
     name: str
@@ -77,6 +79,7 @@ class Arm:
     acceleration: tuple[float, ...] | None = field(default=None, repr=False)
     jerk: tuple[float, ...] | None = field(default=None, repr=False)
     link_spread: float = field(default=10.0, repr=False)
+    motor_torque: bool = field(default=False, repr=False)
 
     def __post_init__(self) -> None:
         try:

@@ -79,6 +79,7 @@ ALL = {
         Population("odd", "odd", "payloads unlike all that training saw: dumbbells, poles, panes, rings, off the axis"),
         Population("everyday", "everyday", "motions of work: stops, pick and place, slow, some joints only"),
         Population("same-motion", "same motion", "the tare along the run's own motion"),
+        Population("same-place", "same place", "the tare about the run's own mean pose, on another motion"),
         Population("elsewhere", "elsewhere", "the tare in another part of the workspace than the run"),
         Population("tool", "tool", "an unknown tool on the arm, at the tare and in the run"),
         Population(REPEAT, "repeat", "one payload on one arm, other motions, tares and noise", True, 20),

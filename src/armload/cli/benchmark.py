@@ -16,7 +16,8 @@ examples:
   armload benchmark --populations reference,tool --methods hybrid,map,rls-filter+tare
   armload benchmark --methods ekf                 (one more row; what is finished is not measured again)
 
-Populations: reference, untared, container, beyond, shapes, odd, everyday, same-motion, elsewhere, tool, repeat.
+Populations: reference, untared, container, beyond, shapes, odd, everyday, same-motion, same-place, elsewhere, tool,
+repeat.
 Methods are those of `armload methods`; NAME+tare subtracts what the method says of the tare. The two baselines are
 always there.
 The page, the summary and the report show all finished cells of the same --episodes and --rate.

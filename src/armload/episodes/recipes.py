@@ -10,15 +10,16 @@
 | `everyday`       | `World.real_like`  | boxes       | stops, slow, partial | as reference               |
 | `same-motion`    | `World.real_like`  | boxes       | reference            | bare, 6 s, the same motion |
 | `untared`        | `World.real_like`  | boxes       | reference            | none                       |
+| `same-place`     | `World.real_like`  | boxes       | reference            | bare, 20 s, the same place |
 | `elsewhere`      | `World.real_like`  | boxes       | reference            | bare, 20 s, another place  |
 | `tool`           | `World.real_like`  | boxes       | reference            | as reference, tool mounted |
 | `broad`          | half and half      | all but odd | every kind           | any, or none; tool or not  |
 
 `reference` is the population that methods are compared on; the others change one thing each; `broad` is for training;
 `odd` holds payloads unlike any that training sees.
-A tare's motion is another one near the run's mean pose, as of an arm that works in one place; `elsewhere` has it about
-a pose of its own, where an arm's residual, of a length scale of about 1 rad, is hardly the same. In `broad`, payloads
-are also lighter, and sensors, log rates and the controller's stiffness vary.
+A tare's motion is another one near the run's mean pose, as of an arm that works in one place; `same-place` has it about
+that very pose, `elsewhere` about a pose of its own, where an arm's residual, of a length scale of about 1 rad, is
+hardly the same. In `broad`, payloads are also lighter, and sensors, log rates and the controller's stiffness vary.
 """
 
 from __future__ import annotations
@@ -89,6 +90,7 @@ POPULATIONS: dict[str, Recipe] = {
     "everyday": replace(REFERENCE, motions=("point-to-point", "pick-and-place", "slow", "partial")),
     "same-motion": replace(REFERENCE, same_motion=1.0),
     "untared": replace(REFERENCE, untared=1.0),
+    "same-place": replace(REFERENCE, near=0.0),
     "elsewhere": replace(REFERENCE, elsewhere=1.0),
     "tool": replace(REFERENCE, tool=1.0),
     "broad": Recipe(

@@ -2,18 +2,21 @@
 
     1. a bag of trees and networks reads from the traits of a log by which factor kappa the physics overrates its
        evidence; the evidence is taken as Λ/kappa, h/kappa
-    2. the half-width of parameter i is c_i(t)·std_i, where c_i is the 95 % quantile of |error|/std over episodes that
-       the bag has not seen (split conformal prediction), one per time and with or without a tare
+    2. the half-width h_i of parameter i has h_i² = (c_i(t)·std_i)² + (1.96·gain·phi_i)², gain being how well the
+       torque's scale is known; c_i is such that 95 % of the episodes lie inside, each answered by a bag that has not
+       seen it (cross-conformal prediction), one per time and with or without a tare
 
 The first makes widths follow the log at hand, the second makes them hold on average over the episodes they were
-calibrated on, whatever the distribution of the errors.
+calibrated on, whatever the distribution of the errors. The gain stands apart: it is a share of the payload, however
+good the log, and a quantile of all logs would blow it up where the rest is small.
 
-Sources: Lei et al., JASA 2018 (split conformal, locally weighted); Breiman 1996 (bagging).
+Sources: Lei et al., JASA 2018 (locally weighted conformal prediction); Vovk, Annals of Mathematics and Artificial
+Intelligence 2015 (cross-conformal); Breiman 1996 (bagging).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -32,6 +35,8 @@ COVERAGE = 0.95
 _INFORMATIVE = 9.0  # a direction counts as seen once the evidence shrinks its prior's variance so many times
 _MEMBERS, _DEPTH, _UNITS, _EPOCHS = 5, 7, 32, 60
 _FEWEST = 30  # episodes below which a quantile is not worth its name
+_FOLDS = 3  # of the episodes: each is scored by a bag fitted on the others
+_NARROWEST = 0.1  # c is no less, even where the gain alone covers 95 %
 _KAPPA = (0.1, 1e3)  # range of the factor
 
 
@@ -43,7 +48,7 @@ class Calibration:
         bag: traits (N, T) → log10 kappa (N, 1); None: kappa is 1.
         level: kappa's constant factor, so that it is right on average.
         times: (B,) [s] at which the widths were calibrated.
-        widths: (3, B, 10) quantile of |error|/std, by what there was to compare with (`KINDS`).
+        widths: (3, B, 10) c, by what there was to compare with (`KINDS`).
     """
 
     bag: Compiled | None
@@ -59,7 +64,7 @@ class Calibration:
         return min(max(self.level * 10.0 ** float(said.sum() / said.size), _KAPPA[0]), _KAPPA[1])
 
     def width(self, t: float, kind: int) -> NDArray[np.float64]:
-        """Quantile (10,) of |error|/std after t seconds: linear in log t, constant beyond the calibrated times."""
+        """c (10,) after t seconds: linear in log t, constant beyond the calibrated times."""
         return _between(self.widths[kind], self.times, t)
 
     def trusted(self, evidence: Evidence) -> Evidence:
@@ -88,34 +93,36 @@ class Calibration:
         learned: tuple[str, ...] = ("tree", "network"),
         trusted: bool = False,
         seed: int = 0,
-        held_out: float = 0.5,
     ) -> Calibration:
-        """Fit the bag on one part of the episodes and the widths on the rest.
+        """Fit the bag on all episodes, and the widths on the scores of bags that had a third of them left out.
 
         Args:
             records: of many episodes. prior: the payload prior the answers will use.
             learned: what the bag is made of; nothing: no bag, one kappa for all (the ablation).
             trusted: kappa is 1, whatever the episodes say (the other ablation).
-            held_out: share of the episodes that the widths are calibrated on.
         """
-        rng = np.random.default_rng(seed)
-        episodes = rng.permutation(np.unique(records.episode))
-        calibrated = np.isin(records.episode, episodes[: int(held_out * len(episodes))])
-        bag, level = (None, 1.0) if trusted else _fit_kappa(records.select(~calibrated), prior, learned, seed)
         times = _times(records.t)
-        draft = cls(bag, level, times, np.ones((len(KINDS), len(times), 10)))
-        rest = records.select(calibrated)
-        score, which = scores(rest, prior, draft), nearest(rest.t, times)
+
+        def draft(some: Records) -> Calibration:
+            bag, level = (None, 1.0) if trusted else _fit_kappa(some, prior, learned, seed)
+            return cls(bag, level, times, np.ones((len(KINDS), len(times), 10)))
+
+        episodes = np.random.default_rng(seed).permutation(np.unique(records.episode))
+        score, which = np.empty((len(records), 10)), nearest(records.t, times)
+        for k in range(_FOLDS):
+            held = np.isin(records.episode, episodes[k::_FOLDS])
+            score[held] = scores(records.select(held), prior, draft(records.select(~held)))
         widths = np.ones((len(KINDS), len(times), 10))
         for kind in range(len(KINDS)):
             for b in range(len(times)):
-                rows = (rest.kind == kind) & (which == b)
+                rows = (records.kind == kind) & (which == b)
                 if (n := int(rows.sum())) >= _FEWEST:
                     share = min(np.ceil((n + 1) * COVERAGE) / n, 1.0)
-                    widths[kind, b] = np.quantile(score[rows], share, axis=0, method="higher")
+                    found = np.quantile(score[rows], share, axis=0, method="higher")
+                    widths[kind, b] = np.maximum(found, _NARROWEST)
                 elif kind > 0:  # too few to tell: as with any tare
                     widths[kind, b] = widths[kind - 1, b]
-        return cls(bag, level, times, widths)
+        return replace(draft(records), widths=widths)
 
 
 def _times(t: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -133,11 +140,11 @@ def nearest(t: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.in
 
 @njit(cache=True, nogil=True)
 def _spread(covariance, mean, gain_std, d):  # pragma: no cover - compiled
-    """Covariance (10, 10), widened by the torque's own calibration, in units of 1/d (10,)."""
+    """Covariance (10, 10) in units of 1/d (10,), widened by the torque's own calibration."""
     out = np.empty((10, 10))
     for i in range(10):
         for j in range(10):
-            out[i, j] = (covariance[i, j] + gain_std**2 * mean[i] * mean[j]) * d[i] * d[j]
+            out[i, j] = covariance[i, j] * d[i] * d[j] + gain_std**2 * mean[i] * mean[j]
     return out
 
 
@@ -153,14 +160,13 @@ def _between(table, times, t):  # pragma: no cover - compiled
 
 
 def scores(records: Records, prior: MixturePrior, calibration: Calibration) -> NDArray[np.float64]:
-    """|error|/std (N, 10) of the answers before their widths."""
+    """The smallest c (N, 10) with which each answer's intervals would hold: 0 where the gain's part alone does."""
     out = np.empty((len(records), 10))
     for k in range(len(records)):
         trusted = calibration.trusted(records.evidence(k))
         found = prior.posterior(trusted.information, trusted.vector)
-        out[k] = np.abs(found.mean - records.truth[k]) / np.sqrt(
-            np.diag(_spread(found.covariance, found.mean, trusted.gain_std, np.ones(10)))
-        )
+        beyond = (found.mean - records.truth[k]) ** 2 - (Z95 * trusted.gain_std * found.mean) ** 2
+        out[k] = np.sqrt(np.maximum(beyond, 0.0) / np.diag(found.covariance))
     return out
 
 

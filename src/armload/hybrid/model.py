@@ -5,7 +5,6 @@ safetensors with JSON in its header, nothing in it is executed when it is read.
 
 from __future__ import annotations
 
-import hashlib
 import json
 from dataclasses import dataclass, replace
 from os import PathLike
@@ -14,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from armload.arms import Arm
+from armload.arms import Arm, kinship
 from armload.atomic import replacing
 from armload.errors import ModelError
 from armload.hybrid.calibration import COVERAGE, Calibration
@@ -23,20 +22,9 @@ from armload.hybrid.mixture import MixturePrior
 from armload.inertia import InertialParameters
 from armload.learners.artefact import put_together, take_apart
 
-FORMAT = 1
+FORMAT = 2  # 1: the widths scaled the torque's gain too
 _HEADER = "armload-hybrid"
 POOLED = "pooled coverage, cross-validated"  # in the provenance
-
-
-def kinship(arm: Arm) -> str:
-    """SHA-256 of an arm's links and of how they sit to each other: the same however its base stands."""
-    R, p = arm.link_poses(np.linspace(-0.5, 0.7, arm.n))
-    frame_R, frame_p = arm.frame_pose(np.linspace(-0.5, 0.7, arm.n))
-    R, p = np.concatenate([R[0], frame_R]), np.concatenate([p[0], frame_p])
-    digest = hashlib.sha256(np.round(arm.link_parameters, 6).tobytes())
-    digest.update((np.round(R[0].T @ R, 6) + 0.0).tobytes())  # as seen from the first moving link
-    digest.update((np.round((p - p[0]) @ R[0], 6) + 0.0).tobytes())
-    return digest.hexdigest()
 
 
 @dataclass(frozen=True, eq=False)

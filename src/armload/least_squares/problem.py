@@ -244,8 +244,8 @@ class Problem:
         """The payload of the last run."""
         phi, covariance = found.mean[self.last], found.covariance[self.last, self.last]
         eta = found.mean[self.payloads :]
-        side = np.median(np.abs(self.correction.coulomb(eta)) / self.correction.effort) > _MOTOR_SIDE
-        torque = "motor" if side else "link"
+        friction = float(np.median(np.abs(self.correction.coulomb(eta)) / self.correction.effort))
+        torque = "motor" if self.correction.arm.motor_torque or friction > _MOTOR_SIDE else "link"
         precision = np.linalg.inv(covariance)
         if self.root is None:
             before, pull = np.diag(1.0 / self.payload_variance[self.last]), np.zeros(10)

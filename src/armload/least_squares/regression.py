@@ -22,8 +22,6 @@ from armload.least_squares.features import JointFeatures
 
 REGRESSOR_RATE = 200.0  # [Hz] W, Z and G are computed no more often: they hold nothing above a few hertz
 GAP = 0.1  # [s] a longer pause between samples restarts the lags
-# variance of a joint's residual grows up to 1 + this where the joint stands still: friction is unknown there
-_PRESLIDING = 10.0
 _STILL = (
     1e-3  # [rad] an arm that stays so near for a block shows one value of its stiction: more of it tells nothing new
 )
@@ -51,9 +49,9 @@ class Stiction:
 
 
 @vectorize(cache=True)
-def presliding(dq):
-    """Weight of a joint's row at velocity dq [rad/s]: 1 in motion, less where friction is anything below stiction."""
-    return 1.0 / (1.0 + _PRESLIDING * (1.0 - np.tanh(np.abs(dq) / FRICTION_WIDTH) ** 2))
+def presliding(dq, excess):
+    """Weight of a joint's row at velocity dq [rad/s]: 1 in motion, 1/(1 + excess) at rest (`Correction.presliding`)."""
+    return 1.0 / (1.0 + excess * (1.0 - np.tanh(np.abs(dq) / FRICTION_WIDTH) ** 2))
 
 
 class RegressionData:
@@ -106,7 +104,9 @@ class RegressionData:
         h[~np.isfinite(h)] = 0.0
         h[[self._stiction.known(now, pose) for now, pose in zip(t[rows].tolist(), q[rows], strict=True)]] = 0.0
         self._last_row = last
-        self.take_rows(h, *self._rows(t[rows], q[rows], dq[rows], lagged[rows]), presliding(dq[rows]))
+        self.take_rows(
+            h, *self._rows(t[rows], q[rows], dq[rows], lagged[rows]), presliding(dq[rows], self.correction.presliding)
+        )
 
     def take_rows(self, h: NDArray, X: NDArray, r: NDArray, w: NDArray) -> None:
         """Take rows X (N, n, size), r (N, n) that stand for h (N,) seconds each, of weights w (N, n)."""

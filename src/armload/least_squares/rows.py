@@ -78,7 +78,7 @@ class RowStream:
         X, r = _row(*inputs, self.gain, h, self._fresh, *self._states)
         self._row_t, self._fresh = t, False
         counted = 0.0 if self._stiction.known(t, q.copy()) else h
-        return Row(counted, X, r, presliding(dq))
+        return Row(counted, X, r, presliding(dq, self.correction.presliding))
 
 
 @njit(cache=True, nogil=True)

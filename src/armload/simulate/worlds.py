@@ -5,13 +5,15 @@ The measured joint torque of a world is
     tau_J = gain·[rigid body(links) + rotor inertia·ddq + friction(dq, tau) + residual(q)] + offset + drift(t)
 
 Friction and residual are torques inside the joint: they disturb the arm's motion and show in the sensor. Rotor inertia
-is there only where the torque is measured on the motor's side of the gear. Gain, offset and drift are the sensor's own.
+is there only where the torque is measured on the motor's side of the gear; so is stiction, what a joint at rest holds
+that its motor need not (`World.stuck`). Gain, offset and drift are the sensor's own.
 
 The figures for the Panda are measured ones: two robots, published model, below 10 Hz. After links, offsets and friction
 have been fitted, (.20 .29 .19 .20 .08 .05 .05) N·m rms remain, smooth in q and repeatable: a torque outside the
-rigid-body span. The link figures (2 % of mass, 2 mm, 5 % of inertia) are our choice. Other arms scale with rated
-torque. Worlds beyond the measured ones (`World.beyond`) are our choice altogether: they are to make a learner and its
-error bars ready for an arm that nobody has measured.
+rigid-body span. The link figures (2 % of mass, 2 mm, 5 % of inertia, times `Arm.link_spread`: a model identified on a
+robot is better than a maker's drawing) are our choice. Other arms scale with rated torque. Worlds beyond the measured
+ones (`World.beyond`) are our choice altogether: they are to make a learner and its error bars ready for an arm that
+nobody has measured.
 """
 
 from __future__ import annotations
@@ -31,12 +33,15 @@ from armload.simulate.residual import SmoothTorque
 
 # one standard deviation of a link's mass [1], centre of mass [m] and inertia [1]
 _LINK_MASS, _LINK_COM, _LINK_INERTIA = 0.02, 0.002, 0.05
+_LINK_MOST = 10.0  # a spread of links beyond this many of the above would leave no arm
+_LIGHTEST_LINK = 0.2  # of the model's mass
 _PANDA_OFFSET = (0.2, 0.3, 0.12, 0.25, 0.05, 0.08, 0.02)  # [N·m], 1 sigma
 _PANDA_FRICTION = (0.25, 0.25, 0.2, 0.35, 0.35, 0.2, 0.26)  # [N·m]
 _PANDA_RESIDUAL = (0.20, 0.28, 0.19, 0.20, 0.08, 0.05, 0.045)  # [N·m], rms
 _OTHER_OFFSET, _OTHER_FRICTION, _OTHER_RESIDUAL = 0.003, 0.01, 0.0035  # of the rated torque
 _FRICTION_WIDTH = 0.06  # [rad/s]
 _FRICTION_SPREAD = 0.3
+_MOVING = 4.0  # widths of the friction beyond which a joint's next rest is another one; stiction is 0.1 % there
 
 # beyond the measured ones
 _HEAVIER = (1.0, 3.0)  # each mismatch over its reference
@@ -46,6 +51,7 @@ _STRIBECK, _VISCOUS, _LOAD = 0.6, 0.5, 0.015  # at most: of the level, of the le
 _GAIN, _MOTOR_GAIN = 0.01, 0.03  # torque scale, at most
 _WARMING = (60.0, 1200.0)  # [s]
 _MOTOR_FRICTION = (0.05, 0.15)  # of the rated torque
+_MOTOR_LOAD = 0.08  # at most of the torque: gears lose a share of what they transmit
 _ROTOR = (0.002, 0.02)  # [s²] rotor inertia over rated torque
 
 
@@ -82,6 +88,7 @@ class World:
         gain: scale (n,) of the torque sensor; None: 1.
         drift: what the torque sensor's offset gains with time; None: nothing.
         rotor_inertia: (n,) seen through the gear [kg·m²]; None: the torque is measured behind the gear.
+        stiction: (n,) the most that friction holds at rest [N·m], where that shows in the torque; None: it does not.
     """
 
     name: str
@@ -93,10 +100,17 @@ class World:
     gain: NDArray[np.float64] | None = field(default=None, repr=False)
     drift: Drift | None = field(default=None, repr=False)
     rotor_inertia: NDArray[np.float64] | None = field(default=None, repr=False)
+    stiction: NDArray[np.float64] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         n = len(self.links)
-        for name, shape in (("links", (n, 10)), ("offset", (n,)), ("gain", (n,)), ("rotor_inertia", (n,))):
+        for name, shape in (
+            ("links", (n, 10)),
+            ("offset", (n,)),
+            ("gain", (n,)),
+            ("rotor_inertia", (n,)),
+            ("stiction", (n,)),
+        ):
             if getattr(self, name) is None:
                 continue
             value = np.array(getattr(self, name), dtype=float)
@@ -116,16 +130,27 @@ class World:
 
     @classmethod
     def real_like(cls, arm: Arm, seed: int) -> World:
-        """An arm that differs from its model about as much as real ones were measured to."""
+        """An arm that differs from its model about as much as real ones were measured to.
+
+        Where torque is known to be the motor's, friction, gain and rotor inertia are as in `beyond` on that side, and
+        gears lose up to 8 % of what they transmit.
+        """
         rng = np.random.default_rng([seed, 1])
         offset, friction, residual = _sizes(arm)
+        links = np.array([_perturbed(phi, rng, np.full(3, arm.link_spread)) for phi in _bare_links(arm)])
+        offset = offset * rng.normal(size=arm.n)
+        level, rotor = _on_motor(arm, rng) if arm.motor_torque else (friction, None)
+        friction = _any_friction(level, rng, _MOTOR_LOAD) if arm.motor_torque else _plain_friction(level, rng)
         return cls(
             "real-like",
             seed,
-            np.array([_perturbed(phi, rng) for phi in _bare_links(arm)]),
-            offset * rng.normal(size=arm.n),
-            _plain_friction(friction, rng),
+            links,
+            offset,
+            friction,
             SmoothTorque.drawn(residual, rng),
+            1.0 + rng.uniform(-_MOTOR_GAIN, _MOTOR_GAIN, size=arm.n) if arm.motor_torque else None,
+            rotor_inertia=rotor,
+            stiction=friction.level if arm.motor_torque else None,
         )
 
     @classmethod
@@ -138,16 +163,18 @@ class World:
         5–15 % of the rated torque, the gain is off by up to 3 % and the rotors' inertia shows.
 
         Args:
-            motor_side: where torque is measured; None: drawn, on the motor's side in a third of the worlds.
+            motor_side: where torque is measured; None: drawn, on the motor's side in a third of the worlds, and in all
+                of them where that is known of the arm.
         """
         rng = np.random.default_rng([seed, 2])
         offset, level, residual = _sizes(arm)
         heavier = np.exp(rng.uniform(*np.log(_HEAVIER), size=6))
-        on_motor = rng.random() < 1 / 3 if motor_side is None else motor_side
+        if motor_side is None:
+            motor_side = arm.motor_torque or rng.random() < 1 / 3
+        on_motor = motor_side
         rotor = None
         if on_motor:
-            level = rated_effort(arm) * np.exp(rng.uniform(*np.log(_MOTOR_FRICTION), size=arm.n))
-            rotor = rated_effort(arm) * np.exp(rng.uniform(*np.log(_ROTOR), size=arm.n))
+            level, rotor = _on_motor(arm, rng)
         else:
             level = heavier[4] * level
         rippled = rng.random() < 0.5
@@ -158,13 +185,14 @@ class World:
         return cls(
             "beyond, motor side" if on_motor else "beyond",
             seed,
-            np.array([_perturbed(phi, rng, heavier[:3]) for phi in _bare_links(arm)]),
+            np.array([_perturbed(phi, rng, arm.link_spread * heavier[:3]) for phi in _bare_links(arm)]),
             heavier[3] * offset * rng.normal(size=arm.n),
-            _any_friction(level, rng),
+            _any_friction(level, rng, _MOTOR_LOAD if arm.motor_torque else _LOAD),
             smooth + SmoothTorque.ripple(share * heavier[5] * residual, rng) if rippled else smooth,
             1.0 + rng.uniform(-worst, worst, size=arm.n),
             Drift(0.5 * offset * rng.normal(size=arm.n), warming) if rng.random() < 0.5 else None,
             rotor,
+            level if arm.motor_torque else None,
         )
 
     def arm(self, nominal: Arm) -> Arm:
@@ -193,6 +221,23 @@ class World:
         seen = seen + self.offset
         return seen if self.drift is None else seen + self.drift(t)
 
+    def stuck(self, dq: ArrayLike, seed: int) -> NDArray[np.float64]:
+        """What stiction adds (N, n) to the torque of a log at velocities dq (N, n) [N·m]; the same for the same seed.
+
+        A joint that comes to rest is held by friction of any size up to its level, either way, until it moves on:
+
+            u_k·stiction·(1 − tanh²(dq/w)),      u_k ~ U(−1, 1), another one for each rest
+        """
+        dq = np.asarray(dq, dtype=float)
+        if self.stiction is None:
+            return np.zeros_like(dq)
+        rng, rests = np.random.default_rng([seed, 5]), np.zeros(dq.shape, dtype=int)
+        moving = np.abs(dq) > _MOVING * self.friction.width
+        rests[1:] = np.cumsum(moving[:-1] & ~moving[1:], axis=0)
+        held = rng.uniform(-1.0, 1.0, size=(int(rests.max(initial=0)) + 1, dq.shape[1]))
+        share = 1.0 - np.tanh(dq / self.friction.width) ** 2
+        return self.stiction * share * np.take_along_axis(held, rests, axis=0)
+
     @property
     def fingerprint(self) -> str:
         """SHA-256 of all its numbers."""
@@ -200,7 +245,12 @@ class World:
         arrays = [self.links, self.offset, *self.friction.numbers]
         if self.residual is not None:
             arrays += [self.residual.waves, self.residual.cosine, self.residual.sine]
-        for name, value in (("gain", self.gain), ("rotor inertia", self.rotor_inertia), ("drift", self.drift)):
+        for name, value in (
+            ("gain", self.gain),
+            ("rotor inertia", self.rotor_inertia),
+            ("drift", self.drift),
+            ("stiction", self.stiction),
+        ):
             if value is not None:
                 digest.update(name.encode())
                 arrays += [np.append(value.size, value.time)] if isinstance(value, Drift) else [value]
@@ -221,6 +271,13 @@ def _sizes(arm: Arm) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[
     return rated * _OTHER_OFFSET, rated * _OTHER_FRICTION, rated * _OTHER_RESIDUAL
 
 
+def _on_motor(arm: Arm, rng: np.random.Generator) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Friction level (n,) [N·m] and rotor inertia (n,) [kg·m²] where torque is measured on the motor's side."""
+    rated = rated_effort(arm)
+    level = rated * np.exp(rng.uniform(*np.log(_MOTOR_FRICTION), size=arm.n))
+    return level, rated * np.exp(rng.uniform(*np.log(_ROTOR), size=arm.n))
+
+
 def _spread(level: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
     return level * np.clip(1.0 + _FRICTION_SPREAD * rng.normal(size=len(level)), 0.1, None)
 
@@ -229,8 +286,8 @@ def _plain_friction(level: NDArray[np.float64], rng: np.random.Generator) -> Fri
     return Friction(_spread(level, rng), np.full(len(level), _FRICTION_WIDTH))
 
 
-def _any_friction(level: NDArray[np.float64], rng: np.random.Generator) -> Friction:
-    """Friction of any width, with each other shape in half of the worlds."""
+def _any_friction(level: NDArray[np.float64], rng: np.random.Generator, load: float) -> Friction:
+    """Friction of any width, with each other shape in half of the worlds; load: the most that grows with the torque."""
     n = len(level)
     level = _spread(level, rng)
     width = np.exp(rng.uniform(*np.log(_WIDTHS), size=n))
@@ -242,19 +299,17 @@ def _any_friction(level: NDArray[np.float64], rng: np.random.Generator) -> Frict
         has[1] * level * rng.uniform(0.0, _STRIBECK, size=n),
         width + rng.uniform(0.03, 0.2, size=n),
         has[2] * level * rng.uniform(0.0, _VISCOUS, size=n),
-        has[3] * rng.uniform(0.0, _LOAD, size=n),
+        has[3] * rng.uniform(0.0, load, size=n),
     )
 
 
-def _perturbed(
-    phi: NDArray[np.float64], rng: np.random.Generator, heavier: NDArray[np.float64] | None = None
-) -> NDArray[np.float64]:
-    """A link somewhat off its model, still a body that can exist; heavier: of mass, centre and inertia."""
+def _perturbed(phi: NDArray[np.float64], rng: np.random.Generator, spread: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A link somewhat off its model, still a body that can exist; spread: of mass, centre and inertia."""
     mass, com, inertia = phi_to_com(phi)
-    more = np.ones(3) if heavier is None else heavier
+    more = np.minimum(spread, _LINK_MOST)
     root = np.sqrt(np.abs(np.diag(inertia)))
     noise = rng.normal(size=(3, 3))
     inertia = inertia + more[2] * _LINK_INERTIA * np.outer(root, root) * (np.triu(noise) + np.triu(noise, 1).T)
-    off = mass * (1 + more[0] * _LINK_MASS * rng.normal())
+    off = mass * max(1 + more[0] * _LINK_MASS * rng.normal(), _LIGHTEST_LINK)
     changed = com_to_phi(off, com + more[1] * _LINK_COM * rng.normal(size=3), inertia)
     return nearest_consistent(changed)
