@@ -229,10 +229,24 @@ def test_real_ur10e_pair_gives_the_weighed_mass(answer, real_data):
         real_data / "ur10e_loaded_2805g.csv",
         *("--robot", real_data / "ur10e.urdf", "--frame", "tool0", "--tare", real_data / "ur10e_unloaded.csv"),
     )
-    assert found["relative_to"] == "tare"
-    assert found["mass"] == pytest.approx(2.805, rel=0.04)
+    assert (found["relative_to"], found["method"], found["interval"]) == ("tare", "hybrid", "calibrated")
+    assert found["mass"] == pytest.approx(2.805, rel=0.03)
     assert found["phi_low"][0] <= 2.805 <= found["phi_high"][0]
+    assert found["phi_high"][0] - found["phi_low"][0] < 2 * 0.06 * 2.805
     assert found["held"] is True
+
+
+def test_real_empty_ur10e_without_a_tare_holds_nothing(answer, real_data):
+    found = answer(real_data / "ur10e_unloaded.csv", "--robot", "ur10e")
+    assert found["phi_low"][0] <= 0.0 <= found["phi_high"][0]
+    assert found["held"] is False
+
+
+@pytest.mark.xfail(strict=True, reason="this arm is 0.9 kg off its description: 3.70 ± 0.79 kg, an eighth too narrow")
+def test_real_loaded_ur10e_without_a_tare_is_within_its_interval(answer, real_data):
+    found = answer(real_data / "ur10e_loaded_2805g.csv", "--robot", "ur10e")
+    assert found["held"] is True
+    assert found["phi_low"][0] <= 2.805 <= found["phi_high"][0]
 
 
 def test_real_unloaded_panda_holds_nothing(answer, real_data):
