@@ -614,7 +614,7 @@ def test_a_file_with_the_links_of_a_known_arm_is_that_arm(tmp_path, name):
     found = arm(tmp_path / "cell.urdf", known.frame, gravity=(0.0, 9.81, 0.0))
     facts = ("rated_payload", "link_spread", "motor_torque", "acceleration", "jerk")
     assert [getattr(found, fact) for fact in facts] == [getattr(known, fact) for fact in facts]
-    assert (found.name, found.gravity) == ("cell", (0.0, 9.81, 0.0))
+    assert (found.name, found.known_as, found.gravity) == ("cell", name, (0.0, 9.81, 0.0))
 
 
 def test_a_file_with_other_links_is_no_known_arm(tmp_path):

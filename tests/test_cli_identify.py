@@ -157,17 +157,10 @@ def test_the_built_in_arm_and_its_urdf_file_give_the_same(answer, logs, tmp_path
     built_in = answer(logs / "body.csv", "--robot", "panda", "--method", "rls-filter")
     filed = answer(logs / "body.csv", "--robot", path, "--frame", "panda_link8", "--method", "rls-filter")
     assert filed == built_in
-    # how good the figures are is known of the built-in arm only: without a tare the file's answer is less sure
-    default = answer(logs / "body.csv", "--robot", path, "--frame", "panda_link8")
-    surer = answer(logs / "body.csv", "--robot", "panda")
-    assert default["phi_low"][0] < surer["phi_low"][0] < BODY.mass < surer["phi_high"][0] < default["phi_high"][0]
-    # with one it hardly matters
-    tared = [
-        answer(logs / "both.csv", "--robot", robot, "--frame", "panda_link8", "--tare", logs / "hand.csv")
-        for robot in ("panda", path)
-    ]
-    assert tared[0]["mass"] == pytest.approx(tared[1]["mass"], rel=0.01)
-    assert tared[0]["com"] == pytest.approx(tared[1]["com"], abs=2e-3)
+    # a file with the links of a built-in arm is that arm: what is known of it holds, too
+    mine = path.rename(tmp_path / "my_cell.urdf")
+    default = answer(logs / "body.csv", "--robot", mine, "--frame", "panda_link8")
+    assert default == answer(logs / "body.csv", "--robot", "panda") | {"robot": "my_cell"}
 
 
 def test_an_arm_that_never_moves_tells_what_gravity_tells(answer, panda, tmp_path):

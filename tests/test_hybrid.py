@@ -338,7 +338,7 @@ def logs(panda):
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
 def test_a_shipped_model_is_small_and_calibrated_and_belongs_to_its_arm(path):
     own, model = arm(path.stem), HybridModel.load(path)
-    assert path == HybridModel.shipped(own.name)
+    assert path == HybridModel.shipped(own)
     assert path.stat().st_size < 5e6
     assert model.calibrated
     assert model.provenance["episodes"] >= 1000

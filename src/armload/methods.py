@@ -315,7 +315,7 @@ def default_for(arm: Arm) -> str:
     """The name of the most trustworthy method for an arm: the hybrid where one is shipped, map-gp elsewhere."""
     from armload.hybrid import HybridModel
 
-    shipped = HybridModel.shipped(arm.name)
+    shipped = HybridModel.shipped(arm)
     if shipped is None:
         return _ELSEWHERE
     try:

@@ -84,5 +84,5 @@ def _as_known(found: Arm) -> Arm:
         if facts["frame"] in found.frames:
             known = arm(name)
             if known.n == found.n and kinship(replace(found, frame=known.frame)) == kinship(known):
-                return replace(found, **{fact: value for fact, value in facts.items() if fact != "frame"})
+                return replace(found, known_as=name, **{fact: x for fact, x in facts.items() if fact != "frame"})
     return found

@@ -67,6 +67,7 @@ class Arm:
             of inertia (1 sigma): 1 for an identified model, 10 for nominal figures of unknown quality.
         motor_torque: whether the torque is known to be motor current times a constant, with all of the gear's friction
             in it; where it is not known, each log tells.
+        known_as: which built-in arm it is, where a file of another name describes one.
     """
 
     name: str
@@ -80,6 +81,7 @@ class Arm:
     jerk: tuple[float, ...] | None = field(default=None, repr=False)
     link_spread: float = field(default=10.0, repr=False)
     motor_torque: bool = field(default=False, repr=False)
+    known_as: str | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         try:

@@ -126,7 +126,7 @@ def shipped_model(arm: Arm) -> HybridModel:
     Raises:
         ModelError: there are none.
     """
-    path = HybridModel.shipped(arm.name)
+    path = HybridModel.shipped(arm)
     if path is None:
         raise ModelError(f"no hybrid is shipped for {arm.name}: train one with `armload train --method hybrid`")
     return HybridModel.load(path)

@@ -157,7 +157,7 @@ class HybridModel:
             return False
 
     @staticmethod
-    def shipped(arm_name: str) -> Path | None:
+    def shipped(arm: Arm) -> Path | None:
         """The model that comes with armload for an arm of the catalogue; None: there is none."""
-        path = Path(__file__).parent / "models" / f"{arm_name}.safetensors"
+        path = Path(__file__).parent / "models" / f"{arm.known_as or arm.name}.safetensors"
         return path if path.is_file() else None
