@@ -6,7 +6,7 @@ import time
 import numpy as np
 import pytest
 
-from armload import Recording, arm
+from armload import Recording, arm, read_recording
 from armload.inertia import InertialParameters
 from armload.motion import random_motion, taie2024
 from armload.online import OnlineIdentifier
@@ -175,3 +175,15 @@ def test_a_pose_first_seen_shortly_after_a_change_is_not_another_change():
     log = stream(5001, [(-1.0, None), (5.217, box(1.0))], 14.0, motion=taie2024())
     _, events = said(log, "map-gp")  # the empty arm was not seen in all poses of the round before it took hold
     assert [event.kind for event in events] == ["grasp"]
+
+
+def test_a_real_arm_that_breaks_away_from_rest_is_no_change_of_payload(real_data):
+    ur = arm("ur10e")
+    loaded, tare = (read_recording(real_data / f"ur10e_{name}.csv", ur) for name in ("loaded_2805g", "unloaded"))
+    identifier, estimates = OnlineIdentifier(ur, tare), []
+    for sample in zip(loaded.t, loaded.q, loaded.dq, loaded.tau, strict=True):
+        estimates.append(identifier.update(*sample))
+    identifier.close()
+    assert estimates[-1].event is None
+    assert all(covers(at(estimates, loaded.t[0] + t), 2.805)[0] for t in (1.0, 3.0, 6.0, 10.0, 15.0, 30.0, 60.0))
+    assert 1.96 * estimates[-1].std[0] < 0.06 * 2.805
