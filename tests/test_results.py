@@ -47,8 +47,10 @@ def test_what_a_tare_is_worth_is_that_of_the_committed_benchmark():
 
 def test_the_readme_s_real_logs_are_those_of_the_committed_benchmark():
     result = json.loads((RESULTS / "real_logs.json").read_text())
-    pair, semi = result["ur10e_pair"]["map-gp"], result["panda_semi_real"]
-    assert f"{pair['mass_kg']:.2f} ± {pair['half_width_kg']:.2f} kg" in README
+    semi = result["panda_semi_real"]
+    for name in ("hybrid", "hybrid, no tare", "hybrid, empty, no tare"):
+        said = result["ur10e_pair"][name]
+        assert f"{said['mass_kg']:.2f} ± {said['half_width_kg']:.2f} kg" in README
     assert f"{result['panda_unloaded_phantom']['hybrid']['mass_kg']:.3f} kg" in README
     for name, digits in (("hybrid, with tare, 6 s", 1), ("hybrid, with tare, 1 s", 0), ("hybrid, 6 s", 0)):
         moment = np.mean(semi[name]["first_moment_g_m"])
@@ -76,6 +78,23 @@ def test_the_width_of_the_shipped_hybrid_is_that_of_its_training_s_report():
     assert f"on at most {np.nanmax(ratio[:2, 3:]):.1f};" in page  # times from 0.5 s
     assert f"up to {np.nanmax(ratio[:2]):.1f} in the first tenth" in page
     assert f"of which there are few episodes, up to {np.nanmax(ratio[2]):.1f}." in page
+
+
+def test_what_the_intervals_promise_is_what_new_episodes_showed():
+    page = " ".join((ROOT / "docs" / "hybrid.md").read_text(encoding="utf-8").split())
+    found = json.loads((RESULTS / "fresh_intervals_panda.json").read_text())
+    cells, ratio = 100 * np.array(found["cells"], dtype=float), np.array(found["ratio"], dtype=float)
+    most = np.max(found["counts"][2])
+    assert (
+        f"Of {found['episodes']} new ones (`python benchmarks/fresh_intervals.py`), {100 * found['pooled']:.1f} %"
+        in page
+    )
+    assert f"by parameter and time {np.nanmin(cells[:2]):.1f} to {np.nanmax(cells[:2]):.1f} %" in page
+    assert f"same motion {np.nanmin(cells[2]):.1f} to {np.nanmax(cells[2]):.1f} % of {most} at most" in page
+    assert (
+        f"half-width is {np.nanmean(ratio[:2]):.1f} times the mean error, at most {np.nanmax(ratio[:2]):.1f} times"
+        in page
+    )
 
 
 def rows_of_events(result):
