@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from pathlib import Path
 
 from armload import arm
@@ -43,7 +44,7 @@ def main() -> None:
     console().print(cells_table(found))
     print(f"pooled: {100 * found.pooled:.1f} %")
     result = {
-        "command": f"python benchmarks/fresh_intervals.py --robot {robot.name} --episodes {options.episodes}",
+        "command": " ".join(["python benchmarks/fresh_intervals.py", *sys.argv[1:]]),
         "population": "broad",
         "seed": SEED,
         "trained": {key: model.provenance[key] for key in ("population", "episodes", "seed")},

@@ -85,10 +85,7 @@ def test_what_the_intervals_promise_is_what_new_episodes_showed():
     found = json.loads((RESULTS / "fresh_intervals_panda.json").read_text())
     cells, ratio = 100 * np.array(found["cells"], dtype=float), np.array(found["ratio"], dtype=float)
     most = np.max(found["counts"][2])
-    assert (
-        f"Of {found['episodes']} new ones (`python benchmarks/fresh_intervals.py`), {100 * found['pooled']:.1f} %"
-        in page
-    )
+    assert f"Of {found['episodes']} new ones (`{found['command']}`), {100 * found['pooled']:.1f} %" in page
     assert f"by parameter and time {np.nanmin(cells[:2]):.1f} to {np.nanmax(cells[:2]):.1f} %" in page
     assert f"same motion {np.nanmin(cells[2]):.1f} to {np.nanmax(cells[2]):.1f} % of {most} at most" in page
     assert (
