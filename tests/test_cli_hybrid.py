@@ -59,8 +59,9 @@ def small(tmp_path_factory):
     std = payload_prior_std(two)
     prior = MixturePrior(np.ones(1), np.zeros((1, 10)), np.diag(std**2)[None], ("anything",))
     calibration = Calibration(None, 1.0, np.array([0.1, 6.0]), np.full((3, 2, 10), 1.96))
-    for name, pooled in (("checked", 0.95), ("trial", 0.80)):
-        model = HybridModel(prior, calibration, two.name, kinship(two), str(two.frame), two.n, {POOLED: pooled})
+    for name, pooled, episodes in (("checked", 0.95, 2400), ("trial", 0.80, 2400), ("small", 0.95, 300)):
+        known = {POOLED: pooled, "episodes": episodes}
+        model = HybridModel(prior, calibration, two.name, kinship(two), str(two.frame), two.n, known)
         model.save(folder / f"{name}.safetensors")
     return folder
 
@@ -79,7 +80,9 @@ def coverage():
 # ---------------------------------------------------------------------- a model of one's own
 
 
-@pytest.mark.parametrize(("name", "interval"), [("checked", "calibrated"), ("trial", "approximate")])
+@pytest.mark.parametrize(
+    ("name", "interval"), [("checked", "calibrated"), ("trial", "approximate"), ("small", "approximate")]
+)
 def test_identify_reads_a_hybrid_and_calls_calibrated_only_what_held(call, small, name, interval):
     argv = ("identify", small / "run.csv", "--robot", small / "two.urdf", "--method", small / f"{name}.safetensors")
     out = call(*argv, "--tare", small / "tare.csv", "--json")

@@ -32,6 +32,7 @@ def run(options: argparse.Namespace) -> None:
 
     from armload.arms import arm
     from armload.hybrid import train_hybrid
+    from armload.hybrid.model import ENOUGH
     from armload.hybrid.training import EPISODES
 
     robot = arm(options.robot, options.frame)
@@ -65,9 +66,11 @@ def run(options: argparse.Namespace) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(report, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     if not model.calibrated:
+        few = f"{episodes} episodes are too few to set the widths by, expected {ENOUGH} or more"
+        missed = f"{100 * coverage.pooled:.1f} % is not the 95 % that was asked for"
         print_note(
-            f"{100 * coverage.pooled:.1f} % is not the 95 % that was asked for: `armload identify` will call the "
-            f"intervals of this model approximate; train on more than {episodes} episodes"
+            f"{few if episodes < ENOUGH else missed}: `armload identify` will call the intervals of this model "
+            f"approximate; train on more than {episodes} episodes"
         )
     if options.json:
         print_json(report | {"out": str(out)})

@@ -24,6 +24,7 @@ from armload.learners.artefact import put_together, take_apart
 
 FORMAT = 2  # 1: the widths scaled the torque's gain too
 _HEADER = "armload-hybrid"
+ENOUGH = 1000  # episodes: the share of a parameter's intervals that hold is then within 1.5 points of what is said
 POOLED = "pooled coverage, cross-validated"  # in the provenance
 
 
@@ -48,8 +49,12 @@ class HybridModel:
 
     @property
     def calibrated(self) -> bool:
-        """Whether 93–97 % of what training held out lay inside the intervals; too few episodes give less."""
-        return abs(float(self.provenance.get(POOLED, 0.0)) - COVERAGE) <= 0.02
+        """Whether 93–97 % of what training held out lay inside the intervals, and episodes enough set their widths.
+
+        Of few episodes the share held out lies near 95 %, too: their folds are judged by each other.
+        """
+        held = abs(float(self.provenance.get(POOLED, 0.0)) - COVERAGE) <= 0.02
+        return held and int(self.provenance.get("episodes", 0)) >= ENOUGH
 
     def prior_for(self, arm: Arm) -> MixturePrior:
         """The payload prior about the frame of an arm: of this model's kind, whatever its frame, base and hand.
