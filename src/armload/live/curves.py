@@ -11,7 +11,8 @@ from armload.inertia import NAMES, UNITS
 
 # Okabe & Ito, "Color Universal Design", 2008: told apart by the colour-blind
 COLOURS = ((0, 114, 178), (213, 94, 0), (0, 158, 115))
-_WIDER = 1.5  # times the present interval that is shown beyond the values
+_WIDER = 1.5  # times the narrowest present interval that is shown beyond the values
+_ALIKE = 5.0  # times the narrowest: present intervals up to this wide are shown whole
 
 
 class Group(NamedTuple):
@@ -61,7 +62,7 @@ def data_of(group: Group, t: NDArray[np.float64], rows: NDArray[np.float64]) -> 
     """uPlot's data for `series_of`, from a history of phi, half-widths and truth.
 
     Intervals are cut to what leaves the curves readable: the range of the values and of the truth, and somewhat more
-    than the present interval.
+    than the present intervals.
 
     Args:
         t: (N,) [s]. rows: (N, 30).
@@ -90,7 +91,9 @@ def _range(phi: NDArray, now: NDArray, truth: NDArray) -> tuple[float, float]:
     low, high = float(seen.min()), float(seen.max())
     room = max(_WIDER * float(np.min(now)), 0.35 * (high - low), 1e-6)
     room = min(room, max(3.0 * (high - low), 1e-2)) if np.min(now) > 1e8 else room
-    return low - room, high + room
+    ends = phi[-1] + np.array([[-1.0], [1.0]]) * now
+    whole = ends[:, (now <= _ALIKE * np.min(now)) & (now < 1e8) & np.isfinite(phi[-1])]  # one far wider is cut
+    return min(low - room, whole[0].min(initial=np.inf)), max(high + room, whole[1].max(initial=-np.inf))
 
 
 def _css(colour: tuple[int, int, int], alpha: float = 1.0) -> str:
