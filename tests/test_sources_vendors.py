@@ -7,6 +7,7 @@ import re
 import socket
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -70,7 +71,8 @@ def franka_urdf(robot):
 def franka(robot, version, address, tmp_path, *, seconds=2.5, motion=None, lose=(), rest=60.0):
     """A simulated robot with a payload behind the Franka Control Interface; also its log, at whole milliseconds."""
     motion = motion or (taie2024() if robot.name == "panda" else random_motion(robot, 3))
-    run = simulate(robot, motion, heavy_payload(), world=World.real_like(robot, 2), duration=seconds)
+    world = World.real_like(replace(robot, link_spread=1.0), 2)  # one whose links are as well known as a Panda's
+    run = simulate(robot, motion, heavy_payload(), world=world, duration=seconds)
     log = {"t": np.round(10.0 + run.t, 3), "q": run.q, "dq": run.dq, "tau": run.tau}
     if rest:  # it stops where it is, for longer than any test on any machine takes
         still = np.full(round(1000 * rest), -1)
