@@ -35,7 +35,7 @@ _PER_JOINT = {"offset": 4e-3, "coulomb": 1e-2, "viscous": 5e-3, "rotor": 3e-4}
 # prior standard deviations of a link's mass [1], centre of mass [m] and inertia [1], times `Arm.link_spread`
 _LINK_MASS, _LINK_COM, _LINK_INERTIA = 0.02, 2e-3, 0.05
 # where torque is motor current, the gear's friction is in it: Coulomb and viscous friction so much larger
-_MOTOR_SIDE = {"coulomb": 5.0, "viscous": 5.0}
+_MOTOR_FRICTION = {"coulomb": 5.0, "viscous": 5.0}
 # by how much the variance of a joint's residual is larger at rest than in motion: friction is unknown there
 _PRESLIDING, _MOTOR_PRESLIDING = 10.0, 250.0
 _UNMODELLED_INERTIA = 5e-3  # [kg·m²] of every link at least: cables, covers, elastic joints
@@ -61,7 +61,7 @@ class Correction:
     @property
     def prior_std(self) -> NDArray[np.float64]:
         """Prior standard deviation of eta (p,), its mean being zero."""
-        larger = _MOTOR_SIDE if self.arm.motor_torque else {}
+        larger = _MOTOR_FRICTION if self.arm.motor_torque else {}
         per_joint = [fraction * larger.get(name, 1.0) * self.effort for name, fraction in _PER_JOINT.items()]
         return np.concatenate([*per_joint, _link_std(self.arm)])
 

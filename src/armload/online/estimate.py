@@ -20,8 +20,8 @@ class OnlineEstimate(Estimate):
     """An `Estimate` with what a controller has to know of it.
 
     t: time of the last sample, on the stream's clock [s]. n_samples: samples of this payload so far.
-    age: how much older the newest sample in phi is than the last one [s]: more than 0.01 only while samples that do
-        not fit are left out, which `notes` then says.
+    age: how much older the newest sample in phi is than the last one [s]; it grows while samples that do not fit are
+        left out, which `notes` then says.
     since: when this payload was taken up, on the stream's clock [s].
     relative_to: "arm", "tool" (which the arm was given with), "tare", or "before": the run of the empty arm before the
         last change was taken for a tare. method: its name.

@@ -132,8 +132,8 @@ class World:
     def real_like(cls, arm: Arm, seed: int) -> World:
         """An arm that differs from its model about as much as real ones were measured to.
 
-        Where torque is known to be the motor's, friction, gain and rotor inertia are as in `beyond` on that side, and
-        gears lose up to 8 % of what they transmit.
+        Where torque is known to be the motor's, friction, gain and rotor inertia are as in `beyond` on that side, gears
+        lose up to 8 % of what they transmit, and stiction shows at rest.
         """
         rng = np.random.default_rng([seed, 1])
         offset, friction, residual = _sizes(arm)
@@ -171,19 +171,18 @@ class World:
         heavier = np.exp(rng.uniform(*np.log(_HEAVIER), size=6))
         if motor_side is None:
             motor_side = arm.motor_torque or rng.random() < 1 / 3
-        on_motor = motor_side
         rotor = None
-        if on_motor:
+        if motor_side:
             level, rotor = _on_motor(arm, rng)
         else:
             level = heavier[4] * level
         rippled = rng.random() < 0.5
         share = rng.uniform(0.2, 0.7) if rippled else 0.0
         smooth = SmoothTorque.of_length(np.sqrt(1 - share**2) * heavier[5] * residual, _LENGTHS, rng)
-        worst = _MOTOR_GAIN if on_motor else _GAIN
+        worst = _MOTOR_GAIN if motor_side else _GAIN
         warming = float(np.exp(rng.uniform(*np.log(_WARMING))))
         return cls(
-            "beyond, motor side" if on_motor else "beyond",
+            "beyond, motor side" if motor_side else "beyond",
             seed,
             np.array([_perturbed(phi, rng, arm.link_spread * heavier[:3]) for phi in _bare_links(arm)]),
             heavier[3] * offset * rng.normal(size=arm.n),
