@@ -82,7 +82,7 @@ def test_the_width_of_the_shipped_hybrid_is_that_of_its_training_s_report():
 
 def test_what_the_intervals_promise_is_what_new_episodes_showed():
     page = " ".join((ROOT / "docs" / "hybrid.md").read_text(encoding="utf-8").split())
-    found = json.loads((RESULTS / "fresh_intervals_panda.json").read_text())
+    found = json.loads((RESULTS / "fresh_episodes_panda.json").read_text())
     cells, ratio = 100 * np.array(found["cells"], dtype=float), np.array(found["ratio"], dtype=float)
     most = np.max(found["counts"][2])
     assert f"Of {found['episodes']} new ones (`{found['command']}`), {100 * found['pooled']:.1f} %" in page

@@ -475,6 +475,16 @@ def test_kill_9_of_the_reader_is_an_error_and_its_record_can_be_read(tmp_path, p
     assert len(kept) - len(seen) <= 1
 
 
+def has_ended(reader):
+    """An orphan is handed on and collected by others: wait until its memory is gone."""
+    for _ in range(500):
+        if not Path(f"/proc/{reader}/fd").exists() or not os.listdir(f"/proc/{reader}/fd"):
+            return
+        threading.Event().wait(0.02)
+    os.kill(reader, signal.SIGKILL)
+    pytest.fail("the reader outlived whoever started it")
+
+
 def test_kill_9_of_whoever_listens_ends_the_reader_and_loses_nothing(tmp_path, path):
     code = """
 import sys
@@ -491,14 +501,7 @@ for sample in source:
         reader = int(process.stdout.readline())
         seen = [float(line) for line in itertools.islice(process.stdout, 200)]
         process.kill()
-    # an orphan is handed on and collected by others: wait until its memory is gone
-    for _ in range(500):
-        if not Path(f"/proc/{reader}/fd").exists() or not os.listdir(f"/proc/{reader}/fd"):
-            break
-        threading.Event().wait(0.02)
-    else:
-        os.kill(reader, signal.SIGKILL)
-        pytest.fail("the reader outlived its listener")
+    has_ended(reader)
     kept = read_recording(record)
     assert kept.t[:200].tolist() == seen
 
@@ -621,6 +624,27 @@ def test_a_robot_that_does_not_answer_is_an_error_and_its_client_is_ended(client
     assert not Path("/proc", (tmp_path / "asked").read_text()).exists()
     assert set(os.listdir("/proc/self/fd")) == before
     assert not (tmp_path / "run.csv").exists()
+
+
+def test_kill_9_of_whoever_starts_a_reader_that_connects_ends_the_reader(client, monkeypatch, tmp_path):
+    client("""
+        def Robot(*_):
+            with open(os.environ["ASKED"] + ".part", "w") as file:
+                file.write(str(os.getpid()))
+            os.rename(os.environ["ASKED"] + ".part", os.environ["ASKED"])
+            while True:
+                time.sleep(3600)
+        """)
+    asked = tmp_path / "asked"
+    monkeypatch.setenv("ASKED", str(asked))
+    code = "import armload, armload.sources as s; s.open_source('fr3://192.0.2.9', armload.arm('fr3'))"
+    with subprocess.Popen([sys.executable, "-c", code]) as process:
+        for _ in range(1500):
+            if asked.exists():
+                break
+            threading.Event().wait(0.02)
+        process.kill()
+    has_ended(int(asked.read_text()))
 
 
 def test_a_client_that_takes_long_to_load_is_not_a_robot_that_does_not_answer(client, monkeypatch):

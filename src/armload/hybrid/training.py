@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm, kinship
 from armload.determined import Z95
-from armload.episodes import LIGHTEST, POPULATIONS, TOOL_SHARE, draw_episodes
+from armload.episodes import LIGHTEST, POPULATIONS, TOOL_SHARE, Episode, draw_episodes
 from armload.errors import ModelError
 from armload.hybrid.calibration import Calibration, nearest
 from armload.hybrid.evidence import KINDS
@@ -198,7 +198,7 @@ def episode_records(
         if path is not None and path.is_file():
             part = Records.load(path)
         else:
-            drawn = draw_episodes(arm, population, count, 1000 * seed + _FIRST_SEED + first // _CHUNK, motions=_MOTIONS)
+            drawn = _chunk(arm, population, seed, first, count)
 
             def tell(done: int, _: int, first: int = first) -> None:
                 if progress is not None:
@@ -209,3 +209,13 @@ def episode_records(
                 part.save(path)
         parts.append(replace(part, episode=part.episode + first))
     return Records.joined(parts)
+
+
+def drawn_episodes(arm: Arm, population: str = "broad", episodes: int = EPISODES, seed: int = 0) -> list[Episode]:
+    """The episodes behind `episode_records`, in its order, not simulated. Arguments as of `train_hybrid`."""
+    parts = [_chunk(arm, population, seed, k, min(_CHUNK, episodes - k)) for k in range(0, episodes, _CHUNK)]
+    return [episode for part in parts for episode in part]
+
+
+def _chunk(arm: Arm, population: str, seed: int, first: int, count: int) -> list[Episode]:
+    return draw_episodes(arm, population, count, 1000 * seed + _FIRST_SEED + first // _CHUNK, motions=_MOTIONS)

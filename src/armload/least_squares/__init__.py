@@ -12,7 +12,7 @@ from armload.least_squares.live import StreamingIdentifier
 from armload.least_squares.map import PosteriorLeastSquares, SmoothPosteriorLeastSquares
 from armload.least_squares.momentum import MomentumLeastSquares
 from armload.least_squares.normal import OrdinaryLeastSquares, WeightedLeastSquares
-from armload.least_squares.prior import GaussianPrior, payload_prior_std
+from armload.least_squares.prior import GaussianPrior, payload_prior_std, solution_prior_std
 from armload.least_squares.problem import Posterior
 from armload.least_squares.recursive import FilteredRecursiveLeastSquares, RecursiveLeastSquares
 from armload.least_squares.total import RecursiveTotalLeastSquares
@@ -41,4 +41,5 @@ __all__ = [
     "WeightedLeastSquares",
     "effort_scale",
     "payload_prior_std",
+    "solution_prior_std",
 ]

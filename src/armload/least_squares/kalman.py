@@ -23,7 +23,7 @@ from armload.arms.forward import ForwardDynamics
 from armload.identifier import Estimate, Identifier
 from armload.inertia import is_consistent, nearest_consistent
 from armload.least_squares.correction import FRICTION_WIDTH, effort_scale
-from armload.least_squares.prior import payload_prior_std
+from armload.least_squares.prior import solution_prior_std
 from armload.recording import Sample
 
 STEP_RATE = 200.0  # [Hz] a faster log's torque is averaged over each step
@@ -31,7 +31,6 @@ GAP = 0.1  # [s] after a longer pause the joints' state begins anew
 # as fractions of the effort limit: √S of the unmodelled torque per √Hz; first spread of offset and Coulomb friction
 _TORQUE, _OFFSET, _COULOMB = 4e-3, 4e-3, 1e-2
 _MARGIN = 1e-3  # [kg] how far inside the cone of bodies (lengths in units of 0.1 m) the model is linearised
-_WIDE = 4.0  # phi's first spread, in units of `payload_prior_std`: it must not pull a determined payload
 _ITERATIONS = 6
 _SMOOTH = 0.02  # [s] lag of the acceleration at which f is linearised
 _NEAR = 1e-3  # of the payload's first spread: linearised no further off, a step is not repeated
@@ -71,7 +70,7 @@ class ExtendedKalmanFilter(Identifier):
         self.arm, self.torque_density = arm, torque_density
         self._dynamics = ForwardDynamics(arm)
         self._R = np.repeat([position_noise**2, velocity_noise**2], arm.n)
-        self._unit = _WIDE * payload_prior_std(arm)
+        self._unit = solution_prior_std(arm)
         self.reset()
 
     def reset(self) -> None:

@@ -11,13 +11,11 @@ from armload.least_squares.correction import Correction, effort_scale
 from armload.least_squares.features import JointFeatures
 from armload.least_squares.noise import RIGID, SMOOTH, NoiseModel
 from armload.least_squares.posterior import solve
-from armload.least_squares.prior import GaussianPrior, payload_prior_std
+from armload.least_squares.prior import GaussianPrior, payload_prior_std, solution_prior_std
 from armload.least_squares.problem import Posterior, Scales
 from armload.least_squares.regression import RegressionData
 from armload.least_squares.streaming import StreamingPosterior
 from armload.recording import Recording, Sample
-
-_WIDE = 4.0  # the solution's prior is so much wider than the stated one: it must not pull a determined payload
 
 
 class PosteriorLeastSquares(BatchIdentifier):
@@ -106,7 +104,7 @@ class PosteriorLeastSquares(BatchIdentifier):
         if tare is None and reference is not None:
             tare, start = reference.finish(), reference.posterior.scales
         empty = self._data(self._correction)
-        std = _WIDE * payload_prior_std(self.arm)
+        std = solution_prior_std(self.arm)
         return StreamingPosterior(self._correction, empty.features, self._noise, std, tare, start, self.gain)
 
     def _take(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
@@ -120,7 +118,7 @@ class PosteriorLeastSquares(BatchIdentifier):
     def _estimate(self, t: float) -> Estimate:
         assert self._run is not None
         runs = [self._run] if self._tare is None else [self._tare, self._run]
-        prior_std = _WIDE * payload_prior_std(self.arm)
+        prior_std = solution_prior_std(self.arm)
         self._posterior = solve(runs, prior_std, self.prior, self._noise, self._iterations, self._start)
         self._solved_at = t
         return self._last(t)

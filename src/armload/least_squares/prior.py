@@ -18,6 +18,7 @@ from armload.inertia import InertialParameters
 
 _SHRINK = 0.05  # share of the diagonal in the covariance: few payloads say little about correlations
 _FLOOR = np.array([5e-3] + [5e-4] * 3 + [5e-5] * 6)  # [kg, kg·m, kg·m²] no family is known better than this
+_WIDE = 4.0
 
 
 def payload_prior_std(arm: Arm) -> NDArray[np.float64]:
@@ -27,6 +28,14 @@ def payload_prior_std(arm: Arm) -> NDArray[np.float64]:
     """
     rated = arm.rated_payload or 0.4 * float(arm.link_parameters[:, 0].sum())
     return 0.5 * rated * np.array([1.0] + [0.15] * 3 + [0.15**2] * 6)
+
+
+def solution_prior_std(arm: Arm) -> NDArray[np.float64]:
+    """Standard deviation (10,) of the prior that solutions are computed with: it must not pull a determined payload.
+
+    Four times that of `payload_prior_std`, which is the one that what a log cannot tell is reported with.
+    """
+    return _WIDE * payload_prior_std(arm)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,12 +8,8 @@ Friction and residual are torques inside the joint: they disturb the arm's motio
 is there only where the torque is measured on the motor's side of the gear; so is stiction, what a joint at rest holds
 that its motor need not (`World.stuck`). Gain, offset and drift are the sensor's own.
 
-The figures for the Panda are measured ones: two robots, published model, below 10 Hz. After links, offsets and friction
-have been fitted, (.20 .29 .19 .20 .08 .05 .05) N·m rms remain, smooth in q and repeatable: a torque outside the
-rigid-body span. The link figures (2 % of mass, 2 mm, 5 % of inertia, times `Arm.link_spread`: a model identified on a
-robot is better than a maker's drawing) are our choice. Other arms scale with rated torque. Worlds beyond the measured
-ones (`World.beyond`) are our choice altogether: they are to make a learner and its error bars ready for an arm that
-nobody has measured.
+How large each part is and how it is drawn says `armload.simulate.mismatch`. Worlds beyond the measured ones
+(`World.beyond`) are to make a learner and its error bars ready for an arm that nobody has measured.
 """
 
 from __future__ import annotations
@@ -26,33 +22,24 @@ from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
 from armload.errors import ArmError
-from armload.inertia import com_to_phi, nearest_consistent, phi_to_com
 from armload.simulate.friction import Friction
-from armload.simulate.ratings import rated_effort
+from armload.simulate.mismatch import (
+    GAIN,
+    LENGTHS,
+    LOAD,
+    MOTOR_GAIN,
+    MOTOR_LOAD,
+    any_friction,
+    on_motor,
+    perturbed,
+    plain_friction,
+    sizes,
+)
 from armload.simulate.residual import SmoothTorque
 
-# one standard deviation of a link's mass [1], centre of mass [m] and inertia [1]
-_LINK_MASS, _LINK_COM, _LINK_INERTIA = 0.02, 0.002, 0.05
-_LINK_MOST = 10.0  # a spread of links beyond this many of the above would leave no arm
-_LIGHTEST_LINK = 0.2  # of the model's mass
-_PANDA_OFFSET = (0.2, 0.3, 0.12, 0.25, 0.05, 0.08, 0.02)  # [N·m], 1 sigma
-_PANDA_FRICTION = (0.25, 0.25, 0.2, 0.35, 0.35, 0.2, 0.26)  # [N·m]
-_PANDA_RESIDUAL = (0.20, 0.28, 0.19, 0.20, 0.08, 0.05, 0.045)  # [N·m], rms
-_OTHER_OFFSET, _OTHER_FRICTION, _OTHER_RESIDUAL = 0.003, 0.01, 0.0035  # of the rated torque
-_FRICTION_WIDTH = 0.06  # [rad/s]
-_FRICTION_SPREAD = 0.3
 _MOVING = 4.0  # widths of the friction beyond which a joint's next rest is another one; stiction is 0.1 % there
-
-# beyond the measured ones
-_HEAVIER = (1.0, 3.0)  # each mismatch over its reference
-_WIDTHS = (0.02, 0.2)  # [rad/s]
-_LENGTHS = (0.3, 3.0)  # [rad]
-_STRIBECK, _VISCOUS, _LOAD = 0.6, 0.5, 0.015  # at most: of the level, of the level per rad/s, of the torque
-_GAIN, _MOTOR_GAIN = 0.01, 0.03  # torque scale, at most
 _WARMING = (60.0, 1200.0)  # [s]
-_MOTOR_FRICTION = (0.05, 0.15)  # of the rated torque
-_MOTOR_LOAD = 0.08  # at most of the torque: gears lose a share of what they transmit
-_ROTOR = (0.002, 0.02)  # [s²] rotor inertia over rated torque
+_HEAVIER = (1.0, 3.0)  # each mismatch over its reference, beyond the measured ones
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,11 +123,11 @@ class World:
         lose up to 8 % of what they transmit, and stiction shows at rest.
         """
         rng = np.random.default_rng([seed, 1])
-        offset, friction, residual = _sizes(arm)
-        links = np.array([_perturbed(phi, rng, np.full(3, arm.link_spread)) for phi in _bare_links(arm)])
+        offset, friction, residual = sizes(arm)
+        links = np.array([perturbed(phi, rng, np.full(3, arm.link_spread)) for phi in _bare_links(arm)])
         offset = offset * rng.normal(size=arm.n)
-        level, rotor = _on_motor(arm, rng) if arm.motor_torque else (friction, None)
-        friction = _any_friction(level, rng, _MOTOR_LOAD) if arm.motor_torque else _plain_friction(level, rng)
+        level, rotor = on_motor(arm, rng) if arm.motor_torque else (friction, None)
+        friction = any_friction(level, rng, MOTOR_LOAD) if arm.motor_torque else plain_friction(level, rng)
         return cls(
             "real-like",
             seed,
@@ -148,7 +135,7 @@ class World:
             offset,
             friction,
             SmoothTorque.drawn(residual, rng),
-            1.0 + rng.uniform(-_MOTOR_GAIN, _MOTOR_GAIN, size=arm.n) if arm.motor_torque else None,
+            1.0 + rng.uniform(-MOTOR_GAIN, MOTOR_GAIN, size=arm.n) if arm.motor_torque else None,
             rotor_inertia=rotor,
             stiction=friction.level if arm.motor_torque else None,
         )
@@ -167,26 +154,26 @@ class World:
                 of them where that is known of the arm.
         """
         rng = np.random.default_rng([seed, 2])
-        offset, level, residual = _sizes(arm)
+        offset, level, residual = sizes(arm)
         heavier = np.exp(rng.uniform(*np.log(_HEAVIER), size=6))
         if motor_side is None:
             motor_side = arm.motor_torque or rng.random() < 1 / 3
         rotor = None
         if motor_side:
-            level, rotor = _on_motor(arm, rng)
+            level, rotor = on_motor(arm, rng)
         else:
             level = heavier[4] * level
         rippled = rng.random() < 0.5
         share = rng.uniform(0.2, 0.7) if rippled else 0.0
-        smooth = SmoothTorque.of_length(np.sqrt(1 - share**2) * heavier[5] * residual, _LENGTHS, rng)
-        worst = _MOTOR_GAIN if motor_side else _GAIN
+        smooth = SmoothTorque.of_length(np.sqrt(1 - share**2) * heavier[5] * residual, LENGTHS, rng)
+        worst = MOTOR_GAIN if motor_side else GAIN
         warming = float(np.exp(rng.uniform(*np.log(_WARMING))))
         return cls(
             "beyond, motor side" if motor_side else "beyond",
             seed,
-            np.array([_perturbed(phi, rng, arm.link_spread * heavier[:3]) for phi in _bare_links(arm)]),
+            np.array([perturbed(phi, rng, arm.link_spread * heavier[:3]) for phi in _bare_links(arm)]),
             heavier[3] * offset * rng.normal(size=arm.n),
-            _any_friction(level, rng, _MOTOR_LOAD if arm.motor_torque else _LOAD),
+            any_friction(level, rng, MOTOR_LOAD if arm.motor_torque else LOAD),
             smooth + SmoothTorque.ripple(share * heavier[5] * residual, rng) if rippled else smooth,
             1.0 + rng.uniform(-worst, worst, size=arm.n),
             Drift(0.5 * offset * rng.normal(size=arm.n), warming) if rng.random() < 0.5 else None,
@@ -260,55 +247,3 @@ class World:
 
 def _bare_links(arm: Arm) -> NDArray[np.float64]:
     return (arm if arm.attached is None else replace(arm, attached=None)).link_parameters
-
-
-def _sizes(arm: Arm) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Offset, friction and residual (n,) of an arm like the measured ones [N·m]."""
-    if arm.name == "panda" and arm.n == 7:
-        return np.array(_PANDA_OFFSET), np.array(_PANDA_FRICTION), np.array(_PANDA_RESIDUAL)
-    rated = rated_effort(arm)
-    return rated * _OTHER_OFFSET, rated * _OTHER_FRICTION, rated * _OTHER_RESIDUAL
-
-
-def _on_motor(arm: Arm, rng: np.random.Generator) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Friction level (n,) [N·m] and rotor inertia (n,) [kg·m²] where torque is measured on the motor's side."""
-    rated = rated_effort(arm)
-    level = rated * np.exp(rng.uniform(*np.log(_MOTOR_FRICTION), size=arm.n))
-    return level, rated * np.exp(rng.uniform(*np.log(_ROTOR), size=arm.n))
-
-
-def _spread(level: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
-    return level * np.clip(1.0 + _FRICTION_SPREAD * rng.normal(size=len(level)), 0.1, None)
-
-
-def _plain_friction(level: NDArray[np.float64], rng: np.random.Generator) -> Friction:
-    return Friction(_spread(level, rng), np.full(len(level), _FRICTION_WIDTH))
-
-
-def _any_friction(level: NDArray[np.float64], rng: np.random.Generator, load: float) -> Friction:
-    """Friction of any width, with each other shape in half of the worlds; load: the most that grows with the torque."""
-    n = len(level)
-    level = _spread(level, rng)
-    width = np.exp(rng.uniform(*np.log(_WIDTHS), size=n))
-    has = rng.random(4) < 0.5
-    return Friction(
-        level,
-        width,
-        has[0] * np.clip(0.2 * rng.normal(size=n), -0.5, 0.5),
-        has[1] * level * rng.uniform(0.0, _STRIBECK, size=n),
-        width + rng.uniform(0.03, 0.2, size=n),
-        has[2] * level * rng.uniform(0.0, _VISCOUS, size=n),
-        has[3] * rng.uniform(0.0, load, size=n),
-    )
-
-
-def _perturbed(phi: NDArray[np.float64], rng: np.random.Generator, spread: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A link somewhat off its model, still a body that can exist; spread: of mass, centre and inertia."""
-    mass, com, inertia = phi_to_com(phi)
-    more = np.minimum(spread, _LINK_MOST)
-    root = np.sqrt(np.abs(np.diag(inertia)))
-    noise = rng.normal(size=(3, 3))
-    inertia = inertia + more[2] * _LINK_INERTIA * np.outer(root, root) * (np.triu(noise) + np.triu(noise, 1).T)
-    off = mass * max(1 + more[0] * _LINK_MASS * rng.normal(), _LIGHTEST_LINK)
-    changed = com_to_phi(off, com + more[1] * _LINK_COM * rng.normal(size=3), inertia)
-    return nearest_consistent(changed)

@@ -15,9 +15,11 @@ unless ARMLOAD_TRACEBACK=1. What Python has to say, such as where a bug is, goes
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import json
 import os
 import queue
+import select
 import signal
 import sys
 import threading
@@ -35,6 +37,7 @@ from armload.sources.source import Source
 
 _CALLS = ("read_once", "set_load")  # what may be asked of the source from outside
 _PATIENCE = 1.0  # [s] a source may take to end before the process does
+_PR_SET_PDEATHSIG = 1  # of prctl(2): the signal this process gets when the thread that started it ends
 
 
 class _Reader:
@@ -58,10 +61,14 @@ class _Reader:
         if options.get("payloads"):
             options["payloads"] = payloads_from_json(options["payloads"])
         try:
-            if (silent := prepare(order["spec"])) is not None:
-                self.tell(event="connecting", message=silent)
             with contextlib.ExitStack() as stack:
-                source = stack.enter_context(open_source(order["spec"], arm, detached=False, **options))
+                if (silent := prepare(order["spec"])) is not None:
+                    self.tell(event="connecting", message=silent)
+                    with _ended_with_its_starter():
+                        source = open_source(order["spec"], arm, detached=False, **options)
+                else:
+                    source = open_source(order["spec"], arm, detached=False, **options)
+                stack.enter_context(source)
                 record = order["record"]
                 recorder = None if record is None else stack.enter_context(Recorder(record, source.n))
                 threading.Thread(target=self.listen, args=(source, lines), daemon=True).start()
@@ -103,6 +110,23 @@ class _Reader:
         watch.start()
         with contextlib.suppress(SourceError):
             source.close()
+
+
+@contextlib.contextmanager
+def _ended_with_its_starter() -> Iterator[None]:
+    """While a client connects it may hold the interpreter for a minute: Linux itself ends the reader meanwhile."""
+    prctl = ctypes.CDLL(None).prctl if sys.platform == "linux" else None
+    if prctl is not None:
+        prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        hung_up = select.poll()
+        hung_up.register(sys.stdin.fileno(), 0)
+        if hung_up.poll(0):  # it ended before it could be followed
+            sys.exit()
+    try:
+        yield
+    finally:
+        if prctl is not None:
+            prctl(_PR_SET_PDEATHSIG, 0)
 
 
 def _silence_clients() -> None:

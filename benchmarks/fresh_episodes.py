@@ -1,0 +1,126 @@
+"""The shipped hybrid on episodes that no training, calibration or cross-validation has touched: intervals and errors.
+
+    python benchmarks/fresh_episodes.py [--robot panda] [--episodes 2000] [--jobs 2] [--work out/fresh-panda]
+
+Intervals: the cross-validation that `armload train` prints sets each quarter's widths on the other three, so that its
+shares lie near 95 % whatever the luck of the draw. Here the finished model answers new episodes of `broad`, of another
+seed. Errors: beside those of its own physics with the weak prior (`map-gp`), of least squares with the same prior as
+one Gaussian, and of the mean of all payloads; for all episodes, for each kind of world, for a known family of payloads
+and by weight; the differences are paired, ± their standard error, an episode being one observation.
+
+Writes benchmarks/results/fresh_episodes_ROBOT.json. About a second of one core for each episode; goes on from --work.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+import numpy as np
+from hybrid_ablation import GROUPS, gaussian
+from numpy.typing import NDArray
+
+from armload import Arm, arm
+from armload.atomic import replacing
+from armload.cli.printing import console
+from armload.cli.train_hybrid import cells_table, episodes_shown, summary, versions
+from armload.hybrid import HybridModel, shipped_model
+from armload.hybrid.calibration import nearest
+from armload.hybrid.records import TIMES, Records
+from armload.hybrid.training import coverage_on, drawn_episodes, episode_records
+from armload.least_squares import solution_prior_std
+
+SEED = 1  # trainings have seed 0
+RESULTS = Path(__file__).parent / "results"
+COMPARED = ("its physics, map-gp", "same-prior least squares", "predict the mean")
+LIGHT = 0.2  # [kg]
+
+
+def errors(robot: Arm, model: HybridModel, records: Records) -> dict[str, NDArray[np.float64]]:
+    """|error| (N, 10) of the hybrid and of what it is compared with."""
+    prior = model.prior_for(robot)
+    one, weak = gaussian(prior), np.diag(solution_prior_std(robot) ** -2)
+    found = {name: np.empty((len(records), 10)) for name in ("hybrid", *COMPARED)}
+    for k in range(len(records)):
+        evidence = records.evidence(k)
+        found["hybrid"][k] = model.calibration.answer(evidence, prior).mean
+        found[COMPARED[0]][k] = np.linalg.solve(evidence.information + weak, evidence.vector)
+        found[COMPARED[1]][k] = one.posterior(evidence.information, evidence.vector).mean
+    found[COMPARED[2]][:] = records.truth.mean(axis=0)
+    return {name: np.abs(phi - records.truth) for name, phi in found.items()}
+
+
+def compared(error: dict[str, NDArray[np.float64]], records: Records, families: NDArray[np.str_]) -> list[dict]:
+    """Mean errors of every row, and how far the others are above the hybrid, subset by subset and time by time."""
+    which, family, mass = nearest(records.t, np.array(TIMES)), families[records.episode], records.truth[:, 0]
+    everything = np.ones(len(records), dtype=bool)
+    subsets = {"all": everything}
+    subsets |= {f"world: {g.removeprefix('broad ')}": records.group == g for g in np.unique(records.group)}
+    subsets |= {f"payload: {name}": family == name for name in np.unique(family)}
+    subsets |= {f"below {LIGHT} kg": mass < LIGHT, f"{LIGHT} kg and above": mass >= LIGHT}
+    out = []
+    for subset, rows in subsets.items():
+        for kind, what in ((0, "no tare"), (1, "tare")):
+            for b, t in enumerate(TIMES):
+                cell = rows & (records.kind == kind) & (which == b)
+                line: dict = {"subset": subset, "what": what, "t": t, "episodes": int(cell.sum())}
+                for group, part in GROUPS.items():
+                    own = 1e3 * error["hybrid"][cell][:, part].mean(axis=1)
+                    line[group] = {"hybrid": round(float(own.mean()), 3)}
+                    for name in COMPARED:
+                        more = 1e3 * error[name][cell][:, part].mean(axis=1) - own
+                        line[group][name] = round(float((own + more).mean()), 3)
+                        line[group][f"{name}, more"] = round(float(more.mean()), 3)
+                        line[group][f"{name}, more, se"] = round(float(more.std(ddof=1) / np.sqrt(len(more))), 3)
+                out.append(line)
+    return out
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--robot", default="panda")
+    parser.add_argument("--episodes", type=int, default=2000)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--work", type=Path)
+    options = parser.parse_args()
+    robot = arm(options.robot)
+    model = shipped_model(robot)
+    work = options.work or Path(f"out/fresh-{robot.name}")
+    with episodes_shown() as progress:
+        records = episode_records(
+            robot, episodes=options.episodes, seed=SEED, folder=work, jobs=options.jobs, progress=progress
+        )
+    found = coverage_on(records, model.prior_for(robot), model.calibration)
+    console().print(cells_table(found))
+    print(f"pooled: {100 * found.pooled:.1f} %")
+    drawn = drawn_episodes(robot, episodes=options.episodes, seed=SEED)
+    families = np.array([episode.payload.name.split()[0] for episode in drawn])
+    lines = compared(errors(robot, model, records), records, families)
+    behind = [
+        f"{line['subset']}, {line['what']}, {line['t']:g} s, {group}, {name}"
+        for line in lines
+        for group in GROUPS
+        for name in COMPARED
+        if line[group][f"{name}, more"] < -2.0 * line[group][f"{name}, more, se"]
+    ]
+    print(f"behind by two standard errors in {len(behind)} of {len(lines) * len(GROUPS) * len(COMPARED)} comparisons")
+    print("\n".join(behind))
+    asked = [f"--robot {robot.name}"] * (robot.name != "panda") + [f"--episodes {options.episodes}"]
+    result = {
+        "command": " ".join(["python benchmarks/fresh_episodes.py", *asked]),
+        "population": "broad",
+        "seed": SEED,
+        "trained": {key: model.provenance[key] for key in ("population", "episodes", "seed")},
+        **summary(robot, found),
+        "errors": lines,
+        "versions": versions(),
+    }
+    path = RESULTS / f"fresh_episodes_{robot.name}.json"
+    with replacing(path) as part:
+        part.write_text(json.dumps(result, allow_nan=False) + "\n", encoding="utf-8")
+    print(f"wrote {path}")
+
+
+if __name__ == "__main__":
+    main()
