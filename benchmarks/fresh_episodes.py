@@ -8,7 +8,8 @@ seed. Errors: beside those of its own physics with the weak prior (`map-gp`), of
 one Gaussian, and of the mean of all payloads; for all episodes, for each kind of world, for a known family of payloads
 and by weight; the differences are paired, ± their standard error, an episode being one observation.
 
-Writes benchmarks/results/fresh_episodes_ROBOT.json. About a second of one core for each episode; goes on from --work.
+Writes benchmarks/results/fresh_episodes_ROBOT.json and, of the Panda, a table of docs/hybrid.md. About a second of one
+core for each episode; goes on from --work.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from pathlib import Path
 import numpy as np
 from hybrid_ablation import GROUPS, gaussian
 from numpy.typing import NDArray
+from study_of_arms import ROOT, write_table
 
 from armload import Arm, arm
 from armload.atomic import replacing
@@ -32,9 +34,17 @@ from armload.hybrid.training import coverage_on, drawn_episodes, episode_records
 from armload.least_squares import solution_prior_std
 
 SEED = 1  # trainings have seed 0
-RESULTS = Path(__file__).parent / "results"
+RESULTS = ROOT / "benchmarks" / "results"
 COMPARED = ("its physics, map-gp", "same-prior least squares", "predict the mean")
 LIGHT = 0.2  # [kg]
+SHOWN = (
+    ("tare", "all", "with a tare"),
+    ("tare", "world: real-like", "arms like the measured ones"),
+    ("tare", "world: beyond", "arms beyond them"),
+    ("tare", "world: beyond, motor side", "torque of the motor's side"),
+    ("tare", "payload: container", "the container"),
+    ("no tare", "all", "as if without a tare"),
+)
 
 
 def errors(robot: Arm, model: HybridModel, records: Records) -> dict[str, NDArray[np.float64]]:
@@ -77,6 +87,44 @@ def compared(error: dict[str, NDArray[np.float64]], records: Records, families: 
     return out
 
 
+def verdicts(lines: list[dict]) -> dict[str, int]:
+    """In how many comparisons the hybrid is ahead by two standard errors, behind by as much, or neither."""
+    score = [
+        line[group][f"{name}, more"] / line[group][f"{name}, more, se"]
+        for line in lines
+        for group in GROUPS
+        for name in COMPARED
+    ]
+    ahead, behind = sum(s > 2.0 for s in score), sum(s < -2.0 for s in score)
+    return {"ahead": ahead, "behind": behind, "neither": len(score) - ahead - behind}
+
+
+def sentence(verdict: dict[str, int]) -> str:
+    """The same in words."""
+    return (
+        f"Of {sum(verdict.values())} comparisons (kinds of world and payload, with and without a tare, seven times, "
+        f"three groups of\nparameters, three other rows: `benchmarks/results/fresh_episodes_panda.json`) the hybrid is "
+        f"ahead by more than two\nstandard errors of the paired difference in {verdict['ahead']}, behind by as much in "
+        f"{verdict['behind']}."
+    )
+
+
+def table(lines: list[dict]) -> str:
+    """Mean errors [g · g·m · g·m²] of the rows that docs/hybrid.md shows, as Markdown."""
+    out = ["| episodes | answered by | 0.1 s | 1 s | 6 s |", "|---|---|---|---|---|"]
+    for what, subset, title in SHOWN:
+        cells = [
+            next(line for line in lines if (line["what"], line["subset"], line["t"]) == (what, subset, t))
+            for t in (0.1, 1.0, 6.0)
+        ]
+        for name in ("hybrid", *COMPARED):
+            errors = [[cell[group][name] for group in GROUPS] for cell in cells]
+            shown = (f"{mass:.0f} · {moment:.1f} · {inertia:.2f}" for mass, moment, inertia in errors)
+            first = f"{title}, {cells[1]['episodes']}" if name == "hybrid" else ""
+            out.append(f"| {first} | {name} | {' | '.join(shown)} |")
+    return "\n".join(out)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--robot", default="panda")
@@ -97,15 +145,8 @@ def main() -> None:
     drawn = drawn_episodes(robot, episodes=options.episodes, seed=SEED)
     families = np.array([episode.payload.name.split()[0] for episode in drawn])
     lines = compared(errors(robot, model, records), records, families)
-    behind = [
-        f"{line['subset']}, {line['what']}, {line['t']:g} s, {group}, {name}"
-        for line in lines
-        for group in GROUPS
-        for name in COMPARED
-        if line[group][f"{name}, more"] < -2.0 * line[group][f"{name}, more, se"]
-    ]
-    print(f"behind by two standard errors in {len(behind)} of {len(lines) * len(GROUPS) * len(COMPARED)} comparisons")
-    print("\n".join(behind))
+    verdict = verdicts(lines)
+    print(sentence(verdict))
     asked = [f"--robot {robot.name}"] * (robot.name != "panda") + [f"--episodes {options.episodes}"]
     result = {
         "command": " ".join(["python benchmarks/fresh_episodes.py", *asked]),
@@ -114,12 +155,15 @@ def main() -> None:
         "trained": {key: model.provenance[key] for key in ("population", "episodes", "seed")},
         **summary(robot, found),
         "errors": lines,
+        "verdicts": verdict,
         "versions": versions(),
     }
     path = RESULTS / f"fresh_episodes_{robot.name}.json"
     with replacing(path) as part:
         part.write_text(json.dumps(result, allow_nan=False) + "\n", encoding="utf-8")
     print(f"wrote {path}")
+    if robot.name == "panda":
+        write_table(ROOT / "docs" / "hybrid.md", "new episodes", table(lines) + "\n\n" + sentence(verdict))
 
 
 if __name__ == "__main__":

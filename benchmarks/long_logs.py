@@ -1,11 +1,11 @@
 """Whether the hybrid's error bars hold on logs longer than those they were calibrated on.
 
-    python benchmarks/long_logs.py [--episodes 40] [--worlds real_like]
+    python benchmarks/long_logs.py [--robot panda] [--episodes 40] [--worlds real_like]
 
 The shipped model's widths were calibrated up to 6 s after a run began. Here runs last 60 s: every episode is another
 arm, payload and motion (a Fourier motion that repeats, a slow one that does not, stops at ever new poses, pick and
 place), logged at 200 Hz, identified without and with a tare of 20 s on another motion, at several times of the same
-run. Written to benchmarks/results/long_logs.json, for each world, with and without a tare, and each group of
+run. Written to benchmarks/results/long_logs_ROBOT.json, for each world, with and without a tare, and each group of
 parameters, over time:
 
 coverage: share of the 95 % intervals that hold the truth. The episodes are few: `standard_error` is that of the
@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from armload import Recording, __version__, arm
+from armload import Arm, Recording, __version__, arm
 from armload.determined import Z95
 from armload.episodes import Episode, Recipe, draw_episodes, simulate_episodes
 from armload.hybrid import HybridIdentifier, HybridModel, shipped_model
@@ -42,15 +42,17 @@ MOTIONS = ("harmonics", "long", "point-to-point", "pick-and-place")
 LONG = Recipe(payloads=("boxes", "shapes", "tools", "container"), motions=MOTIONS, duration=TIMES[-1])
 
 
-def episodes(world: str, count: int) -> list[Episode]:
+def episodes(robot: Arm, world: str, count: int) -> list[Episode]:
     """`count` long episodes on arms of a world."""
     recipe = replace(LONG, worlds=(world,), elapsed=(30.0, 600.0) if world == "beyond" else LONG.elapsed)
-    return draw_episodes(arm("panda"), recipe, count, FIRST_SEED, motions=count)
+    return draw_episodes(robot, recipe, count, FIRST_SEED, motions=count)
 
 
-def measured(model: HybridModel, run: Recording, tare: Recording | None, truth: NDArray) -> tuple[NDArray, NDArray]:
+def measured(
+    robot: Arm, model: HybridModel, run: Recording, tare: Recording | None, truth: NDArray
+) -> tuple[NDArray, NDArray]:
     """|error| and half-width (T, 10) at the times."""
-    found = HybridIdentifier(arm("panda"), tare, model).at(run, TIMES)
+    found = HybridIdentifier(robot, tare, model).at(run, TIMES)
     return np.abs([e.phi - truth for e in found]), Z95 * np.array([e.std for e in found])
 
 
@@ -80,12 +82,16 @@ def table(error: NDArray, half: NDArray) -> dict:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--robot", default="panda")
     parser.add_argument("--episodes", type=int, default=40)
     parser.add_argument("--worlds", default="real_like")
     asked = parser.parse_args()
-    model = shipped_model(arm("panda"))
+    robot = arm(asked.robot)
+    model = shipped_model(robot)
     result = {
-        "command": f"python benchmarks/long_logs.py --episodes {asked.episodes} --worlds {asked.worlds}",
+        "command": f"python benchmarks/long_logs.py --robot {robot.name} --episodes {asked.episodes} "
+        f"--worlds {asked.worlds}",
+        "robot": robot.name,
         "version": __version__,
         "model": {key: model.provenance.get(key) for key in ("population", "episodes", "seed", POOLED)},
         "first_seed": FIRST_SEED,
@@ -95,10 +101,10 @@ def main() -> None:
     }
     with threadpool_limits(1):
         for world in asked.worlds.split(","):
-            drawn, found = episodes(world, asked.episodes), {"no tare": [], "tare": []}
+            drawn, found = episodes(robot, world, asked.episodes), {"no tare": [], "tare": []}
             for k, logs in enumerate(simulate_episodes(drawn), start=1):
                 for name, tare in (("no tare", None), ("tare", logs.tare)):
-                    found[name].append(measured(model, logs.run, tare, logs.truth.phi))
+                    found[name].append(measured(robot, model, logs.run, tare, logs.truth.phi))
                 print(f"{world}: {k} of {len(drawn)}, {time.process_time():.0f} s of CPU time", flush=True)
             tables = {}
             kinds = np.array([next(kind for kind in MOTIONS if f"run-{kind}" in str(e.motion.name)) for e in drawn])
@@ -111,7 +117,7 @@ def main() -> None:
                 }
             result["worlds"][world] = tables
             text = json.dumps(result, indent=1)
-            (HERE / "results" / "long_logs.json").write_text(text + "\n")
+            (HERE / "results" / f"long_logs_{robot.name}.json").write_text(text + "\n")
     print(text)
 
 

@@ -10,7 +10,7 @@ from armload import Recording, arm, read_recording
 from armload.inertia import InertialParameters
 from armload.motion import random_motion, taie2024
 from armload.online import OnlineIdentifier
-from armload.simulate import Sensors, World
+from armload.simulate import Sensors, World, simulate
 from armload.sources import Simulator
 
 
@@ -188,3 +188,26 @@ def test_a_real_arm_that_breaks_away_from_rest_is_no_change_of_payload(real_data
     assert not any(at(estimates, loaded.t[0] + t).determined[0] for t in (1.0, 2.0, 3.0, 4.0))  # it moves from 2.5 s on
     assert all(covers(at(estimates, loaded.t[0] + t), 2.805)[0] for t in np.arange(10.0, 64.0, 2.0))
     assert 1.96 * estimates[-1].std[0] < 0.06 * 2.805
+
+
+@pytest.mark.parametrize("rate", [50.0, 200.0])
+def test_a_change_is_said_to_have_begun_as_far_back_as_the_rows_go_that_show_it(rate):
+    _, events = said(stream(1, [(5.0, HALF_KILO)], 6.5, rate), "map-gp")
+    assert [event.kind for event in events] == ["grasp"]
+    back = rate * (events[0].t - events[0].began)  # rows, and a few that were lost
+    assert 15.5 < back < 20.0
+    assert events[0].began < 5.0
+
+
+def test_the_run_of_the_empty_arm_counts_beside_a_tare_that_was_given():
+    panda, log, found = arm("panda"), stream(1, [(6.0, HALF_KILO)], 8.0), {}
+    elsewhere = random_motion(panda, 98, duration=20.0, harmonics=10)
+    given = simulate(panda, elsewhere, world=World.real_like(panda, 1), sensors=Sensors.panda(panda), rate=200.0)
+    for name, tare in (("without", None), ("with", given)):
+        identifier = OnlineIdentifier(panda, tare, "map-gp")
+        for sample in log:
+            found[name] = identifier.update(*sample)
+        identifier.close()
+        assert identifier.relative_to == ("before" if tare is None else "tare")
+        assert covers(found[name], HALF_KILO.phi)[:4].all()
+    assert np.all(found["with"].std[:4] < 1.1 * found["without"].std[:4])

@@ -94,6 +94,20 @@ def test_what_the_intervals_promise_is_what_new_episodes_showed():
     )
 
 
+def test_what_held_at_the_end_of_long_logs_is_what_was_measured():
+    page = " ".join((ROOT / "docs" / "hybrid.md").read_text(encoding="utf-8").split())
+    said = {}
+    for robot in ("panda", "ur10e"):
+        found = json.loads((RESULTS / f"long_logs_{robot}.json").read_text())
+        for what, cell in found["worlds"]["real_like"].items():
+            share, error = 100 * cell["all"]["coverage"][-1], 100 * cell["all"]["standard_error"][-1]
+            said[robot, what] = (f"{share:.1f}", f"{error:.1f}")
+    (a, b), (c, d) = said["panda", "no tare"], said["panda", "tare"]
+    assert f"{a} ± {b} % held for the Panda without a tare, {c} ± {d} % with one" in page
+    (a, b), (c, d) = said["ur10e", "no tare"], said["ur10e", "tare"]
+    assert f"{a} ± {b} and {c} ± {d} % for the UR10e" in page
+
+
 def rows_of_events(result):
     """The rows of the table of changes in docs/online.md."""
     parts, out = result["parts"], []

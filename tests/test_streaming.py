@@ -174,3 +174,14 @@ def test_an_empty_run_may_be_the_tare_of_the_next(panda, log, tare):
     alone, tared = first.beside().run(log), following.run(log)
     assert tared.std[0] < 0.85 * alone.std[0]
     assert abs(tared.phi[0] - mass) < 3.0 * tared.std[0]
+
+
+def test_two_tares_say_what_one_tare_of_their_rows_says(panda, rows):
+    """Whatever was mounted was mounted at both."""
+    a, b, std = len(rows) // 3, 2 * len(rows) // 3, payload_prior_std(panda)
+    parted = [regression(panda, rows[:a]), regression(panda, rows[a:b]), regression(panda, rows[b:])]
+    joined = [regression(panda, rows[:b]), regression(panda, rows[b:])]
+    (two, _), (one, _) = (advance(runs, std, steps=0) for runs in (parted, joined))
+    unit = np.sqrt(np.diag(one.covariance))
+    assert two.phi / unit == pytest.approx(one.phi / unit, abs=1e-6)
+    assert two.covariance / np.outer(unit, unit) == pytest.approx(one.covariance / np.outer(unit, unit), abs=1e-6)

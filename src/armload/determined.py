@@ -10,6 +10,7 @@ SHRINK = 3.0  # a parameter counts as determined if its half-width shrinks at le
 # for a method without a prior: 95 % half-width below 50 g, 5 g·m, 5e-3 kg·m²
 SMALL = np.array([0.05] + [0.005] * 3 + [0.005] * 6)
 HELD = 3.0  # standard deviations of mass above zero before something counts as held
+LIGHTEST_HELD = 1e-3  # [kg] less is nothing: a log that is compared with itself leaves so much of rounding
 
 
 def determined(
@@ -34,4 +35,4 @@ def determined(
 
 def held(mass: float, std: float, determined: bool) -> bool:
     """Whether anything is there at all, by its mass [kg] and the standard deviation of it."""
-    return bool(determined and mass > HELD * std)
+    return bool(determined and mass > max(HELD * std, LIGHTEST_HELD))

@@ -52,6 +52,7 @@ TARGETS = (
     Target("reference", "hybrid", _GP, (1.0, 3.0, 6.0), _ALL),
     Target("reference", "hybrid", _GP, (0.02, 0.1, 0.5), _ALL, 1.2),
     Target("reference", "hybrid", _CALIBRATED, (1.0,), _ALL[:2], 0.25),
+    Target("same-place", "hybrid", _CALIBRATED, (1.0,), _ALL[:2], 0.25),
     Target("container", "hybrid", _GP, (0.1, 1.0, 6.0), _ALL, strict=True),
     Target("beyond", "hybrid", _GP, (0.1, 1.0, 6.0), _ALL, strict=True),
     *(

@@ -65,8 +65,8 @@ class StreamingHybrid(StreamingIdentifier):
         assert self.stream is not None
         stream, speed = self.stream, float(np.sqrt(self._squares / self._values))
         tare_time = self._tare_time
-        if stream.tare is not None and self.reference is not None and self.reference.stream is not None:
-            tare_time = tare_time or self.reference.stream.seconds
+        if self.reference is not None and self.reference.stream is not None:
+            tare_time += self.reference.stream.seconds
         evidence = Evidence.of(
             stream.information, stream.vector, stream.posterior, seconds, tare_time, speed, self._weak
         )

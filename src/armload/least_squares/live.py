@@ -14,7 +14,7 @@ from armload.least_squares.prior import payload_prior_std
 from armload.least_squares.streaming import StreamingPosterior
 from armload.recording import Sample
 
-_FAST = 2.5e-3  # [s] samples that come closer than this share the work of a row and of an answer between them
+FAST = 2.5e-3  # [s] samples that come closer than this share the work of a row and of an answer between them
 
 
 class StreamingIdentifier(Identifier):
@@ -26,7 +26,7 @@ class StreamingIdentifier(Identifier):
 
     Attributes:
         stream: the posterior of the run; None before the first sample.
-        reference: the run that is the tare, if one is.
+        reference: the earlier run that is a tare, if one is.
         fresh: whether the last update brought a new answer. data_t: time of the newest sample in the answer [s].
     """
 
@@ -53,7 +53,7 @@ class StreamingIdentifier(Identifier):
         if self._began is None:
             self._began = sample.t
         self._count += 1
-        slow, self._last_t = sample.t - self._last_t > _FAST, sample.t
+        slow, self._last_t = sample.t - self._last_t > FAST, sample.t
         new = self.stream.take(*sample)
         self.fresh = self._due and (slow or not new)  # of a fast stream, a row and an answer share no sample
         if new:  # it is due if it would be too old by the next row
@@ -74,8 +74,8 @@ class StreamingIdentifier(Identifier):
         """Another run of the same arm, that has seen nothing yet.
 
         Args:
-            reference: an earlier run; where there is no tare it becomes the tare, and estimates are of what was added
-                since.
+            reference: an earlier run with the same mounted as at the tare; it is a tare, too, and estimates are of
+                what was added since.
         """
         other = copy(self)
         other.stream, other.reference = None, reference

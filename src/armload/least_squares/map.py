@@ -96,16 +96,16 @@ class PosteriorLeastSquares(BatchIdentifier):
 
         Args:
             tau: (n,) [N·m] the first torque seen.
-            reference: an earlier run of the stream; it becomes the tare if there is no other.
+            reference: an earlier run of the stream with the same mounted as at the tare; it is another one.
         """
         if self._correction is None:
             self._correction = Correction(self.arm, effort_scale(self.arm, np.atleast_2d(tau)))
-        tare, start = self._tare, self._start
-        if tare is None and reference is not None:
-            tare, start = reference.finish(), reference.posterior.scales
+        tares, start = () if self._tare is None else (self._tare,), self._start
+        if reference is not None:
+            tares, start = (*reference.tares, reference.finish()), reference.posterior.scales
         empty = self._data(self._correction)
         std = solution_prior_std(self.arm)
-        return StreamingPosterior(self._correction, empty.features, self._noise, std, tare, start, self.gain)
+        return StreamingPosterior(self._correction, empty.features, self._noise, std, tares, start, self.gain)
 
     def _take(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
         if self._run is None:

@@ -8,7 +8,7 @@ The information A = Σ_j ∫ X_jᵀ·X_j dt / S_j with X = [W Z G] accumulates i
 x = (A + P⁻¹)⁻¹·b, joint by joint with g_j eliminated first. S_j (batch means of the residual) and the scales of the
 priors of offsets, friction and features (expectation–maximisation) are found from the data in a few iterations.
 
-A tare run enters the same model: it sees phi_0 (whatever was mounted then) with the same eta and g, the later run sees
+Tares enter the same model: they see phi_0 (whatever was mounted then) with the same eta and g, the later run sees
 phi_0 + phi. Virtual calibration [Kurdas 2022] is the special case without eta and g.
 
 Sources: information form and EM: Bishop 2006, ch. 3 and 9; arm and load together: Khalil, Gautier, Lemoine, ICRA 2007.
@@ -43,9 +43,9 @@ def solve(
     iterations: int = 12,
     start: Scales | None = None,
 ) -> Posterior:
-    """Posterior of the payload of the last run; runs before it are tares.
+    """Posterior of the payload of the last run; runs before it are tares, all with the same mounted.
 
-    Unknowns z = [phi_1, phi_2 − phi_1, …, eta], and g_j: run k carries the sum of the first k payloads. Each payload is
+    Unknowns z = [phi_0, phi, eta], and g_j: tares carry phi_0, the last run phi_0 + phi. Each payload is
     near zero within `prior_std` (10,), a tare's moments also within `_REACH` of its mass; the last one follows `prior`
     where that is given. `start` holds scales found before, of the same runs or of all but the last.
     """

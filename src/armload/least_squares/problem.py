@@ -34,7 +34,7 @@ class Scales:
     """What expectation–maximisation finds.
 
     noise: S of each run (K, n) [N²·m²·s]. eta: prior variance (p,). features: prior variance of the weights (n, R).
-    payloads: prior variance of each run's payload (10·K,).
+    payloads: prior variance (10,) of the payload, or (20,) of the tares' and of what was added.
     """
 
     noise: NDArray[np.float64]
@@ -118,7 +118,7 @@ class Problem:
     ) -> None:
         self.runs, self.noise_model, self.correction = runs, noise, runs[0].correction
         self.features = runs[0].features
-        count, p = len(runs), self.correction.size
+        count, p = min(len(runs), 2), self.correction.size
         self.payloads, self.size = 10 * count, 10 * count + p
         self.last = slice(10 * (count - 1), 10 * count)
         self.payload_variance = np.tile(np.asarray(prior_std) ** 2, count)
@@ -128,9 +128,9 @@ class Problem:
         share = [share_of_noise(run.blocks.duration) for run in runs]
         self.expected = np.outer(share, whole_noise(self.correction, noise))  # (K, n)
         self.selections = []
-        for k in range(count):
+        for run in runs:
             E = np.zeros((10 + p, self.size))
-            for i in range(k + 1):
+            for i in range(count if run is runs[-1] else 1):
                 E[:10, 10 * i : 10 * i + 10] = np.eye(10)
             E[10:, self.payloads :] = np.eye(p)
             self.selections.append(E)
@@ -179,7 +179,7 @@ class Problem:
     def sequential(self, scales: Scales) -> SequentialPosterior:
         """The same posterior as a state that takes further rows of the last run: phi last to be integrated out."""
         found = self._eliminated(scales)
-        first, last = 10 * (len(self.runs) - 1), self.last
+        first, last = self.last.start, self.last
         shared = np.r_[0:first, last.stop : self.size]
         order = np.r_[last.start : last.stop, shared]
         prior = np.concatenate([scales.payloads, scales.eta])[shared]
@@ -199,7 +199,7 @@ class Problem:
             information=0.5 * (Λ + Λ.T),
             vector=h,
             noise=scales.noise[-1].copy(),
-            tares=len(self.runs) - 1,
+            tares=first // 10,
         )
 
     def improved(self, scales: Scales, found: _Gaussian) -> Scales:
@@ -234,10 +234,9 @@ class Problem:
     def _payloads(self, z: NDArray, variance: NDArray) -> NDArray:
         """A light body has small moments: what was mounted at a tare seldom weighs much, and its moments follow."""
         now = self.payload_variance.copy()
-        for k in range(len(self.runs) - 1):
-            heaviest = max(abs(z[10 * k]) + 2.0 * np.sqrt(max(variance[10 * k], 0.0)), _LIGHTEST)
-            moments = slice(10 * k + 1, 10 * k + 10)
-            now[moments] = np.minimum(now[moments], (heaviest * _REACH) ** 2)
+        if self.last.start > 0:
+            heaviest = max(abs(z[0]) + 2.0 * np.sqrt(max(variance[0], 0.0)), _LIGHTEST)
+            now[1:10] = np.minimum(now[1:10], (heaviest * _REACH) ** 2)
         return now
 
     def answer(self, scales: Scales, found: _Gaussian) -> Posterior:

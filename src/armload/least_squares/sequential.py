@@ -38,7 +38,7 @@ class SequentialPosterior:
     C (n, R, R), own (n, R), slope (n, R, 10 + m): of the joints' own weights. shared_C (m, m), shared_own (m,),
     shared_slope (m, 10): of what the joints share, s = [tares' payloads, eta]. Of C and shared_C only the lower
     triangles count: half of what a row reads and writes. information Λ (10, 10), vector h (10,).
-    noise: S (n,) [N²·m²·s]. tares: runs before this one, whose payloads the rows carry too.
+    noise: S (n,) [N²·m²·s]. tares: payloads of runs before this one, which the rows carry too: 0 or 1.
     seen: (n, 12) of each joint's last row, given all before: w (10,), e' and v', so that e' ~ N(w·phi, v').
     scale: (n,) what the last row was multiplied by.
     """

@@ -9,7 +9,7 @@ any speed gives the same numbers.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from queue import SimpleQueue
@@ -75,7 +75,7 @@ class StreamingPosterior:
     Args:
         correction: the unknowns eta of the arm. features: of each joint's nonparametric part. noise: as for `solve`.
         prior_std: of each payload (10,).
-        tare: what an earlier run said, if there was one; `start`: the scales found from it.
+        tares: what earlier runs said, all with the same mounted; `start`: the scales found from them.
         gain: λ of the lag [1/s].
 
     Attributes:
@@ -89,12 +89,12 @@ class StreamingPosterior:
         features: JointFeatures,
         noise: NoiseModel,
         prior_std: NDArray[np.float64],
-        tare: RegressionData | None = None,
+        tares: Sequence[RegressionData] = (),
         start: Scales | None = None,
         gain: float = 20.0,
     ) -> None:
         self.correction, self.features, self.noise, self.prior_std = correction, features, noise, prior_std
-        self.tare, self.gain, self.start = tare, gain, start
+        self.tares, self.gain, self.start = tuple(tares), gain, start
         self._rows = RowStream(correction, gain, features, noise.block)
         self._whole = whole_noise(correction, noise)
         self._base: SequentialPosterior | None = None
@@ -119,7 +119,7 @@ class StreamingPosterior:
         return RegressionData(self.correction, self.gain, self.features, self.noise.block)
 
     def _runs(self) -> list[RegressionData]:
-        return [self._run] if self.tare is None else [self.tare, self._run]
+        return [*self.tares, self._run]
 
     def take(self, t: float, q: NDArray, dq: NDArray, tau: NDArray) -> bool:
         """Take one sample (n,); times rise. True if it completed a row, that is, if there is something new."""
@@ -140,6 +140,10 @@ class StreamingPosterior:
             self._state.take(row)
         self._beside(row)
         return True
+
+    def look(self, t: float, q: NDArray, dq: NDArray, tau: NDArray) -> Row | None:
+        """Pass a sample over: the row it completes, if it does, counts for nothing here."""
+        return self._rows.feed(t, q, dq, tau)
 
     @property
     def state(self) -> SequentialPosterior | None:
@@ -228,7 +232,6 @@ class StreamingPosterior:
     def finish(self) -> RegressionData:
         """All rows so far, accumulated, for another run to take as its tare; this one may go on later."""
         self._abandon()
-        self._early = None if self._early is not None and self.seconds >= _EARLY else self._early
         rows, self._waiting = self._waiting, []
         self._accumulate(rows)
         return self._run

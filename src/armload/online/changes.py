@@ -40,15 +40,18 @@ _OUTLIER = 8.0  # one window counts no more than so many times the level
 
 
 class Suspicion(NamedTuple):
-    """ln of the likelihood ratios of a payload and of a push over nothing, and the change of phi (10,) it would be."""
+    """ln of the likelihood ratios of a payload and of a push over nothing, and the change of phi (10,) it would be.
+
+    seconds: how far back the rows go that say so [s].
+    """
 
     payload: float
     push: float
     delta: NDArray[np.float64]
-    rows: int
+    seconds: float
 
 
-_NOTHING = Suspicion(0.0, 0.0, np.zeros(10), 0)
+_NOTHING = Suspicion(0.0, 0.0, np.zeros(10), 0.0)
 
 
 def body_root() -> NDArray[np.float64]:
@@ -75,7 +78,7 @@ class ChangeDetector:
         self.root, self.effort = mass * body_root(), effort
         n, longest = len(effort), max(_WINDOWS)
         self._A, self._b = np.zeros((longest, 10, 10)), np.zeros((longest, 10))
-        self._N, self._B = np.zeros((longest, n)), np.zeros((longest, n))
+        self._N, self._B, self._h = np.zeros((longest, n)), np.zeros((longest, n)), np.zeros(longest)
         self.level = _LEVEL
         self.reset()
 
@@ -86,6 +89,7 @@ class ChangeDetector:
 
     def take(
         self,
+        h: float,
         seen: NDArray[np.float64],
         X: NDArray[np.float64],
         scale: NDArray[np.float64],
@@ -95,13 +99,14 @@ class ChangeDetector:
         """Take a row; None unless the payload seems to have changed.
 
         Args:
-            seen: (n, 12) as in `SequentialPosterior`. X: (n, ≥ 10) the row's regressor, payload first. scale: (n,) what
-                the row was multiplied by. mean, covariance: of phi before the row.
+            h: what the row stands for [s]. seen: (n, 12) as in `SequentialPosterior`. X: (n, ≥ 10) the row's regressor,
+                payload first. scale: (n,) what the row was multiplied by. mean, covariance: of phi before the row.
         """
         longest = max(_WINDOWS)
         k = self._count % longest
         sums = (self._A, self._b, self._N, self._B)
         _parts(seen, X, scale, self.root, mean, covariance, *(x[k] for x in sums))
+        self._h[k] = h
         self._count += 1
         if self._count % longest == 0 and not self.uneasy:
             ratio = _loudness(self._N, self._B)
@@ -118,7 +123,7 @@ class ChangeDetector:
             lately |= rows == _WINDOWS[0] and payload > push + _LATELY
             most = [max(payload, push) if rows == _WINDOWS[0] else most[0], max(most[1], payload, push)]
             if best is None or payload > best.payload:
-                best = Suspicion(payload, push, self.root @ delta, rows)
+                best = Suspicion(payload, push, self.root @ delta, float(self._h[self._window(rows)].sum()))
         self._alarmed = self._alarmed + 1 if alarm and lately else 0
         self.last = best or _NOTHING
         self.uneasy = most[1] > _ALARM or (self.uneasy and most[0] > _CALM)
@@ -127,9 +132,13 @@ class ChangeDetector:
     def ratio(self, shift: NDArray[np.float64]) -> float:
         """ln of the likelihood ratio, over nothing, of phi having changed by just this (10,), in the short window."""
         rows = min(self._count, _WINDOWS[0])
-        last = (self._count - 1 - np.arange(rows)) % max(_WINDOWS)
+        last = self._window(rows)
         x = np.linalg.solve(self.root, shift)
         return float(self._b[last].sum(axis=0) @ x - 0.5 * x @ self._A[last].sum(axis=0) @ x) / self.level
+
+    def _window(self, rows: int) -> NDArray[np.intp]:
+        """Where the last so many rows are kept."""
+        return (self._count - 1 - np.arange(rows)) % max(_WINDOWS)
 
 
 def foresee(state: SequentialPosterior, row: Row) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -2,9 +2,10 @@
 
     … run A (empty) ──change──▶ 0.2 s left out ──▶ run B (tare: A) ──change──▶ 0.2 s ──▶ run C, or A again if it fits
 
-Where no tare was given, the run of the empty arm is the tare of the runs after it: what was just grasped is then found
-as well as with a tare. A push that ends brings back the run before it, once the new run is sure that it is the same.
-Rows that do not fit are left out until it is clear whether the payload has changed, or whatever it was is over.
+The run of the empty arm is a tare of the runs after it, beside the one that was given, if one was: what was just
+grasped is then found as well as with a tare at that place. A push that ends brings back the run before it, once the new
+run is sure that it is the same. Rows that do not fit are left out until it is clear whether the payload has changed, or
+whatever it was is over.
 
 Of a fast stream, the row, the answer and the suspicion fall on three samples, one after the other.
 """
@@ -22,6 +23,7 @@ from scipy.stats import chi2
 
 from armload.identifier import Estimate
 from armload.least_squares import StreamingIdentifier, payload_prior_std
+from armload.least_squares.live import FAST
 from armload.least_squares.regression import REGRESSOR_RATE
 from armload.least_squares.streaming import Worker
 from armload.online.changes import ChangeDetector, Suspicion, foresee
@@ -40,7 +42,7 @@ _AGAIN = 0.05  # [s] of such rows shortly after a change, after which it may be 
 _BACK = 6.0  # if ln of the likelihood ratio of what was held before, over what is held now, is above this
 _LEARNT, _PATIENCE = 10.0, 4.0  # [s] of a run that knows its arm; what it leaves out at most, others leave _DECIDED out
 _REFERENCE = 3.0  # [s] an empty run must have lasted to be a tare
-_FAST, _ROW = 2.5e-3, 0.9 / REGRESSOR_RATE  # [s] between samples of a fast stream, and between rows
+_ROW = 0.9 / REGRESSOR_RATE  # [s] between rows
 
 
 class PayloadWatch:
@@ -118,7 +120,7 @@ class PayloadWatch:
                 self._suspect(sample, held)
                 if self.settling or self._aside < np.inf:
                     return None
-        slow, self._last_t = sample.t - self._last_t > _FAST, sample.t
+        slow, self._last_t = sample.t - self._last_t > FAST, sample.t
         before = 0 if self.run.stream is None else self.run.stream.rows
         self.answered = self.run
         estimate = self.run.update(sample)
@@ -156,9 +158,9 @@ class PayloadWatch:
         if self._detector is None:
             self._detector = ChangeDetector(float(payload_prior_std(self.run.arm)[0]), stream.correction.effort)
             foresee(state, row)  # loaded now, not in the middle of a change
-        found = self._detector.take(state.seen, row.X, state.scale, *self._mean)
+        found = self._detector.take(row.h, state.seen, row.X, state.scale, *self._mean)
         self._mean = stream.answer()
-        if stream.seconds <= _FIRST[stream.tare is None]:
+        if stream.seconds <= _FIRST[not stream.tares]:
             return
         self._enough = self._enough and self._detector.uneasy
         if found is not None:
@@ -172,17 +174,17 @@ class PayloadWatch:
         assert stream is not None
         assert stream.state is not None
         assert detector is not None
-        row = stream._rows.feed(*sample)
+        row = stream.look(*sample)
         if row is None or row.h <= 0.0:
             return
         seen, scale = foresee(stream.state, row)
-        found = detector.take(seen, row.X, scale, *self._mean)
+        found = detector.take(row.h, seen, row.X, scale, *self._mean)
         since = sample.t - self._aside
         if found is not None and since < _DECIDED:
             self._begin(sample, found, held)
         elif self._unresolved and self._short < _MOST_SHORT and since > _AGAIN and self._back():
             self._begin(sample, detector.last, held)
-        sure = stream.tare is not None or stream.seconds > _LEARNT
+        sure = bool(stream.tares) or stream.seconds > _LEARNT
         self._enough = since > (_PATIENCE if sure else _DECIDED)
         if self.settling or self._enough or not detector.uneasy:
             self._aside = np.inf
@@ -209,7 +211,7 @@ class PayloadWatch:
     def _begin(self, sample: Sample, found: Suspicion, held: bool) -> None:
         """A change: the next run is made beside the stream while the transient lasts."""
         mass = float(found.delta[0])
-        self.event = Event("change", sample.t, sample.t - found.rows / 200.0, mass)
+        self.event = Event("change", sample.t, sample.t - found.seconds, mass)
         run = self.run
         self._passing = self._unresolved and run.stream is not None and run.stream.seconds < _PASSING
         self._short = self._short + 1 if self._passing else 0

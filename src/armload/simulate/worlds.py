@@ -6,7 +6,8 @@ The measured joint torque of a world is
 
 Friction and residual are torques inside the joint: they disturb the arm's motion and show in the sensor. Rotor inertia
 is there only where the torque is measured on the motor's side of the gear; so is stiction, what a joint at rest holds
-that its motor need not (`World.stuck`). Gain, offset and drift are the sensor's own.
+that its motor need not (`World.stuck`), on arms that are known to measure there. Gain, offset and drift are the
+sensor's own.
 
 How large each part is and how it is drawn says `armload.simulate.mismatch`. Worlds beyond the measured ones
 (`World.beyond`) are to make a learner and its error bars ready for an arm that nobody has measured.
@@ -154,7 +155,7 @@ class World:
                 of them where that is known of the arm.
         """
         rng = np.random.default_rng([seed, 2])
-        offset, level, residual = sizes(arm)
+        usual, level, residual = sizes(arm)
         heavier = np.exp(rng.uniform(*np.log(_HEAVIER), size=6))
         if motor_side is None:
             motor_side = arm.motor_torque or rng.random() < 1 / 3
@@ -168,17 +169,20 @@ class World:
         smooth = SmoothTorque.of_length(np.sqrt(1 - share**2) * heavier[5] * residual, LENGTHS, rng)
         worst = MOTOR_GAIN if motor_side else GAIN
         warming = float(np.exp(rng.uniform(*np.log(_WARMING))))
+        links = np.array([perturbed(phi, rng, arm.link_spread * heavier[:3]) for phi in _bare_links(arm)])
+        offset = heavier[3] * usual * rng.normal(size=arm.n)
+        friction = any_friction(level, rng, MOTOR_LOAD if arm.motor_torque else LOAD)
         return cls(
             "beyond, motor side" if motor_side else "beyond",
             seed,
-            np.array([perturbed(phi, rng, arm.link_spread * heavier[:3]) for phi in _bare_links(arm)]),
-            heavier[3] * offset * rng.normal(size=arm.n),
-            any_friction(level, rng, MOTOR_LOAD if arm.motor_torque else LOAD),
+            links,
+            offset,
+            friction,
             smooth + SmoothTorque.ripple(share * heavier[5] * residual, rng) if rippled else smooth,
             1.0 + rng.uniform(-worst, worst, size=arm.n),
-            Drift(0.5 * offset * rng.normal(size=arm.n), warming) if rng.random() < 0.5 else None,
+            Drift(0.5 * usual * rng.normal(size=arm.n), warming) if rng.random() < 0.5 else None,
             rotor,
-            level if arm.motor_torque else None,
+            friction.level if arm.motor_torque and motor_side else None,
         )
 
     def arm(self, nominal: Arm) -> Arm:
