@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+import re
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import FrozenInstanceError, replace
 from multiprocessing import get_context
@@ -21,6 +22,7 @@ from armload.arms import (
     full_arm_regressor,
     momentum_regressor,
     payload_regressor,
+    rated_effort,
 )
 from armload.errors import ArmError, ArmloadError
 from armload.inertia import InertialParameters, is_consistent, to_order
@@ -440,6 +442,18 @@ def test_links_can_be_replaced(panda):
     np.testing.assert_allclose(heavier.link_parameters, links, rtol=1e-12)
 
 
+def test_fingerprint_knows_the_axis_of_a_joint():
+    def one(axis):
+        return Arm(
+            "x", robot(link("base"), joint("j", "revolute", "base", "a", axis=axis), link("a", 1.0, com="0.3 0.1 0.2"))
+        )
+
+    a, b = one("0.6 0.8 0"), one("0.6 0 0.8")
+    assert not np.allclose(a.torque([0.4]), b.torque([0.4]))
+    assert a.fingerprint != b.fingerprint
+    assert a.fingerprint == one("0.6 0.8 0").fingerprint
+
+
 def test_fingerprint_follows_the_physics_and_not_the_name(panda):
     other = {
         "mass": panda.with_links(panda.link_parameters * (1 + 1e-3)),
@@ -624,6 +638,36 @@ def test_a_file_with_other_links_is_no_known_arm(tmp_path):
     (tmp_path / "ur10e.urdf").write_text(heavier)
     found = arm(tmp_path / "ur10e.urdf")
     assert (found.rated_payload, found.motor_torque, found.link_spread) == (None, False, 10.0)
+
+
+def test_an_arm_whose_first_joint_turns_about_another_axis_is_no_known_arm(tmp_path):
+    known = arm("panda")
+    first = known.urdf.index('name="panda_joint1"')
+    axis = known.urdf.index('xyz="0 0 1"', known.urdf.index("<axis", first))
+    turned = known.urdf[:axis] + 'xyz="0 1 0"' + known.urdf[axis + len('xyz="0 0 1"') :]
+    (tmp_path / "cell.urdf").write_text(turned)
+    found = arm(tmp_path / "cell.urdf", known.frame)
+    q = np.linspace(0.3, 0.9, 7)
+    assert np.abs(found.torque(q) - known.torque(q)).max() > 1.0
+    assert found.known_as is None
+
+
+def test_a_known_arm_whose_links_and_joints_have_a_prefix_is_that_arm(tmp_path):
+    known = arm("ur10e")
+    prefixed = re.sub(r'(name|link)="(?!ur10e)', r'\1="left_', known.urdf)
+    (tmp_path / "two_arms.urdf").write_text(prefixed)
+    found = arm(tmp_path / "two_arms.urdf", "left_tool0")
+    assert found.joint_names == tuple(f"left_{name}" for name in known.joint_names)
+    assert (found.known_as, found.rated_payload, found.motor_torque) == ("ur10e", 12.5, True)
+
+
+def test_the_strength_of_joints_without_limits_is_about_that_of_the_ratings():
+    known = arm("ur10e")
+    limitless = replace(known, urdf=re.sub(r'effort="[^"]*"', 'effort="0"', known.urdf))
+    assert not np.isfinite(limitless.limits.effort).any()
+    ratio = rated_effort(limitless) / known.limits.effort
+    assert np.all((ratio > 0.3) & (ratio < 2.0))
+    np.testing.assert_array_equal(rated_effort(known), known.limits.effort)
 
 
 def test_an_arm_loads_from_a_urdf_file(tmp_path, panda):

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from armload.arms import rated_effort
 from armload.errors import IdentificationError
 from armload.evaluate import (
     Comparison,
@@ -23,7 +24,7 @@ from armload.evaluate import (
 )
 from armload.identifier import Estimate, Identifier
 from armload.inertia import NAMES, InertialParameters
-from armload.least_squares import Correction, effort_scale
+from armload.least_squares import Correction
 from armload.least_squares.noise import RIGID
 from armload.least_squares.posterior import solve
 from armload.least_squares.regression import RegressionData
@@ -277,7 +278,7 @@ def test_prior_of_a_family_has_its_moments_and_is_never_singular():
 def test_a_payload_prior_enters_as_bayes_rule_says(panda, analytic_log):
     """Oracle: (A + P₀⁻¹)·z = b + P₀⁻¹·z₀ solved densely, with the first iteration's weights."""
     log = analytic_log(panda, CAMERA, duration=1.0)
-    correction = Correction(panda, effort_scale(panda, log.tau))
+    correction = Correction(panda, rated_effort(panda))
     data = RegressionData(correction, 20.0)
     data.add(log.t, log.q, log.dq, log.tau)
     prior = GaussianPrior.of(FAMILY)

@@ -124,7 +124,7 @@ def test_a_franka_load_measured_in_a_turned_frame_is_told_in_the_flange_s():
     rpy = pin.rpy.matrixToRpy(R)
     tool = f'<link name="tool"/><joint name="tool_joint" type="fixed"><origin xyz="{p[0]} {p[1]} {p[2]}" '
     tool += f'rpy="{rpy[0]} {rpy[1]} {rpy[2]}"/><parent link="panda_link8"/><child link="tool"/></joint></robot>'
-    panda = Arm("panda", arm("panda").urdf.replace("</robot>", tool), "tool", rated_payload=3.0)
+    panda = Arm("panda", arm("panda").urdf.replace("</robot>", tool), "tool", rated_payload=3.0, known_as="panda")
     told = franka_load(check_writable(Load(skew_body("tool")), panda, moving=False, write=True))
     np.testing.assert_allclose(told.com, R @ COM + p, atol=1e-12)
     np.testing.assert_allclose(np.reshape(told.inertia, (3, 3)), R @ INERTIA @ R.T, atol=1e-12)
@@ -486,7 +486,9 @@ UNDETERMINED = {k: [i != k for i in range(10)] for k in range(10)}
             "what panda is rated for is not known",
         ),
         (
-            lambda: check_writable(Load(skew_body()), replace(arm("panda"), name="mine"), moving=False, write=True),
+            lambda: check_writable(
+                Load(skew_body()), replace(arm("panda"), name="mine", known_as=None), moving=False, write=True
+            ),
             "the flange of mine is not known",
         ),
     ],

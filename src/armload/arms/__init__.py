@@ -3,7 +3,7 @@
 from armload.arms.catalogue import ARMS, arm
 from armload.arms.filtered import FilteredRegression, first_order_lag
 from armload.arms.forward import ForwardDerivatives, ForwardDynamics
-from armload.arms.kinship import kinship
+from armload.arms.kinship import kinship, namesake
 from armload.arms.model import Arm, BodyMotion, Limits
 from armload.arms.regressors import (
     MomentumRegressor,
@@ -11,6 +11,7 @@ from armload.arms.regressors import (
     momentum_regressor,
     payload_regressor,
 )
+from armload.arms.strength import poses, rated_effort
 
 __all__ = [
     "ARMS",
@@ -26,5 +27,8 @@ __all__ = [
     "full_arm_regressor",
     "kinship",
     "momentum_regressor",
+    "namesake",
     "payload_regressor",
+    "poses",
+    "rated_effort",
 ]

@@ -17,7 +17,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from armload.arms.kinship import kinship
+from armload.arms.kinship import kinship, namesake
 from armload.arms.model import STANDARD_GRAVITY, Arm
 from armload.errors import ArmError
 
@@ -65,7 +65,7 @@ def arm(robot: str | Path, frame: str | None = None, gravity: tuple[float, float
         if frame is not None:
             facts["frame"] = frame
         text = resources.files("armload.arms").joinpath(f"descriptions/{name}.urdf").read_text(encoding="utf-8")
-        return Arm(name, text, gravity=gravity, **facts)
+        return Arm(name, text, gravity=gravity, known_as=name, **facts)
     path = Path(robot)
     if not path.is_file():
         raise ArmError(
@@ -81,8 +81,9 @@ def arm(robot: str | Path, frame: str | None = None, gravity: tuple[float, float
 def _as_known(found: Arm) -> Arm:
     """The arm with the catalogue's facts, if it is one of the catalogue's."""
     for name, facts in ARMS.items():
-        if facts["frame"] in found.frames:
+        flange = namesake(found, str(facts["frame"]))
+        if flange is not None:
             known = arm(name)
-            if known.n == found.n and kinship(replace(found, frame=known.frame)) == kinship(known):
+            if known.n == found.n and kinship(replace(found, frame=flange)) == kinship(known):
                 return replace(found, known_as=name, **{fact: x for fact, x in facts.items() if fact != "frame"})
     return found

@@ -1,20 +1,43 @@
-"""Whether two descriptions are of the same arm, however their bases stand and whatever their files are called."""
+"""Whether two descriptions are of the same arm, however their bases stand and whatever is called how."""
 
 from __future__ import annotations
 
 import hashlib
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armload.arms.model import Arm
 
+_TURN = 0.3  # [rad, m] of the first joint, which shows its axis
+
 
 def kinship(arm: Arm) -> str:
-    """SHA-256 of an arm's links and of how they sit to each other: the same however its base stands."""
-    R, p = arm.link_poses(np.linspace(-0.5, 0.7, arm.n))
-    frame_R, frame_p = arm.frame_pose(np.linspace(-0.5, 0.7, arm.n))
-    R, p = np.concatenate([R[0], frame_R]), np.concatenate([p[0], frame_p])
-    digest = hashlib.sha256(np.round(arm.link_parameters, 6).tobytes())
-    digest.update((np.round(R[0].T @ R, 6) + 0.0).tobytes())  # as seen from the first moving link
-    digest.update((np.round((p - p[0]) @ R[0], 6) + 0.0).tobytes())
+    """SHA-256 of an arm's links, of how they sit to each other and move: the same however its base stands."""
+    q = np.linspace(-0.5, 0.7, arm.n)
+    R, p = _poses(arm, q)
+    turned_R, turned_p = _poses(arm, q + _TURN * np.eye(arm.n)[0])
+    digest = hashlib.sha256((np.round(arm.link_parameters, 6) + 0.0).tobytes())
+    for part in (
+        R[0].T @ R,  # as seen from the first moving link
+        (p - p[0]) @ R[0],
+        R[0].T @ turned_R[0],
+        (turned_p[0] - p[0]) @ R[0],
+    ):
+        digest.update((np.round(part, 6) + 0.0).tobytes())
     return digest.hexdigest()
+
+
+def namesake(arm: Arm, frame: str) -> str | None:
+    """The frame of an arm that is called so, with whatever prefix; None: there is none, or there are several."""
+    if frame in arm.frames:
+        return frame
+    found = [name for name in arm.frames if name.endswith(frame)]
+    return found[0] if len(found) == 1 else None
+
+
+def _poses(arm: Arm, q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Orientations (n + 1, 3, 3) and origins (n + 1, 3) of the moving links and of the payload's frame."""
+    R, p = arm.link_poses(q)
+    frame_R, frame_p = arm.frame_pose(q)
+    return np.concatenate([R[0], frame_R]), np.concatenate([p[0], frame_p])

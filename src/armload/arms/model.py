@@ -67,7 +67,7 @@ class Arm:
             of inertia (1 sigma): 1 for an identified model, 10 for nominal figures of unknown quality.
         motor_torque: whether the torque is known to be motor current times a constant, with all of the gear's friction
             in it; where it is not known, each log tells.
-        known_as: which built-in arm it is, where a file of another name describes one.
+        known_as: which built-in arm it is, whatever the file that describes it is called.
     """
 
     name: str
@@ -130,7 +130,10 @@ class Arm:
         digest = hashlib.sha256()
         for joint in range(1, self.n + 1):
             digest.update(np.round(model.jointPlacements[joint].homogeneous, 9).tobytes())
-            digest.update(model.joints[joint].shortname().encode())
+            kind = model.joints[joint]
+            digest.update(kind.shortname().encode())
+            if kind.shortname().endswith("Unaligned"):
+                digest.update((np.round(kind.extract().axis, 9) + 0.0).tobytes())
             digest.update(np.round(model.inertias[joint].toDynamicParameters(), 9).tobytes())
         digest.update(np.round(self._frame_placement.homogeneous, 9).tobytes())
         digest.update(np.round(self.gravity, 6).tobytes())

@@ -21,11 +21,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armload.arms import Arm
+from armload.arms import Arm, rated_effort
 from armload.determined import SHRINK, Z95
 from armload.errors import IdentificationError
 from armload.inertia import NAMES, UNITS
-from armload.least_squares.correction import Correction, effort_scale
+from armload.least_squares.correction import Correction
 from armload.least_squares.features import JointFeatures
 from armload.least_squares.noise import SMOOTH, NoiseModel
 from armload.least_squares.posterior import solve
@@ -156,7 +156,7 @@ def bound(
     before = None if tare is None else followed(arm, tare)
     stops = _times(log, times)
     prior = GaussianPrior.weak(arm) if prior is None else prior
-    correction = Correction(arm, effort_scale(arm, log.tau))
+    correction = Correction(arm, rated_effort(arm))
     features = features or JointFeatures(arm.n)
     at_tare = payload_prior_std(arm) if mounted is None else np.asarray(mounted, dtype=float)
     _check_shapes(at_tare, scales, correction, features)

@@ -83,7 +83,7 @@ def run(options: argparse.Namespace) -> None:
             raise UsageError(f"unknown world {name!r}: expected nominal or real-like:SEED")
     sensors = None
     if options.noise:
-        sensors = Sensors.panda(arm) if arm.name == "panda" else Sensors.generic(arm)
+        sensors = Sensors.of(arm)
     dataset = build_dataset(
         options.out,
         arm,

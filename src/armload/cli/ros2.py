@@ -144,7 +144,7 @@ def _simulate(options: argparse.Namespace) -> None:
     arm = arm_of(options)
     sensors = None
     if options.noise:
-        sensors = Sensors.panda(arm) if arm.name == "panda" else Sensors.generic(arm)
+        sensors = Sensors.of(arm)
     if options.world == "nominal":
         world = World.nominal(arm)
     elif options.world.startswith("real-like:"):

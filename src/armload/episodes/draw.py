@@ -54,11 +54,6 @@ def draw_episodes(
     return [draw.episode(k) for k in range(count)]
 
 
-def sensors_of(arm: Arm) -> Sensors:
-    """The Panda's sensors, or the like for another arm."""
-    return Sensors.panda(arm) if arm.name == "panda" and arm.n == 7 else Sensors.generic(arm)
-
-
 @dataclass(frozen=True, eq=False)
 class _Draw:
     """A recipe at work; what episodes share is made once."""
@@ -79,7 +74,7 @@ class _Draw:
         payload, world, noise = (int(x) for x in rng.integers(1 << 30, size=3))
         rng = np.random.default_rng([self.seed, k, 4])
         slot = k if k < self.motions else int(rng.integers(self.motions))
-        sensors = sensors_of(arm)
+        sensors = Sensors.of(arm)
         if recipe.vary_sensors:
             sensors = _varied(sensors, rng)
         softest, stiffest = np.log(recipe.stiffness)

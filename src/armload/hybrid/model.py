@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from armload.arms import Arm, kinship
+from armload.arms import Arm, kinship, namesake
 from armload.atomic import replacing
 from armload.errors import ModelError
 from armload.hybrid.calibration import COVERAGE, Calibration
@@ -62,16 +62,17 @@ class HybridModel:
         Raises:
             ModelError: the model was trained for another arm.
         """
-        if arm.n != self.n or self.frame not in arm.frames:
+        flange = namesake(arm, self.frame)
+        if arm.n != self.n or flange is None:
             raise ModelError(f"the hybrid was trained for {self.arm_name}: {arm.name} is another arm; train one for it")
-        if kinship(replace(arm, frame=self.frame, attached=None)) != self.arm_fingerprint:
+        if kinship(replace(arm, frame=flange, attached=None)) != self.arm_fingerprint:
             raise ModelError(
                 f"the hybrid was trained for {self.arm_name}: {arm.name} has other links; train one for it with "
                 "`armload train --method hybrid`"
             )
-        if arm.frame == self.frame:
+        if arm.frame == flange:
             return self.prior
-        T = np.array([arm.in_frame(InertialParameters(unit, self.frame)).phi for unit in np.eye(10)]).T
+        T = np.array([arm.in_frame(InertialParameters(unit, flange)).phi for unit in np.eye(10)]).T
         return self.prior.moved(T)
 
     def save(self, path: str | PathLike[str]) -> Path:
@@ -164,5 +165,5 @@ class HybridModel:
     @staticmethod
     def shipped(arm: Arm) -> Path | None:
         """The model that comes with armload for an arm of the catalogue; None: there is none."""
-        path = Path(__file__).parent / "models" / f"{arm.known_as or arm.name}.safetensors"
+        path = Path(__file__).parent / "models" / f"{arm.known_as}.safetensors"
         return path if path.is_file() else None

@@ -3,7 +3,7 @@
 from armload.least_squares.acceleration import CommandedLeastSquares, PolynomialLeastSquares
 from armload.least_squares.autocorrelation import BlockMeans
 from armload.least_squares.consistent import ConsistentLeastSquares, LogCholeskyLeastSquares
-from armload.least_squares.correction import Correction, effort_scale
+from armload.least_squares.correction import Correction
 from armload.least_squares.difference import DifferenceLeastSquares
 from armload.least_squares.features import JointFeatures
 from armload.least_squares.joint import JointLeastSquares
@@ -39,7 +39,6 @@ __all__ = [
     "SmoothPosteriorLeastSquares",
     "StreamingIdentifier",
     "WeightedLeastSquares",
-    "effort_scale",
     "payload_prior_std",
     "solution_prior_std",
 ]

@@ -47,7 +47,7 @@ class Correction:
 
     Args:
         arm: the arm.
-        effort: torque scale of each joint (n,) [N·m], usually `effort_scale(arm, tau)`.
+        effort: torque scale of each joint (n,) [N·m], usually `rated_effort(arm)`.
     """
 
     arm: Arm
@@ -98,12 +98,6 @@ class Correction:
         return MomentumRegressor(
             np.concatenate([*momentum, links.momentum], axis=2), np.concatenate([*drift, links.drift], axis=2)
         )
-
-
-def effort_scale(arm: Arm, tau: ArrayLike) -> NDArray[np.float64]:
-    """Torque scale of each joint (n,): its effort limit; where that is unknown, 1.5 × the largest torque seen."""
-    seen = np.maximum(1.5 * np.abs(np.asarray(tau)).max(axis=0), 1.0)
-    return np.where(np.isfinite(arm.limits.effort), arm.limits.effort, seen)
 
 
 def _link_std(arm: Arm) -> NDArray[np.float64]:

@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
-from armload.arms import Arm
+from armload.arms import Arm, rated_effort
 from armload.identifier import BatchIdentifier, Estimate
-from armload.least_squares.correction import Correction, effort_scale
+from armload.least_squares.correction import Correction
 from armload.least_squares.normal import UNKNOWN
 from armload.least_squares.prior import payload_prior_std
 from armload.least_squares.regression import RegressionData
@@ -57,7 +57,7 @@ class JointLeastSquares(BatchIdentifier):
     def __init__(self, arm: Arm, tare: Recording, gain: float = 20.0, refresh: float = 0.02) -> None:
         self.arm, self.gain, self.refresh = arm, gain, refresh
         self._check(tare)
-        self._correction = Correction(arm, effort_scale(arm, tare.tau))
+        self._correction = Correction(arm, rated_effort(arm))
         self._base = base_parameters(self._correction)
         self._tare = RegressionData(self._correction, gain)
         self._tare.add(tare.t, tare.q, tare.dq, tare.tau)

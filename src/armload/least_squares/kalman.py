@@ -18,11 +18,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm
+from armload.arms import Arm, rated_effort
 from armload.arms.forward import ForwardDynamics
 from armload.identifier import Estimate, Identifier
 from armload.inertia import is_consistent, nearest_consistent
-from armload.least_squares.correction import FRICTION_WIDTH, effort_scale
+from armload.least_squares.correction import FRICTION_WIDTH
 from armload.least_squares.prior import solution_prior_std
 from armload.recording import Sample
 
@@ -87,7 +87,7 @@ class ExtendedKalmanFilter(Identifier):
         """Take one sample (t, q, dq, tau) and return the estimate so far, at most one step old."""
         n, last = self.arm.n, self._last
         if self._count == 0:
-            self._begin(sample.tau)
+            self._begin()
         now = Sample(sample.t, sample.q.copy(), sample.dq.copy(), sample.tau.copy())
         if last is None or now.t - last.t > GAP:
             joints = slice(0, 2 * n)
@@ -110,8 +110,8 @@ class ExtendedKalmanFilter(Identifier):
         phi = slice(2 * n, 2 * n + 10)
         return Estimate(float(now.t), self._x[phi].copy(), self._P[phi, phi].copy(), self._count, str(self.arm.frame))
 
-    def _begin(self, tau: NDArray) -> None:
-        n, effort = self.arm.n, effort_scale(self.arm, tau[None])
+    def _begin(self) -> None:
+        n, effort = self.arm.n, rated_effort(self.arm)
         first = np.concatenate([np.zeros(2 * n), self._unit, _OFFSET * effort, _COULOMB * effort])
         self._P = np.diag(first**2)
         density = _TORQUE * effort if self.torque_density is None else self.torque_density

@@ -48,7 +48,7 @@ class StreamingIdentifier(Identifier):
 
     def update(self, sample: Sample) -> Estimate:
         """Take one sample (t, q, dq, tau) and return the estimate so far, at most `publish` old."""
-        self.prepare(sample.tau)
+        self.prepare()
         assert self.stream is not None
         if self._began is None:
             self._began = sample.t
@@ -82,11 +82,11 @@ class StreamingIdentifier(Identifier):
         other.reset()
         return other
 
-    def prepare(self, tau: NDArray) -> None:
-        """Do now what the first sample would have to wait for; tau (n,) [N·m] as it would be."""
+    def prepare(self) -> None:
+        """Do now what the first sample would have to wait for."""
         if self.stream is None:
             reference = None if self.reference is None else self.reference.stream
-            self.stream = self.method.streaming(tau, reference)
+            self.stream = self.method.streaming(reference)
 
     def close(self) -> None:
         """Stop the thread that finds the scales; the identifier may go on."""

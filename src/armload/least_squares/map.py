@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm
+from armload.arms import Arm, rated_effort
 from armload.identifier import BatchIdentifier, Estimate
-from armload.least_squares.correction import Correction, effort_scale
+from armload.least_squares.correction import Correction
 from armload.least_squares.features import JointFeatures
 from armload.least_squares.noise import RIGID, SMOOTH, NoiseModel
 from armload.least_squares.posterior import solve
@@ -47,19 +47,18 @@ class PosteriorLeastSquares(BatchIdentifier):
         prior: GaussianPrior | None = None,
     ) -> None:
         self.arm, self.gain, self.refresh, self.prior = arm, gain, refresh, prior
-        self._correction: Correction | None = None
+        self._correction = Correction(arm, rated_effort(arm))
         self._tare: RegressionData | None = None
         self._start: Scales | None = None
         if tare is not None:
-            self._correction = Correction(arm, effort_scale(arm, tare.tau))
-            self._tare = self._data(self._correction)
+            self._tare = self._data()
             self._tare.add(tare.t, tare.q, tare.dq, tare.tau)
             self._start = self._from_tare(self._tare)
         self.reset()
 
-    def _data(self, correction: Correction) -> RegressionData:
+    def _data(self) -> RegressionData:
         """An empty regression of the kind this method accumulates."""
-        return RegressionData(correction, self.gain, block=self._noise.block)
+        return RegressionData(self._correction, self.gain, block=self._noise.block)
 
     def _from_tare(self, tare: RegressionData) -> Scales | None:  # noqa: ARG002
         """Scales found from the tare once, for all later solutions to begin with; None: begin with those stated."""
@@ -91,27 +90,22 @@ class PosteriorLeastSquares(BatchIdentifier):
             raise RuntimeError("no sample has been seen: call update or run first")
         return self._posterior
 
-    def streaming(self, tau: NDArray, reference: StreamingPosterior | None = None) -> StreamingPosterior:
+    def streaming(self, reference: StreamingPosterior | None = None) -> StreamingPosterior:
         """The same method for a live stream, with the same tare.
 
         Args:
-            tau: (n,) [N·m] the first torque seen.
             reference: an earlier run of the stream with the same mounted as at the tare; it is another one.
         """
-        if self._correction is None:
-            self._correction = Correction(self.arm, effort_scale(self.arm, np.atleast_2d(tau)))
         tares, start = () if self._tare is None else (self._tare,), self._start
         if reference is not None:
             tares, start = (*reference.tares, reference.finish()), reference.posterior.scales
-        empty = self._data(self._correction)
+        empty = self._data()
         std = solution_prior_std(self.arm)
         return StreamingPosterior(self._correction, empty.features, self._noise, std, tares, start, self.gain)
 
     def _take(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
         if self._run is None:
-            if self._correction is None:
-                self._correction = Correction(self.arm, effort_scale(self.arm, tau))
-            self._run = self._data(self._correction)
+            self._run = self._data()
         self._run.add(t, q, dq, tau)
         self._count += len(t)
 
@@ -159,8 +153,8 @@ class SmoothPosteriorLeastSquares(PosteriorLeastSquares):
         self.features = features or JointFeatures(arm.n)
         super().__init__(arm, tare, gain, refresh, prior)
 
-    def _data(self, correction: Correction) -> RegressionData:
-        return RegressionData(correction, self.gain, self.features, self._noise.block)
+    def _data(self) -> RegressionData:
+        return RegressionData(self._correction, self.gain, self.features, self._noise.block)
 
     def _from_tare(self, tare: RegressionData) -> Scales:
         return solve([tare], payload_prior_std(self.arm), None, self._noise, self._iterations).scales

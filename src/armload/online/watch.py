@@ -220,14 +220,14 @@ class PayloadWatch:
         reference = run.reference
         if reference is None and not held and run.stream is not None and run.stream.seconds >= _REFERENCE:
             reference = run
-        self._next = self._beside(self._prepared, run, reference, sample.tau)
+        self._next = self._beside(self._prepared, run, reference)
 
     @staticmethod
-    def _prepared(run: StreamingIdentifier, reference: StreamingIdentifier | None, tau: NDArray) -> StreamingIdentifier:
+    def _prepared(run: StreamingIdentifier, reference: StreamingIdentifier | None) -> StreamingIdentifier:
         if run.stream is not None:
             run.stream.finish()
         following = run.beside(reference)
-        following.prepare(tau)
+        following.prepare()
         return following
 
     def _resolve(self, estimate: Estimate, held: bool) -> None:

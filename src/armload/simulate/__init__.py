@@ -4,7 +4,7 @@ from armload.simulate.continued import ContinuedRun
 from armload.simulate.controller import Command, Gains
 from armload.simulate.friction import Friction
 from armload.simulate.plant import build_model, settled_start
-from armload.simulate.ratings import rated_mass
+from armload.simulate.ratings import is_panda, rated_mass
 from armload.simulate.residual import SmoothTorque
 from armload.simulate.resolution import Resolution
 from armload.simulate.runs import Run, simulate, simulate_many
@@ -29,6 +29,7 @@ __all__ = [
     "TorqueRun",
     "World",
     "build_model",
+    "is_panda",
     "moderate_stiffness",
     "rated_mass",
     "settled_start",

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm
+from armload.arms import Arm, poses, rated_effort
 from armload.motion import Motion
-from armload.simulate.ratings import poses, rated_effort
+from armload.simulate.ratings import is_panda
 
 # Joint stiffness that libfranka's example programs set before they move (`setJointImpedance` in examples_common.cpp);
 # Franka publishes no damping. With 2 kg at arm's length the Panda then sags 4 mrad in joint 2.
@@ -47,9 +47,7 @@ class Gains:
         np.float64(3000.0)
         """
         inertia = np.mean([np.diag(arm.mass_matrix(q)) for q in poses(arm)], axis=0)
-        stiffness = (
-            np.array(_PANDA_STIFFNESS) if arm.name == "panda" and arm.n == 7 else rated_effort(arm) / _FULL_LOAD_SAG
-        )
+        stiffness = np.array(_PANDA_STIFFNESS) if is_panda(arm) else rated_effort(arm) / _FULL_LOAD_SAG
         return cls(stiffness, np.maximum(2.0 * np.sqrt(stiffness * inertia), _SHORTEST_RETURN * stiffness))
 
     def stiffer(self, factor: float) -> Gains:

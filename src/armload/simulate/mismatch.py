@@ -12,10 +12,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm
+from armload.arms import Arm, rated_effort
 from armload.inertia import com_to_phi, nearest_consistent, phi_to_com
 from armload.simulate.friction import Friction
-from armload.simulate.ratings import rated_effort
+from armload.simulate.ratings import is_panda
 
 # one standard deviation of a link's mass [1], centre of mass [m] and inertia [1]
 _LINK_MASS, _LINK_COM, _LINK_INERTIA = 0.02, 0.002, 0.05
@@ -40,7 +40,7 @@ _ROTOR = (0.002, 0.02)  # [s²] rotor inertia over rated torque
 
 def sizes(arm: Arm) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Offset, friction and residual (n,) of an arm like the measured ones [N·m]."""
-    if arm.name == "panda" and arm.n == 7:
+    if is_panda(arm):
         return np.array(_PANDA_OFFSET), np.array(_PANDA_FRICTION), np.array(_PANDA_RESIDUAL)
     rated = rated_effort(arm)
     return rated * _OTHER_OFFSET, rated * _OTHER_FRICTION, rated * _OTHER_RESIDUAL

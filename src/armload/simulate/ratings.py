@@ -1,25 +1,19 @@
-"""How strong an arm's joints are: the scale of everything in the simulator that is not known for that arm."""
+"""What an arm is built for: the scale of everything in the simulator that is not known for that arm."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armload.arms import Arm
+from armload.arms import Arm, poses, rated_effort
 from armload.inertia import InertialParameters
 from armload.motion.collision import PAYLOAD_REACH
 
-_POSES = 200
-_FULL = (
-    0.7  # of what the joints could hold almost everywhere; gives 3.6 kg for the Panda (3) and 11.2 for a UR10e (12.5)
-)
+_FULL = 0.7  # of what the joints could hold almost everywhere: 3.6 kg for the Panda (3), 11.2 for a UR10e (12.5)
 
 
-def rated_effort(arm: Arm) -> NDArray[np.float64]:
-    """Torque (n,) each joint is built for [N·m]: its effort limit; without one, twice what holding the arm can take."""
-    effort = arm.limits.effort
-    static = np.abs(arm.torque(poses(arm))).max(axis=0)
-    return np.where(np.isfinite(effort), effort, 2.0 * np.maximum(static, 0.05 * static.max()))
+def is_panda(arm: Arm) -> bool:
+    """Whether it is the Panda: the one arm whose stiffness, mismatch and sensors are known figures here."""
+    return arm.known_as == "panda" and arm.n == 7
 
 
 def rated_mass(arm: Arm) -> float:
@@ -32,10 +26,3 @@ def rated_mass(arm: Arm) -> float:
     lever = np.abs(arm.with_payload(kilogram).torque(q) - bare)
     room = np.maximum(rated_effort(arm) - np.abs(bare), 0.0)
     return float(max(0.05, _FULL * np.quantile((room / np.maximum(lever, 1e-3)).min(axis=1), 0.05)))
-
-
-def poses(arm: Arm) -> NDArray[np.float64]:
-    """A fixed set of poses (200, n) spread over the joint limits, at most one turn each [rad]."""
-    low = np.maximum(arm.limits.position_low, -np.pi)
-    high = np.minimum(arm.limits.position_high, np.pi)
-    return low + (high - low) * np.random.default_rng(0).random((_POSES, arm.n))

@@ -15,10 +15,10 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm
+from armload.arms import Arm, rated_effort
 from armload.errors import ArmError
 from armload.recording import Recording
-from armload.simulate.ratings import rated_effort
+from armload.simulate.ratings import is_panda
 
 _BAND = (15.0, 120.0)  # [Hz] of the vibration
 _VIBRATION_RATE = 1000.0  # [Hz] at least; slower logs see the vibration aliased, as they do in reality
@@ -98,6 +98,11 @@ class Sensors:
             jitter=1e-4,
             lost=0.08,
         )
+
+    @classmethod
+    def of(cls, arm: Arm) -> Sensors:
+        """The Panda's sensors, or the like for another arm."""
+        return cls.panda(arm) if is_panda(arm) else cls.generic(arm)
 
     def evenly(self) -> Sensors:
         """The same sensors with a log that is evenly spaced and complete."""

@@ -22,10 +22,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm
+from armload.arms import Arm, rated_effort
 from armload.errors import MotionError
 from armload.motion import Motion
-from armload.simulate.ratings import rated_effort
+from armload.simulate.ratings import is_panda
 
 # (t [s], q (n,) [rad], dq (n,) [rad/s]) → joint torque (n,) [N·m]
 Law = Callable[[float, NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
@@ -42,7 +42,7 @@ def moderate_stiffness(arm: Arm) -> NDArray[np.float64]:
     >>> moderate_stiffness(arm("panda")).tolist()
     [600.0, 600.0, 600.0, 600.0, 250.0, 150.0, 50.0]
     """
-    return np.array(_PANDA_STIFFNESS) if arm.name == "panda" and arm.n == 7 else rated_effort(arm) / _FULL_LOAD_SAG
+    return np.array(_PANDA_STIFFNESS) if is_panda(arm) else rated_effort(arm) / _FULL_LOAD_SAG
 
 
 @dataclass(frozen=True, eq=False)

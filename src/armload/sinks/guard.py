@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armload.answer import Identification
-from armload.arms import ARMS, Arm
+from armload.arms import ARMS, Arm, namesake
 from armload.errors import SinkError
 from armload.inertia import NAMES, InertialParameters
 from armload.sinks.load import Load
@@ -55,9 +55,10 @@ def flange_of(arm: Arm) -> str:
     Raises:
         SinkError: the arm is not a built-in one.
     """
-    if arm.name not in ARMS:
+    flange = None if arm.known_as is None else namesake(arm, str(ARMS[arm.known_as]["frame"]))
+    if flange is None:
         raise SinkError(f"the flange of {arm.name} is not known: name its frame with flange=…")
-    return str(ARMS[arm.name]["frame"])
+    return flange
 
 
 def check_writable(

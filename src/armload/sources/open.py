@@ -170,5 +170,5 @@ def _simulator(
         payloads = []
         for k in range(180):
             payloads += [(5.0 + 20.0 * k, draw_payload("boxes", seed + k, **rated)), (20.0 + 20.0 * k, None)]
-    seen = (Sensors.panda(arm) if arm.name == "panda" and arm.n == 7 else Sensors.generic(arm)) if sensors else None
+    seen = Sensors.of(arm) if sensors else None
     return Simulator(arm, payloads=payloads, world=worlds[world](), sensors=seen, seed=seed, **more)

@@ -18,7 +18,7 @@ from armload.errors import PayloadError
 from armload.inertia import InertialParameters
 from armload.motion import EndlessMotion, Motion, random_motion, taie2024
 from armload.recording import Recording, Sample
-from armload.simulate import ContinuedRun, Sensors, World
+from armload.simulate import ContinuedRun, Sensors, World, is_panda
 from armload.sources.pace import Pace
 from armload.sources.source import Source
 
@@ -69,7 +69,7 @@ class Simulator(Source):
         seed: int = 0,
     ) -> None:
         if motion is None:
-            motion = taie2024() if arm.name == "panda" and arm.n == 7 else random_motion(arm, seed)
+            motion = taie2024() if is_panda(arm) else random_motion(arm, seed)
         self.arm = arm
         self.motion = EndlessMotion(motion)
         self.name = f"simulated {arm.name}"

@@ -51,7 +51,7 @@ class URSource(Source):
         if arm.n != 6:
             raise SourceError(f"{arm.name} has {arm.n} joints: a UR arm has 6; name the arm that is there")
         if torque_constants is None:
-            torque_constants = TORQUE_CONSTANTS.get(arm.name)
+            torque_constants = TORQUE_CONSTANTS.get(arm.known_as or arm.name)
         if torque_constants is None:
             raise SourceError(
                 f"{arm.name} measures motor currents, and no torque constants are known for it: give six numbers in "
