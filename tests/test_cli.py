@@ -191,3 +191,22 @@ def test_numba_keeps_what_it_compiles_in_a_folder_of_the_user_s_own_where_nothin
     other = folder()
     assert other != kept
     assert other.stat().st_mode & 0o777 == 0o700
+
+
+@pytest.mark.parametrize("closed", ["2>&-", ">&-"])
+def test_a_stream_that_is_closed_is_no_crash(closed):
+    """A shell can start a program without standard output or error; Python then has None for them."""
+    done = subprocess.run(
+        ["sh", "-c", f'"{sys.executable}" -m armload methods {closed}'], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0
+    assert "Traceback" not in done.stdout + done.stderr
+    assert ("hybrid" in done.stdout) == (closed == "2>&-")
+    done = subprocess.run(
+        ["sh", "-c", f'"{sys.executable}" -m armload identify no.csv --robot panda {closed}'],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert done.stdout == ""

@@ -202,6 +202,7 @@ def test_the_rest_of_a_subtraction_is_made_a_body_and_that_is_said(export, tmp_p
         (result_of(HELD, frame=None, robot=None), ["--to", "urdf"], "does not name its frame"),
         (result_of(HELD, determined="all"), ["--to", "urdf"], "expected 10 times true or false"),
         ({"phi": [None] * 10}, ["--to", "urdf"], "undetermined"),
+        (result_of(HELD, robot="cell", frame="tcp"), ["--to", "franka"], "about 'tcp' and a controller counts from"),
         (result_of(HELD), ["--to", "urdf", "--out", "no/such/folder/p.urdf"], "cannot be written"),
     ],
 )
@@ -215,3 +216,10 @@ def test_refusals_are_one_sentence_and_nothing_is_printed(export, result, argume
 def test_the_hand_itself_can_be_exported(capsys):
     assert main(["export", "franka-hand", "--to", "mjcf"]) == 0
     np.testing.assert_allclose(mjcf_numbers(capsys.readouterr().out)[0], 0.73)
+
+
+def test_a_frame_that_is_no_flange_is_written_for_a_controller_only_where_asked_for_and_said(export):
+    _, err = export(result_of(HELD, robot="cell", frame="tcp"), "--to", "franka", "--frame", "tcp")
+    assert "these numbers are about tcp" in err
+    _, err = export(result_of(HELD, robot="cell", frame="left_panda_link8"), "--to", "franka")
+    assert "these numbers" not in err

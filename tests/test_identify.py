@@ -34,12 +34,16 @@ def loaded(real_like):
 
 def test_the_answer_is_the_method_s_estimate_moved_to_the_nearest_body(loaded, real_like):
     panda, _ = real_like
-    answer, estimate = identify(loaded, panda), PosteriorLeastSquares(panda).run(loaded)
+    answer, estimate = identify(loaded, panda, method="map"), PosteriorLeastSquares(panda).run(loaded)
+    assert not is_consistent(estimate.phi)
     assert answer.consistent
     assert is_consistent(answer.phi)
-    known = np.array(answer.determined)
-    away = np.abs(np.array(answer.phi) - estimate.phi)
-    assert np.all(away[known] <= Z95 * estimate.std[known])
+    metric = np.linalg.inv(estimate.covariance)
+    away = np.array(answer.phi) - estimate.phi
+    # no body on the way from the answer to the truth, nor a mix of it and another body, is nearer
+    for body in (BOX.phi, TOOL.phi, 2.0 * BOX.phi, (BOX + TOOL).phi):
+        nearer = np.array(answer.phi) + 1e-3 * (body - np.array(answer.phi)) - estimate.phi
+        assert away @ metric @ away <= nearer @ metric @ nearer * (1 + 1e-6)
     assert answer.parameters.mass == answer.mass
     again = InertialParameters.from_com(answer.mass, answer.com, answer.inertia_com)
     assert again.phi == pytest.approx(np.array(answer.phi), abs=1e-12)
@@ -164,13 +168,37 @@ def test_a_tool_in_grams_is_refused(panda, analytic_log):
         identify(analytic_log(panda, BOX), panda, tool=InertialParameters(1e3 * np.array([0.73] + [0.0] * 9)))
 
 
+def test_a_known_tool_that_is_not_mounted_is_missed_and_said_to_be(real_like):
+    panda, how = real_like
+    answer = identify(simulate(panda, taie2024(), None, seed=5, **how), panda, tool=TOOL)
+    assert answer.phi_low[0] < -TOOL.mass < answer.phi_high[0] < 0.0
+    assert (answer.held, answer.consistent) == (False, False)
+    assert "less is mounted" in answer.notes[0]
+
+
+def test_where_the_tare_does_not_tell_of_the_tool_the_intervals_hold_both_cases():
+    ur, light = arm("ur10e"), 0.25 * TOOL.phi
+    tool = InertialParameters(light, "tool0")
+    how = {"world": World.real_like(ur, 3), "sensors": Sensors.generic(ur), "rate": 100.0}
+    tare = simulate(ur, random_motion(ur, 53, duration=15.0), None, seed=4, **how)
+    log = simulate(ur, random_motion(ur, 54, duration=8.0), InertialParameters(2.5 * BOX.phi + light), seed=5, **how)
+    answer = identify(log, ur, tare=tare, tool=tool)
+    assert any("does not tell for sure" in note for note in answer.notes)
+    assert answer.interval == "approximate"
+    plain = identify(log, ur, tare=tare)
+    assert answer.phi_high[0] - answer.phi_low[0] > plain.phi_high[0] - plain.phi_low[0] + 0.9 * tool.mass
+    assert answer.phi_low[0] < 2.5 * BOX.mass < answer.phi_high[0]
+
+
 @pytest.mark.parametrize("gravity", [(5.0, 0.0, -8.44), (0.0, -4.0, -8.96)])
 def test_a_base_that_stands_otherwise_than_was_said_is_noticed(real_like, gravity):
     panda, how = real_like
     true = arm("panda", gravity=gravity)
     log = simulate(true, taie2024(), BOX, seed=3, **how)
-    assert not any("--gravity" in note for note in identify(log, true).notes)
-    assert any("--gravity" in note for note in identify(log, panda).notes)
+    right, wrong = identify(log, true), identify(log, panda)
+    assert not any("--gravity" in note for note in right.notes)
+    assert any("--gravity" in note for note in wrong.notes)
+    assert (right.interval, wrong.interval) == ("calibrated", "approximate")
 
 
 def test_arms_as_they_are_are_not_called_strange(panda):

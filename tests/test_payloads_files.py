@@ -83,6 +83,7 @@ PHI = InertialParameters.from_com(1.0, TRIPLE["com"], TRIPLE["inertia_com"]).phi
         ({**TRIPLE, "mass": 0}, "mass of 0 kg"),
         ({**TRIPLE, "com": [0, 0]}, "com is .*expected 3 numbers"),
         ({**TRIPLE, "com": [0, 0, 100]}, "100 m from the frame.*millimetres"),
+        ({**TRIPLE, "inertia_com": [[9, 0, 0], [0, 9, 0], [0, 0, 9]]}, r"inertia of a body .* m wide.*kg·m²"),
         ({**TRIPLE, "inertia_com": [1, 2, 3]}, "inertia_com is .*expected 3 rows of 3 numbers"),
         ({**TRIPLE, "inertia_com": [[1, 2, 0], [0, 1, 0], [0, 0, 1]]}, r"p\.json: inertia_com is not symmetric"),
         ({**TRIPLE, "inertia_com": [[1, 0, 0], [0, 1, 0], [0, 0, 3]]}, "cannot exist.*1, 1, 3"),

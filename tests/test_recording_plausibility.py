@@ -229,6 +229,16 @@ def test_torque_that_stands_still_while_the_arm_moves_is_refused_by_row(real, na
         check_plausible(replace(log, tau=tau), robot)
 
 
+@pytest.mark.parametrize("name", ["panda", "ur10e"])
+def test_a_torque_that_never_changes_while_its_joint_moves_is_refused_by_joint(real, name):
+    robot, log = real[name]
+    joint = int(np.argmax(np.ptp(log.q, axis=0)))
+    tau = log.tau.copy()
+    tau[:, joint] = 0.0
+    with pytest.raises(RecordingError, match=rf"tau{joint + 1} is 0 in all rows although q{joint + 1} moves"):
+        check_plausible(replace(log, tau=tau), robot)
+
+
 def test_positions_outside_the_limits_are_refused_by_joint_and_row(sound, panda):
     log = sound["panda"][1][0]
     q = log.q.copy()

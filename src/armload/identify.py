@@ -25,6 +25,7 @@ from armload.recording import Recording, check_plausible
 LOWEST_RATE = 20.0  # [Hz]
 _MISFIT = 3.0  # standard deviations between the estimate and the nearest body, beyond which something is wrong
 _STRANGE = 5.0  # rms of torque offsets over what is expected: about 1 of most simulated arms, so much of none tried
+_DECISIVE = 9.0  # between two squared distances: 90 to 1
 _CHECK = "check the robot, the base (--gravity), what is mounted and the torques' signs"
 
 
@@ -61,15 +62,24 @@ def identify(
     if tool is None:
         return _answer(_run(recording, arm, tare, method), arm, recording, "arm" if tare is None else "tare")
     tool = _plausible_tool(arm.in_frame(tool), arm)
-    if tare is None or _carries(tare, arm, tool):
+    if tare is None:
         arm = arm.with_payload(tool)
-        found, relative_to = _run(recording, arm, tare, method), "tool" if tare is None else "tare"
-        note = () if tare is None else ("the tool was mounted at the tare already",)
+        return _answer(_run(recording, arm, None, method), arm, recording, "tool")
+    carried, sure = _carries(tare, arm, tool)
+    if carried:
+        arm = arm.with_payload(tool)
+        found, relative_to = _run(recording, arm, tare, method), "tare"
+        note, otherwise = "the tool was mounted at the tare already", -tool.phi
     else:
-        found, relative_to = _run(recording, arm, tare, method), "tool"
-        found = found.less(tool.phi)
-        note = ("the tool was mounted after the tare: the answer is what was added since, less the tool",)
-    return _answer(found, arm, recording, relative_to, note)
+        found, relative_to = _run(recording, arm, tare, method).less(tool.phi), "tool"
+        note, otherwise = (
+            "the tool was mounted after the tare: the answer is what was added since, less the tool",
+            tool.phi,
+        )
+    if sure:
+        return _answer(found, arm, recording, relative_to, (note,))
+    note = f"it seems that {note}; the tare does not tell for sure, the intervals hold the other case, too"
+    return _answer(found, arm, recording, relative_to, (note,), otherwise)
 
 
 def _plausible_tool(tool: InertialParameters, arm: Arm) -> InertialParameters:
@@ -82,12 +92,17 @@ def _plausible_tool(tool: InertialParameters, arm: Arm) -> InertialParameters:
     return tool
 
 
-def _carries(log: Recording, arm: Arm, tool: InertialParameters) -> bool:
-    """Whether a log fits the arm with the tool better than the bare arm, in the metric of what the log tells."""
-    seen = PosteriorLeastSquares(arm).run(log)
+def _carries(log: Recording, arm: Arm, tool: InertialParameters) -> tuple[bool, bool]:
+    """Whether a log fits the arm with the tool better than the bare arm, and whether it does so beyond doubt.
+
+    The metric is what the log tells by the method that knows best how far it can be trusted.
+    """
+    identifier = METHODS[default_for(arm)].make(arm, None)
+    seen = identifier.run(log)
     information = np.linalg.inv(seen.covariance)
     with_tool = seen.phi - tool.phi
-    return bool(with_tool @ information @ with_tool < seen.phi @ information @ seen.phi)
+    ahead = float(seen.phi @ information @ seen.phi - with_tool @ information @ with_tool)
+    return ahead > 0.0, abs(ahead) > _DECISIVE
 
 
 class _Found(NamedTuple):
@@ -187,8 +202,14 @@ def _misfit(estimate: Estimate) -> float:
 
 
 def _answer(
-    found: _Found, arm: Arm, recording: Recording, relative_to: str, notes: tuple[str, ...] = ()
+    found: _Found,
+    arm: Arm,
+    recording: Recording,
+    relative_to: str,
+    notes: tuple[str, ...] = (),
+    otherwise: NDArray[np.float64] | None = None,
 ) -> Identification:
+    """What is said of an estimate; `otherwise` (10,): how far off the truth may be beyond the error bars."""
     estimate, before = found.estimate, found.before
     phi, half, half_before = estimate.phi.copy(), Z95 * estimate.std, Z95 * found.before_std
     determined = told(estimate.std, found.before_std if found.prior else None, found.alone, payload_prior_std(arm))
@@ -197,8 +218,10 @@ def _answer(
     reach = np.minimum(half, half_before) if found.prior else half
     low = np.where(determined, phi - half, np.minimum(before - half_before, phi - reach))
     high = np.where(determined, phi + half, np.maximum(before + half_before, phi + reach))
+    if otherwise is not None:
+        low, high = np.minimum(low, low + otherwise), np.maximum(high, high + otherwise)
     removed = determined[0] and phi[0] < -half[0]
-    said = list(notes)
+    said, trusted = list(notes), found.calibrated and otherwise is None
     if removed:
         said.append(
             "something was taken off since the tare: the added mass is negative, so no body has these parameters"
@@ -210,8 +233,10 @@ def _answer(
         phi = _body(estimate)
         if _misfit(estimate) > _MISFIT:
             said.append(f"no body fits within the error bars: {_CHECK}")
+            trusted = False
         elif found.offset > _STRANGE:
             said.append(f"the torques are {found.offset:.0f} times as far off as those of an arm should be: {_CHECK}")
+            trusted = False
     low, high = np.minimum(low, phi), np.maximum(high, phi)
     if not determined.all():
         missing = ", ".join(n for n, known in zip(NAMES, determined, strict=True) if not known)
@@ -227,7 +252,7 @@ def _answer(
         phi=phi.tolist(),
         phi_low=low.tolist(),
         phi_high=high.tolist(),
-        interval="calibrated" if found.calibrated else "approximate",
+        interval="calibrated" if trusted else "approximate",
         determined=[bool(x) for x in determined],
         mass=mass,
         com=com.tolist(),

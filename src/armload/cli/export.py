@@ -81,6 +81,7 @@ def parser() -> Parser:
 def run(options: argparse.Namespace) -> None:
     """Read, combine, move, write."""
     from armload.determined import held
+    from armload.errors import SinkError
     from armload.sinks import CONTROLLERS, about, export_load
 
     load = _load_of(options.result)
@@ -94,6 +95,12 @@ def run(options: argparse.Namespace) -> None:
     if frame is None and arm is not None and (options.to in CONTROLLERS or load.frame is None):
         frame = arm.frame
     load = load.about(frame, arm)
+    elsewhere = options.to in CONTROLLERS and load.frame is not None and not _is_flange(load.frame)
+    if elsewhere and options.frame is None:
+        raise SinkError(
+            f"the payload is about {load.frame!r} and a controller counts from its flange ({', '.join(_flanges())}): "
+            "name the arm and its flange with --robot FILE.urdf --frame FLANGE"
+        )
     body = load.as_body()
     if body is not load:
         print_note(
@@ -103,12 +110,25 @@ def run(options: argparse.Namespace) -> None:
     text = export_load(body, options.to, options.out, options.name)
     if nothing:
         print_note("nothing seems to be held: the mass is within three standard deviations of zero")
+    if elsewhere:
+        print_note(f"a controller counts from its flange; these numbers are about {load.frame}, as was asked for")
     for note in _notes(body, options.to):
         print_note(note)
     if options.out is None:
         print(text, end="")
     else:
         print_note(f"{options.out}: {'; '.join(body.said())}")
+
+
+def _flanges() -> list[str]:
+    from armload.arms import ARMS
+
+    return sorted({str(facts["frame"]) for facts in ARMS.values()})
+
+
+def _is_flange(frame: str) -> bool:
+    """Whether a frame is called as a built-in arm's flange, with whatever prefix."""
+    return frame.endswith(tuple(_flanges()))
 
 
 def _load_of(name: str) -> Load:

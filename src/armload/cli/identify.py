@@ -51,13 +51,18 @@ def parser() -> Parser:
 def run(options: argparse.Namespace) -> None:
     """Identify and print."""
     from armload.identify import identify
-    from armload.recording import read_recording
+    from armload.recording import Recording, has_topics, read_recording
 
     with working("reading") as say:
         arm = arm_of(options)
         tool = None if options.tool is None else payload_of(options.tool)
-        log = read_recording(options.log, arm, topic=options.topic)
-        tare = None if options.tare is None else read_recording(options.tare, arm, topic=options.topic)
+        bags = [path for path in (options.log, options.tare) if path is not None and has_topics(path)]
+
+        def read(path: str) -> Recording:
+            return read_recording(path, arm, topic=options.topic if path in bags or not bags else None)
+
+        log = read(options.log)
+        tare = None if options.tare is None else read(options.tare)
         result = identify(log, arm, tare=tare, tool=tool, method=options.method, progress=say)
     for note in (*log.notes, *(tare.notes if tare else ()), *result.notes):
         print_note(note)

@@ -19,7 +19,7 @@ from armload.least_squares import JointFeatures, payload_prior_std
 from armload.recording import Recording
 
 _MARGIN = 1e-5
-_REMOVED = 0.1  # how likely it is, beforehand, that something was taken off since the tare
+_REMOVED = 0.1  # how likely it is, beforehand, that something was taken off
 
 
 class HybridIdentifier(Physics):
@@ -65,7 +65,8 @@ class HybridIdentifier(Physics):
     def _estimate(self, t: float) -> Estimate:
         super()._estimate(t)
         self._trusted = self.model.calibration.trusted(self.evidence(t))
-        self._phi, self._covariance = answer(self._trusted, self.model.calibration, self._payloads)
+        removable = self._trusted.kind > 0 or self.arm.attached is not None
+        self._phi, self._covariance = answer(self._trusted, self.model.calibration, self._payloads, removable)
         return self._last(t)
 
     @property
@@ -79,21 +80,23 @@ class HybridIdentifier(Physics):
 
 
 def answer(
-    trusted: Evidence, calibration: Calibration, payloads: MixturePrior, quick: bool = False
+    trusted: Evidence, calibration: Calibration, payloads: MixturePrior, removable: bool, quick: bool = False
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """phi (10,), a body that can exist or what such a body left behind, and its covariance with calibrated widths.
 
-    `trusted`: evidence as far as it can be trusted (`Calibration.trusted`). `quick`: the body is found in bounded time,
-    to a hundredth of a standard deviation.
+    `trusted`: evidence as far as it can be trusted (`Calibration.trusted`). `removable`: whether there is something
+    that may have been taken off, since the tare or of the tool. `quick`: the body is found in bounded time, to a
+    hundredth of a standard deviation.
     """
-    vectors = np.array([trusted.vector, -trusted.vector] if trusted.kind else [trusted.vector])
+    vectors = np.array([trusted.vector, -trusted.vector] if removable else [trusted.vector])
     found, *removed = payloads.posteriors(trusted.information, vectors)
-    if removed and removed[0].log_evidence + np.log(_REMOVED) > found.log_evidence:  # it was taken off since the tare
-        return -removed[0].mean, calibration.widened(removed[0], trusted)  # −phi is a body
+    sign = 1.0
+    if removed and removed[0].log_evidence + np.log(_REMOVED) > found.log_evidence:
+        found, sign = removed[0], -1.0
     covariance = calibration.widened(found, trusted)
     if quick:
-        return near_consistent(found.mean, inverse(covariance)), covariance
-    return body(found.mean, covariance), covariance
+        return sign * near_consistent(found.mean, inverse(covariance)), covariance
+    return sign * body(found.mean, covariance), covariance
 
 
 def std_alone(trusted: Evidence | None, weak: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -18,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm, momentum_regressor
+from armload.arms import Arm, momentum_regressor, rated_effort
 from armload.arms.filtered import Lag, filtered_regressor
 from armload.errors import IdentificationError
 from armload.least_squares.normal import GAP, NormalLeastSquares
@@ -27,6 +27,7 @@ from armload.recording.alignment import LEAST, TOLERANCE, Aligned, MotionTracker
 
 _ROW_RATE = 200.0  # [Hz] rows are computed no more often: they hold nothing above a few hertz
 _SETTLED = 7.99  # time constants after which a lag has forgotten where it started
+_RESOLUTION = 1e-5  # of the effort limit: two logs differ by so much at least
 _PRIOR_BLOCKS = 8.0  # weight of the rows' own variance, in blocks
 
 
@@ -141,7 +142,7 @@ class DifferenceLeastSquares(NormalLeastSquares):
 
     def _residual_variance(self, phi: NDArray) -> NDArray[np.float64]:
         """Long-run variance per row (n,): of few blocks, drawn towards the variance of the rows, scaled alike."""
-        rows = super()._residual_variance(phi)
+        rows = super()._residual_variance(phi) + (_RESOLUTION * rated_effort(self.arm)) ** 2
         if not self._blocks.ready:
             return rows
         means, times = self._blocks.means()

@@ -27,6 +27,7 @@ from armload.payloads.payload import Box, Payload, require_consistent
 FORMAT = "armload-payload/1"
 _TRIPLE = ("mass", "com", "inertia_com")
 _FARTHEST = 5.0  # [m] a centre of mass farther from the flange than this is in other units
+_WIDEST, _LIGHT = 1.0, 0.01  # [m] radius of gyration; [kg] below which inertia is what was known beforehand
 # Where a file gives phi and (mass, com, inertia_com) they may differ by printed digits, not by an edit.
 _AGREE = {"mass": 1e-3, "com": 1e-3, "inertia_com": 1e-4}  # [kg, m, kg·m²]
 
@@ -47,6 +48,7 @@ def payload_from(content: dict[str, Any], path: str | Path) -> Payload:
     try:
         parameters = _parameters(content, path)
         require_consistent(parameters, f"the payload in {path}")
+        _require_size(parameters, path)
         return Payload(_text(content, "name", path) or path.stem, parameters, _boxes(content, path))
     except PayloadError:
         raise
@@ -136,6 +138,19 @@ def _parameters(content: dict[str, Any], path: Path) -> InertialParameters:
             "expected metres; is it in millimetres?"
         )
     return parameters
+
+
+def _require_size(parameters: InertialParameters, path: Path) -> None:
+    if parameters.mass > _LIGHT and (reach := _gyration(parameters)) > _WIDEST:
+        raise PayloadError(
+            f"payload file {path} has the inertia of a body {reach:.3g} m wide about its centre of mass (radius of "
+            f"gyration): expected at most {_WIDEST:g} m; is it in kg·m²?"
+        )
+
+
+def _gyration(parameters: InertialParameters) -> float:
+    """The largest radius of gyration about the centre of mass [m]."""
+    return float(np.sqrt(np.abs(np.linalg.eigvalsh(parameters.inertia_com)).max() / parameters.mass))
 
 
 def _require_agreement(phi: InertialParameters, triple: InertialParameters, path: Path) -> None:

@@ -1,7 +1,7 @@
 """Recordings: what a robot's joints did, the files they come in, and whether they can be believed."""
 
 from armload.recording.alignment import Alignment, same_motion
-from armload.recording.files import read_recording, write_recording
+from armload.recording.files import has_topics, read_recording, write_recording
 from armload.recording.plausibility import check_plausible
 from armload.recording.recording import CHANNELS, Recording, Sample
 
@@ -11,6 +11,7 @@ __all__ = [
     "Recording",
     "Sample",
     "check_plausible",
+    "has_topics",
     "read_recording",
     "same_motion",
     "write_recording",

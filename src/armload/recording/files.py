@@ -62,6 +62,12 @@ def read_recording(path: str | Path, arm: Arm | None = None, *, topic: str | Non
         raise RecordingError(f"{where} cannot be read: {error.strerror or error}") from None
 
 
+def has_topics(path: str | Path) -> bool:
+    """Whether a file is a ROS bag, by its name."""
+    path = Path(path)
+    return path.is_dir() or path.suffix.lower() in BAG_SUFFIXES
+
+
 def write_recording(path: str | Path, recording: Recording) -> None:
     """Write a recording as CSV, Parquet or NPZ, by suffix; the file appears whole or not at all.
 

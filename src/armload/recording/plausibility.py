@@ -50,6 +50,7 @@ def check_plausible(recording: Recording, arm: Arm) -> None:
     _check_effort(recording, arm)
     if recording.channel == "measured":  # the others need not hold the arm's own weight
         _check_torque_goes_on(recording)
+        _check_no_torque_is_dead(recording)
         _check_torque_is_the_arms(recording, arm)
 
 
@@ -201,6 +202,18 @@ def _check_torque_goes_on(recording: Recording) -> None:
                 f"{recording.source}: tau stays exactly the same in all joints from {_row(recording, first)} for "
                 f"{time:.2f} s although the arm moves: expected the torque of every moment; remove the rows"
             )
+
+
+def _check_no_torque_is_dead(recording: Recording) -> None:
+    """Refuse a torque that is exactly the same in all rows although its joint moves, beside others that are alive."""
+    dead = np.ptp(recording.tau, axis=0) == 0.0
+    moves = np.ptp(recording.q, axis=0) > _FROZEN_MOTION
+    if np.any(dead & moves) and not np.all(dead):
+        j = int(np.flatnonzero(dead & moves)[0])
+        raise RecordingError(
+            f"{recording.source}: tau{j + 1} is {recording.tau[0, j]:.4g} in all rows although q{j + 1} moves: "
+            "expected the measured joint torque in N·m; the channel is dead, or another one was meant"
+        )
 
 
 def _check_torque_is_the_arms(recording: Recording, arm: Arm) -> None:
