@@ -6,12 +6,22 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from armload.arms import arm
+from armload.arms import arm, rated_effort
 from armload.errors import ArmError
 from armload.inertia import InertialParameters, is_consistent
-from armload.motion import FourierMotion
-from armload.simulate import Drift, Friction, Gains, Resolution, Run, SmoothTorque, World, simulate, simulate_many
-from armload.simulate.ratings import rated_effort
+from armload.motion import FourierMotion, random_motion
+from armload.simulate import (
+    ContinuedRun,
+    Drift,
+    Friction,
+    Gains,
+    Resolution,
+    Run,
+    SmoothTorque,
+    World,
+    simulate,
+    simulate_many,
+)
 
 PAYLOAD = InertialParameters.from_com(2.0, (0.02, -0.03, 0.08), np.diag([8e-3, 9e-3, 6e-3]))
 COARSE = Resolution.coarse()
@@ -74,25 +84,45 @@ def test_a_log_beyond_is_the_sum_of_the_world_s_parts(any_arm, motor_side, resol
         rigid = any_arm.with_links(world.links).with_payload(PAYLOAD).torque(log.q, log.dq, ddq)
         if motor_side:
             rigid = rigid + world.rotor_inertia * ddq
-        joint = rigid + world.friction(log.dq, rigid) + world.residual(log.q) + world.stuck(log.dq, run.seed)
-        expected = world.gain * joint + world.offset + drift(50.0 + log.t)
+        joint = rigid + world.friction(log.dq, rigid) + world.residual(log.q)
+        expected = world.gain * joint + world.sticking(run.seed)(log.dq) + world.offset + drift(50.0 + log.t)
         left = rms(log.tau - expected)
         assert np.all(left < 2e-4 * rated_effort(any_arm))
         assert np.all(rms(log.tau - rigid) > 5e-3 * rms(log.tau - log.tau.mean(axis=0)))
 
 
 def test_stiction_holds_any_torque_at_rest_another_at_each_rest_and_none_in_motion():
-    world = World.real_like(arm("ur10e"), 3)
+    world = replace(World.real_like(arm("ur10e"), 3), gain=None)
     dq = np.repeat([0.0, 1.0, 0.0, -1.0, 0.0], 100)[:, None] * np.ones(6)
-    stuck = world.stuck(dq, seed=4)
+    stuck = world.sticking(4)(dq)
     rests = stuck.reshape(5, 100, 6)[::2]
     assert np.all(rests == rests[:, :1])
     assert np.all(np.abs(rests) <= world.stiction)
     assert len(np.unique(rests[:, 0])) == 18
     assert np.all(np.abs(stuck[np.abs(dq[:, 0]) > 0.5]) < 1e-3 * world.stiction)
-    np.testing.assert_array_equal(stuck, world.stuck(dq, seed=4))
-    assert np.all(stuck[0] != world.stuck(dq, seed=5)[0])
-    assert not World.real_like(arm("panda"), 3).stuck(np.zeros((5, 7)), seed=4).any()
+    assert np.all(stuck[0] != world.sticking(5)(dq)[0])
+    assert not World.real_like(arm("panda"), 3).sticking(4)(np.zeros((5, 7))).any()
+
+
+def test_stiction_is_the_same_however_a_run_is_cut():
+    world, rng = World.real_like(arm("ur10e"), 3), np.random.default_rng(0)
+    dq = np.cumsum(0.1 * rng.normal(size=(2000, 6)), axis=0)
+    whole, pieces = world.sticking(4)(dq), world.sticking(4)
+    cut = np.concatenate([pieces(part) for part in np.split(dq, [1, 2, 700, 701, 1500])])
+    np.testing.assert_array_equal(cut, whole)
+    assert np.abs(whole).max() > 1.0
+
+
+def test_a_run_that_goes_on_is_the_run_in_one_piece_stiction_and_all():
+    ur = arm("ur10e")
+    world = World.real_like(ur, 3)
+    motion = random_motion(ur, 3, duration=2.0)
+    whole = simulate_many(ur, [Run(motion, PAYLOAD, world, seed=6)], rate=200.0)[0]
+    going = ContinuedRun(ur, motion, PAYLOAD, world=world, rate=200.0, seed=6)
+    tau = np.concatenate([going.advance(50)[3] for _ in range(6)])
+    assert rms(world.sticking(6)(whole.dq)).max() > 0.1
+    # pieces iterate towards the motor's friction on their own
+    assert np.all(rms(tau - whole.tau[:300]) < 0.05 * rated_effort(ur))
 
 
 def test_a_drift_starts_at_nothing_and_ends_at_its_size():

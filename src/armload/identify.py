@@ -17,7 +17,7 @@ from armload.determined import SMALL, Z95, held
 from armload.determined import determined as told
 from armload.errors import IdentificationError
 from armload.identifier import Estimate, Identifier
-from armload.inertia import NAMES, InertialParameters, is_consistent, nearest_consistent, phi_to_com
+from armload.inertia import NAMES, InertialParameters, is_consistent, nearest_body, phi_to_com
 from armload.least_squares import PosteriorLeastSquares, payload_prior_std
 from armload.methods import METHODS, default_for
 from armload.recording import Recording, check_plausible
@@ -188,16 +188,9 @@ def _found(identifier: Identifier, recording: Recording, weak: NDArray, prior: b
     return _Found(estimate, known, std, prior, identifier.name, why, identifier.calibrated, identifier.alone, offset)
 
 
-def _body(estimate: Estimate) -> NDArray[np.float64]:
-    """The nearest parameters (10,) that a body can have, in the metric of what is known."""
-    if is_consistent(estimate.phi):
-        return estimate.phi.copy()
-    return nearest_consistent(estimate.phi, np.linalg.inv(estimate.covariance), margin=1e-5)
-
-
 def _misfit(estimate: Estimate) -> float:
     """Standard deviations between an estimate and the nearest body."""
-    away = _body(estimate) - estimate.phi
+    away = nearest_body(estimate.phi, estimate.covariance) - estimate.phi
     return float(np.sqrt(away @ np.linalg.inv(estimate.covariance) @ away)) if away.any() else 0.0
 
 
@@ -230,7 +223,7 @@ def _answer(
             "sign is turned"
         )
     else:
-        phi = _body(estimate)
+        phi = nearest_body(estimate.phi, estimate.covariance)
         if _misfit(estimate) > _MISFIT:
             said.append(f"no body fits within the error bars: {_CHECK}")
             trusted = False

@@ -4,7 +4,7 @@ from armload.arms.catalogue import ARMS, arm
 from armload.arms.filtered import FilteredRegression, first_order_lag
 from armload.arms.forward import ForwardDerivatives, ForwardDynamics
 from armload.arms.kinship import kinship, namesake
-from armload.arms.model import Arm, BodyMotion, Limits
+from armload.arms.model import LINK_SPREAD, Arm, BodyMotion, Limits
 from armload.arms.regressors import (
     MomentumRegressor,
     full_arm_regressor,
@@ -15,6 +15,7 @@ from armload.arms.strength import poses, rated_effort
 
 __all__ = [
     "ARMS",
+    "LINK_SPREAD",
     "Arm",
     "BodyMotion",
     "FilteredRegression",

@@ -30,6 +30,10 @@ class BodyMotion(NamedTuple):
     gravity: NDArray[np.float64]
 
 
+# one `link_spread`: standard deviation of a link's mass [1], centre of mass [m] and inertia [1]
+LINK_SPREAD = (0.02, 0.002, 0.05)
+
+
 @dataclass(frozen=True)
 class Limits:
     """What the joints may do; each an array (n,). Acceleration and jerk are infinite where the maker gives none."""

@@ -230,11 +230,14 @@ def measure(
                 identifier = row.make(episode.arm, log.tare, prior)
                 found = identifier.at(log.run, times)
                 trained = trained_on(identifier)
+                known = episode.tool is not None and log.tare is not None and not row.tared
+                tool = episode.tool.parameters.phi if known and episode.tool is not None else np.zeros(10)
             except ArmloadError as error:
                 refused.append(str(error))
-                found = [Estimate(t, np.zeros(10), np.diag(np.full(10, np.inf)), 0, "") for t in times]
-            known = episode.tool is not None and log.tare is not None and not row.tared
-            tool = episode.tool.parameters.phi if known and episode.tool is not None else 0.0
+                found, tool = (
+                    [Estimate(t, np.zeros(10), np.diag(np.full(10, np.inf)), 0, "") for t in times],
+                    np.zeros(10),
+                )
             phi.append(np.array([e.phi for e in found]) - tool)
             std.append(np.array([e.std for e in found]))
         wall.append(round(time.perf_counter() - begun, 4))

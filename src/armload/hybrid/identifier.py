@@ -14,11 +14,10 @@ from armload.hybrid.evidence import Evidence, Physics
 from armload.hybrid.mixture import MixturePrior
 from armload.hybrid.model import HybridModel
 from armload.identifier import Estimate
-from armload.inertia import is_consistent, near_consistent, nearest_consistent
+from armload.inertia import near_consistent, nearest_body
 from armload.least_squares import JointFeatures, payload_prior_std
 from armload.recording import Recording
 
-_MARGIN = 1e-5
 _REMOVED = 0.1  # how likely it is, beforehand, that something was taken off
 
 
@@ -96,7 +95,7 @@ def answer(
     covariance = calibration.widened(found, trusted)
     if quick:
         return sign * near_consistent(found.mean, inverse(covariance)), covariance
-    return sign * body(found.mean, covariance), covariance
+    return sign * nearest_body(found.mean, covariance), covariance
 
 
 def std_alone(trusted: Evidence | None, weak: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -116,11 +115,6 @@ def _std_alone(information, weak):  # pragma: no cover - compiled
     for i in range(10):
         out[i] = weak[i] * np.sqrt(P[i, i])
     return out
-
-
-def body(phi: NDArray[np.float64], covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The nearest parameters (10,) that a body can have, in the metric of the covariance."""
-    return phi if is_consistent(phi) else nearest_consistent(phi, np.linalg.inv(covariance), margin=_MARGIN)
 
 
 def shipped_model(arm: Arm) -> HybridModel:

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, astuple, dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from armload import __version__
 from armload.arms import Arm, kinship
+from armload.cells import key_of
 from armload.determined import Z95
 from armload.episodes import LIGHTEST, POPULATIONS, TOOL_SHARE, Episode, draw_episodes
 from armload.errors import ModelError
 from armload.hybrid.calibration import Calibration, nearest
-from armload.hybrid.evidence import KINDS
+from armload.hybrid.evidence import KINDS, TRAITS
 from armload.hybrid.mixture import MixturePrior
 from armload.hybrid.model import POOLED, HybridModel
 from armload.hybrid.records import TIMES, Records, measure_episodes
@@ -74,7 +75,7 @@ def train_hybrid(
 
     Args:
         arm: the bare arm, nominal.
-        episodes: how many; a few hundred give a usable model, two thousand a calibrated one.
+        episodes: how many; a few hundred give a usable model, a thousand and more a calibrated one.
         seed: the same seed gives the same model on the same kind of machine.
         folder: where finished chunks of episodes are kept; the same call goes on from them. None: nowhere.
         jobs: processes; the model does not depend on it.
@@ -191,10 +192,7 @@ def episode_records(
     parts: list[Records] = []
     for first in range(0, episodes, _CHUNK):
         count = min(_CHUNK, episodes - first)
-        name = f"{arm.fingerprint}{population}{seed}{first}{count}"
-        if arm.rated_payload is None:  # the same links, but payloads are drawn for what the joints can hold
-            name += "unrated"
-        path = None if folder is None else folder / f"episodes-{hashlib.sha256(name.encode()).hexdigest()[:12]}.npz"
+        path = None if folder is None else folder / f"episodes-{_key(arm, population, seed, first, count)[:12]}.npz"
         if path is not None and path.is_file():
             part = Records.load(path)
         else:
@@ -215,6 +213,14 @@ def drawn_episodes(arm: Arm, population: str = "broad", episodes: int = EPISODES
     """The episodes behind `episode_records`, in its order, not simulated. Arguments as of `train_hybrid`."""
     parts = [_chunk(arm, population, seed, k, min(_CHUNK, episodes - k)) for k in range(0, episodes, _CHUNK)]
     return [episode for part in parts for episode in part]
+
+
+def _key(arm: Arm, population: str, seed: int, first: int, count: int) -> str:
+    """Of everything that a chunk's records depend on."""
+    facts = (arm.fingerprint, arm.known_as, arm.rated_payload, arm.link_spread, arm.motor_torque)
+    limits = [np.nan_to_num(column, posinf=1e9, neginf=-1e9).tolist() for column in astuple(arm.limits)]
+    recipe = asdict(POPULATIONS[population]) if population in POPULATIONS else population
+    return key_of(__version__, facts, limits, recipe, seed, first, count, TIMES, TRAITS)
 
 
 def _chunk(arm: Arm, population: str, seed: int, first: int, count: int) -> list[Episode]:

@@ -23,6 +23,8 @@ _LENGTH = 0.1  # [m]
 # phi of the body whose J, lengths in units of _LENGTH, is the 4×4 identity
 _BALL = np.array([1.0, 0.0, 0.0, 0.0, *(2 * _LENGTH**2 * np.array([1.0, 0.0, 0.0, 1.0, 0.0, 1.0]))])
 
+_ANSWER = 1e-5  # [kg] smallest eigenvalue of an answer's J, lengths in units of 0.1 m
+
 
 def pseudo_inertia(phi: ArrayLike) -> NDArray[np.float64]:
     """J(phi), shape (..., 4, 4) [kg·m², kg·m, kg]; linear in phi (..., 10)."""
@@ -51,6 +53,16 @@ def is_consistent(phi: ArrayLike, tolerance: float = 1e-9) -> bool:
     """
     J = _scaled(pseudo_inertia(phi))
     return bool(J[3, 3] > 0 and np.linalg.eigvalsh(J)[0] >= -tolerance * max(1.0, float(J[3, 3])))
+
+
+def nearest_body(phi: NDArray[np.float64], covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """An answer (10,): phi where a body can have it, else the nearest that one can, in the metric of phi's covariance.
+
+    It stays far enough inside to survive being printed.
+    """
+    if is_consistent(phi):
+        return phi.copy()
+    return nearest_consistent(phi, np.linalg.inv(covariance), margin=_ANSWER)
 
 
 def nearest_consistent(phi: ArrayLike, information: ArrayLike | None = None, margin: float = 1e-6) -> NDArray:

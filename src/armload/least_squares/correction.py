@@ -25,15 +25,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armload.arms import Arm, MomentumRegressor, full_arm_regressor
+from armload.arms import LINK_SPREAD, Arm, MomentumRegressor, full_arm_regressor
 from armload.inertia import InertialParameters
 
 FRICTION_WIDTH = 0.06  # [rad/s] of the smooth Coulomb friction
 
 # prior standard deviations, as fractions of the joint's effort limit (per rad/s, per rad/s²)
 _PER_JOINT = {"offset": 4e-3, "coulomb": 1e-2, "viscous": 5e-3, "rotor": 3e-4}
-# prior standard deviations of a link's mass [1], centre of mass [m] and inertia [1], times `Arm.link_spread`
-_LINK_MASS, _LINK_COM, _LINK_INERTIA = 0.02, 2e-3, 0.05
 # where torque is motor current, the gear's friction is in it: Coulomb and viscous friction so much larger
 _MOTOR_FRICTION = {"coulomb": 5.0, "viscous": 5.0}
 # by how much the variance of a joint's residual is larger at rest than in motion: friction is unknown there
@@ -102,7 +100,7 @@ class Correction:
 
 def _link_std(arm: Arm) -> NDArray[np.float64]:
     """First-order spread of each link's ten parameters about its joint frame for the stated spread of m, r and I."""
-    mass_std, com_std, inertia_std = (arm.link_spread * x for x in (_LINK_MASS, _LINK_COM, _LINK_INERTIA))
+    mass_std, com_std, inertia_std = (arm.link_spread * x for x in LINK_SPREAD)
     out = []
     for phi in arm.link_parameters:
         link = InertialParameters(phi)

@@ -7,11 +7,10 @@ import numpy as np
 from armload.determined import HELD
 from armload.errors import InertiaError
 from armload.identifier import Estimate
-from armload.inertia import InertialParameters, is_consistent, nearest_consistent
+from armload.inertia import InertialParameters, is_consistent, nearest_body
 from armload.online import OnlineEstimate
 
 _KNOWN = 0.15  # [kg] standard deviation of the mass above which nothing is said, if it is a tenth of the mass, too
-_MARGIN = 1e-5  # as in `identify`
 
 
 def announced(estimate: Estimate) -> InertialParameters | None:
@@ -35,7 +34,7 @@ def announced(estimate: Estimate) -> InertialParameters | None:
     if is_consistent(phi):
         return estimate.parameters
     try:
-        nearest = nearest_consistent(phi, np.linalg.inv(covariance), margin=_MARGIN)
+        nearest = nearest_body(phi, covariance)
     except (InertiaError, np.linalg.LinAlgError):
         return None
     return InertialParameters(nearest, estimate.frame)

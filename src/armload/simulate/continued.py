@@ -58,7 +58,7 @@ class ContinuedRun:
         motion: as long as the run is to go on; beyond its end the arm stands still.
         payload: at the start.
         world: the arm as it really is; None: nominal.
-        rate: [Hz].
+        rate: [Hz]. seed: of what stiction holds at rest.
 
     Raises:
         MotionError: the motion has another number of joints.
@@ -74,6 +74,7 @@ class ContinuedRun:
         world: World | None = None,
         rate: float = 1000.0,
         resolution: Resolution = FINE,
+        seed: int = 0,
     ) -> None:
         if not (np.isfinite(rate) and rate > 0):
             raise ArmError(f"the rate is {rate}: expected a positive number of Hz")
@@ -82,7 +83,7 @@ class ContinuedRun:
         self.rate = rate
         self._arm, self._motion, self._resolution = arm, motion, resolution
         world = world or World.nominal(arm)
-        self._actual = world.arm(arm)
+        self._actual, self._sticking = world.arm(arm), world.sticking(seed)
         gains = Gains.of(arm)
         clock = Clock.at(rate, 2, resolution)
         command = Command.along(arm, motion, clock.step, clock.steps, resolution.knots)
@@ -114,6 +115,7 @@ class ContinuedRun:
         (q, dq, tau), self._state = roll_on(replace(self._state, command=command), clock)
         if not np.all(np.isfinite(tau)):
             raise ArmError(f"the simulated {self._arm.name} diverged: its gains do not suit its motion")
+        tau = tau + self._sticking(dq)
         t = (self._rows + np.arange(samples)) / self.rate
         self._rows += samples
         return t, q, dq, tau

@@ -12,14 +12,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm, rated_effort
+from armload.arms import LINK_SPREAD, Arm, rated_effort
 from armload.inertia import com_to_phi, nearest_consistent, phi_to_com
 from armload.simulate.friction import Friction
 from armload.simulate.ratings import is_panda
 
-# one standard deviation of a link's mass [1], centre of mass [m] and inertia [1]
-_LINK_MASS, _LINK_COM, _LINK_INERTIA = 0.02, 0.002, 0.05
-_LINK_MOST = 10.0  # a spread of links beyond this many of the above would leave no arm
+_LINK_MOST = 10.0  # a spread of links beyond this many of `LINK_SPREAD` would leave no arm
 _LIGHTEST_LINK = 0.2  # of the model's mass
 _PANDA_OFFSET = (0.2, 0.3, 0.12, 0.25, 0.05, 0.08, 0.02)  # [N·m], 1 sigma
 _PANDA_FRICTION = (0.25, 0.25, 0.2, 0.35, 0.35, 0.2, 0.26)  # [N·m]
@@ -82,10 +80,10 @@ def any_friction(level: NDArray[np.float64], rng: np.random.Generator, load: flo
 def perturbed(phi: NDArray[np.float64], rng: np.random.Generator, spread: NDArray[np.float64]) -> NDArray[np.float64]:
     """A link somewhat off its model, still a body that can exist; spread: of mass, centre and inertia."""
     mass, com, inertia = phi_to_com(phi)
-    more = np.minimum(spread, _LINK_MOST)
+    off_mass, off_com, off_inertia = np.minimum(spread, _LINK_MOST) * LINK_SPREAD
     root = np.sqrt(np.abs(np.diag(inertia)))
     noise = rng.normal(size=(3, 3))
-    inertia = inertia + more[2] * _LINK_INERTIA * np.outer(root, root) * (np.triu(noise) + np.triu(noise, 1).T)
-    off = mass * max(1 + more[0] * _LINK_MASS * rng.normal(), _LIGHTEST_LINK)
-    changed = com_to_phi(off, com + more[1] * _LINK_COM * rng.normal(size=3), inertia)
+    inertia = inertia + off_inertia * np.outer(root, root) * (np.triu(noise) + np.triu(noise, 1).T)
+    off = mass * max(1 + off_mass * rng.normal(), _LIGHTEST_LINK)
+    changed = com_to_phi(off, com + off_com * rng.normal(size=3), inertia)
     return nearest_consistent(changed)

@@ -138,9 +138,7 @@ def _batch(arm: Arm, gains: Gains, runs: list[Run], clock: Clock, workers: int) 
                 f"the simulated {arm.name} diverged on the motion {_name(run.motion)!r}: its gains do not suit it"
             )
         world = run.world or nominal
-        if world.stiction is not None:
-            stuck = world.stuck(dq, run.seed)
-            tau = tau + (stuck if world.gain is None else world.gain * stuck)
+        tau = tau + world.sticking(run.seed)(dq)
         truth = Recording(
             clock.times, q, dq, tau, joint_names=arm.joint_names, source=f"simulated {arm.name}, {_name(run.motion)}"
         )

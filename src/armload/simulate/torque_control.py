@@ -122,8 +122,8 @@ def torque_controlled(
     model.dof_damping[:] = 0.0
     q, v, after, rigid, command, outside = rows[:, before:]
     dq, t = 0.5 * (v + after), times[before:]
-    rigid = rigid + coriolis_missed(model, Clock.at(rate, count), q, v, after)
-    tau = world.measured(rigid + world.disturbance(q, dq, rigid), t)
+    rigid = rigid + coriolis_missed(model, Clock(h, 1, count), q, v, after)
+    tau = world.measured(rigid + world.disturbance(q, dq, rigid), t) + world.sticking(0)(dq)
     log = Recording(t, q, dq, tau, joint_names=arm.joint_names, source=f"simulated {arm.name}, torque-controlled")
     return TorqueRun(log, command, outside, (after - v) * rate)
 

@@ -6,7 +6,7 @@ The measured joint torque of a world is
 
 Friction and residual are torques inside the joint: they disturb the arm's motion and show in the sensor. Rotor inertia
 is there only where the torque is measured on the motor's side of the gear; so is stiction, what a joint at rest holds
-that its motor need not (`World.stuck`), on arms that are known to measure there. Gain, offset and drift are the
+that its motor need not (`Stiction`), on arms that are known to measure there. Gain, offset and drift are the
 sensor's own.
 
 How large each part is and how it is drawn says `armload.simulate.mismatch`. Worlds beyond the measured ones
@@ -16,6 +16,7 @@ How large each part is and how it is drawn says `armload.simulate.mismatch`. Wor
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -37,8 +38,8 @@ from armload.simulate.mismatch import (
     sizes,
 )
 from armload.simulate.residual import SmoothTorque
+from armload.simulate.stiction import Stiction
 
-_MOVING = 4.0  # widths of the friction beyond which a joint's next rest is another one; stiction is 0.1 % there
 _WARMING = (60.0, 1200.0)  # [s]
 _HEAVIER = (1.0, 3.0)  # each mismatch over its reference, beyond the measured ones
 
@@ -211,22 +212,12 @@ class World:
         seen = seen + self.offset
         return seen if self.drift is None else seen + self.drift(t)
 
-    def stuck(self, dq: ArrayLike, seed: int) -> NDArray[np.float64]:
-        """What stiction adds (N, n) to the torque of a log at velocities dq (N, n) [N·m]; the same for the same seed.
-
-        A joint that comes to rest is held by friction of any size up to its level, either way, until it moves on:
-
-            u_k·stiction·(1 − tanh²(dq/w)),      u_k ~ U(−1, 1), another one for each rest
-        """
-        dq = np.asarray(dq, dtype=float)
+    def sticking(self, seed: int) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+        """What stiction adds to a log's torque (N, n) at its velocities (N, n), piece by piece; see `Stiction`."""
         if self.stiction is None:
-            return np.zeros_like(dq)
-        rng, rests = np.random.default_rng([seed, 5]), np.zeros(dq.shape, dtype=int)
-        moving = np.abs(dq) > _MOVING * self.friction.width
-        rests[1:] = np.cumsum(moving[:-1] & ~moving[1:], axis=0)
-        held = rng.uniform(-1.0, 1.0, size=(int(rests.max(initial=0)) + 1, dq.shape[1]))
-        share = 1.0 - np.tanh(dq / self.friction.width) ** 2
-        return self.stiction * share * np.take_along_axis(held, rests, axis=0)
+            return np.zeros_like
+        shown = self.stiction if self.gain is None else self.gain * self.stiction
+        return Stiction(shown, self.friction.width, seed)
 
     @property
     def fingerprint(self) -> str:

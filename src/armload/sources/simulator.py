@@ -101,7 +101,9 @@ class Simulator(Source):
             int
         )  # rows; what changes in one, the last wins
         start = int(np.searchsorted(changes, 0, side="right")) - 1
-        run = ContinuedRun(self.arm, self.motion, self._payloads[start], world=self._world, rate=self.rate)
+        run = ContinuedRun(
+            self.arm, self.motion, self._payloads[start], world=self._world, rate=self.rate, seed=self._seed
+        )
         row, piece, before = 0, max(2, round(_PIECE * self.rate)), None
         while self._end is None or row < self._end:
             k = int(np.searchsorted(changes, row, side="right"))
