@@ -27,7 +27,7 @@ from armload.payloads import test_payload
 
 HERE = Path(__file__).resolve().parent
 METHODS = ("hybrid", "map-gp", "map", "rls", "rls-filter")
-WINDOWS = (10.0, 11.0, 12.0, 13.0, 14.0)  # [s] since the start of the log
+WINDOWS = np.arange(10.0, 14.75, 0.5)  # [s] since the start of the log: every half second that six follow
 
 
 def data() -> Path:

@@ -57,7 +57,7 @@ TARGETS = (
     Target("beyond", "hybrid", _GP, (0.1, 1.0, 6.0), _ALL, strict=True),
     *(
         Target(population, "hybrid", _GP, (1.0, 6.0), _ALL)
-        for population in ("untared", "shapes", "everyday", "same-motion", "same-place", "elsewhere", "tool")
+        for population in ("untared", "shapes", "odd", "everyday", "same-motion", "same-place", "elsewhere", "tool")
     ),
     Target("same-motion", "hybrid", "difference", (1.0, 6.0), _ALL),
 )
