@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -315,6 +316,23 @@ def test_a_file_that_is_no_hybrid_is_refused_in_a_sentence(tmp_path):
         assert not HybridModel.wrote(tmp_path / f"{name}.safetensors")
         with pytest.raises(ModelError, match=name):
             HybridModel.load(tmp_path / f"{name}.safetensors")
+
+
+@pytest.mark.parametrize("broken", ["nan", "negative", "of one kind", "no provenance"])
+def test_a_hybrid_with_numbers_that_cannot_be_is_refused_in_a_sentence(tmp_path, broken):
+    model = HybridModel.load(SHIPPED[0])
+    widths = model.calibration.widths.copy()
+    if broken == "nan":
+        widths[0, 0, 0] = np.nan
+    elif broken == "negative":
+        widths[1, 2, 3] *= -1.0
+    elif broken == "of one kind":
+        widths = widths[:1]
+    calibration = replace(model.calibration, widths=widths)
+    provenance: Any = None if broken == "no provenance" else model.provenance
+    path = replace(model, calibration=calibration, provenance=provenance).save(tmp_path / "model.safetensors")
+    with pytest.raises(ModelError, match=r"model\.safetensors holds a hybrid armload cannot use"):
+        HybridModel.load(path)
 
 
 def test_records_read_back_as_they_were_written(synthetic, tmp_path):

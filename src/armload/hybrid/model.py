@@ -17,7 +17,7 @@ from armload.arms import Arm, kinship, namesake
 from armload.atomic import replacing
 from armload.errors import ModelError
 from armload.hybrid.calibration import COVERAGE, Calibration
-from armload.hybrid.evidence import TRAITS
+from armload.hybrid.evidence import KINDS, TRAITS
 from armload.hybrid.mixture import MixturePrior
 from armload.inertia import InertialParameters
 from armload.learners.artefact import put_together, take_apart
@@ -138,7 +138,15 @@ class HybridModel:
             prior = MixturePrior(
                 tensors["weights"], tensors["means"], tensors["covariances"], tuple(header["families"])
             )
-            calibration = Calibration(bag, float(header["level"]), tensors["times"], tensors["widths"])
+            times, widths = tensors["times"], tensors["widths"]
+            if widths.shape != (len(KINDS), len(times), 10) or not np.all((widths > 0) & np.isfinite(widths)):
+                raise ValueError(
+                    f"widths of shape {widths.shape}, expected {len(KINDS)} × {len(times)} × 10 positive ones"
+                )
+            if not all(np.all(np.isfinite(array)) for array in tensors.values()):
+                raise ValueError("numbers that are not finite")
+            header["provenance"].get(POOLED)
+            calibration = Calibration(bag, float(header["level"]), times, widths)
             return cls(
                 prior,
                 calibration,
