@@ -661,6 +661,26 @@ def test_a_known_arm_whose_links_and_joints_have_a_prefix_is_that_arm(tmp_path):
     assert (found.known_as, found.rated_payload, found.motor_torque) == ("ur10e", 12.5, True)
 
 
+@pytest.mark.parametrize(("name", "frame"), [("panda", "panda_link8"), ("ur10e", "tool0")])
+@pytest.mark.parametrize("at", ["flange", "tip"])
+def test_a_known_arm_with_a_tool_in_its_file_is_that_arm_with_the_tool_attached(tmp_path, name, frame, at):
+    known = arm(name)
+    tool = link("tip", 0.9, com="0.01 0 0.05", inertia="0.002 0.003 0.0015")
+    joint_to_tip = (
+        f'<joint name="tip_joint" type="fixed"><parent link="{frame}"/><child link="tip"/>'
+        '<origin xyz="0 0.02 0.1" rpy="0.3 0 0.7"/></joint>'
+    )
+    (tmp_path / "cell.urdf").write_text(known.urdf.replace("</robot>", f"{joint_to_tip}{tool}</robot>"))
+    found = arm(tmp_path / "cell.urdf", frame if at == "flange" else "tip")
+    assert (found.known_as, found.rated_payload, found.link_spread) == (name, known.rated_payload, known.link_spread)
+    assert found.attached.mass == pytest.approx(0.9)
+    as_written = Arm("cell", (tmp_path / "cell.urdf").read_text(), found.frame)
+    states = random_states(found.n, 5)
+    np.testing.assert_allclose(found.torque(*states), as_written.torque(*states), atol=1e-9)
+    bare = replace(found, attached=None, frame=frame)
+    np.testing.assert_allclose(bare.torque(*states), known.torque(*states), atol=1e-9)
+
+
 def test_the_strength_of_joints_without_limits_is_about_that_of_the_ratings():
     known = arm("ur10e")
     limitless = replace(known, urdf=re.sub(r'effort="[^"]*"', 'effort="0"', known.urdf))

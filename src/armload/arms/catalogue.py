@@ -17,9 +17,14 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from armload.arms.kinship import kinship, namesake
 from armload.arms.model import STANDARD_GRAVITY, Arm
 from armload.errors import ArmError
+from armload.inertia import is_consistent
+
+_LIGHTEST = 1e-3  # [kg] of a tool; what is less is another link
 
 ARMS: dict[str, dict[str, Any]] = {
     "panda": {
@@ -52,7 +57,8 @@ def arm(robot: str | Path, frame: str | None = None, gravity: tuple[float, float
 
     Args:
         robot: a name in `ARMS`, or the path of a URDF file. A file with the links of an arm in `ARMS` is that arm:
-            what is known of it and no URDF says (rated payload, where torque is measured) holds.
+            what is known of it and no URDF says (rated payload, where torque is measured) holds, and a tool in the file
+            is attached to it.
         frame: link whose frame the payload is about. Default: the catalogue's; for a URDF its last link.
         gravity: gravity in the axes of the base [m/s²].
 
@@ -79,11 +85,20 @@ def arm(robot: str | Path, frame: str | None = None, gravity: tuple[float, float
 
 
 def _as_known(found: Arm) -> Arm:
-    """The arm with the catalogue's facts, if it is one of the catalogue's."""
+    """The arm with the catalogue's facts, if it is one of the catalogue's; a tool in its file is then attached."""
     for name, facts in ARMS.items():
         flange = namesake(found, str(facts["frame"]))
-        if flange is not None:
-            known = arm(name)
-            if known.n == found.n and kinship(replace(found, frame=flange)) == kinship(known):
-                return replace(found, known_as=name, **{fact: x for fact, x in facts.items() if fact != "frame"})
+        known = None if flange is None else arm(name)
+        if known is None or known.n != found.n:
+            continue
+        named, bare, what = found, replace(found, frame=flange), kinship(known)
+        if kinship(bare) != what:
+            links = np.array([*bare.link_parameters[:-1], known.link_parameters[-1]])
+            named = found.parted(links)
+            tool = named.attached
+            if tool is None or tool.mass < _LIGHTEST or not is_consistent(tool.phi):
+                continue
+            if kinship(bare.with_links(links)) != what:
+                continue
+        return replace(named, known_as=name, **{fact: x for fact, x in facts.items() if fact != "frame"})
     return found

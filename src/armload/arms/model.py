@@ -178,6 +178,13 @@ class Arm:
             raise ArmError(f"link parameters have shape {links.shape}: expected ({self.n}, 10)")
         return replace(self, links=links)
 
+    def parted(self, links: ArrayLike) -> Arm:
+        """The same arm with these parameters (n, 10) of its moving links and, attached, what the last has beyond."""
+        links = np.asarray(links, dtype=float)
+        beyond = InertialParameters(self.link_parameters[-1] - links[-1])
+        joint = self._frame_placement.inverse()  # as the payload frame sees it
+        return replace(self.with_links(links), attached=beyond.moved(joint.rotation, joint.translation, self.frame))
+
     def in_frame(self, parameters: InertialParameters) -> InertialParameters:
         """The same body about this arm's payload frame, from any frame fixed to the arm's last moving link.
 
