@@ -187,6 +187,20 @@ def rows_of_speed(result):
     return out
 
 
+def test_what_a_given_tare_is_worth_on_a_stream_is_that_of_the_committed_benchmark():
+    parts = json.loads((RESULTS / "events.json").read_text())["parts"]
+    page = " ".join((ROOT / "docs" / "online.md").read_text(encoding="utf-8").split())
+    error = {
+        (part, group): 1e3 * parts[part]["groups"][group]["mass_after_1_s"]["median_error_kg"]
+        for part in ("steps", "hybrid")
+        for group in ("with a tare", "without")
+    }
+    assert (
+        f"is off by {error['hybrid', 'with a tare']:.1f} g (hybrid; {error['steps', 'with a tare']:.1f} g `map-gp`), "
+        f"without one by {error['hybrid', 'without']:.1f} g ({error['steps', 'without']:.1f} g)"
+    ) in page
+
+
 def test_the_readme_s_changes_are_those_of_the_committed_benchmark():
     parts = json.loads((RESULTS / "events.json").read_text())["parts"]
     live, alarms = (parts["steps"], parts["hybrid"]), parts["false_alarms_in_all"]
