@@ -137,6 +137,7 @@ def rows_of_events(result):
         "`map-gp`, 200 Hz, nothing changes": parts["quiet"],
         "`hybrid`, 1 kHz": parts["hybrid"],
         "real Panda, payloads' torque added, `hybrid`": parts["real"]["hybrid"]["panda_steps_added"],
+        "the same after a tare of 10 s, `hybrid`": parts["real"]["hybrid"]["panda_steps_added, tare"],
     }
     for name, part in streams.items():
         alarms, noticed, known = part["false_alarms"], "– | – | – | –", "– | –"
