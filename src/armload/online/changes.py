@@ -42,16 +42,16 @@ _OUTLIER = 8.0  # one window counts no more than so many times the level
 class Suspicion(NamedTuple):
     """ln of the likelihood ratios of a payload and of a push over nothing, and the change of phi (10,) it would be.
 
-    seconds: how far back the rows go that say so [s].
+    rows: how many of the last ones say so.
     """
 
     payload: float
     push: float
     delta: NDArray[np.float64]
-    seconds: float
+    rows: int
 
 
-_NOTHING = Suspicion(0.0, 0.0, np.zeros(10), 0.0)
+_NOTHING = Suspicion(0.0, 0.0, np.zeros(10), 0)
 
 
 def body_root() -> NDArray[np.float64]:
@@ -123,7 +123,7 @@ class ChangeDetector:
             lately |= rows == _WINDOWS[0] and payload > push + _LATELY
             most = [max(payload, push) if rows == _WINDOWS[0] else most[0], max(most[1], payload, push)]
             if best is None or payload > best.payload:
-                best = Suspicion(payload, push, self.root @ delta, float(self._h[self._window(rows)].sum()))
+                best = Suspicion(payload, push, self.root @ delta, rows)
         self._alarmed = self._alarmed + 1 if alarm and lately else 0
         self.last = best or _NOTHING
         self.uneasy = most[1] > _ALARM or (self.uneasy and most[0] > _CALM)
@@ -135,6 +135,10 @@ class ChangeDetector:
         last = self._window(rows)
         x = np.linalg.solve(self.root, shift)
         return float(self._b[last].sum(axis=0) @ x - 0.5 * x @ self._A[last].sum(axis=0) @ x) / self.level
+
+    def seconds(self, rows: int) -> float:
+        """What the last so many rows stand for [s]."""
+        return float(self._h[self._window(rows)].sum())
 
     def _window(self, rows: int) -> NDArray[np.intp]:
         """Where the last so many rows are kept."""

@@ -210,8 +210,9 @@ class PayloadWatch:
 
     def _begin(self, sample: Sample, found: Suspicion, held: bool) -> None:
         """A change: the next run is made beside the stream while the transient lasts."""
+        assert self._detector is not None
         mass = float(found.delta[0])
-        self.event = Event("change", sample.t, sample.t - found.seconds, mass)
+        self.event = Event("change", sample.t, sample.t - self._detector.seconds(found.rows), mass)
         run = self.run
         self._passing = self._unresolved and run.stream is not None and run.stream.seconds < _PASSING
         self._short = self._short + 1 if self._passing else 0
