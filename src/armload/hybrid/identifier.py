@@ -64,8 +64,8 @@ class HybridIdentifier(Physics):
     def _estimate(self, t: float) -> Estimate:
         super()._estimate(t)
         self._trusted = self.model.calibration.trusted(self.evidence(t))
-        removable = self._trusted.kind > 0 or self.arm.attached is not None
-        self._phi, self._covariance = answer(self._trusted, self.model.calibration, self._payloads, removable)
+        tool = self.arm.attached is not None
+        self._phi, self._covariance = answer(self._trusted, self.model.calibration, self._payloads, tool)
         return self._last(t)
 
     @property
@@ -79,15 +79,15 @@ class HybridIdentifier(Physics):
 
 
 def answer(
-    trusted: Evidence, calibration: Calibration, payloads: MixturePrior, removable: bool, quick: bool = False
+    trusted: Evidence, calibration: Calibration, payloads: MixturePrior, tool: bool, quick: bool = False
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """phi (10,), a body that can exist or what such a body left behind, and its covariance with calibrated widths.
 
-    `trusted`: evidence as far as it can be trusted (`Calibration.trusted`). `removable`: whether there is something
-    that may have been taken off, since the tare or of the tool. `quick`: the body is found in bounded time, to a
-    hundredth of a standard deviation.
+    `trusted`: evidence as far as it can be trusted (`Calibration.trusted`). `tool`: whether the arm counts with one,
+    which may not be there, as something may have been taken off since a tare. `quick`: the body is found in bounded
+    time, to a hundredth of a standard deviation.
     """
-    vectors = np.array([trusted.vector, -trusted.vector] if removable else [trusted.vector])
+    vectors = np.array([trusted.vector, -trusted.vector] if trusted.kind > 0 or tool else [trusted.vector])
     found, *removed = payloads.posteriors(trusted.information, vectors)
     sign = 1.0
     if removed and removed[0].log_evidence + np.log(_REMOVED) > found.log_evidence:

@@ -71,8 +71,8 @@ class StreamingHybrid(StreamingIdentifier):
             stream.information, stream.vector, stream.posterior, seconds, tare_time, speed, self._weak
         )
         self._trusted = self.model.calibration.trusted(evidence)
-        removable = self._trusted.kind > 0 or self.arm.attached is not None
-        return answer(self._trusted, self.model.calibration, self._payloads, removable, quick=True)
+        tool = self.arm.attached is not None
+        return answer(self._trusted, self.model.calibration, self._payloads, tool, quick=True)
 
     @property
     def alone(self) -> NDArray[np.float64]:
