@@ -638,6 +638,9 @@ def test_a_file_with_other_links_is_no_known_arm(tmp_path):
     (tmp_path / "ur10e.urdf").write_text(heavier)
     found = arm(tmp_path / "ur10e.urdf")
     assert (found.rated_payload, found.motor_torque, found.link_spread) == (None, False, 10.0)
+    assert found.name == "ur10e.urdf"  # a result of it must not be taken for one of the built-in arm
+    (tmp_path / "ur10e.urdf").write_text(known.urdf)
+    assert arm(tmp_path / "ur10e.urdf").name == "ur10e"
 
 
 def test_an_arm_whose_first_joint_turns_about_another_axis_is_no_known_arm(tmp_path):

@@ -4,6 +4,7 @@ Needs viser, playwright and a Chromium (on Debian: apt-get install chromium-head
 keeps the picture of the page there.
 """
 
+import contextlib
 import io
 import os
 import re
@@ -43,17 +44,30 @@ PATIENCE = 120_000  # [ms] drawing without a GPU is slow
 
 
 @pytest.fixture(scope="module")
-def browser():
-    pytest.importorskip("viser", reason="the page needs viser")
+def open_browser():
+    """Open the page in a browser of its own, which closes with the `with`: two that draw without a GPU in one process
+    have been seen to stop each other."""
     sync_api = pytest.importorskip("playwright.sync_api", reason="driving a browser needs playwright")
     program = next(filter(None, map(shutil.which, BROWSERS)), None)
     if program is None:
         pytest.skip(f"no browser found: expected one of {', '.join(BROWSERS)}")
-    with (
-        sync_api.sync_playwright() as playwright,
-        playwright.chromium.launch(executable_path=program, args=list(FLAGS)) as browser,
-    ):
-        yield browser
+    with sync_api.sync_playwright() as playwright:
+
+        @contextlib.contextmanager
+        def opened(url, complaints, strangers, size=(1360, 860)):
+            with playwright.chromium.launch(executable_path=program, args=list(FLAGS)) as browser:
+                tab = browser.new_page(viewport=dict(zip(("width", "height"), size, strict=True)))
+                tab.set_default_timeout(PATIENCE)
+                tab.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
+                tab.on("pageerror", lambda error: complaints.append(str(error)))
+                tab.on(
+                    "request", lambda r: None if r.url.startswith((url, "data:", "blob:")) else strangers.append(r.url)
+                )
+                tab.goto(url)
+                tab.wait_for_selector("[data-armload=state]")
+                yield tab
+
+        yield opened
 
 
 class Hesitant(Simulator):
@@ -71,28 +85,37 @@ class Hesitant(Simulator):
 
 
 @pytest.fixture(scope="module")
-def shown(browser, panda):
-    """The page of a simulated Panda that takes up a payload, open in a browser; what the browser complains of."""
+def served(panda):
+    """The page of a simulated Panda that takes up a payload; what browsers complain of, whom else they ask."""
+    pytest.importorskip("viser", reason="the page needs viser")
     simulator = Hesitant(panda, payloads=[(6.0, HELD)], rate=250.0)
     session = Session(simulator, panda)
     page = Page(session, port=0, period=0.3)
     server = threading.Thread(target=page.serve)
     server.start()
-    tab = browser.new_page(viewport={"width": 1360, "height": 860})
-    tab.set_default_timeout(PATIENCE)
-    complaints, strangers = [], []
-    tab.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
-    tab.on("pageerror", lambda error: complaints.append(str(error)))
-    tab.on("request", lambda r: None if r.url.startswith((page.url, "data:", "blob:")) else strangers.append(r.url))
-    tab.goto(page.url)
-    tab.wait_for_selector("[data-armload=state]")
     session.start()
-    yield tab, session, page, complaints, strangers
+    yield session, page, [], []
     simulator.go_on.set()
-    tab.close()
     page.close()
     server.join()
     session.close()
+
+
+@pytest.fixture
+def tab(served, open_browser):
+    """The page open in a browser."""
+    _, page, complaints, strangers = served
+    with open_browser(page.url, complaints, strangers) as tab:
+        yield tab
+
+
+@pytest.fixture
+def holding(served, tab):
+    """The page open in a browser while the payload is held and known."""
+    session, *_ = served
+    session.source.go_on.set()
+    until(lambda: session.estimate.determined.all())
+    return tab
 
 
 def text(tab, name):
@@ -118,8 +141,8 @@ def choose(tab, label, option):
     tab.get_by_role("option", name=option, exact=True).click()
 
 
-def test_numbers_move_and_approach_the_truth(shown):
-    tab, session, *_ = shown
+def test_numbers_move_and_approach_the_truth(served, tab):
+    session, *_ = served
     first = until(lambda: tab.locator("[data-armload=mass]").count() and mass(tab))
     assert first[0] < 0.2  # nothing is held yet
     assert "nothing is held" in text(tab, "state")
@@ -135,11 +158,11 @@ def test_numbers_move_and_approach_the_truth(shown):
     assert session.error is None
 
 
-def test_the_picture_shows_the_arm_and_what_it_holds(shown, tmp_path):
+def test_the_picture_shows_the_arm_and_what_it_holds(holding, tmp_path):
     from PIL import Image
 
-    tab, session, *_ = shown
-    until(lambda: session.estimate.determined.all())
+    tab = holding
+    until(lambda: mass(tab))
     tab.evaluate("document.querySelectorAll('.mantine-Notification-root button').forEach(b => b.click())")
     time.sleep(2.0)
     image = Image.open(io.BytesIO(tab.screenshot())).convert("RGB")
@@ -153,8 +176,8 @@ def test_the_picture_shows_the_arm_and_what_it_holds(shown, tmp_path):
     assert (folder / "live.jpg").stat().st_size < 150_000
 
 
-def test_downloads_read_back(shown, tmp_path):
-    tab, _, _, *_ = shown
+def test_downloads_read_back(holding, tmp_path):
+    tab = holding
     with tab.expect_download() as started:
         tab.get_by_role("button", name="Download").click()
     assert started.value.suggested_filename == "payload-urdf.urdf"
@@ -171,31 +194,30 @@ def test_downloads_read_back(shown, tmp_path):
     assert np.allclose(load.parameters.com, HELD.com, atol=0.005)
 
 
-def test_whoever_comes_later_sees_the_present_state(shown, browser):
-    tab, _, page, *_ = shown
-    with browser.new_page() as late:
-        late.set_default_timeout(PATIENCE)
-        late.goto(page.url)
+def test_whoever_comes_later_sees_the_present_state(served, holding, open_browser):
+    _, page, complaints, strangers = served
+    with open_browser(page.url, complaints, strangers, size=(800, 500)) as late:
         late.wait_for_selector("[data-armload=phi9]")
-        assert until(lambda: mass(late))[0] == pytest.approx(mass(tab)[0], abs=0.05)
+        assert until(lambda: mass(late))[0] == pytest.approx(until(lambda: mass(holding))[0], abs=0.05)
         assert "grasp" in text(late, "log")
 
 
-def test_the_method_can_be_switched_and_the_stream_tared(shown):
-    tab, session, *_ = shown
-    choose(tab, "Method", "map")
+def test_the_method_can_be_switched_and_the_stream_tared(served, holding):
+    session, *_ = served
+    choose(holding, "Method", "map")
     until(lambda: session.method == "map")
-    until(lambda: "method map" in text(tab, "log"))
-    until(lambda: (now := mass(tab)) is not None and abs(now[0] - HELD.mass) < 0.1)
+    until(lambda: "method map" in text(holding, "log"))
+    until(lambda: (now := mass(holding)) is not None and abs(now[0] - HELD.mass) < 0.1)
     began = session.estimate.t
     until(lambda: session.estimate.t > began + 5.0)
-    tab.get_by_role("button", name="Tare").or_(tab.get_by_text("Tare", exact=True)).first.click()
+    holding.get_by_role("button", name="Tare").or_(holding.get_by_text("Tare", exact=True)).first.click()
     until(lambda: session.estimate.relative_to == "tare")
-    until(lambda: (now := mass(tab)) is not None and abs(now[0]) < 0.1)
+    until(lambda: (now := mass(holding)) is not None and abs(now[0]) < 0.1)
 
 
-def test_the_browser_had_nothing_to_complain_of_and_asked_nobody_else(shown):
-    *_, complaints, strangers = shown
+@pytest.mark.usefixtures("tab")
+def test_the_browser_had_nothing_to_complain_of_and_asked_nobody_else(served):
+    *_, complaints, strangers = served
     assert complaints == []
     assert strangers == []
 

@@ -12,6 +12,7 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
 from armload.arms import arm
+from armload.cli import main
 from armload.errors import RecordingError
 from armload.recording import read_recording
 
@@ -138,6 +139,20 @@ def test_several_topics_with_the_arms_joints_ask_for_one(tmp_path, panda):
     assert chosen.channel == "desired"
     with pytest.raises(RecordingError, match=r"no JointState topic '/nope': expected one of /joint_states, "):
         read_recording(path, panda, topic="/nope")
+
+
+def test_identify_reads_the_tare_from_its_own_topic(tmp_path, capsys):
+    def both(name, mine, seed):
+        return write_bag(tmp_path, "mcap", {mine: samples(seed=seed), f"{mine}_desired": samples(seed=9)}, name)
+
+    log, tare = both("run", "/arm/joint_states", 1), both("bare", "/joint_states", 2)
+    asked = ["identify", str(log), "--robot", "panda", "--topic", "/arm/joint_states"]
+    assert main([*asked, "--tare", str(tare)]) == 2
+    assert "bare has no JointState topic '/arm/joint_states'" in capsys.readouterr().err
+    assert main([*asked, "--tare-topic", "/joint_states"]) == 2
+    assert "there is no --tare" in capsys.readouterr().err
+    main([*asked, "--tare", str(tare), "--tare-topic", "/joint_states"])
+    assert "topic" not in capsys.readouterr().err  # what else is wrong with noise is another matter
 
 
 @pytest.mark.parametrize(

@@ -81,7 +81,10 @@ def arm(robot: str | Path, frame: str | None = None, gravity: tuple[float, float
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise ArmError(f"robot description {name} cannot be read as text: {error}") from None
-    return _as_known(Arm(path.stem, text, frame, gravity))
+    found = _as_known(Arm(path.stem, text, frame, gravity))
+    if path.stem in ARMS and found.known_as != path.stem:
+        return replace(found, name=path.name)  # called like an arm of the catalogue, and not that arm
+    return found
 
 
 def _as_known(found: Arm) -> Arm:

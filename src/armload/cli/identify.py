@@ -44,25 +44,29 @@ def parser() -> Parser:
         help="a mounted tool that is known (JSON, or franka-hand); the answer is what it carries",
     )
     parser.add_argument("--topic", metavar="T", help="JointState topic of a bag, where it has several")
+    parser.add_argument("--tare-topic", metavar="T", help="that of the tare's bag, where it is another one")
     parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     return parser
 
 
 def run(options: argparse.Namespace) -> None:
     """Identify and print."""
+    from armload.errors import UsageError
     from armload.identify import identify
     from armload.recording import Recording, has_topics, read_recording
 
     with working("reading") as say:
         arm = arm_of(options)
         tool = None if options.tool is None else payload_of(options.tool)
+        if options.tare_topic is not None and options.tare is None:
+            raise UsageError("--tare-topic names a topic of the tare's bag, but there is no --tare")
         bags = [path for path in (options.log, options.tare) if path is not None and has_topics(path)]
 
-        def read(path: str) -> Recording:
-            return read_recording(path, arm, topic=options.topic if path in bags or not bags else None)
+        def read(path: str, topic: str | None) -> Recording:
+            return read_recording(path, arm, topic=topic if path in bags or not bags else None)
 
-        log = read(options.log)
-        tare = None if options.tare is None else read(options.tare)
+        log = read(options.log, options.topic)
+        tare = None if options.tare is None else read(options.tare, options.tare_topic or options.topic)
         result = identify(log, arm, tare=tare, tool=tool, method=options.method, progress=say)
     for note in (*log.notes, *(tare.notes if tare else ()), *result.notes):
         print_note(note)
