@@ -41,6 +41,7 @@ FLAGS = (
     "--disable-background-networking",
 )
 PATIENCE = 120_000  # [ms] drawing without a GPU is slow
+LARGE, SMALL = (1360, 860), (960, 600)  # [px] of the picture to keep, and where nothing but text is looked at
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +55,7 @@ def open_browser():
     with sync_api.sync_playwright() as playwright:
 
         @contextlib.contextmanager
-        def opened(url, complaints, strangers, size=(1360, 860)):
+        def opened(url, complaints, strangers, size=SMALL):
             with playwright.chromium.launch(executable_path=program, args=list(FLAGS)) as browser:
                 tab = browser.new_page(viewport=dict(zip(("width", "height"), size, strict=True)))
                 tab.set_default_timeout(PATIENCE)
@@ -102,10 +103,10 @@ def served(panda):
 
 
 @pytest.fixture
-def tab(served, open_browser):
+def tab(request, served, open_browser):
     """The page open in a browser."""
     _, page, complaints, strangers = served
-    with open_browser(page.url, complaints, strangers) as tab:
+    with open_browser(page.url, complaints, strangers, getattr(request, "param", SMALL)) as tab:
         yield tab
 
 
@@ -158,6 +159,7 @@ def test_numbers_move_and_approach_the_truth(served, tab):
     assert session.error is None
 
 
+@pytest.mark.parametrize("tab", [LARGE], indirect=True, ids=["large"])
 def test_the_picture_shows_the_arm_and_what_it_holds(holding, tmp_path):
     from PIL import Image
 
@@ -196,7 +198,7 @@ def test_downloads_read_back(holding, tmp_path):
 
 def test_whoever_comes_later_sees_the_present_state(served, holding, open_browser):
     _, page, complaints, strangers = served
-    with open_browser(page.url, complaints, strangers, size=(800, 500)) as late:
+    with open_browser(page.url, complaints, strangers) as late:
         late.wait_for_selector("[data-armload=phi9]")
         assert until(lambda: mass(late))[0] == pytest.approx(until(lambda: mass(holding))[0], abs=0.05)
         assert "grasp" in text(late, "log")

@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 from armload.arms import Arm, payload_regressor
 from armload.errors import IdentificationError
 from armload.least_squares.normal import NormalLeastSquares
+from armload.least_squares.regression import REGRESSOR_RATE
 from armload.motion import Motion
 from armload.recording import Recording
 
 _DEGREE = 4
 _NEIGHBOURS = 4  # samples on either side that a polynomial needs at least
-_ROW_RATE = 200.0  # [Hz] polynomials are fitted no more often: they hold nothing above a few hertz
 _TRACKS = 0.05  # [rad] rms distance from the commanded motion beyond which it is another motion
 
 
@@ -66,7 +66,7 @@ class PolynomialLeastSquares(NormalLeastSquares):
         stop = np.maximum(np.searchsorted(t, t + self.half, side="right"), index + _NEIGHBOURS + 1)
         times, fits, k = [], [], self._next
         while k + _NEIGHBOURS < len(t) and t[-1] >= t[k] + self.half:
-            if t[k] - self.half >= self._begin and t[k] - self._fitted_at >= 0.9 / _ROW_RATE:
+            if t[k] - self.half >= self._begin and t[k] - self._fitted_at >= 0.9 / REGRESSOR_RATE:
                 window = slice(first[k], stop[k])
                 fits.append(_derivatives((t[window] - t[k]) / self.half, self._signal[window]))
                 times.append(t[k])

@@ -21,18 +21,18 @@ from numpy.typing import NDArray
 from armload.arms import Arm, momentum_regressor, rated_effort
 from armload.arms.filtered import Lag, filtered_regressor
 from armload.errors import IdentificationError
-from armload.least_squares.normal import GAP, NormalLeastSquares
-from armload.recording import Recording
+from armload.least_squares.normal import NormalLeastSquares
+from armload.least_squares.regression import REGRESSOR_RATE
+from armload.recording import GAP, Recording
 from armload.recording.alignment import LEAST, TOLERANCE, Aligned, MotionTracker, align
 
-_ROW_RATE = 200.0  # [Hz] rows are computed no more often: they hold nothing above a few hertz
 _SETTLED = 7.99  # time constants after which a lag has forgotten where it started
 _RESOLUTION = 1e-5  # of the effort limit: two logs differ by so much at least
 _PRIOR_BLOCKS = 8.0  # weight of the rows' own variance, in blocks
 
 
 class _FilteredRows:
-    """r and W of a log at `_ROW_RATE`, torque at its full rate, a piece at a time; NaN in r until the lags settle."""
+    """r and W of a log at `REGRESSOR_RATE`, torque at its full rate, piece by piece; NaN in r until the lags settle."""
 
     def __init__(self, arm: Arm, gain: float) -> None:
         self.arm, self.gain = arm, gain
@@ -47,7 +47,7 @@ class _FilteredRows:
         lagged = self._torque(t, tau)
         rows = []
         for k, now in enumerate(t):
-            if now - self._last >= 0.9 / _ROW_RATE:
+            if now - self._last >= 0.9 / REGRESSOR_RATE:
                 rows.append(k)
                 self._last = now
         if not rows:
@@ -136,7 +136,7 @@ class DifferenceLeastSquares(NormalLeastSquares):
         edges = np.flatnonzero(np.diff(t, prepend=self._last_row) > GAP)
         for start, stop in zip([0, *edges], [*edges, len(t)], strict=True):
             if start in edges:
-                self._last_row = t[start] - 1.0 / _ROW_RATE
+                self._last_row = t[start] - 1.0 / REGRESSOR_RATE
             if stop > start:
                 super()._add(t[start:stop], y[start:stop], Y[start:stop])
 

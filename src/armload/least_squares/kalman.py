@@ -24,10 +24,9 @@ from armload.identifier import Estimate, Identifier
 from armload.inertia import is_consistent, nearest_consistent
 from armload.least_squares.correction import FRICTION_WIDTH
 from armload.least_squares.prior import solution_prior_std
-from armload.recording import Sample
+from armload.least_squares.regression import REGRESSOR_RATE
+from armload.recording import GAP, Sample
 
-STEP_RATE = 200.0  # [Hz] a faster log's torque is averaged over each step
-GAP = 0.1  # [s] after a longer pause the joints' state begins anew
 # as fractions of the effort limit: √S of the unmodelled torque per √Hz; first spread of offset and Coulomb friction
 _TORQUE, _OFFSET, _COULOMB = 4e-3, 4e-3, 1e-2
 _MARGIN = 1e-3  # [kg] how far inside the cone of bodies (lengths in units of 0.1 m) the model is linearised
@@ -98,7 +97,7 @@ class ExtendedKalmanFilter(Identifier):
             self._dq, self._ddq = now.dq, np.zeros(n)
         else:
             self._input = self._input + 0.5 * (now.t - last.t) * (_input(last) + _input(now))
-            if now.t - self._since >= 0.9 / STEP_RATE:
+            if now.t - self._since >= 0.9 / REGRESSOR_RATE:
                 h = now.t - self._since
                 tau, moving = np.split(self._input / h, 2)
                 self._step(h, tau, moving, np.concatenate([now.q, now.dq]))

@@ -20,8 +20,8 @@ from armload.arms import Arm
 from armload.arms.filtered import FilteredRegression
 from armload.identifier import BatchIdentifier, Estimate
 from armload.least_squares.autocorrelation import BlockMeans
+from armload.recording import GAP
 
-GAP = 0.1  # [s] a longer pause between samples restarts whatever has a memory
 # what a payload may be before anything is known: standard deviations in kg, kg·m, kg·m²
 UNKNOWN = np.array([100.0] + [10.0] * 3 + [3.0] * 6)
 _RESOLUTION = 1e-3  # [N·m] no joint's torque is known better

@@ -21,7 +21,7 @@ from armload.arms import Arm, payload_regressor
 from armload.arms.filtered import Lag
 from armload.identifier import BatchIdentifier, Estimate
 from armload.least_squares.autocorrelation import BlockMeans
-from armload.least_squares.normal import GAP
+from armload.recording import GAP
 
 _AT_REST = 0.01  # [rad/s]
 _TRANSIENT = 5.0  # time constants after which an observer started in motion has settled

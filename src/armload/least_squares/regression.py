@@ -19,9 +19,9 @@ from armload.arms.filtered import Lag, filtered_regressor
 from armload.least_squares.autocorrelation import BlockMeans
 from armload.least_squares.correction import FRICTION_WIDTH, Correction
 from armload.least_squares.features import JointFeatures
+from armload.recording import GAP
 
 REGRESSOR_RATE = 200.0  # [Hz] W, Z and G are computed no more often: they hold nothing above a few hertz
-GAP = 0.1  # [s] a longer pause between samples restarts the lags
 _STILL = (
     1e-3  # [rad] an arm that stays so near for a block shows one value of its stiction: more of it tells nothing new
 )

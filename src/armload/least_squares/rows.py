@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from armload.arms.rows import MomentumRow
 from armload.least_squares.correction import FRICTION_WIDTH, Correction
 from armload.least_squares.features import JointFeatures
-from armload.least_squares.regression import GAP, REGRESSOR_RATE, Stiction, presliding
+from armload.least_squares.regression import REGRESSOR_RATE, Stiction, presliding
+from armload.recording import GAP
 
 
 class Row(NamedTuple):

@@ -13,7 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from armload.arms import Arm
-from armload.recording import Sample
+from armload.recording import GAP, Sample
 
 REASONS = (
     "wrong size",  # not n numbers
@@ -62,7 +62,7 @@ class Gate:
         gap: a longer pause between samples counts as an interruption [s].
     """
 
-    def __init__(self, arm: Arm, gap: float = 0.1) -> None:
+    def __init__(self, arm: Arm, gap: float = GAP) -> None:
         limits, n = arm.limits, arm.n
         self.n, self.gap, self._shape = n, gap, (n,)
         known, bounded = np.isfinite(limits.velocity), np.isfinite(limits.effort)

@@ -3,10 +3,11 @@
 from armload.recording.alignment import Alignment, same_motion
 from armload.recording.files import has_topics, read_recording, write_recording
 from armload.recording.plausibility import check_plausible
-from armload.recording.recording import CHANNELS, Recording, Sample
+from armload.recording.recording import CHANNELS, GAP, Recording, Sample
 
 __all__ = [
     "CHANNELS",
+    "GAP",
     "Alignment",
     "Recording",
     "Sample",

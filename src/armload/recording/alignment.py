@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armload.recording.recording import Recording
+from armload.recording.recording import GAP, Recording
 
 TOLERANCE = 0.1  # distance in q, relative to the motion's amplitude, below which two motions are the same
 LEAST = 0.5  # share of the run's path that has to be found in the other log
@@ -26,7 +26,6 @@ _MOVES = 0.05  # [rad] rms amplitude of a window that can be looked up
 _EVERY = 0.09  # [s] between two searches
 _TIE = 2e-3  # [rad] lags whose rms distances differ by no more are equally good: the earliest has most to follow
 _EDGE = 1e-3  # [s] by which a sample may lie beyond the other log's ends
-_GAP = 0.1  # [s] a longer pause between samples ends whatever was being followed
 
 
 class Piece(NamedTuple):
@@ -91,7 +90,7 @@ class MotionTracker:
 
     def feed(self, t: float, q: NDArray, row: Any = None) -> list[Aligned]:
         """The samples that are now found: this one, or after a search also those that waited for it, at most 4 s."""
-        if t - self._last > _GAP:
+        if t - self._last > GAP:
             self.restart()
         self._last = t
         if self.shift is not None:
@@ -116,7 +115,7 @@ class MotionTracker:
             return False
         k = min(max(int(np.searchsorted(tare.t, t)), 1), len(tare.t) - 1)
         before, after = tare.t[k - 1], tare.t[k]
-        if after - before > _GAP:
+        if after - before > GAP:
             return False
         there = tare.q[k - 1] + (t - before) / (after - before) * (tare.q[k] - tare.q[k - 1])
         return _rms(q - there) <= self._far
@@ -161,7 +160,7 @@ class MotionTracker:
         """Which of the tare's times (N,) lie between samples of it, not in a gap or beyond its ends."""
         k = np.clip(np.searchsorted(self.tare.t, t), 1, len(self.tare.t) - 1)
         before, after = self.tare.t[k - 1], self.tare.t[k]
-        return (t >= before - _EDGE) & (t <= after + _EDGE) & (after - before <= _GAP)
+        return (t >= before - _EDGE) & (t <= after + _EDGE) & (after - before <= GAP)
 
 
 def align(run: Recording, tare: Recording, tolerance: float = TOLERANCE) -> Alignment:
@@ -182,7 +181,7 @@ def align(run: Recording, tare: Recording, tolerance: float = TOLERANCE) -> Alig
     pieces: list[Piece] = []
     for aligned in found:
         last = pieces[-1] if pieces else None
-        if last is not None and last.shift == aligned.shift and aligned.t - last.stop <= _GAP:
+        if last is not None and last.shift == aligned.shift and aligned.t - last.stop <= GAP:
             pieces[-1] = last._replace(stop=aligned.t)
         else:
             pieces.append(Piece(aligned.t, aligned.t, aligned.shift))

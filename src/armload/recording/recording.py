@@ -13,6 +13,7 @@ from armload.errors import RecordingError
 
 # What a torque column can mean; "measured" is the contract: rigid body + friction, gravity included.
 CHANNELS = ("measured", "desired", "external")
+GAP = 0.1  # [s] a longer pause between samples ends whatever has a memory of those before it
 
 
 class Sample(NamedTuple):
