@@ -1,5 +1,8 @@
 """One log in, one answer out: intervals, what is determined, tare, tool, frames, and bodies that can exist."""
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -111,6 +114,30 @@ def test_what_was_taken_off_since_the_tare_is_negative_and_said_so(real_like):
     assert "within three standard deviations" not in str(answer)
 
 
+@pytest.mark.parametrize(("sigmas", "says"), [(2.5, False), (3.5, True)])
+def test_taken_off_asks_for_as_much_evidence_as_held(real_like, sigmas, says):
+    panda, how = real_like
+    tare = simulate(panda, taie2024(), None, seed=3, **how)
+    now = simulate(panda, taie2024(), TOOL, seed=4, **how)
+    added = identify(now, panda, tare=tare)
+    sigma = (added.phi_high[0] - added.phi_low[0]) / 2 / Z95
+    heavier = InertialParameters.from_com(added.mass + sigmas * sigma, TOOL.com, TOOL.inertia_com)
+    answer = identify(now, panda, tare=tare, tool=heavier)
+    assert any("taken off" in note or "is negative" in note for note in answer.notes) == says
+
+
+def test_gear_friction_in_the_torques_of_an_arm_that_nobody_knows_is_found_from_the_log(tmp_path):
+    known = arm("ur5e")
+    text = re.sub(r'mass value="([\d.e+-]+)"', lambda m: f'mass value="{1.01 * float(m[1])}"', known.urdf)
+    (tmp_path / "like_a_ur.urdf").write_text(text)
+    stranger = arm(tmp_path / "like_a_ur.urdf", "tool0")
+    told = replace(stranger, motor_torque=True)
+    motion = random_motion(told, 4, duration=8.0, harmonics=4)
+    log = simulate(stranger, motion, BOX, seed=1, world=World.real_like(told, 3), rate=250.0)
+    assert (stranger.known_as, stranger.motor_torque) == (None, False)
+    assert identify(log, stranger).phi == pytest.approx(identify(log, told).phi)
+
+
 def test_an_empty_arm_holds_nothing_and_a_light_payload_is_held_with_a_tare(real_like):
     panda, how = real_like
     light = InertialParameters.from_com(0.25, (0, 0, 0.05), np.diag([2e-4] * 3))
@@ -206,6 +233,18 @@ def test_arms_as_they_are_are_not_called_strange(panda):
     recipe = Recipe(worlds=("beyond",), motions=("slow",), untared=1.0, duration=30.0)
     for logs in simulate_episodes(draw_episodes(panda, recipe, 4, seed=5)):
         assert not any("check the robot" in note for note in identify(logs.run, panda).notes)
+
+
+def test_error_bars_that_lean_on_the_prior_are_named_and_those_that_a_log_tells_are_not(real_like, loaded):
+    panda, how = real_like
+    tare = simulate(panda, taie2024(), None, seed=9, **how)
+    told, leaning = identify(loaded, panda, tare=tare), identify(loaded, panda)
+    assert all(told.determined)
+    assert not any("rest on what payloads are usually like" in note for note in told.notes)
+    (said,) = (note for note in leaning.notes if "rest on what payloads are usually like" in note)
+    assert "map-gp" in said
+    assert "mass" not in said
+    assert not any("usually like" in note for note in identify(loaded, panda, method="map-gp").notes)
 
 
 def test_an_undetermined_interval_of_a_method_without_a_prior_holds_its_own(real_like):

@@ -100,6 +100,24 @@ def test_what_the_intervals_promise_is_what_new_episodes_showed():
     )
 
 
+def test_what_held_of_wide_bodies_is_what_was_measured():
+    page = " ".join((ROOT / "docs" / "hybrid.md").read_text(encoding="utf-8").split())
+    readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    found = json.loads((RESULTS / "wide_bodies.json").read_text())
+    one = {
+        cell["method"]: {group: f"{100 * cell[group]:.0f}" for group in ("first moments", "inertia", "its diagonal")}
+        for cell in found["cells"]
+        if (cell["payloads"], cell["what"], cell["t"]) == ("wide", "tare", 6.0)
+    }
+    hybrid, said, alone = (one[name] for name in ("hybrid", "as identify reports", "log alone"))
+    diagonal = hybrid["its diagonal"]
+    assert f"(`{found['command']}`) {hybrid['first moments']} % of the first moments'" in page
+    assert f"{hybrid['inertia']} % of the inertia's and {diagonal} % of its diagonal's" in page
+    assert f"prior's interval, {said['inertia']} and {said['its diagonal']} %" in page
+    assert f"weak prior, holds {alone['inertia']} % there" in page
+    assert f"{diagonal} % of its diagonal's intervals hold" in readme
+
+
 def test_what_held_at_the_end_of_long_logs_is_what_was_measured():
     page = " ".join((ROOT / "docs" / "hybrid.md").read_text(encoding="utf-8").split())
     said = {}

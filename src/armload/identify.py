@@ -13,18 +13,22 @@ from numpy.typing import NDArray
 
 from armload.answer import Identification
 from armload.arms import Arm
-from armload.determined import SMALL, Z95, held
+from armload.determined import HELD, SMALL, Z95, held
 from armload.determined import determined as told
 from armload.errors import IdentificationError
 from armload.identifier import Estimate, Identifier
 from armload.inertia import NAMES, InertialParameters, is_consistent, nearest_body, phi_to_com
-from armload.least_squares import PosteriorLeastSquares, payload_prior_std
+from armload.least_squares import Posterior, PosteriorLeastSquares, payload_prior_std
 from armload.methods import METHODS, default_for
 from armload.recording import Recording, check_plausible
 
 LOWEST_RATE = 20.0  # [Hz]
 _MISFIT = 3.0  # standard deviations between the estimate and the nearest body, beyond which something is wrong
-_STRANGE = 5.0  # rms of torque offsets over what is expected: about 1 of most simulated arms, so much of none tried
+# rms of torque offsets over what is expected, from which on something is wrong: 1 of most simulated arms, up to 5.4
+# where friction holds the joints (motor currents)
+_STRANGE = {"link": 5.0, "motor": 8.0}
+_MOVES = 0.05  # [rad] a joint that stays within so much stands
+_LEANS = 3.0  # a log that alone tells a parameter so many times worse leaves it to the learned prior
 _DECISIVE = 9.0  # between two squared distances: 90 to 1
 _CHECK = "check the robot, the base (--gravity), what is mounted and the torques' signs"
 
@@ -110,7 +114,7 @@ class _Found(NamedTuple):
 
     calibrated: whether its error bars were checked on held-out episodes.
     alone: standard deviation (10,) without a learned prior, of a method that has one.
-    offset: the arm's torque offsets over what is expected of them (rms), of a method that asks.
+    strange: how many times the arm's torque offsets are what is expected of them, where that is too often.
     """
 
     estimate: Estimate
@@ -121,7 +125,7 @@ class _Found(NamedTuple):
     why: str
     calibrated: bool = False
     alone: NDArray[np.float64] | None = None
-    offset: float = 0.0
+    strange: float = 0.0
 
     def less(self, tool: NDArray[np.float64]) -> _Found:
         """The same without a tool (10,)."""
@@ -151,7 +155,13 @@ def _run(recording: Recording, arm: Arm, tare: Recording | None, method: str | P
         )
         if method is None and tare is None:
             why += "; without a tare the error bars allow for the model's errors"
-        return _found(entry.make(arm, tare), recording, weak, entry.prior, why)
+        identifier = entry.make(arm, tare)
+        found = _found(identifier, recording, weak, entry.prior, why)
+        if _holds_friction(identifier, arm):
+            arm = replace(arm, motor_torque=True)
+            why += "; the torque holds the gears' friction, as that of motor currents does"
+            found = _found(entry.make(arm, tare), recording, weak, entry.prior, why)
+        return found
     assert method is not None
     if not Path(method).is_file():
         near = get_close_matches(str(method), METHODS, 1)
@@ -184,8 +194,23 @@ def _found(identifier: Identifier, recording: Recording, weak: NDArray, prior: b
     known, std = (np.zeros(10), weak) if identifier.known is None else identifier.known
     estimate = identifier.run(recording)
     asks = isinstance(identifier, PosteriorLeastSquares)
-    offset = float(np.sqrt(identifier.posterior.ratios["offset"].mean())) if asks else 0.0
-    return _Found(estimate, known, std, prior, identifier.name, why, identifier.calibrated, identifier.alone, offset)
+    strange = _strangeness(identifier.posterior, recording) if asks else 0.0
+    return _Found(estimate, known, std, prior, identifier.name, why, identifier.calibrated, identifier.alone, strange)
+
+
+def _strangeness(posterior: Posterior, recording: Recording) -> float:
+    """How many times the torque offsets are what is expected of an arm; 0 where that is not too often."""
+    ratios = posterior.ratios["offset"]
+    if posterior.torque == "motor":  # there a joint at rest is held by any friction below stiction
+        ratios = ratios[np.ptp(recording.q, axis=0) > _MOVES]
+    times = float(np.sqrt(ratios.mean())) if ratios.size else 0.0
+    return times if times > _STRANGE[posterior.torque] else 0.0
+
+
+def _holds_friction(identifier: Identifier, arm: Arm) -> bool:
+    """Whether a log showed gear friction in its torques that nobody knew of: of what is learned, it is part already."""
+    physics = isinstance(identifier, PosteriorLeastSquares) and identifier.known is None
+    return physics and not arm.motor_torque and identifier.posterior.torque == "motor"
 
 
 def _misfit(estimate: Estimate) -> float:
@@ -213,7 +238,7 @@ def _answer(
     high = np.where(determined, phi + half, np.maximum(before + half_before, phi + reach))
     if otherwise is not None:
         low, high = np.minimum(low, low + otherwise), np.maximum(high, high + otherwise)
-    removed = determined[0] and phi[0] < -half[0]
+    removed = determined[0] and phi[0] < -HELD * estimate.std[0]
     said, trusted = list(notes), found.calibrated and otherwise is None
     if removed:
         said.append(
@@ -227,13 +252,19 @@ def _answer(
         if _misfit(estimate) > _MISFIT:
             said.append(f"no body fits within the error bars: {_CHECK}")
             trusted = False
-        elif found.offset > _STRANGE:
-            said.append(f"the torques are {found.offset:.0f} times as far off as those of an arm should be: {_CHECK}")
+        elif found.strange:
+            said.append(f"the torques are {found.strange:.0f} times as far off as those of an arm should be: {_CHECK}")
             trusted = False
     low, high = np.minimum(low, phi), np.maximum(high, phi)
     if not determined.all():
         missing = ", ".join(n for n, known in zip(NAMES, determined, strict=True) if not known)
         said.append(f"this motion does not determine {missing}: what was known before is reported for them")
+    if found.alone is not None and np.any(leaning := determined & (found.alone > _LEANS * estimate.std)):
+        names = ", ".join(n for n, one in zip(NAMES, leaning, strict=True) if one)
+        said.append(
+            f"the error bars of {names} rest on what payloads are usually like more than on this log: of something "
+            "wide and thin (a tray, a frame) believe --method map-gp instead"
+        )
     mass, com, inertia_com = phi_to_com(phi)
     return Identification(
         method=found.method,

@@ -1,0 +1,128 @@
+"""Bodies that are wide, thin and centred: what the hybrid's intervals are worth where its payload prior misleads.
+
+    python benchmarks/wide_bodies.py [--episodes 2000] [--jobs 2] [--work out/fresh-panda]
+
+A tray or a ring has the mass and the centre of a compact body and several times its inertia. Such bodies are among the
+training's, but rare. Here one takes the place of the payload in every episode of `fresh_episodes.py`: torque is linear
+in the ten parameters, so that h becomes h + Λ·(phi_wide − phi); the arm, its motion and all errors stay. Compared: the
+hybrid; the same log under the weak prior, trusted as far as the hybrid trusts it (`log alone`); what `identify` reports
+of the hybrid, with the prior's interval where `determined` says no; each also for the episodes' own payloads.
+
+Writes benchmarks/results/wide_bodies.json. Goes on from --work, which fresh_episodes.py shares.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from fresh_episodes import RESULTS, SEED
+from numpy.typing import NDArray
+
+from armload import Arm, arm
+from armload.atomic import replacing
+from armload.cli.train_hybrid import episodes_shown, versions
+from armload.determined import Z95, determined
+from armload.hybrid import HybridModel, shipped_model
+from armload.hybrid.calibration import nearest
+from armload.hybrid.identifier import std_alone
+from armload.hybrid.records import TIMES, Records
+from armload.hybrid.training import episode_records
+from armload.least_squares import payload_prior_std
+from armload.payloads import solids
+
+MASS, SIDE, THICK = (0.3, 2.0), (0.2, 0.4), (0.002, 0.01)  # [kg, m]
+OFF, ALONG = 0.01, (0.01, 0.06)  # [m] centre off the flange's axis, and along it
+GROUPS = {"mass": [0], "first moments": [1, 2, 3], "inertia": list(range(4, 10)), "its diagonal": [4, 7, 9]}
+
+
+def wide(seed: int) -> NDArray[np.float64]:
+    """phi (10,) of a bar, a tray or a ring across the flange."""
+    rng = np.random.default_rng([seed, 99])
+    mass, side, thick = (rng.uniform(*x) for x in (MASS, SIDE, THICK))
+    at = np.array([*rng.normal(0.0, OFF, size=2), rng.uniform(*ALONG)])
+    kind = seed % 3
+    if kind == 0:
+        return solids.box((side, 0.03, thick), mass=mass, translation=at).phi
+    if kind == 1:
+        return solids.box((side, rng.uniform(0.5, 1.0) * side, thick), mass=mass, translation=at).phi
+    outer, inner = 0.5 * side, 0.45 * side
+    full = mass * outer**2 / (outer**2 - inner**2)
+    disc = solids.cylinder(outer, thick, mass=full, translation=at)
+    return (disc - solids.cylinder(inner, thick, mass=full - mass, translation=at)).phi
+
+
+def exchanged(records: Records, phi: NDArray[np.float64]) -> Records:
+    """The same episodes with other payloads, phi (E, 10) of each episode."""
+    _, which = np.unique(records.episode, return_inverse=True)
+    truth = phi[which]
+    return replace(
+        records,
+        truth=truth,
+        vector=records.vector + np.einsum("nij,nj->ni", records.information, truth - records.truth),
+    )
+
+
+def held(robot: Arm, model: HybridModel, records: Records) -> dict[str, NDArray[np.bool_]]:
+    """Which truths (N, 10) lie inside, by what answers."""
+    prior, weak = model.prior_for(robot), payload_prior_std(robot)
+    out = {name: np.empty((len(records), 10), dtype=bool) for name in ("hybrid", "log alone", "as identify reports")}
+    for k in range(len(records)):
+        trusted, truth = model.calibration.trusted(records.evidence(k)), records.truth[k]
+        found = prior.posterior(trusted.information, trusted.vector)
+        half = Z95 * np.sqrt(np.diag(model.calibration.widened(found, trusted)))
+        out["hybrid"][k] = np.abs(found.mean - truth) <= half
+        P = np.linalg.inv(trusted.information + np.diag(weak**-2))
+        alone = P @ trusted.vector
+        out["log alone"][k] = np.abs(alone - truth) <= Z95 * np.sqrt(np.diag(P) + (trusted.gain_std * alone) ** 2)
+        told = determined(half / Z95, prior.std, std_alone(trusted, weak), weak)
+        before, reach = Z95 * prior.std, np.minimum(half, Z95 * prior.std)
+        low = np.where(told, found.mean - half, np.minimum(prior.mean - before, found.mean - reach))
+        high = np.where(told, found.mean + half, np.maximum(prior.mean + before, found.mean + reach))
+        out["as identify reports"][k] = (low <= truth) & (truth <= high)
+    return out
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--episodes", type=int, default=2000)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--work", type=Path, default=Path("out/fresh-panda"))
+    options = parser.parse_args()
+    robot = arm("panda")
+    model = shipped_model(robot)
+    with episodes_shown() as progress:
+        records = episode_records(
+            robot, episodes=options.episodes, seed=SEED, folder=options.work, jobs=options.jobs, progress=progress
+        )
+    bodies = np.array([wide(k) for k in range(len(np.unique(records.episode)))])
+    which, cells = nearest(records.t, np.array(TIMES)), []
+    for name, some in (("wide", exchanged(records, bodies)), ("as drawn", records)):
+        inside = held(robot, model, some)
+        for kind, what in ((0, "no tare"), (1, "tare")):
+            for b, t in enumerate(TIMES):
+                rows = (records.kind == kind) & (which == b)
+                for method, found in inside.items():
+                    shares = {group: round(float(found[rows][:, part].mean()), 4) for group, part in GROUPS.items()}
+                    line = {"payloads": name, "what": what, "t": t, "method": method, "episodes": int(rows.sum())}
+                    cells.append(line | shares)
+                    if t in (0.1, 1.0, 6.0):
+                        print(*line.values(), *(f"{group} {100 * x:.1f} %" for group, x in shares.items()), sep="  ")
+    result = {
+        "command": f"python benchmarks/wide_bodies.py --episodes {options.episodes}",
+        "population": "broad",
+        "seed": SEED,
+        "cells": cells,
+        "versions": versions(),
+    }
+    path = RESULTS / "wide_bodies.json"
+    with replacing(path) as part:
+        part.write_text(json.dumps(result, allow_nan=False) + "\n", encoding="utf-8")
+    print(f"wrote {path}")
+
+
+if __name__ == "__main__":
+    main()
