@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from armload.arms import arm
+from armload.arms import arm, rated_effort
 from armload.errors import RecordingError
 from armload.inertia import InertialParameters
 from armload.motion import random_motion, taie2024
@@ -291,3 +291,23 @@ def test_windows_never_span_a_gap_and_integrate_exactly():
     assert np.sum(t[parts.last] - t[parts.first]) > 9.0
     change = log.q[parts.last] - log.q[parts.first]
     np.testing.assert_allclose(integrals(log, log.dq, parts), change, atol=1e-5)  # trapezoids: h²/12
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_friction_that_keeps_hold_of_resting_joints_is_no_wrong_robot(seed):
+    """A pick-and-place log of motor currents: at rest each joint is held by the friction of its last move."""
+    robot, rng, t = arm("ur5e"), np.random.default_rng(seed), np.arange(0.0, 6.0, 0.008)
+    poses = rng.uniform([-1.0, -2.0, -1.0, -1.0, -1.0, -1.0], [1.0, -0.9, 1.0, 1.0, 1.0, 1.0], size=(4, 6))
+    q, dq, ddq = np.zeros((3, len(t), 6))
+    q += poses[0]
+    held = np.tile(np.sign(rng.normal(size=6)), (len(t), 1))
+    for k, move in enumerate(np.diff(poses, axis=0)):
+        s = np.clip(t - 0.5 - 2.0 * k, 0.0, 1.0)
+        q += np.outer(10 * s**3 - 15 * s**4 + 6 * s**5, move)
+        dq += np.outer(30 * s**2 - 60 * s**3 + 30 * s**4, move)
+        ddq += np.outer(60 * s - 180 * s**2 + 120 * s**3, move)
+        held[t >= 0.5 + 2.0 * k] = np.sign(move)
+    tau = robot.torque(q, dq, ddq) + 0.12 * rated_effort(robot) * held
+    check_plausible(Recording(t, q, dq, tau), robot)
+    with pytest.raises(RecordingError, match=r"opposite sign|does not fit|holds only"):
+        check_plausible(Recording(t, q, dq, -tau), robot)

@@ -28,6 +28,7 @@ _FRICTION_WIDTH = 0.05  # [rad/s]
 _MODEL_ERROR = 0.03  # of the rated torque, rms
 _OFFSET = 0.05  # of the rated torque
 _FRICTION = 0.2  # of the rated torque: gear friction as motor currents show it
+_STICTION = 0.1  # of the rated torque, of a joint at rest
 _WEAKEST = 0.4  # rating of an unrated wrist, as a share of the largest torque the model asks: 0.3 to 0.4 on real arms
 _UNRATED = 5.0  # [kg] payload assumed where the maker's rating is not known
 _LEVER = 0.15  # [m] of the payload's centre of mass and radius of gyration
@@ -46,7 +47,7 @@ def torque_scale(recording: Recording, arm: Arm) -> TorqueScale | None:
     parts = _some(windows(recording))
     if len(parts.first) < 2:
         return None
-    own, payload, tau, friction = _averages(recording, arm, parts)
+    own, payload, tau, friction, moving = _averages(recording, arm, parts)
     W, n = own.shape
     rated = _rated_torque(arm, own)
 
@@ -57,7 +58,8 @@ def torque_scale(recording: Recording, arm: Arm) -> TorqueScale | None:
     prior = np.concatenate(
         [mass * np.r_[1.0, [_LEVER] * 3, [_LEVER**2] * 6], _OFFSET * rated, _FRICTION * rated]
     )  # standard deviations
-    noise = np.tile(_MODEL_ERROR * rated, W)
+    # a joint at rest is held by any friction below stiction: tanh knows nothing of it
+    noise = (rated * np.hypot(_MODEL_ERROR, _STICTION * (1.0 - np.minimum(moving, 1.0)))).ravel()
     A = A.reshape(W * n, -1) * prior / noise[:, None]
     b, y = own.ravel() / noise, tau.ravel() / noise
 
@@ -75,8 +77,8 @@ def torque_scale(recording: Recording, arm: Arm) -> TorqueScale | None:
     return TorqueScale(scale, std, misfit)
 
 
-def _averages(recording: Recording, arm: Arm, parts: Windows) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Window means of the bare arm's torque (W, n), payload regressor (W, n, 10), tau and tanh(dq/width) (W, n)."""
+def _averages(recording: Recording, arm: Arm, parts: Windows) -> tuple[NDArray, ...]:
+    """Window means: bare arm's torque (W, n), payload regressor (W, n, 10), tau, tanh(dq/width) and its size (W, n)."""
     q, dq = recording.q, recording.dq
     T = (recording.t[parts.last] - recording.t[parts.first])[:, None]
     rows = np.linspace(parts.first, parts.last, _POINTS, axis=1).round().astype(int)  # (W, P)
@@ -88,8 +90,9 @@ def _averages(recording: Recording, arm: Arm, parts: Windows) -> tuple[NDArray, 
     own = (p[:, -1] - p[:, 0]) / T + np.einsum("wpi,p->wi", drift, weight)
     payload = (Yp[:, -1] - Yp[:, 0]) / T[:, :, None] + np.einsum("wpij,p->wij", Yd, weight)
     tau = integrals(recording, recording.tau, parts) / T
-    friction = integrals(recording, np.tanh(dq / _FRICTION_WIDTH), parts) / T
-    return own, payload, tau, friction
+    direction = np.tanh(dq / _FRICTION_WIDTH)
+    friction, moving = (integrals(recording, x, parts) / T for x in (direction, np.abs(direction)))
+    return own, payload, tau, friction, moving
 
 
 def _some(parts: Windows) -> Windows:
