@@ -100,10 +100,10 @@ def test_what_the_intervals_promise_is_what_new_episodes_showed():
     )
 
 
-def test_what_held_of_wide_bodies_is_what_was_measured():
+def test_what_held_of_payload_intervals_is_what_was_measured():
     page = " ".join((ROOT / "docs" / "hybrid.md").read_text(encoding="utf-8").split())
     readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
-    found = json.loads((RESULTS / "wide_bodies.json").read_text())
+    found = json.loads((RESULTS / "payload_intervals.json").read_text())
     one = {
         cell["method"]: {group: f"{100 * cell[group]:.0f}" for group in ("first moments", "inertia", "its diagonal")}
         for cell in found["cells"]
@@ -116,6 +116,9 @@ def test_what_held_of_wide_bodies_is_what_was_measured():
     assert f"prior's interval, {said['inertia']} and {said['its diagonal']} %" in page
     assert f"weak prior, holds {alone['inertia']} % there" in page
     assert f"{diagonal} % of its diagonal's intervals hold" in readme
+    light, less_light, *heavier = (f"{100 * line['mass']:.0f}" for line in found["weights"])
+    assert f"of those of 30–100 g {light} % of the mass's intervals hold, of 100–200 g {less_light} %" in page
+    assert {f"of heavier ones {share} %" in page for share in heavier} == {True}
 
 
 def test_what_held_at_the_end_of_long_logs_is_what_was_measured():

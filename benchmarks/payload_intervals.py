@@ -1,14 +1,15 @@
-"""Bodies that are wide, thin and centred: what the hybrid's intervals are worth where its payload prior misleads.
+"""What the hybrid's intervals are worth where its payload prior misleads: wide thin bodies, and light ones.
 
-    python benchmarks/wide_bodies.py [--episodes 2000] [--jobs 2] [--work out/fresh-panda]
+    python benchmarks/payload_intervals.py [--episodes 2000] [--jobs 2] [--work out/fresh-panda]
 
 A tray or a ring has the mass and the centre of a compact body and several times its inertia. Such bodies are among the
 training's, but rare. Here one takes the place of the payload in every episode of `fresh_episodes.py`: torque is linear
 in the ten parameters, so that h becomes h + Λ·(phi_wide − phi); the arm, its motion and all errors stay. Compared: the
 hybrid; the same log under the weak prior, trusted as far as the hybrid trusts it (`log alone`); what `identify` reports
-of the hybrid, with the prior's interval where `determined` says no; each also for the episodes' own payloads.
+of the hybrid, with the prior's interval where `determined` says no; each also for the episodes' own payloads, and the
+hybrid for those by weight, from one second on: a light payload is easily taken for nothing.
 
-Writes benchmarks/results/wide_bodies.json. Goes on from --work, which fresh_episodes.py shares.
+Writes benchmarks/results/payload_intervals.json. Goes on from --work, which fresh_episodes.py shares.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from __future__ import annotations
 import argparse
 import json
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +38,7 @@ from armload.payloads import solids
 
 MASS, SIDE, THICK = (0.3, 2.0), (0.2, 0.4), (0.002, 0.01)  # [kg, m]
 OFF, ALONG = 0.01, (0.01, 0.06)  # [m] centre off the flange's axis, and along it
+WEIGHTS = (0.03, 0.1, 0.2, 0.4, 1.0, 3.0)  # [kg]
 GROUPS = {"mass": [0], "first moments": [1, 2, 3], "inertia": list(range(4, 10)), "its diagonal": [4, 7, 9]}
 
 
@@ -99,7 +102,7 @@ def main() -> None:
             robot, episodes=options.episodes, seed=SEED, folder=options.work, jobs=options.jobs, progress=progress
         )
     bodies = np.array([wide(k) for k in range(len(np.unique(records.episode)))])
-    which, cells = nearest(records.t, np.array(TIMES)), []
+    which, cells, weights = nearest(records.t, np.array(TIMES)), [], []
     for name, some in (("wide", exchanged(records, bodies)), ("as drawn", records)):
         inside = held(robot, model, some)
         for kind, what in ((0, "no tare"), (1, "tare")):
@@ -111,14 +114,23 @@ def main() -> None:
                     cells.append(line | shares)
                     if t in (0.1, 1.0, 6.0):
                         print(*line.values(), *(f"{group} {100 * x:.1f} %" for group, x in shares.items()), sep="  ")
+        if name == "as drawn":
+            for low, high in pairwise(WEIGHTS):
+                rows = (low <= some.truth[:, 0]) & (some.truth[:, 0] < high) & (records.kind < 2) & (records.t > 0.8)
+                shares = {
+                    group: round(float(inside["hybrid"][rows][:, part].mean()), 4) for group, part in GROUPS.items()
+                }
+                weights.append({"kg": [low, high], "episodes": len(np.unique(records.episode[rows]))} | shares)
+                print(weights[-1])
     result = {
-        "command": f"python benchmarks/wide_bodies.py --episodes {options.episodes}",
+        "command": f"python benchmarks/payload_intervals.py --episodes {options.episodes}",
         "population": "broad",
         "seed": SEED,
         "cells": cells,
+        "weights": weights,
         "versions": versions(),
     }
-    path = RESULTS / "wide_bodies.json"
+    path = RESULTS / "payload_intervals.json"
     with replacing(path) as part:
         part.write_text(json.dumps(result, allow_nan=False) + "\n", encoding="utf-8")
     print(f"wrote {path}")
