@@ -24,8 +24,9 @@ from armload.arms import (
     payload_regressor,
     rated_effort,
 )
-from armload.errors import ArmError, ArmloadError
+from armload.errors import ArmError, ArmloadError, PayloadError
 from armload.inertia import InertialParameters, is_consistent, to_order
+from armload.payloads import franka_hand, hand_on
 
 LEVEL, TILTED = (0.0, 0.0, -9.81), (3.0, -2.0, -9.1)
 PAYLOAD = InertialParameters.from_com(
@@ -662,6 +663,55 @@ def test_a_known_arm_whose_links_and_joints_have_a_prefix_is_that_arm(tmp_path):
     found = arm(tmp_path / "two_arms.urdf", "left_tool0")
     assert found.joint_names == tuple(f"left_{name}" for name in known.joint_names)
     assert (found.known_as, found.rated_payload, found.motor_torque) == ("ur10e", 12.5, True)
+
+
+def called(tmp_path, name, old, new):
+    """A file of a built-in arm whose links and joints are called otherwise."""
+    path = tmp_path / "cell.urdf"
+    path.write_text(re.sub(rf'(name|link)="{old}_', rf'\1="{new}_', arm(name).urdf))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("name", "called_so", "flange"),
+    [
+        ("panda", None, "panda_link8"),
+        ("fr3", None, "fr3_link8"),
+        ("panda", "left_panda", "left_panda_link8"),
+        ("panda", "fer", "fer_link8"),
+        ("fr3", "fer", "fer_link8"),
+        ("fr3", "right", "right_link8"),
+    ],
+)
+def test_the_franka_hand_sits_on_the_flange_of_any_franka_whatever_it_is_called(tmp_path, name, called_so, flange):
+    robot = name if called_so is None else called(tmp_path, name, name, called_so)
+    hand = hand_on(arm(robot, flange)).parameters
+    assert hand.frame == flange
+    np.testing.assert_array_equal(hand.phi, franka_hand().parameters.phi)
+    # about link 7 the flange's origin is 0.107 m along z, axes parallel
+    np.testing.assert_allclose(
+        arm(robot, flange.replace("link8", "link7")).in_frame(hand).phi,
+        hand.moved(np.eye(3), [0, 0, 0.107]).phi,
+        atol=1e-12,
+    )
+
+
+def test_a_frame_that_the_arm_does_not_have_is_an_error_and_so_is_the_franka_hand_on_another_make(any_arm):
+    payload = InertialParameters(PAYLOAD.phi, "elsewhere_link8")
+    with pytest.raises(ArmError, match=f"{any_arm.name} has no frame 'elsewhere_link8'"):
+        any_arm.in_frame(payload)
+    if any_arm.name not in ("panda", "fr3"):
+        with pytest.raises(PayloadError, match=f"{any_arm.name} has no flange of a Franka.* such as 'tool0'"):
+            hand_on(any_arm)
+
+
+@pytest.mark.parametrize("frame", ["panda_link6", "panda_link5", "panda_link4"])
+def test_a_payload_behind_a_joint_that_does_not_move_the_frame_is_not_moved_to_it(frame):
+    behind = InertialParameters(PAYLOAD.phi, "panda_link8")
+    with pytest.raises(ArmError, match="joints lie between the two"):
+        arm("panda", frame).in_frame(behind)
+    with pytest.raises(ArmError, match="joints lie between the two"):
+        arm("panda").in_frame(InertialParameters(PAYLOAD.phi, frame))
 
 
 @pytest.mark.parametrize(("name", "frame"), [("panda", "panda_link8"), ("ur10e", "tool0")])

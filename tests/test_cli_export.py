@@ -4,6 +4,8 @@ import ast
 import json
 import os
 import re
+import subprocess
+import sys
 import threading
 import xml.etree.ElementTree as ET
 
@@ -15,6 +17,7 @@ from armload.cli import main
 from armload.cli.export import _EXAMPLES, _FORMS
 from armload.inertia import InertialParameters
 from armload.payloads import Payload, franka_hand, write_payload
+from armload.recording import write_recording
 from armload.sinks import FORMS
 
 HELD = InertialParameters.from_com(
@@ -136,6 +139,148 @@ def test_a_controller_gets_its_flange_and_a_description_the_frame_of_the_result(
     assert joint.find("parent").get("link") == "panda_link7"
     joint = ET.fromstring(export(result_of(at_link7), "--to", "urdf", "--frame", "panda_link8")[0]).find("./joint")
     assert joint.find("parent").get("link") == "panda_link8"
+
+
+def renamed(path, name, prefix):
+    """A file of a built-in arm whose links and joints are called otherwise; its path as text."""
+    path.write_text(re.sub(rf'(name|link)="{name}_', rf'\1="{prefix}_', arm(name).urdf))
+    return str(path)
+
+
+@pytest.mark.parametrize(("name", "prefix"), [("fr3", "fr3"), ("panda", "fer"), ("panda", "left_panda")])
+def test_the_hand_is_taken_off_and_put_on_any_franka_whatever_its_flange_is_called(export, tmp_path, name, prefix):
+    named = ["--robot", renamed(tmp_path / "cell.urdf", name, prefix)] if prefix != name else []
+    robot, flange = "cell" if named else name, f"{prefix}_link8"
+    alone = InertialParameters(HELD.phi, flange)
+    with_hand = alone + InertialParameters(franka_hand().parameters.phi, flange)
+    for measured, wanted, part in ((with_hand, alone, "--minus"), (alone, with_hand, "--plus")):
+        for frame in ("link7", "link8"):
+            moved = measured.moved(np.eye(3), [0, 0, 0.107 * (frame == "link7")], f"{prefix}_{frame}")
+            text, _ = export(
+                result_of(moved, robot=robot), "--to", "mjcf", part, "franka-hand", "--frame", flange, *named
+            )
+            np.testing.assert_allclose(mjcf_numbers(text)[:4], [wanted.mass, *wanted.com], atol=1e-12)
+    alone_again, _ = export(result_of(with_hand, robot=robot), "--to", "franka", "--minus", "franka-hand", *named)
+    com = ast.literal_eval(re.search(r"F_x_Cload = (\[.*?\])", alone_again).group(1))
+    np.testing.assert_allclose(com, HELD.com, atol=1e-12)
+
+
+@pytest.mark.parametrize("prefix", ["fr3", "fer"])
+def test_the_hand_is_a_tool_on_any_franka(tmp_path, capsys, analytic_log, prefix):
+    robot = renamed(tmp_path / "cell.urdf", "fr3", prefix) if prefix != "fr3" else "fr3"
+    carried = InertialParameters(HELD.phi + franka_hand().parameters.phi, f"{prefix}_link8")
+    write_recording(tmp_path / "log.csv", analytic_log(arm(robot), carried))
+    asked = ["--robot", robot, "--tool", "franka-hand", "--method", "map", "--json"]
+    assert main(["identify", str(tmp_path / "log.csv"), *asked]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["frame"], found["relative_to"]) == (f"{prefix}_link8", "tool")
+    assert found["mass"] == pytest.approx(HELD.mass, abs=0.02)
+    np.testing.assert_allclose(found["com"], HELD.com, atol=5e-3)
+
+
+def test_a_result_of_an_arm_that_is_a_panda_by_another_prefix_needs_no_file(export):
+    flange = "left_panda_link8"
+    both = InertialParameters((HELD + franka_hand().parameters).phi, flange)
+    text, _ = export(result_of(both), "--to", "franka", "--minus", "franka-hand")  # robot: panda, by its links
+    com = ast.literal_eval(re.search(r"F_x_Cload = (\[.*?\])", text).group(1))
+    np.testing.assert_allclose(com, HELD.com, atol=1e-12)
+
+
+def test_the_hand_is_exported_about_the_flange_of_the_robot_that_is_named(capsys):
+    assert main(["export", "franka-hand", "--to", "urdf", "--robot", "fr3"]) == 0
+    out = capsys.readouterr().out
+    assert ET.fromstring(out).find("./joint/parent").get("link") == "fr3_link8"
+
+
+def test_a_tool_file_about_a_frame_the_arm_lacks_and_the_hand_on_another_make_are_refused(export, tmp_path):
+    write_payload(tmp_path / "hand.json", franka_hand())
+    _, err = export(of_arm("fr3"), "--to", "franka", "--minus", str(tmp_path / "hand.json"), code=2)
+    assert "fr3 has no frame 'panda_link8'" in err
+    _, err = export(of_arm("ur5e"), "--to", "ur", "--plus", "franka-hand", code=2)
+    assert "ur5e has no flange of a Franka" in err
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize("to", ["urdf", "franka"])
+@pytest.mark.parametrize("frame", ["panda_link5", "panda_link6"])
+@pytest.mark.parametrize("robot", [None, "panda", "cell.urdf"])
+def test_joints_between_two_frames_are_an_error(export, tmp_path, robot, frame, to):
+    (tmp_path / "cell.urdf").write_text(arm("panda").urdf)
+    named = [] if robot is None else ["--robot", str(tmp_path / robot) if "." in robot else robot]
+    out, err = export(result_of(HELD), "--to", to, "--frame", frame, *named, code=2)
+    assert "joints lie between" in err
+    assert (out, err.count("\n")) == ("", 1)
+    # nor the other way, from a link before the last joint to the flange
+    behind = InertialParameters(HELD.phi, frame)
+    out, err = export(result_of(behind), "--to", to, "--frame", "panda_link8", *named, code=2)
+    assert "joints lie between" in err
+    out, err = export(result_of(behind), "--to", to, "--frame", frame, "--minus", "franka-hand", *named, code=2)
+    assert "joints lie between" in err
+
+
+@pytest.mark.parametrize(
+    ("relative_to", "says"),
+    [
+        ("tare", "relative to the tare: what was mounted then is not in it; was franka-hand mounted after it?"),
+        ("before", "relative to the empty arm before: what was mounted then is not in it; was franka-hand mounted"),
+        ("tool", "relative to the tool: the tool is not in it; is franka-hand mounted beside it?"),
+        ("arm", ""),
+    ],
+)
+def test_a_part_that_may_not_be_in_the_answer_is_asked_about(export, relative_to, says):
+    both = HELD + franka_hand().parameters
+    out, err = export(result_of(both, relative_to=relative_to), "--to", "mjcf", "--minus", "franka-hand")
+    np.testing.assert_allclose(mjcf_numbers(out)[0], HELD.mass)
+    assert says in err
+    assert (err == "") == (says == "")
+
+
+def test_a_part_that_is_taken_off_twice_is_said_to_be(export):
+    both = HELD + franka_hand().parameters + franka_hand().parameters
+    _, err = export(result_of(both), "--to", "mjcf", "--minus", "franka-hand", "--minus", "franka-hand")
+    assert "franka-hand is taken off 2 times" in err
+
+
+@pytest.mark.parametrize("relative_to", ["tare", "before", "tool"])
+def test_a_part_that_cannot_be_in_the_answer_is_refused(export, relative_to):
+    light = InertialParameters(0.5 * HELD.phi, HELD.frame)  # 0.6 kg, less than the hand
+    out, err = export(result_of(light, relative_to=relative_to), "--to", "mjcf", "--minus", "franka-hand", code=2)
+    assert out == ""
+    assert re.search(r"what is left has a mass of -0\.13 kg and is no body: relative to the .* is not in it", err)
+
+
+def test_a_link_given_as_the_file_stays_a_link(export, tmp_path):
+    link = tmp_path / "link.urdf"
+    (tmp_path / "robot.urdf").write_text("old")
+    link.symlink_to("robot.urdf")
+    export(result_of(HELD), "--to", "urdf", "--out", str(link))
+    assert link.is_symlink()
+    assert ET.parse(tmp_path / "robot.urdf").find("./link").get("name") == "payload"
+
+
+@pytest.mark.parametrize("into", ["pipe", "file"])
+def test_standard_output_can_be_named_as_the_file(export, tmp_path, into):
+    filed = export(result_of(HELD), "--to", "ur").out
+    link = tmp_path / "stdout"
+    link.symlink_to("/proc/self/fd/1")  # what /dev/stdout is
+    name = str(link) if into == "pipe" else "/proc/self/fd/1"
+    arguments = ["export", str(tmp_path / "held.json"), "--to", "ur", "--out", name]
+    code = f"from armload.cli import main; main({arguments!r})"
+    if into == "pipe":
+        said = subprocess.run([sys.executable, "-c", code], stdout=subprocess.PIPE, check=True).stdout.decode()
+        assert (said, link.is_symlink()) == (filed, True)
+        return
+    with (tmp_path / "out.txt").open("wb") as out:
+        out.write(b"# before\n")
+        out.flush()
+        subprocess.run([sys.executable, "-c", code], stdout=out, check=True)
+    assert (tmp_path / "out.txt").read_text() == f"# before\n{filed}"
+
+
+def test_a_folder_that_is_missing_is_named_and_no_temporary_file(export, tmp_path):
+    path = str(tmp_path / "no" / "p.urdf")
+    _, err = export(result_of(HELD), "--to", "urdf", "--out", path, code=2)
+    assert err == f"armload: {path} cannot be written: No such file or directory\n"
 
 
 def test_an_arm_that_is_not_built_in_is_named_by_its_file(export, tmp_path):

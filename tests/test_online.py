@@ -1,6 +1,7 @@
 """An identifier beside a running robot: what a stream may do to it, and what it must not."""
 
 import json
+import re
 from dataclasses import fields, replace
 
 import numpy as np
@@ -20,6 +21,8 @@ from armload.payloads import franka_hand
 from armload.payloads import test_payload as make_payload
 from armload.recording import Sample
 from armload.simulate import World, simulate
+from armload.sinks import Load, franka_robot
+from armload.sources import Simulator
 
 
 @pytest.fixture(scope="module")
@@ -209,6 +212,119 @@ def test_a_standing_arm_says_so_and_claims_no_inertia(panda, online):
     assert "not moving: inertia undetermined" in estimate.notes
     assert not estimate.determined[4:].any()
     assert abs(estimate.phi[0] - make_payload().parameters.mass) < 2.0 * estimate.std[0]
+
+
+# ---------------------------------------------------------------------- an old answer does not look like a new one
+
+
+def test_an_answer_ages_and_says_why_while_no_sample_can_be_used(online, log):
+    samples = list(log)
+    before = fed(online, samples[:600])
+    assert before.age < 0.02
+    assert before.notes == ()
+    dead = [(s.t, s.q, s.dq, np.where(np.arange(7) == 2, np.nan, s.tau)) for s in samples[600:900]]
+    after = fed(online, dead)
+    assert after.t == pytest.approx(samples[899].t)
+    assert after.age == pytest.approx(before.age + 1.5, abs=1e-6)
+    assert not after.moving  # nobody saw it move
+    assert after.notes == ("no sample could be used for 1.5 s (300 left out): torque of joint 3 is not a number",)
+    told = after.to_dict()
+    assert (told["left_out"], told["left_out_why"]) == (300, {"not finite": 300})
+    assert np.array_equal(after.phi, before.phi)
+    again = fed(online, samples[900:940])
+    assert again.notes == ()
+    assert again.age < 0.02
+
+
+def test_an_answer_is_as_old_as_the_pause_before_it(online, log):
+    samples = list(log)[:300]
+    before = fed(online, samples)
+    later = samples[-1]._replace(t=samples[-1].t + 8.0)
+    assert online.update(*later).age == pytest.approx(before.age + 8.0)
+
+
+BAD_STREAMS = {
+    "degrees": (lambda t, *x: (t, *np.degrees(x[:2]), x[2]), "position of joint .* is it in degrees"),
+    "no torque": (lambda t, q, dq, _: (t, q, dq, np.full(7, np.nan)), "torque of joint 1 is not a number"),
+    "no time": (lambda _, *x: (np.nan, *x), "the time is not a number"),
+    "one time": (lambda _, *x: (5.0, *x), "the time of the samples does not change"),
+    "six joints": (lambda t, *x: (t, *(a[:6] for a in x)), "expected 7 joints, found position"),
+    "no lists": (lambda t, *_: (t, None, None, "x"), "expected"),
+    "milliseconds": (lambda t, *x: (1e3 * t, *x), "samples come 5 s apart: .* in seconds"),
+}
+
+
+@pytest.mark.parametrize("bad", BAD_STREAMS)
+def test_a_stream_of_which_nothing_can_be_used_says_why(online, log, bad):
+    change, expected = BAD_STREAMS[bad]
+    estimate = fed(online, [change(*sample) for sample in list(log)[:120]])
+    (note,) = [note for note in estimate.notes if "moving" not in note]
+    assert re.search(expected, note)
+    assert note == online.trouble
+    assert not estimate.determined.any()
+
+
+def motion_that_ends(panda, payload, moves=6.0, stands=2.0, rate=200.0):
+    """Samples of an arm with a payload that comes to rest smoothly and stands there."""
+    t = np.arange(0.0, moves + stands, 1.0 / rate)
+    fine = np.arange(-0.01, moves + stands + 0.01, 1e-4)
+    fade = np.clip((moves - fine) / 1.5, 0.0, 1.0)
+    size = np.sin(0.5 * np.pi * fade**2 * (3.0 - 2.0 * fade)) ** 3
+    waves = np.sin(np.outer(fine, np.linspace(1.5, 3.5, 7)) + np.arange(7))
+    q = np.array([0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8]) + 0.35 * size[:, None] * waves
+    dq = np.gradient(q, 1e-4, axis=0)
+    q, dq, ddq = (
+        np.column_stack([np.interp(t, fine, x) for x in each.T]) for each in (q, dq, np.gradient(dq, 1e-4, axis=0))
+    )
+    loaded = panda.with_payload(payload)
+    return [Sample(t[k], q[k], dq[k], loaded.torque(q[k], dq[k], ddq[k])) for k in range(len(t))]
+
+
+class Client:
+    """A Franka that stands still, without an end effector."""
+
+    m_ee, dq, told = 0.0, np.zeros(7), None
+
+    def read_once(self):
+        return self
+
+    def set_load(self, *told):
+        self.told = told
+
+
+def test_a_standing_arm_says_that_it_notices_no_change_ages_and_can_be_written(panda, online):
+    payload = make_payload().parameters
+    samples = motion_that_ends(panda, payload)
+    estimates = [online.update(*sample) for sample in samples]
+    moving = [e for e in estimates if 1.0 < e.t < 4.5]
+    assert max(e.age for e in moving) < 0.02
+    assert not any(e.notes for e in moving)
+    last = estimates[-1]
+    assert any("noticed only when the arm moves" in note for note in last.notes)
+    assert 1.0 < last.age < 2.5  # since the rows that counted last
+    ages = np.array([e.age for e in estimates if e.t > 7.0])
+    assert np.ptp(np.diff(ages)) == pytest.approx(0.0, abs=1e-9)
+    assert ages[-1] - ages[0] == pytest.approx(samples[-1].t - 7.0, abs=0.011)
+    client = Client()
+    franka_robot.set_load(client, Load.of(last, panda), panda, write=True, allow_undetermined_inertia=True)
+    assert client.told[0] == pytest.approx(payload.mass, abs=0.02)
+
+
+def test_the_mass_of_a_change_is_what_the_runs_tell_once_its_kind_is_known(panda):
+    payload = make_payload().parameters
+    with Simulator(
+        panda, payloads=[(4.0, payload), (8.0, None)], speed=None, rate=200.0, duration=10.0, seed=1
+    ) as source:
+        identifier = OnlineIdentifier(panda, method="map-gp")
+        events = {}
+        for sample in source:
+            event = identifier.update(*sample).event
+            if event is not None:
+                events.setdefault(event.t, {})[event.kind == "change"] = event.mass
+        identifier.close()
+    (taken, put) = events.values()
+    assert taken[False] == pytest.approx(payload.mass, abs=0.15)
+    assert put[False] == pytest.approx(-payload.mass, abs=0.05)
 
 
 @pytest.mark.parametrize("method", [name for name, entry in METHODS.items() if not entry.needs])

@@ -1,10 +1,13 @@
 """Payload files: what is written reads back, and what cannot be used says in one sentence what is wrong."""
 
 import json
+import os
+import stat
 
 import numpy as np
 import pytest
 
+from armload.atomic import replacing
 from armload.errors import PayloadError
 from armload.inertia import InertialParameters
 from armload.payloads import (
@@ -113,3 +116,62 @@ def test_a_payload_file_that_is_not_there_or_not_text_says_so(tmp_path):
         read_payload(tmp_path / "b.json")
     with pytest.raises(PayloadError, match="cannot be written"):
         write_payload(tmp_path / "no" / "p.json", franka_hand())
+
+
+def test_what_a_link_points_to_is_replaced_and_the_link_stays(tmp_path):
+    (tmp_path / "there").mkdir()
+    target, far, link = tmp_path / "there" / "p.json", tmp_path / "far.json", tmp_path / "link.json"
+    target.write_text("old")
+    far.symlink_to(target)
+    link.symlink_to("far.json")
+    write_payload(link, franka_hand())
+    assert (link.is_symlink(), far.is_symlink(), target.is_symlink()) == (True, True, False)
+    np.testing.assert_array_equal(read_payload(target).parameters.phi, HAND.phi)
+    target.unlink()
+    write_payload(link, franka_hand())  # a link to nothing is where the file appears
+    np.testing.assert_array_equal(read_payload(target).parameters.phi, HAND.phi)
+    assert sorted(p.name for p in tmp_path.rglob("*")) == ["far.json", "link.json", "p.json", "there"]
+
+
+def test_a_pipe_is_written_into_and_stays_a_pipe(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    kept = os.open(pipe, os.O_RDWR)  # so that nobody waits for ever if the pipe is replaced
+    try:
+        write_payload(pipe, franka_hand())
+        assert stat.S_ISFIFO(pipe.stat().st_mode)
+        os.set_blocking(kept, False)
+        read = os.read(kept, 65536)
+    finally:
+        os.close(kept)
+    write_payload(tmp_path / "p.json", franka_hand())
+    assert read == (tmp_path / "p.json").read_bytes()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["p.json", "pipe"]
+
+
+def test_a_device_is_written_into_and_stays_a_device(tmp_path):
+    ours, theirs = os.openpty()  # a terminal: not even root can put a file in its place
+    try:
+        link = tmp_path / "terminal.json"
+        link.symlink_to(os.ttyname(theirs))
+        write_payload(link, franka_hand())
+        assert link.is_symlink()
+        assert stat.S_ISCHR(link.stat().st_mode)
+        shown = os.read(ours, 65536).decode()
+    finally:
+        os.close(ours)
+        os.close(theirs)
+    np.testing.assert_array_equal(json.loads(shown)["phi"], HAND.phi)
+
+
+def test_a_folder_that_is_missing_is_said_under_the_name_that_was_given(tmp_path):
+    for path in (tmp_path / "no" / "p.json", tmp_path, tmp_path / "round"):
+        if path.name == "round":
+            path.symlink_to(path)
+        with pytest.raises(PayloadError, match="cannot be written") as caught:
+            write_payload(path, franka_hand())
+        assert str(path) in str(caught.value)
+        with pytest.raises(OSError) as raised, replacing(path):  # noqa: PT011
+            pass
+        assert raised.value.filename == str(path)
+    assert [p.name for p in tmp_path.iterdir()] == ["round"]

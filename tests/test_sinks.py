@@ -19,7 +19,7 @@ from armload.answer import Identification
 from armload.arms import ARMS, Arm, arm, momentum_regressor
 from armload.errors import ArmError, ArmloadError, InertiaError, PayloadError, SinkError
 from armload.inertia import InertialParameters, is_consistent
-from armload.payloads import franka_hand, random_payload, test_payload, write_payload
+from armload.payloads import franka_hand, hand_on, random_payload, test_payload, write_payload
 from armload.sinks import (
     FORMS,
     Load,
@@ -387,6 +387,36 @@ def test_what_was_measured_minus_the_hand():
         measured - InertialParameters(hand.phi, "panda_hand")
 
 
+def test_the_hand_taken_off_twice_is_refused_where_no_body_is_left_and_only_there():
+    hand, held = franka_hand().parameters, InertialParameters(test_payload().parameters.phi, "panda_link8")
+    once = Load.of(identification(held + hand)) - hand
+    light = Load.of(identification(InertialParameters(0.3 * held.phi, held.frame) + hand)) - hand
+    with pytest.raises(
+        SinkError, match=r"mass of -0\.286 kg and is no body: relative to the tool.* do not take it off"
+    ):
+        light - hand
+    assert (once - InertialParameters(0.4 * held.phi, held.frame)).consistent  # another part that is in it
+    for relative_to in ("tare", "before"):
+        with pytest.raises(SinkError, match="what was mounted then is not in it"):
+            Load(InertialParameters(0.9 * hand.phi, hand.frame), relative_to=relative_to) - hand
+
+
+def test_what_is_left_within_the_error_bars_of_a_body_is_left():
+    hand = franka_hand().parameters
+    rod = InertialParameters.from_com(0.4, (0, 0, 0.1), np.diag([3e-3, 3e-3, 1e-5]), "panda_link8")
+    off = np.zeros(10)
+    off[9] = -2e-5  # the rod is turned more easily than anything can be
+    measured = InertialParameters((rod + hand).phi + off, "panda_link8")
+    near = Load(measured, relative_to="tare", std=np.full(10, 2e-5)) - hand
+    assert not near.consistent
+    assert near.as_body().consistent
+    with pytest.raises(SinkError, match="is no body"):
+        Load(measured, relative_to="tare", std=np.full(10, 1e-7)) - hand
+    with pytest.raises(SinkError, match="is no body"):
+        Load(measured, relative_to="tare") - hand
+    assert not (Load(measured, relative_to="arm") - hand).consistent  # as_body may mend it
+
+
 def test_what_no_body_has_is_not_exported_and_the_nearest_body_is():
     phi = skew_body().phi.copy()
     phi[4:] *= 0.1  # less than the mass at its centre needs
@@ -414,6 +444,20 @@ def test_moving_a_load_needs_the_arm_that_knows_both_frames():
         about(skew_body(), "panda_link7")
     with pytest.raises(ArmError, match="unknown frame 'elsewhere'"):
         about(skew_body(), "elsewhere", panda)
+
+
+@pytest.mark.parametrize("frame", ["panda_link4", "panda_link6"])
+def test_a_load_is_not_moved_over_a_joint(frame):
+    panda = arm("panda")
+    for there, here in (("panda_link8", frame), (frame, "panda_link8"), (frame, "panda_link5")):
+        with pytest.raises(ArmError, match="joints lie between the two"):
+            about(skew_body(there), here, panda)
+    with pytest.raises(ArmError, match="joints lie between the two"):
+        about(hand_on(arm("fr3")).parameters, frame.replace("panda", "fr3"), arm("fr3"))
+    with pytest.raises(ArmError, match="joints lie between the two"):
+        check_writable(Load(skew_body()), panda, moving=False, write=True, flange=frame)
+    with pytest.raises(ArmError, match="unknown frame 'nowhere'"):
+        check_writable(Load(skew_body("nowhere")), panda, moving=False, write=True, flange="nowhere")
 
 
 def test_forms_that_name_the_frame_need_it():

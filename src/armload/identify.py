@@ -65,7 +65,7 @@ def identify(
     say("identifying")
     if tool is None:
         return _answer(_run(recording, arm, tare, method), arm, recording, "arm" if tare is None else "tare")
-    tool = _plausible_tool(arm.in_frame(tool), arm)
+    tool = plausible_tool(arm.in_frame(tool), arm)
     if tare is None:
         arm = arm.with_payload(tool)
         return _answer(_run(recording, arm, None, method), arm, recording, "tool")
@@ -86,7 +86,12 @@ def identify(
     return _answer(found, arm, recording, relative_to, (note,), otherwise)
 
 
-def _plausible_tool(tool: InertialParameters, arm: Arm) -> InertialParameters:
+def plausible_tool(tool: InertialParameters, arm: Arm) -> InertialParameters:
+    """The tool, if an arm can carry so much.
+
+    Raises:
+        IdentificationError: it weighs more than three times the rated payload: in grams, say.
+    """
     most = 6.0 * float(payload_prior_std(arm)[0])  # three times the rated payload
     if not abs(tool.mass) <= most:
         raise IdentificationError(

@@ -12,6 +12,7 @@ from armload.errors import ArmError
 _MOVING = ("revolute", "continuous", "prismatic")
 _TYPES = (*_MOVING, "fixed", "floating", "planar")
 _ENDLESS = "1e4"  # [rad] limit given to a continuous joint, so that both engines treat it as one angle
+HELD = "held"  # marks a joint that could move, but does not move the payload frame, and is fixed at zero
 _NUMBERS = {
     "origin": ("xyz", "rpy"),
     "axis": ("xyz",),
@@ -23,17 +24,23 @@ _NUMBERS = {
 
 @dataclass(frozen=True)
 class Chain:
-    """A URDF without meshes whose only moving joints lead from the root to the payload frame."""
+    """A URDF without meshes whose only moving joints lead from the root to the payload frame.
+
+    rigid: the links that move with the payload frame, all joints between fixed.
+    """
 
     name: str
     xml: str
     frame: str
     joint_names: tuple[str, ...]
     frames: tuple[str, ...]
+    rigid: tuple[str, ...]
 
 
 def read_chain(xml: str, frame: str | None, where: str) -> Chain:
     """The serial chain of a URDF that carries `frame`; every joint off the chain (fingers, say) is fixed at zero.
+
+    Such a joint is marked `HELD`: what it carries does not move with the payload frame.
 
     Args:
         xml: the text of a URDF file.
@@ -104,6 +111,8 @@ def read_chain(xml: str, frame: str | None, where: str) -> Chain:
         raise ArmError(f"no joint of {where} moves the frame {frame!r}: choose a frame behind the arm's joints")
     for joint in joints.values():
         if joint not in moving:
+            if joint.get("type") in _MOVING:
+                joint.set(HELD, "true")
             joint.set("type", "fixed")
         elif joint.get("type") == "continuous":
             joint.set("type", "revolute")
@@ -112,12 +121,20 @@ def read_chain(xml: str, frame: str | None, where: str) -> Chain:
                 limit = ET.SubElement(joint, "limit", effort="0", velocity="0")
             limit.set("lower", "-" + _ENDLESS)
             limit.set("upper", _ENDLESS)
+
+    def base(link: str) -> str | None:
+        """What a link is rigidly part of: the last moving or held joint before it."""
+        while link in joints and joints[link] not in moving and HELD not in joints[link].attrib:
+            link = parents[link]
+        return joints[link].get("name") if link in joints else None
+
     return Chain(
         name=root.get("name") or "robot",
         xml=ET.tostring(root, encoding="unicode"),
         frame=frame,
         joint_names=tuple(str(j.get("name")) for j in moving),
         frames=tuple(links),
+        rigid=tuple(link for link in links if base(link) == moving[-1].get("name")),
     )
 
 

@@ -105,6 +105,7 @@ class Arm:
         object.__setattr__(self, "frame", chain.frame)
         object.__setattr__(self, "_joint_names", chain.joint_names)
         object.__setattr__(self, "_frames", chain.frames)
+        object.__setattr__(self, "_rigid", chain.rigid)
         _ = self._model  # fail now, not at the first sample
 
     def __getstate__(self) -> dict[str, Any]:
@@ -196,11 +197,12 @@ class Arm:
             return InertialParameters(parameters.phi, self.frame)
         if there not in self.frames:
             raise ArmError(f"{self.name} has no frame {there!r}: expected one of {', '.join(self.frames)}")
-        index = self._model.getFrameId(there, pin.FrameType.BODY)
-        if self._model.frames[index].parentJoint != self.n:
+        if there not in self._rigid:  # type: ignore[attr-defined]
             raise ArmError(
-                f"frame {there!r} does not move with {self.frame!r}: a payload must sit behind the last joint"
+                f"frame {there!r} does not move with {self.frame!r}, joints lie between the two: a payload must sit "
+                "behind the last joint"
             )
+        index = self._model.getFrameId(there, pin.FrameType.BODY)
         offset = self._frame_placement.actInv(self._model.frames[index].placement)
         return parameters.moved(offset.rotation, offset.translation, self.frame)
 

@@ -146,12 +146,13 @@ def arm_of_dataset(dataset: Dataset, robot: str | None) -> Arm:
     return made_with
 
 
-def payload_of(name: str) -> InertialParameters:
-    """The parameters of a payload file, or of a built-in one by name."""
-    from armload.payloads import franka_hand, read_payload, test_payload
+def payload_of(name: str, arm: Arm | None = None) -> InertialParameters:
+    """The parameters of a payload file, or of a built-in one by name; the hand is about the arm's own flange."""
+    from armload.payloads import franka_hand, hand_on, read_payload, test_payload
 
-    built_in = {"franka-hand": franka_hand, "test": test_payload}
-    return (built_in[name]() if name in built_in else read_payload(name)).parameters
+    if name == "franka-hand":
+        return (franka_hand() if arm is None else hand_on(arm)).parameters
+    return (test_payload() if name == "test" else read_payload(name)).parameters
 
 
 def motion_of(name: str, arm: Arm) -> Motion:

@@ -10,11 +10,13 @@ from armload.cli.printing import print_note
 
 if TYPE_CHECKING:
     from armload.arms import Arm
+    from armload.inertia import InertialParameters
     from armload.sinks import Load
 
 # the names of armload.sinks.FORMS, so that --help need not import them; a test compares
 _FORMS = ("franka", "franka-desk", "ur", "ur-payload", "urdf", "mjcf", "sdf", "ros2")
 _MAKERS = {"franka": ("panda", "fr3"), "ur": ("ur5e", "ur10e")}
+_FRANKA_FLANGE = "_link8"  # with the arm's name before it
 _EXAMPLES = """\
 examples:
   armload identify run.csv --robot panda --json > held.json
@@ -82,17 +84,19 @@ def run(options: argparse.Namespace) -> None:
     """Read, combine, move, write."""
     from armload.determined import held
     from armload.errors import SinkError
-    from armload.sinks import CONTROLLERS, about, export_load
+    from armload.sinks import CONTROLLERS, export_load
 
-    load = _load_of(options.result)
-    arm = _arm_of(options, load)
+    arm = None if options.robot is None else _named(options)
+    load = _load_of(options.result, arm)
+    arm = arm or _arm_of(load)
+    doubts = _doubts(options.minus, load)
     for part in options.minus:
-        load = load - about(payload_of(part), load.frame, arm)
+        load = load - _part(part, load, arm)
     for part in options.plus:
-        load = load + about(payload_of(part), load.frame, arm)
+        load = load + _part(part, load, arm)
     nothing = load.std is not None and load.determined[0] and not held(load.parameters.mass, load.std[0], True)
     frame = options.frame
-    if frame is None and arm is not None and (options.to in CONTROLLERS or load.frame is None):
+    if frame is None and arm is not None and (load.frame is None or (options.to in CONTROLLERS and not _on(load, arm))):
         frame = arm.frame
     load = load.about(frame, arm)
     elsewhere = options.to in CONTROLLERS and load.frame is not None and not _is_flange(load.frame)
@@ -112,7 +116,7 @@ def run(options: argparse.Namespace) -> None:
         print_note("nothing seems to be held: the mass is within three standard deviations of zero")
     if elsewhere:
         print_note(f"a controller counts from its flange; these numbers are about {load.frame}, as was asked for")
-    for note in _notes(body, options.to):
+    for note in (*doubts, *_notes(body, options.to)):
         print_note(note)
     if options.out is None:
         print(text, end="")
@@ -128,22 +132,52 @@ def _flanges() -> list[str]:
 
 def _is_flange(frame: str) -> bool:
     """Whether a frame is called as a built-in arm's flange, with whatever prefix."""
-    return frame.endswith(tuple(_flanges()))
+    return frame.endswith((*_flanges(), _FRANKA_FLANGE))
 
 
-def _load_of(name: str) -> Load:
+def _on(load: Load, arm: Arm) -> bool:
+    """Whether a load is about a flange already that an arm knows by another name."""
+    return load.frame is not None and load.frame not in arm.frames and _is_flange(load.frame)
+
+
+def _named(options: argparse.Namespace) -> Arm:
+    from armload.arms import arm
+
+    return arm(options.robot, options.frame)
+
+
+def _load_of(name: str, arm: Arm | None) -> Load:
     from armload.sinks import Load, read_load
 
-    return Load(payload_of(name)) if name in ("franka-hand", "test") else read_load(name)
+    return Load(payload_of(name, arm)) if name in ("franka-hand", "test") else read_load(name)
 
 
-def _arm_of(options: argparse.Namespace, load: Load) -> Arm | None:
-    """The arm that `--robot` or the result names; None where the result's is only known to whoever made it."""
+def _arm_of(load: Load) -> Arm | None:
+    """The arm that a result names; None where it is only known to whoever made it."""
     from armload.arms import ARMS, arm
 
-    if options.robot is not None:
-        return arm(options.robot, options.frame)
     return arm(load.robot) if load.robot in ARMS else None
+
+
+def _part(name: str, load: Load, arm: Arm | None) -> InertialParameters:
+    """A part about the load's own frame; the Franka Hand sits on the flange, whatever that is called."""
+    from armload.payloads import franka_hand
+    from armload.sinks import about
+
+    if name == "franka-hand" and load.frame is not None and load.frame.endswith(_FRANKA_FLANGE):
+        return franka_hand(load.frame).parameters
+    return about(payload_of(name, arm), load.frame, arm)
+
+
+def _doubts(parts: list[str], load: Load) -> list[str]:
+    """What to ask of whoever takes parts off a load: whether they are in it, and only once."""
+    doubts = [
+        f"{part} is taken off {parts.count(part)} times" for part in dict.fromkeys(parts) if parts.count(part) > 1
+    ]
+    if parts and load.lacks is not None:
+        asked = "is {} mounted beside it?" if load.relative_to == "tool" else "was {} mounted after it?"
+        doubts += [f"{load.lacks}; {asked.format(part)}" for part in dict.fromkeys(parts)]
+    return doubts
 
 
 def _notes(load: Load, to: str) -> list[str]:

@@ -57,7 +57,7 @@ def run(options: argparse.Namespace) -> None:
 
     with working("reading") as say:
         arm = arm_of(options)
-        tool = None if options.tool is None else payload_of(options.tool)
+        tool = None if options.tool is None else payload_of(options.tool, arm)
         if options.tare_topic is not None and options.tare is None:
             raise UsageError("--tare-topic names a topic of the tare's bag, but there is no --tare")
         bags = [path for path in (options.log, options.tare) if path is not None and has_topics(path)]

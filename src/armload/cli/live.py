@@ -3,11 +3,23 @@
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
-from armload.cli.arguments import Parser, add_arm_arguments, add_identifier_arguments, arm_of, at_least, file_name
+from armload.cli.arguments import (
+    Parser,
+    add_arm_arguments,
+    add_identifier_arguments,
+    arm_of,
+    at_least,
+    file_name,
+    payload_of,
+)
 from armload.cli.printing import print_note
-from armload.errors import UsageError
+from armload.errors import ArmloadError, UsageError
+
+if TYPE_CHECKING:
+    from armload.arms import Arm
 
 _EXAMPLES = """\
 examples:
@@ -15,6 +27,7 @@ examples:
   armload live run.csv --robot panda --speed 2 --loop
   armload live fr3://172.16.0.2 --record today.csv
   armload live panda://172.16.0.2 --tare empty.csv --headless | tee estimates.jsonl
+  armload live panda://172.16.0.2 --tool franka-hand
   armload live 'ur://192.168.0.10?torque_constants=12,12,10,11,11,11' --robot ur10e
   armload live ros2:///joint_states --robot my_arm.urdf --frame tool0
 
@@ -45,6 +58,12 @@ def parser() -> Parser:
     )
     add_arm_arguments(parser, required=False)
     add_identifier_arguments(parser)
+    parser.add_argument(
+        "--tool",
+        type=file_name,
+        metavar="FILE",
+        help="a mounted tool that is known (JSON, or franka-hand); the answer is what it carries",
+    )
     parser.add_argument("--headless", action="store_true", help="no page: one JSON object per line on stdout")
     parser.add_argument(
         "--every",
@@ -75,14 +94,14 @@ def parser() -> Parser:
     return parser
 
 
-def run(options: argparse.Namespace) -> None:
-    """Identify until the source ends (--headless) or somebody interrupts."""
+def run(options: argparse.Namespace) -> int | None:
+    """Identify until the source ends (--headless) or somebody interrupts; 2 if an error was told meanwhile."""
     from armload.live import Session
     from armload.recording import read_recording
     from armload.sources import open_source
 
     options.robot = options.robot or _robot_of(options.source)
-    arm = arm_of(options)
+    arm = _arm_of(options)
     tare = None if options.tare is None else read_recording(options.tare, arm, topic=options.topic)
     # the page takes time from its own process: what runs on the clock is read in another one
     beside = True if not options.headless and options.speed is not None and options.speed <= 1.0 else None
@@ -96,11 +115,30 @@ def run(options: argparse.Namespace) -> None:
         topic=options.topic,
     )
     with source:
-        session = Session(source, arm, tare, options.method)
+        session = Session(source, arm, tare, options.method, _warn)
         try:
-            _print_lines(session, options) if options.headless else _serve(session, options)
+            return _print_lines(session, options) if options.headless else _serve(session, options)
         finally:
             session.close()
+
+
+def _arm_of(options: argparse.Namespace) -> Arm:
+    """The arm, with the tool that is mounted if one is known."""
+    arm = arm_of(options)
+    if options.tool is None:
+        return arm
+    if options.tare is not None:
+        raise UsageError(
+            "--tool and --tare together are for a log (armload identify), which finds out whether the tool was mounted "
+            "at the tare: on a live robot give one of them; with a tare, the answer is what was added since"
+        )
+    from armload.identify import plausible_tool
+
+    return arm.with_payload(plausible_tool(arm.in_frame(payload_of(options.tool, arm)), arm))
+
+
+def _warn(text: str) -> None:
+    print_note(f"warning: {text}")
 
 
 def _print_lines(session, options: argparse.Namespace) -> None:
@@ -110,7 +148,7 @@ def _print_lines(session, options: argparse.Namespace) -> None:
         print(line, flush=True)
 
 
-def _serve(session, options: argparse.Namespace) -> None:
+def _serve(session, options: argparse.Namespace) -> int | None:
     from armload.live.page import Page
 
     page = Page(session, options.host, options.port)
@@ -119,8 +157,9 @@ def _serve(session, options: argparse.Namespace) -> None:
         print_note(f"{session.source.name}: {page.url} (Ctrl-C ends it)")
         page.serve()
     except KeyboardInterrupt:  # the only way to end it
-        if session.error is not None:
-            raise session.error from None
+        if session.error is not None and not isinstance(session.error, (ArmloadError, OSError)):
+            raise session.error from None  # a bug: whoever wants to see where asks for it
+        return 0 if session.error is None else 2  # which was told when it happened
     finally:
         page.close()
 

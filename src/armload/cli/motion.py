@@ -169,7 +169,7 @@ def _limits(payload_name: str, arm: Arm, motion: Motion) -> tuple[MotionCheck, s
         payload = rated_load(arm)
         carried = "the rated payload" if payload is not None else "nothing (its rated payload is not known)"
     else:
-        payload = None if payload_name == "none" else arm.in_frame(payload_of(payload_name))
+        payload = None if payload_name == "none" else arm.in_frame(payload_of(payload_name, arm))
         carried = "nothing" if payload is None else payload_name
     return check_motion(arm, motion, payload), carried
 

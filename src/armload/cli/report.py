@@ -78,7 +78,7 @@ def _of_log(options: argparse.Namespace, say: Callable[[str], None]) -> tuple[li
     from armload.report import default_report, log_report
 
     arm = arm_of(options)
-    truth = None if options.truth is None else arm.in_frame(payload_of(options.truth))
+    truth = None if options.truth is None else arm.in_frame(payload_of(options.truth, arm))
     log = read_recording(options.log, arm, topic=options.topic)
     tare = None if options.tare is None else read_recording(options.tare, arm, topic=options.topic)
     for recording in (log, tare):

@@ -154,7 +154,7 @@ def _simulate(options: argparse.Namespace) -> None:
     limits = arm.limits
     middle = 0.5 * (limits.position_low + limits.position_high)
     stand = np.where(np.isfinite(middle), middle, 0.0)
-    payload = None if options.payload is None else payload_of(options.payload)
+    payload = None if options.payload is None else payload_of(options.payload, arm)
     first = stand if options.motion is None else motion_of(options.motion, arm)
     connection = Ros2Connection("armload_robot")
     try:

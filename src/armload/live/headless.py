@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import time
 from collections.abc import Iterator
 from typing import Any
 
@@ -13,10 +14,11 @@ from armload.online import OnlineEstimate
 
 
 def lines(session: Session, every: float = 0.1, duration: float | None = None) -> Iterator[str]:
-    """One JSON object per `every` seconds of the stream's clock, and one for the last sample.
+    """One JSON object per `every` seconds of the stream's clock, one at each change, and one for the last sample.
 
     The fields are those of `OnlineEstimate.to_dict`, and `robot`; and `truth`, phi as it really is, where the source
-    knows. Nothing is said before there is anything to say.
+    knows. What is not determined yet says so in the line. While samples have no times that rise, a line comes every
+    `every` seconds of this machine's clock.
 
     Args:
         session: runs here, in this thread. every: 0: one line per sample. duration: end after so long [s].
@@ -24,15 +26,18 @@ def lines(session: Session, every: float = 0.1, duration: float | None = None) -
     Raises:
         SourceError: the connection was lost.
     """
-    told, last = -math.inf, None
+    told, changed, last, clock, since = -math.inf, None, None, None, time.monotonic()
     for estimate in session.estimates(duration):
-        last = estimate
+        last, now = estimate, time.monotonic()
+        if estimate.t != clock:
+            clock, since = estimate.t, now
+        event = estimate.event and (estimate.event.t, estimate.event.kind)
         # a clock that was set back counts as later; a thousandth less, or rounding would double the distance
-        if abs(estimate.t - told) >= 0.999 * every and _says_something(estimate):
-            told, last = estimate.t, None
+        if abs(estimate.t - told) >= 0.999 * every or event != changed or now - since >= every:
+            told, changed, last, since = estimate.t, event, None, now
             yield _json(estimate, session)
-    if last is not None and _says_something(last):
-        yield _json(last, session)
+    if last is not None:
+        yield _json(session.estimate or last, session)
 
 
 def line_of(estimate: OnlineEstimate, robot: str, truth: InertialParameters | None = None) -> dict[str, Any]:
@@ -43,11 +48,6 @@ def line_of(estimate: OnlineEstimate, robot: str, truth: InertialParameters | No
 
 def _json(estimate: OnlineEstimate, session: Session) -> str:
     return json.dumps(line_of(estimate, session.arm.name, session.truth(estimate.t)), allow_nan=False)
-
-
-def _says_something(estimate: OnlineEstimate) -> bool:
-    """A mass of exactly zero is none that was found, and it has no centre."""
-    return estimate.n_samples > 0 and float(estimate.phi[0]) != 0.0
 
 
 def _finite(value: Any) -> Any:

@@ -6,6 +6,7 @@ something changed leaves an order, which is carried out between two samples.
 
 from __future__ import annotations
 
+import math
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -20,21 +21,27 @@ from armload.determined import Z95
 from armload.errors import IdentificationError, SourceError
 from armload.inertia import InertialParameters
 from armload.live.history import History
+from armload.live.plausible import Plausibility
 from armload.live.recent import Recent
 from armload.online import Event, OnlineEstimate, OnlineIdentifier
 from armload.recording import Recording, Sample
 from armload.sources import Source
 
+_AGAIN = 10.0  # [s] between two warnings of samples that cannot be used
 _TARE_LONGEST, _TARE_SHORTEST = 30.0, 3.0  # [s] of what was just seen that a tare is made of
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A line of the log: what happened, and when on the stream's clock [s]; `event`, if it was a change of payload."""
+    """A line of the log: what happened, and when on the stream's clock [s]; `event`, if it was a change of payload.
+
+    warning: something is wrong.
+    """
 
     t: float
     text: str
     event: Event | None = None
+    warning: bool = False
 
 
 class Session:
@@ -50,10 +57,11 @@ class Session:
 
     Args:
         source: closed with the session.
-        arm: the bare arm. tare: an earlier log of it. method: see `OnlineIdentifier`.
+        arm: the bare arm, or with a tool that is known. tare: an earlier log of it. method: see `OnlineIdentifier`.
+        warn: told at once what is wrong with the stream, also what it ended with in a thread of its own (`start`).
 
     Attributes:
-        sample, estimate: the newest ones; None before the first.
+        sample: the newest that could be used. estimate: the newest. None before the first.
         history: rows (30,) of phi, half-widths of the 95 % intervals and the truth, NaN where nobody knows it.
         log: what happened, the last 200 entries.
         ended: the source has ended. error: what it ended with, if that was one.
@@ -63,9 +71,15 @@ class Session:
     """
 
     def __init__(
-        self, source: Source, arm: Arm, tare: Recording | None = None, method: str | Path | None = None
+        self,
+        source: Source,
+        arm: Arm,
+        tare: Recording | None = None,
+        method: str | Path | None = None,
+        warn: Callable[[str], None] | None = None,
     ) -> None:
         self.source, self.arm, self.tare = source, arm, tare
+        self._warn_too = warn or (lambda _: None)
         # what was held while the tare was recorded; None: nobody knows
         self._tared = InertialParameters.zero(arm.frame) if tare is None else None
         self._identifier = self._made(tare, method)
@@ -77,6 +91,11 @@ class Session:
         self.error: Exception | None = None
         self._orders: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._recent = Recent(arm.n)
+        self._plausibility = Plausibility(arm, source.name)
+        self._trouble, self._warned = (
+            False,
+            -np.inf,
+        )  # whether it is told that samples cannot be used, and when it was last
         self._thread: threading.Thread | None = None
         self._stop = False
 
@@ -104,9 +123,14 @@ class Session:
                 self._orders.get()()
             estimate = self._take(sample)
             yield estimate
-            first = sample.t if first is None else first
-            if self._stop or (duration is not None and sample.t - first >= duration):
+            if first is None and math.isfinite(sample.t):
+                first = sample.t
+            if self._stop or (duration is not None and first is not None and sample.t - first >= duration):
                 break
+        if self._plausibility.look_at_last(self._recent):
+            self._doubted()
+            if self.estimate is not None:
+                self.estimate = self._plausibility.qualified(self.estimate)
         self._say("the source has ended")
         self.ended = True
 
@@ -123,7 +147,7 @@ class Session:
                 self.run(duration)
             except Exception as error:
                 self.error, self.ended = error, True
-                self._say(str(error))
+                self._warn(str(error))
 
         self._thread = threading.Thread(target=loop, name="armload-session", daemon=True)
         self._thread.start()
@@ -139,25 +163,47 @@ class Session:
     def _take(self, sample: Sample) -> OnlineEstimate:
         before, used = self.estimate, self._identifier.health.used
         estimate = self._identifier.update(*sample)
-        self.sample, self.estimate = sample, estimate
         if estimate.event is not None and (before is None or estimate.event != before.event):
             self._tell(estimate.event)
-        if estimate.health.used > used:
+        usable = estimate.health.used > used
+        if usable:
             self._recent.append(sample)
-        if self.history.due(estimate.t):
+            if self._plausibility.look(sample, estimate.health, self._recent):
+                self._doubted()
+        estimate = self._plausibility.qualified(estimate)
+        self.sample, self.estimate = sample if usable else self.sample, estimate
+        if self._trouble or self._identifier.trouble is not None:
+            self._listen(self._identifier.trouble)
+        if usable and self.history.due(estimate.t):
             truth = self.truth(estimate.t)
             known = np.full(10, np.nan) if truth is None else truth.phi
             self.history.append(estimate.t, np.concatenate([estimate.phi, Z95 * estimate.std, known]))
         return estimate
 
+    def _doubted(self) -> None:
+        doubt = self._plausibility.doubt
+        self._say("the samples are plausible now") if doubt is None else self._warn(doubt)
+
+    def _listen(self, trouble: str | None) -> None:
+        """Tell that samples cannot be used, and that they can again; not each time of a stream that stutters."""
+        now = 0.0 if self.estimate is None else self.estimate.t
+        if trouble is None:
+            self._trouble = False
+            self._say("samples can be used again")
+        elif not self._trouble and not 0.0 <= now - self._warned < _AGAIN:
+            self._trouble, self._warned = True, now
+            self._warn(trouble)
+
     def _tell(self, event: Event) -> None:
         """Into the log; what a change was is known a little later, in place of the first guess."""
-        known = bool(self.log) and self.log[-1].event is not None and self.log[-1].event.t == event.t
-        if known:
-            self.log.pop()
-        else:
-            self._recent.clear()
-        self.log.append(Entry(event.t, str(event), event))
+        entry = Entry(event.t, str(event), event)
+        for k, known in enumerate(self.log):
+            if known.event is not None and known.event.t == event.t:
+                self.log[k] = entry
+                return
+        self._recent.clear()
+        self._plausibility.forget()
+        self.log.append(entry)
 
     def truth(self, t: float) -> InertialParameters | None:
         """What was added since the tare, or is held at all, at time t [s]; None where the source does not know."""
@@ -181,6 +227,7 @@ class Session:
         def order() -> None:
             self._identifier.reset()
             self._recent.clear()
+            self._plausibility.reset()
             self._say("started anew")
 
         self._orders.put(order)
@@ -211,6 +258,7 @@ class Session:
             self._identifier.close()
             self._identifier, self.tare, self._tared = identifier, tare, tared
             self._recent.clear()
+            self._plausibility.forget()
             self._say(text)
 
         self._orders.put(order)
@@ -223,5 +271,9 @@ class Session:
         # an arm's model computes in a memory of its own, which two threads must not share
         return OnlineIdentifier(replace(self.arm), tare, method)
 
-    def _say(self, text: str) -> None:
-        self.log.append(Entry(0.0 if self.estimate is None else self.estimate.t, text))
+    def _say(self, text: str, warning: bool = False) -> None:
+        self.log.append(Entry(0.0 if self.estimate is None else self.estimate.t, text, warning=warning))
+
+    def _warn(self, text: str) -> None:
+        self._say(text, warning=True)
+        self._warn_too(text)

@@ -12,9 +12,11 @@ from armload.inertia import NAMES, UNITS, InertialParameters
 from armload.live.session import Entry
 from armload.live.shapes import CHI2_95, com_region
 from armload.online import OnlineEstimate
+from armload.online.listening import UNUSED
 
 _DIM = "color:var(--mantine-color-dimmed)"
 _TEXT = "font-size:13px;line-height:1.45;font-variant-numeric:tabular-nums;padding:2px 8px"
+_WARNING = ' style="color:var(--mantine-color-red-text)"'
 _DECIMALS = (3, 4, 4, 4, 5, 5, 5, 5, 5, 5)
 
 
@@ -38,13 +40,16 @@ def headline(estimate: OnlineEstimate | None, truth: InertialParameters | None =
 def state_of(estimate: OnlineEstimate) -> str:
     """In a few words: whether anything is held, and what keeps it from being known better."""
     if estimate.settling:
-        return "the payload has just changed"
-    if not estimate.determined[0]:
-        return "mass undetermined: move the arm" if not estimate.moving else "mass undetermined yet"
-    words = ["a payload is held" if estimate.held else "nothing is held"]
-    if not estimate.moving:
+        words = ["the payload has just changed"]
+    elif estimate.determined[0]:
+        words = ["a payload is held" if estimate.held else "nothing is held"]
+    else:
+        unused = any(note.startswith(UNUSED) for note in estimate.notes)  # nobody knows whether it moves
+        words = ["mass undetermined yet" if estimate.moving or unused else "mass undetermined: move the arm"]
+    told = any(note.startswith((UNUSED, "standing")) for note in estimate.notes)
+    if estimate.determined[0] and not (estimate.moving or told):
         words.append("the arm stands still")
-    words += [note for note in estimate.notes if "moving" not in note]
+    words += [note for note in estimate.notes if "moving" not in note and "has changed" not in note]
     return "; ".join(words)
 
 
@@ -93,7 +98,9 @@ def events(log: Iterable[Entry], most: int = 6) -> str:
     if not last:
         return f'<div style="{_TEXT};{_DIM}" data-armload="log">nothing has happened yet</div>'
     lines = "".join(
-        f'<div><span style="{_DIM}">{entry.t:.1f} s</span>&ensp;{escape(said(entry))}</div>' for entry in last
+        f'<div{_WARNING if entry.warning else ""}><span style="{_DIM}">{entry.t:.1f} s</span>&ensp;'
+        f"{escape(said(entry))}</div>"
+        for entry in last
     )
     return f'<div style="{_TEXT}" data-armload="log">{lines}</div>'
 

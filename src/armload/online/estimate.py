@@ -19,15 +19,16 @@ from armload.online.gate import Health
 class OnlineEstimate(Estimate):
     """An `Estimate` with what a controller has to know of it.
 
-    t: time of the last sample, on the stream's clock [s]. n_samples: samples of this payload so far.
-    age: how much older the newest sample in phi is than the last one [s]; it grows while samples that do not fit are
-        left out, which `notes` then says.
+    t: time of the last sample, on the stream's clock [s], also of one that could not be used, if its time could.
+    n_samples: samples of this payload so far.
+    age: how much older the newest sample that counted in phi is than t [s]; it grows while samples cannot be used or do
+        not fit, and while the arm stands, whose samples tell nothing new; `notes` then says so.
     since: when this payload was taken up, on the stream's clock [s].
     relative_to: "arm", "tool" (which the arm was given with), "tare", or "before": the run of the empty arm before the
         last change was taken for a tare. method: its name.
     determined: which parameters (10,) the data determine. held: whether anything is there at all.
     calibrated: whether ±1.96 std were checked to be 95 % intervals.
-    moving: whether the arm has moved in the last half second: a standing arm cannot tell an inertia.
+    moving: whether the arm was seen to move in the last half second: a standing arm cannot tell an inertia.
     settling: whether the payload changed so shortly ago that phi is still what was known beforehand.
     event: the last change of payload noticed, if any.
     health: counts of the stream; the same object as long as the stream lives.
@@ -98,6 +99,9 @@ class OnlineEstimate(Estimate):
             "settling": self.settling,
             "event": None if self.event is None else self.event.to_dict(),
             "left_out": self.health.bad,
+            "left_out_why": {reason: count for reason, count in self.health.left_out.items() if count},
+            "pauses": self.health.pauses,
+            "clock_jumps": self.health.clock_jumps,
             "notes": list(self.notes),
         }
 

@@ -15,7 +15,8 @@ class Event:
     kind: "change" until it is known which; "grasp", "release", "swap" (one payload for another) or "return" (what
         was held before the last event is held again: a push, say, is over).
     t: when it was noticed, on the stream's clock [s]. began: when it seems to have begun [s].
-    mass: by how much the mass seems to have changed [kg], a first guess.
+    mass: by how much the mass has changed [kg], below zero where something was put down, of a "return", too; of a
+        "change" a first guess.
     """
 
     kind: str

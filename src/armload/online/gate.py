@@ -5,6 +5,7 @@ Nothing here raises: a robot that stutters must not stop its identifier.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -31,6 +32,8 @@ _JUMP, _JUMP_TIMES = 0.05, 1.5  # [rad] and, times the largest velocity, what a 
 _BELIEVED = 0.1  # [s] after which an arm that stays where it jumped to is believed
 _CLOCK = 1.0  # [s] a time so far back is a clock that was set, not a late sample
 _PAUSE = 0.2  # [s] what a jump or a longer pause counts as: the filters start anew
+_TURN = 2.0 * np.pi + 0.5  # [rad] hardly any joint is beyond it: degrees
+ANY_TIME = 1e12  # [s] no clock shows more
 
 
 @dataclass
@@ -81,9 +84,15 @@ class Gate:
     def reset(self) -> None:
         """Forget the stream and its counts."""
         self.health = Health()
+        self.reason = REASONS[0]  # why the last sample that was left out was
         self._shift = 0.0  # of the stream's clock against our own
         self._t, self._q = np.nan, np.zeros(self.n)  # of the last sample, on the stream's clock; NaN: there is none
         self._elsewhere: tuple[float, NDArray] | None = None  # where the arm seems to have jumped to, and since when
+
+    @property
+    def shift(self) -> float:
+        """What our own clock, which leaves pauses out, is ahead of the stream's [s]."""
+        return self._shift
 
     def take(self, t: Any, q: Any, dq: Any, tau: Any) -> Sample | None:
         """A sample as it came, on a clock of its own that always rises; None if left out (`health` counts why)."""
@@ -125,7 +134,44 @@ class Gate:
         return t - since[0] >= _BELIEVED
 
     def _leave_out(self, reason: str) -> None:
+        self.reason = reason
         self.health.left_out[reason] += 1
+
+    def why(self, reason: str, t: Any, q: Any, dq: Any, tau: Any) -> str:
+        """In words why a sample is left out, if it shows the reason itself; the reason in general elsewhere."""
+        try:
+            now, parts = float(t), [np.array(x, float) for x in (q, dq, tau)]
+        except Exception:
+            return f"expected a time and three times {self.n} numbers"
+        names = ("position", "velocity", "torque")
+        for name, x in zip(names, parts, strict=True):
+            if x.shape != self._shape:
+                return f"expected {self.n} joints, found {name} of shape {x.shape}"
+        if reason == "not finite":
+            for name, x in zip(names[::-1], parts[::-1], strict=True):
+                for k in np.flatnonzero(~np.isfinite(x)):
+                    return f"{name} of joint {k + 1} is {'not a number' if np.isnan(x[k]) else 'infinite'}"
+            if not math.isfinite(now):
+                return "the time is not a number"
+        if reason == "implausible":
+            return self._beyond_limits(now, *parts)
+        return {
+            "repeated": "the time of the samples does not change",
+            "late": "the times of the samples do not rise",
+            "jump": "joint angles cannot have been reached since the sample before; check the order of the joints",
+        }.get(reason, reason)
+
+    def _beyond_limits(self, t: float, q: NDArray, dq: NDArray, tau: NDArray) -> str:
+        low, high, velocity, effort, _ = self._limits
+        if abs(t) > ANY_TIME:
+            return f"the time is {t:.3g} s"
+        for k in np.flatnonzero((q < low) | (q > high)):
+            degrees = "; is it in degrees?" if np.abs(q).max() > _TURN else ""
+            return f"position of joint {k + 1} is {q[k]:.4g} rad, beyond its limits{degrees}"
+        for name, unit, x, most in (("velocity", "rad/s", dq, velocity), ("torque", "N·m", tau, effort)):
+            for k in np.flatnonzero(np.abs(x) > most):
+                return f"{name} of joint {k + 1} is {x[k]:.4g} {unit}, beyond anything it can do"
+        return "beyond anything this arm can do"
 
 
 @njit(cache=True, nogil=True)
@@ -154,7 +200,7 @@ def _look(t, q, dq, tau, limits, last, before):  # pragma: no cover - compiled
         total += q[k] + dq[k] + tau[k]
     if not np.isfinite(total):
         return _NOT_FINITE
-    if abs(t) > 1e12:
+    if abs(t) > ANY_TIME:
         return _IMPLAUSIBLE
     for k in range(q.shape[0]):
         low, high, velocity, effort = limits[0, k], limits[1, k], limits[2, k], limits[3, k]

@@ -27,6 +27,7 @@ from armload.online.engines import engine
 from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
 from armload.online.gate import Gate, Health, all_finite
+from armload.online.listening import Listening
 from armload.online.state import load_state, model_fingerprint, save_state
 from armload.online.watch import PayloadWatch
 from armload.recording import Recording, Sample
@@ -34,6 +35,9 @@ from armload.recording import Recording, Sample
 _MOVING = 0.01  # [rad/s] of any joint, within the last so many seconds
 _RECENT = 0.5  # [s]
 _PUBLISH = 0.01  # [s] intervals and judgements are made anew at most this often
+_STANDS = 0.25  # [s] of rows that count for nothing: with what one pose counts, half a second at rest
+_KNOWN = 0.1  # standard deviation of the two masses, in a payload's own, below which a first guess is made better
+_STANDING = "standing: a change of payload is noticed only when the arm moves"
 _DOUBT = "samples that do not fit are left out: something pulls at the arm, or the payload is changing"
 
 
@@ -63,6 +67,7 @@ class OnlineIdentifier:
         self._engine = first
         self.method = self.engine.name
         self._gate = Gate(arm)
+        self._stream = Listening()
         self._weak = payload_prior_std(arm)
         entry = METHODS.get(self.method)
         known = self.engine.known
@@ -98,6 +103,11 @@ class OnlineIdentifier:
         """Counts of the stream since `reset`."""
         return self._gate.health
 
+    @property
+    def trouble(self) -> str | None:
+        """What keeps the stream's samples from being used at present; `notes` says it too."""
+        return self._stream.trouble
+
     def reset(self) -> None:
         """Forget the stream (not the tare); the next sample is the first."""
         self._gate.reset()
@@ -105,7 +115,10 @@ class OnlineIdentifier:
             self._engine.reset()
         else:
             self._watch.reset()
-        self._clock = self._internal = 0.0
+        self._stream.reset()
+        self._internal = 0.0
+        self._told = -np.inf  # time of the newest sample that counted in the answer, on our own clock
+        self._ended: StreamingIdentifier | None = None  # the run before a change whose kind is not known yet
         self._moved = -np.inf
         self._since: float | None = None
         self._published = -np.inf
@@ -123,10 +136,12 @@ class OnlineIdentifier:
         """
         sample = self._gate.take(t, q, dq, tau)
         if sample is None:
+            self._stream.left_out(self._gate, t, q, dq, tau)
             return self._said()
-        self._clock, self._internal = float(t), sample.t
+        self._internal = sample.t
+        self._stream.used(self._gate, float(t))
         if self._since is None:
-            self._since = self._clock
+            self._since = self._stream.clock
         if sample.t - self._moved > 0.1 * _RECENT and np.abs(sample.dq).max() > _MOVING:
             self._moved = sample.t
         self._identify(sample)
@@ -217,28 +232,68 @@ class OnlineIdentifier:
                 return  # a run just taken up again: until it answers anew, its answer is of long ago
         if (fresh or self._watch is None) and not all_finite(estimate.phi):
             return
+        stands = self._counted(sample, run)
         if fresh:
             self._published = sample.t
-            self._judge(estimate, run)
+            self._judge(estimate, run, stands)
         self._estimate, self._source = estimate, run
+
+    def _counted(self, sample: Sample, run: Identifier) -> bool:
+        """Remember how old the answer is; whether what was seen lately told it nothing, as the arm stands."""
+        if not isinstance(run, StreamingIdentifier):
+            self._told = sample.t
+        elif run.fresh:
+            row = None if run.stream is None else run.stream.row
+            if row is not None and row.h <= 0.0 and run is self._source and self._told > -np.inf:
+                return run.data_t - self._told > _STANDS
+            self._told = run.data_t
+        elif run is self._source:
+            return False
+        else:
+            self._told = -np.inf
+        if self._stream.unseen:
+            self._stream.forget_pauses()
+        return False
 
     def _noticed(self, now: float) -> None:
         """A change: until its transient is over only what was known beforehand is."""
         assert self._watch is not None
         assert self._watch.event is not None
-        event, shift = self._watch.event, self._clock - now
-        self._event = replace(event, t=event.t + shift, began=event.began + shift)
+        event, shift = self._watch.event, self._stream.clock - now
+        mass = event.mass
+        if event.kind == "change":
+            self._ended = self._source if isinstance(self._source, StreamingIdentifier) else None
+        elif self._event is not None:
+            mass = self._change_of_mass(self._event.mass)
+            self._ended = self._ended if mass == self._event.mass and event.kind != "return" else None
+        self._event = replace(event, t=event.t + shift, began=event.began + shift, mass=mass)
         if self._watch.settling:
-            self._since = self._clock
-            self._estimate, self._source = self._nothing(), None
+            self._since = self._stream.clock
+            self._estimate, self._source, self._told = self._nothing(), None, -np.inf
+            self._stream.forget_pauses()
             self._determined, self._held, self._notes = np.zeros(10, dtype=bool), False, ("the payload has changed",)
+
+    def _change_of_mass(self, guess: float) -> float:
+        """From the run before a change to the one at work [kg], if both are relative to the same; else the guess."""
+        assert self._watch is not None
+        before, run = self._ended, self._watch.run
+        if before is None:
+            return guess
+        now, then = run.last, before.last
+        if float(np.hypot(now.std[0], then.std[0])) > _KNOWN * float(self._weak[0]):
+            return guess
+        if run.reference is before:
+            return float(now.phi[0])
+        if before.reference is run:
+            return -float(then.phi[0])
+        return float(now.phi[0] - then.phi[0]) if run.reference is before.reference else guess
 
     def _nothing(self) -> Estimate:
         """What is known beforehand."""
         mean, std = (np.zeros(10), self._weak) if self.engine.known is None else self.engine.known
         return Estimate(0.0, mean, np.diag(std**2), 0, str(self.arm.frame))
 
-    def _judge(self, estimate: Estimate, run: Identifier) -> None:
+    def _judge(self, estimate: Estimate, run: Identifier, stands: bool) -> None:
         """What the data determine, and whether anything is there."""
         std = estimate.std
         self._determined = determined(std, self._before, run.alone, self._weak)
@@ -246,21 +301,23 @@ class OnlineIdentifier:
         notes = []
         if not self._moving:
             notes.append("not moving: inertia undetermined" if not self._determined[4:].all() else "not moving")
+        if stands and self._stream.trouble is None:
+            notes.append(_STANDING)
         self._notes = tuple(notes)
 
     @property
     def _moving(self) -> bool:
-        return self._internal - self._moved < _RECENT
+        return self._internal + self._stream.ahead - self._moved < _RECENT
 
     def _said(self) -> OnlineEstimate:
-        engine, watch = self.engine, self._watch
-        age = self._internal - getattr(self._source, "data_t", self._internal)
+        engine, watch, stream = self.engine, self._watch, self._stream
+        age = stream.unseen + stream.ahead + (self._internal - self._told if self._told > -np.inf else 0.0)
         return OnlineEstimate.of(
             {
                 **vars(self._estimate),
-                "t": self._clock,
-                "age": float(age) if math.isfinite(age) else 0.0,
-                "since": self._clock if self._since is None else self._since,
+                "t": stream.clock,
+                "age": float(age),
+                "since": stream.clock if self._since is None else self._since,
                 "relative_to": self.relative_to,
                 "method": self.method,
                 "determined": self._determined,
@@ -270,6 +327,6 @@ class OnlineIdentifier:
                 "settling": watch is not None and watch.settling,
                 "event": self._event,
                 "health": self._gate.health,
-                "notes": self._notes,
+                "notes": self._notes if stream.trouble is None else (*self._notes, stream.trouble),
             }
         )

@@ -7,7 +7,7 @@ from armload.payloads import solids
 from armload.payloads.container import container, container_loadings, test_payload
 from armload.payloads.families import FAMILIES, draw_payload, random_payload, random_payloads
 from armload.payloads.files import read_payload, write_payload
-from armload.payloads.hand import franka_hand
+from armload.payloads.hand import franka_hand, hand_on
 from armload.payloads.mesh import from_mesh
 from armload.payloads.payload import Box, Payload
 
@@ -20,6 +20,7 @@ __all__ = [
     "draw_payload",
     "franka_hand",
     "from_mesh",
+    "hand_on",
     "random_payload",
     "random_payloads",
     "read_payload",

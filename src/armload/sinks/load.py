@@ -20,6 +20,7 @@ from armload.payloads.files import payload_from, read_content
 
 _KNOWN = (True,) * 10
 _RELATIVE = {"before": "empty arm before"}  # what reads otherwise than it is called
+_MISFIT = 3.0  # standard deviations between what is left and the nearest body, beyond which too much was taken off
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,8 +82,26 @@ class Load:
         """Names of the parameters that were not measured."""
         return tuple(name for name, known in zip(NAMES, self.determined, strict=True) if not known)
 
+    @property
+    def lacks(self) -> str | None:
+        """What is not in the load, in words, and so cannot be taken off it; None: it holds everything, as far as known.
+
+        >>> Load(InertialParameters.zero(), relative_to="tare").lacks
+        'relative to the tare: what was mounted then is not in it'
+        """
+        if self.relative_to in (None, "arm"):
+            return None
+        what = "the tool" if self.relative_to == "tool" else "what was mounted then"
+        return f"relative to the {_RELATIVE.get(self.relative_to, self.relative_to)}: {what} is not in it"
+
     def __sub__(self, other: InertialParameters) -> Load:
-        return self._changed(self.parameters - other, "tool")
+        left = self._changed(self.parameters - other, "tool")
+        if self.lacks is not None and left._is_no_body():
+            raise SinkError(
+                f"what is left has a mass of {left.parameters.mass:.4g} kg and is no body: {self.lacks}; do not take "
+                "it off again"
+            )
+        return left
 
     def __add__(self, other: InertialParameters) -> Load:
         return self._changed(self.parameters + other, "arm")
@@ -106,9 +125,7 @@ class Load:
             )
         if self.consistent:
             return self
-        information = None if self.std is None else np.diag(1.0 / np.maximum(self.std, 1e-9) ** 2)
-        phi = nearest_consistent(self.parameters.phi, information)
-        return replace(self, parameters=InertialParameters(phi, self.frame))
+        return replace(self, parameters=InertialParameters(self._nearest(), self.frame))
 
     def said(self) -> tuple[str, ...]:
         """What to write above the numbers: whose load, about which frame, and what was not measured."""
@@ -121,6 +138,17 @@ class Load:
         if self.undetermined:
             lines.append(f"not determined by the log: {', '.join(self.undetermined)}; known beforehand, not measured")
         return tuple(lines)
+
+    def _nearest(self) -> NDArray[np.float64]:
+        information = None if self.std is None else np.diag(1.0 / np.maximum(self.std, 1e-9) ** 2)
+        return nearest_consistent(self.parameters.phi, information)
+
+    def _is_no_body(self) -> bool:
+        """Whether no body with a mass has these parameters, nor any within the error bars."""
+        if self.parameters.mass <= 0 or self.consistent or self.std is None:
+            return self.parameters.mass <= 0 or not self.consistent
+        away = (self._nearest() - self.parameters.phi) / np.maximum(self.std, 1e-9)
+        return float(np.linalg.norm(away)) > _MISFIT
 
     def _changed(self, parameters: InertialParameters, relative_to: str) -> Load:
         return replace(self, parameters=parameters, relative_to=relative_to if self.relative_to else None)
