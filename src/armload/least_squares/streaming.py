@@ -5,12 +5,16 @@ than a row. A second thread adds them to the accumulated information and now and
 expectation–maximisation from it; the posterior at the new scales, brought up to date, replaces the running one a fixed
 number of rows later. What is adopted when depends on the samples alone, never on how fast the machine is: a replay at
 any speed gives the same numbers.
+
+The last rows join the accumulated information late: until then they can be taken back, as those of a payload that was
+there before anyone noticed. Were they kept, a cycle that returns to the same pose would teach them to the arm's model.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
+from copy import deepcopy
 from dataclasses import dataclass
 from queue import SimpleQueue
 from threading import Thread
@@ -34,6 +38,7 @@ _EARLY = 0.1  # [s] until then a slow residual shows one value: the posterior is
 _REFITS = (20, 60, 100, 150, 200, 300, 400, 600, 800, 1200, 1600, 2400)
 _REFIT_EVERY, _ADOPTED = 2000, 20
 _CHUNK = 50  # rows handed over at once in between
+_LATE = 50  # rows that can be taken back, a quarter of a second: more than a change takes to be noticed
 
 
 @dataclass(eq=False)
@@ -107,7 +112,7 @@ class StreamingPosterior:
         self._rows.reset()
         self._run = self._empty()
         if self._base is None:
-            self.first, self._base = advance(self._runs(), self.prior_std, self.noise, self.start, steps=0)
+            self.first, self._base = advance([*self.tares, self._run], self.prior_std, self.noise, self.start, steps=0)
             self._base.noise = self._whole
         self.posterior, self._state = self.first, self._base.copy()
         self._early: list[Row] | None = []
@@ -117,9 +122,6 @@ class StreamingPosterior:
 
     def _empty(self) -> RegressionData:
         return RegressionData(self.correction, self.gain, self.features, self.noise.block)
-
-    def _runs(self) -> list[RegressionData]:
-        return [*self.tares, self._run]
 
     def take(self, t: float, q: NDArray, dq: NDArray, tau: NDArray) -> bool:
         """Take one sample (n,); times rise. True if it completed a row, that is, if there is something new."""
@@ -188,37 +190,41 @@ class StreamingPosterior:
         elif self._ready is not None:
             self._ready.state.take(row)
         if self._ready is not None and self.rows >= self._adopt_at:
-            ready, self._ready, self._early = self._ready, None, None
-            if np.isfinite(ready.state.information.sum() + ready.state.vector.sum()):  # else the last one goes on
-                self.posterior, self._state = ready.posterior, ready.state
-                self.refits += 1
+            ready, self._ready = self._ready, None
+            self._adopt(ready)
             return
         if self._future is not None or self._ready is not None:
             return
         due = self.rows in _REFITS or self.rows % _REFIT_EVERY == 0
-        if due or len(self._waiting) >= _CHUNK:
-            rows, self._waiting = self._waiting, []
+        if due or len(self._waiting) >= _CHUNK + _LATE:
+            rows, self._waiting = self._waiting[:-_LATE], self._waiting[-_LATE:]
             if self._worker is None:
                 self._worker = Worker()
             if due:
                 self._catching_up = SimpleQueue()
                 self._adopt_at = self.rows + _ADOPTED
-                self._future = self._worker.submit(self._refit, rows, self._catching_up)
+                self._future = self._worker.submit(self._refit, rows, self._waiting.copy(), self._catching_up)
             else:
-                self._last = self._worker.submit(self._accumulate, rows)
+                self._last = self._worker.submit(_accumulate, self._run, rows)
 
-    def _accumulate(self, rows: list[Row]) -> None:
-        if rows:
-            h, X, r, weights = (np.array(column) for column in zip(*rows, strict=True))
-            self._run.take_rows(h, X, r, weights)
-
-    def _refit(self, rows: list[Row], following: SimpleQueue) -> Solution:
-        self._accumulate(rows)
-        start = self.posterior.scales if self.refits else self.start
-        posterior, state = advance(self._runs(), self.prior_std, self.noise, start)
+    def _refit(self, rows: list[Row], late: list[Row], following: SimpleQueue) -> Solution:
+        _accumulate(self._run, rows)
+        run = deepcopy(self._run, {id(self.correction): self.correction})
+        _accumulate(run, late)
+        solution = self._solution(run)
         while (row := following.get()) is not None:
-            state.take(row)
-        return Solution(posterior, state)
+            solution.state.take(row)
+        return solution
+
+    def _solution(self, run: RegressionData) -> Solution:
+        start = self.posterior.scales if self.refits else self.start
+        return Solution(*advance([*self.tares, run], self.prior_std, self.noise, start))
+
+    def _adopt(self, solution: Solution) -> None:
+        self._early = None
+        if np.isfinite(solution.state.information.sum() + solution.state.vector.sum()):  # else the last one goes on
+            self.posterior, self._state = solution.posterior, solution.state
+            self.refits += 1
 
     def hold(self) -> None:
         """Wait for what is done beside; nothing is from then on, until the next rows. What is adopted when stays."""
@@ -229,11 +235,20 @@ class StreamingPosterior:
             self._last.result()
             self._last = None
 
-    def finish(self) -> RegressionData:
-        """All rows so far, accumulated, for another run to take as its tare; this one may go on later."""
+    def finish(self, taken_back: int = 0) -> RegressionData:
+        """All rows so far, accumulated, for another run to take as its tare; this one may go on later.
+
+        Args:
+            taken_back: so many of the last rows, as far as they are still to be had, never were.
+        """
         self._abandon()
         rows, self._waiting = self._waiting, []
-        self._accumulate(rows)
+        kept = max(len(rows) - taken_back, 0)
+        _accumulate(self._run, rows[:kept])
+        if kept < len(rows):
+            self.rows -= len(rows) - kept
+            self.seconds -= sum(row.h for row in rows[kept:])
+            self._adopt(self._solution(self._run))
         return self._run
 
     def _abandon(self) -> None:
@@ -241,7 +256,7 @@ class StreamingPosterior:
         future: Future | None = getattr(self, "_future", None)
         if future is not None:
             self._catching_up.put(None)
-            future.result()
+            future.exception()  # waited for, whatever became of it: its tare may have gone on meanwhile
         self._future: Future[Solution] | None = None
         self._ready: Solution | None = None  # a solution that waits to be adopted
         last: Future | None = getattr(self, "_last", None)
@@ -255,6 +270,12 @@ class StreamingPosterior:
         if self._worker is not None:
             self._worker.stop()
             self._worker = None
+
+
+def _accumulate(run: RegressionData, rows: list[Row]) -> None:
+    if rows:
+        h, X, r, weights = (np.array(column) for column in zip(*rows, strict=True))
+        run.take_rows(h, X, r, weights)
 
 
 @njit(cache=True, nogil=True)

@@ -28,6 +28,7 @@ from armload.least_squares.rows import Row
 from armload.least_squares.sequential import SequentialPosterior
 
 _WINDOWS = (16, 48)  # rows: 0.08 and 0.24 s
+LONGEST = max(_WINDOWS)
 _ALARM = 12.0  # ln of a payload's likelihood ratio over nothing, in either window
 _OVER_PUSH, _LATELY = 6.0, 3.0  # and over a push, there and in the short window
 _ROWS = 6  # in a row

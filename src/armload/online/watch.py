@@ -5,7 +5,7 @@
 The run of the empty arm is a tare of the runs after it, beside the one that was given, if one was: what was just
 grasped is then found as well as with a tare at that place. A push that ends brings back the run before it, once the new
 run is sure that it is the same. Rows that do not fit are left out until it is clear whether the payload has changed, or
-whatever it was is over.
+whatever it was is over; of a run that ends, the last ones are taken back: a change is there before it is noticed.
 
 Of a fast stream, the row, the answer and the suspicion fall on three samples, one after the other.
 """
@@ -26,7 +26,7 @@ from armload.least_squares import StreamingIdentifier, payload_prior_std
 from armload.least_squares.live import FAST
 from armload.least_squares.regression import REGRESSOR_RATE
 from armload.least_squares.streaming import Worker
-from armload.online.changes import ChangeDetector, Suspicion, foresee
+from armload.online.changes import LONGEST, ChangeDetector, Suspicion, foresee
 from armload.online.event import Event
 from armload.recording import Sample
 
@@ -180,11 +180,11 @@ class PayloadWatch:
         seen, scale = foresee(stream.state, row)
         found = detector.take(row.h, seen, row.X, scale, *self._mean)
         since = sample.t - self._aside
+        sure = bool(stream.tares) or stream.seconds > _LEARNT
         if found is not None and since < _DECIDED:
             self._begin(sample, found, held)
         elif self._unresolved and self._short < _MOST_SHORT and since > _AGAIN and self._back():
             self._begin(sample, detector.last, held)
-        sure = bool(stream.tares) or stream.seconds > _LEARNT
         self._enough = since > (_PATIENCE if sure else _DECIDED)
         if self.settling or self._enough or not detector.uneasy:
             self._aside = np.inf
@@ -226,7 +226,7 @@ class PayloadWatch:
     @staticmethod
     def _prepared(run: StreamingIdentifier, reference: StreamingIdentifier | None) -> StreamingIdentifier:
         if run.stream is not None:
-            run.stream.finish()
+            run.stream.finish(taken_back=LONGEST)
         following = run.beside(reference)
         following.prepare()
         return following
