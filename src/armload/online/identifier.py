@@ -29,6 +29,7 @@ from armload.online.event import Event
 from armload.online.gate import Gate, Health, all_finite
 from armload.online.listening import Listening
 from armload.online.state import load_state, model_fingerprint, save_state
+from armload.online.step import MassStep
 from armload.online.watch import PayloadWatch
 from armload.recording import Recording, Sample
 
@@ -36,7 +37,6 @@ _MOVING = 0.01  # [rad/s] of any joint, within the last so many seconds
 _RECENT = 0.5  # [s]
 _PUBLISH = 0.01  # [s] intervals and judgements are made anew at most this often
 _STANDS = 0.25  # [s] of rows that count for nothing: with what one pose counts, half a second at rest
-_KNOWN = 0.1  # standard deviation of the two masses, in a payload's own, below which a first guess is made better
 _STANDING = "standing: a change of payload is noticed only when the arm moves"
 _DOUBT = "samples that do not fit are left out: something pulls at the arm, or the payload is changing"
 
@@ -69,6 +69,7 @@ class OnlineIdentifier:
         self._gate = Gate(arm)
         self._stream = Listening()
         self._weak = payload_prior_std(arm)
+        self._step = MassStep(float(self._weak[0]))
         entry = METHODS.get(self.method)
         known = self.engine.known
         self._before: NDArray | None = None
@@ -118,7 +119,7 @@ class OnlineIdentifier:
         self._stream.reset()
         self._internal = 0.0
         self._told = -np.inf  # time of the newest sample that counted in the answer, on our own clock
-        self._ended: StreamingIdentifier | None = None  # the run before a change whose kind is not known yet
+        self._step.reset()
         self._moved = -np.inf
         self._since: float | None = None
         self._published = -np.inf
@@ -260,33 +261,13 @@ class OnlineIdentifier:
         assert self._watch is not None
         assert self._watch.event is not None
         event, shift = self._watch.event, self._stream.clock - now
-        mass = event.mass
-        if event.kind == "change":
-            self._ended = self._source if isinstance(self._source, StreamingIdentifier) else None
-        elif self._event is not None:
-            mass = self._change_of_mass(self._event.mass)
-            self._ended = self._ended if mass == self._event.mass and event.kind != "return" else None
+        mass = self._step.of(event, self._source, self._watch.run)
         self._event = replace(event, t=event.t + shift, began=event.began + shift, mass=mass)
         if self._watch.settling:
             self._since = self._stream.clock
             self._estimate, self._source, self._told = self._nothing(), None, -np.inf
             self._stream.forget_pauses()
             self._determined, self._held, self._notes = np.zeros(10, dtype=bool), False, ("the payload has changed",)
-
-    def _change_of_mass(self, guess: float) -> float:
-        """From the run before a change to the one at work [kg], if both are relative to the same; else the guess."""
-        assert self._watch is not None
-        before, run = self._ended, self._watch.run
-        if before is None:
-            return guess
-        now, then = run.last, before.last
-        if float(np.hypot(now.std[0], then.std[0])) > _KNOWN * float(self._weak[0]):
-            return guess
-        if run.reference is before:
-            return float(now.phi[0])
-        if before.reference is run:
-            return -float(then.phi[0])
-        return float(now.phi[0] - then.phi[0]) if run.reference is before.reference else guess
 
     def _nothing(self) -> Estimate:
         """What is known beforehand."""

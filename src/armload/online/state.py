@@ -22,7 +22,7 @@ import numpy as np
 from armload.atomic import replacing
 from armload.errors import IdentificationError
 
-FORMAT = 3
+FORMAT = 4
 _PACKAGE = "armload."
 _NOT_SAVED = ("_worker", "_data", "_model", "_catching_up")  # threads, and what Pinocchio makes anew
 _MADE_ANEW = ("armload.arms.rows.MomentumRow", "armload.arms.forward.ForwardDynamics")  # of the arm alone
