@@ -92,10 +92,8 @@ class Session:
         self._orders: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._recent = Recent(arm.n)
         self._plausibility = Plausibility(arm, source.name)
-        self._trouble, self._warned = (
-            False,
-            -np.inf,
-        )  # whether it is told that samples cannot be used, and when it was last
+        self._trouble = False  # whether it is told that samples cannot be used
+        self._warned = -np.inf  # and when it last was, on the stream's clock
         self._thread: threading.Thread | None = None
         self._stop = False
 
