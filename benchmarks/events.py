@@ -1,6 +1,6 @@
 """How well changes of payload are noticed on a live stream, and what is known shortly after one.
 
-    python benchmarks/events.py [--quick] [--parts steps,quiet,hybrid,pushes,hybrid_pushes,real]
+    python benchmarks/events.py [--quick] [--parts steps,quiet,hybrid,pushes,hybrid_pushes,cycles,real]
 
 Every scene is another real-like Panda (`World.real_like`, the sensors as measured: `Sensors.panda`, 8 % of the samples
 lost) that goes on moving, every other one along the published excitation, the rest along random motions. What the arm
@@ -13,6 +13,8 @@ hybrid     the hybrid at 1 kHz: also whether its intervals hold shortly after a 
 pushes     a person pushes the arm: 10–60 N in a random direction at the flange or at the forearm, 0.3–3 s, rising and
            falling smoothly. The torque J(q)ᵀ·F is added to what the joints' sensors see; the arm stays on its way, as
            under stiff control. Nothing is taken up or put down.
+cycles     the hybrid at 200 Hz: one payload taken up and put down every half period of the published excitation,
+           always in the same two poses, for three minutes
 real       logs of real arms without any change; and the real unloaded Panda with payloads' torque added in steps
 
 A change counts as noticed with its first event within 1 s. Every other event is a false alarm, but for one: the first
@@ -21,7 +23,7 @@ the first second after each change; 95 % bounds are Poisson's, one-sided above.
 
 Scenes are cells in out/events: what was measured once is not measured again while `online/watch.py` and
 `online/changes.py` stay as they are. Written to benchmarks/results/events.json, where a part that was not asked for
-keeps what was measured of it before. In full about 80 minutes of CPU time.
+keeps what was measured of it before. In full about 50 minutes of CPU time.
 """
 
 from __future__ import annotations
@@ -81,6 +83,7 @@ def scenes(quick: bool, most: int) -> list[Scene]:
         ("hybrid", 24, 120.0, 1000.0, "hybrid"),
         ("pushes", 20, 120.0, 200.0, "map-gp"),
         ("hybrid_pushes", 6, 120.0, 1000.0, "hybrid"),
+        ("cycles", 10, 180.0, 200.0, "hybrid"),
     )
     out = []
     for place, (part, count, seconds, rate, method) in enumerate(kinds):
@@ -99,6 +102,9 @@ def schedule(scene: Scene, rng: np.random.Generator) -> list[tuple[float, Any]]:
         return [(-1.0, _payload(rng) if scene.seed % 2 else None)]
     if "pushes" in scene.part:
         return [(-1.0, None), *([(3.0, _payload(rng))] if scene.seed % 4 > 1 else [])]
+    if scene.part == "cycles":
+        payload, times = _payload(rng), np.arange(4.0, scene.seconds - LOOKED[-1], 0.5 * taie2024().duration)
+        return [(-1.0, None), *((float(t), None if k % 2 else payload) for k, t in enumerate(times))]
     out, t = [(-1.0, first)], rng.uniform(*EVERY)
     while t < scene.seconds - LOOKED[-1]:
         now, before = out[-1][1], out[-2][1] if len(out) > 1 else None
@@ -199,7 +205,8 @@ def streamed(scene: Scene) -> tuple[Recording, list[tuple[float, Any]], list[Pus
     robot, rng = arm("panda"), np.random.default_rng([scene.seed, 5])
     world, sensors = World.real_like(robot, scene.seed), Sensors.panda(robot)
     held, pushed = schedule(scene, rng), pushes(scene, rng)
-    motion = taie2024() if scene.seed % 2 else random_motion(robot, scene.seed)
+    published = scene.seed % 2 or scene.part == "cycles"
+    motion = taie2024() if published else random_motion(robot, scene.seed)
     source = Simulator(
         robot,
         motion,
@@ -233,7 +240,7 @@ def measured(scene: Scene) -> dict[str, Any]:
     return {
         "seconds": scene.seconds,
         "tare": tare is not None,
-        "motion": "taie2024" if scene.seed % 2 else "random",
+        "motion": "taie2024" if scene.seed % 2 or scene.part == "cycles" else "random",
         "steps": steps,
         "pushes": [_pushed(push, k, pushed, held, found, scene.seconds) for k, push in enumerate(pushed)],
         "events": found.events,
@@ -418,6 +425,8 @@ def of_part(cells: list[dict]) -> dict[str, Any]:
     if steps:
         out |= noticing(steps)
         brief = ("changes", "missed", "right_kind", "mass_after_1_s")
+        if cells[0]["name"].startswith("cycles"):
+            groups |= {f"minute {k + 1}": [s for s in steps if 60 * k <= s["t"] < 60 * (k + 1)] for k in range(3)}
         out["groups"] = {name: {k: noticing(g)[k] for k in brief} for name, g in groups.items() if g}
     return out | {"false_alarms": poisson(len(alarms), risk / 3600) | {"which": alarms}}
 
@@ -501,7 +510,7 @@ def in_all(parts: dict[str, Any]) -> dict[str, Any]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="two short scenes of each part; written to out/")
-    parser.add_argument("--parts", default="steps,quiet,hybrid,pushes,hybrid_pushes,real")
+    parser.add_argument("--parts", default="steps,quiet,hybrid,pushes,hybrid_pushes,cycles,real")
     parser.add_argument("--cells", type=Path, default=CELLS)
     parser.add_argument("--seed", type=int, default=0, help="added to all seeds, to set constants on others")
     parser.add_argument("--scenes", type=int, default=1000, help="at most so many of each part")

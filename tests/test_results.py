@@ -157,6 +157,7 @@ def rows_of_events(result):
         "`map-gp`, 200 Hz": parts["steps"],
         "`map-gp`, 200 Hz, nothing changes": parts["quiet"],
         "`hybrid`, 1 kHz": parts["hybrid"],
+        "`hybrid`, 200 Hz, in step with the motion": parts["cycles"],
         "real Panda, payloads' torque added, `hybrid`": parts["real"]["hybrid"]["panda_steps_added"],
         "the same after a tare of 10 s, `hybrid`": parts["real"]["hybrid"]["panda_steps_added, tare"],
     }
@@ -221,6 +222,15 @@ def test_what_a_given_tare_is_worth_on_a_stream_is_that_of_the_committed_benchma
         f"is off by {error['hybrid', 'with a tare']:.1f} g (hybrid; {error['steps', 'with a tare']:.1f} g `map-gp`), "
         f"without one by {error['hybrid', 'without']:.1f} g ({error['steps', 'without']:.1f} g)"
     ) in page
+
+
+def test_a_cycle_in_step_with_the_motion_is_as_the_page_says():
+    cycles = json.loads((RESULTS / "events.json").read_text())["parts"]["cycles"]
+    page = " ".join((ROOT / "docs" / "online.md").read_text(encoding="utf-8").split())
+    minutes = [cycles["groups"][f"minute {k}"]["mass_after_1_s"] for k in (1, 2, 3)]
+    errors, inside = ([f"{1e3 * m['median_error_kg']:.0f}" for m in minutes], [100 * m["inside_95"] for m in minutes])
+    assert f"by {errors[0]}, {errors[1]} and {errors[2]} g in the first, second and third minute" in page
+    assert f"{inside[0]:.0f}, {inside[1]:.0f} and {inside[2]:.0f} % of the intervals hold" in page
 
 
 def test_the_readme_s_changes_are_those_of_the_committed_benchmark():
