@@ -24,7 +24,7 @@ from armload.recording import Recording, check_plausible
 
 LOWEST_RATE = 20.0  # [Hz]
 _MISFIT = 3.0  # standard deviations between the estimate and the nearest body, beyond which something is wrong
-# rms of torque offsets over what is expected, from which on something is wrong: 1 of most simulated arms, up to 5.4
+# rms of torque offsets over what is expected, from which on something is wrong: about 1 of most simulated arms, more
 # where friction holds the joints (motor currents)
 _STRANGE = {"link": 5.0, "motor": 8.0}
 _MOVES = 0.05  # [rad] a joint that stays within so much stands

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 # the names of armload.sinks.FORMS, so that --help need not import them; a test compares
 _FORMS = ("franka", "franka-desk", "ur", "ur-payload", "urdf", "mjcf", "sdf", "ros2")
 _MAKERS = {"franka": ("panda", "fr3"), "ur": ("ur5e", "ur10e")}
-_FRANKA_FLANGE = "_link8"  # with the arm's name before it
 _EXAMPLES = """\
 examples:
   armload identify run.csv --robot panda --json > held.json
@@ -132,7 +131,9 @@ def _flanges() -> list[str]:
 
 def _is_flange(frame: str) -> bool:
     """Whether a frame is called as a built-in arm's flange, with whatever prefix."""
-    return frame.endswith((*_flanges(), _FRANKA_FLANGE))
+    from armload.payloads.hand import FLANGE
+
+    return frame.endswith((*_flanges(), FLANGE))
 
 
 def _on(load: Load, arm: Arm) -> bool:
@@ -161,10 +162,10 @@ def _arm_of(load: Load) -> Arm | None:
 
 def _part(name: str, load: Load, arm: Arm | None) -> InertialParameters:
     """A part about the load's own frame; the Franka Hand sits on the flange, whatever that is called."""
-    from armload.payloads import franka_hand
+    from armload.payloads.hand import FLANGE, franka_hand
     from armload.sinks import about
 
-    if name == "franka-hand" and load.frame is not None and load.frame.endswith(_FRANKA_FLANGE):
+    if name == "franka-hand" and load.frame is not None and load.frame.endswith(FLANGE):
         return franka_hand(load.frame).parameters
     return about(payload_of(name, arm), load.frame, arm)
 

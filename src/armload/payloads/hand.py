@@ -18,7 +18,7 @@ INERTIA_COM = (1e-3, 2.5e-3, 1.7e-3)  # [kg·m²] diagonal
 TURN = -np.pi / 4  # [rad] panda_hand about the z axis of panda_link8
 
 
-_FLANGE = "link8"  # what every Franka calls its flange, behind a prefix
+FLANGE = "link8"  # what every Franka calls its flange, behind a prefix
 
 
 def franka_hand(flange: str = "panda_link8") -> Payload:
@@ -50,10 +50,10 @@ def hand_on(arm: Arm) -> Payload:
     Raises:
         PayloadError: the arm has no such flange, or several behind its last joint.
     """
-    found = [name for name in arm.frames if name.endswith(_FLANGE) and _moves_with(arm, name)]
+    found = [name for name in arm.frames if name.endswith(FLANGE) and _moves_with(arm, name)]
     if len(found) != 1:
         raise PayloadError(
-            f"{arm.name} has {len(found) or 'no'} flange{'s' * (len(found) > 1)} of a Franka (…{_FLANGE}) for the "
+            f"{arm.name} has {len(found) or 'no'} flange{'s' * (len(found) > 1)} of a Franka (…{FLANGE}) for the "
             f"Franka Hand: describe the tool in a payload file about a frame of {arm.name}, such as {arm.frame!r}"
         )
     return franka_hand(found[0])

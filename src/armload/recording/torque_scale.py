@@ -7,7 +7,8 @@ and an offset of each joint,
     tau = s·tau_arm + W·phi + offset + level·tanh(q̇/0.05) + noise
 
 is linear in (s, phi, offset, level). All but s get a prior wide enough for any sound robot: a payload of three times
-the rated mass, motor-side friction, a model error of a few per cent of the rated torque. If even then s is surely not
+the rated mass, motor-side friction, a model error of a few per cent of the rated torque, a tenth of it for a joint at
+rest, which friction holds in any way below stiction. If even then s is surely not
 about 1, or the noise far larger than a model error, the torque is not that of this arm.
 """
 
