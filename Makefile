@@ -28,7 +28,7 @@ test-all: lint parts ## as test, and the tests marked full too (skipped with a r
 	$(BIN)/python -m pytest -n $(WORKERS) -m ""
 
 test-robots: $(VENV)/.stamp parts ## the makers' clients, ROS 2 and the page in a browser, each where it can be installed
-	$(BIN)/python -m pytest -m full tests/test_sources_vendors.py tests/test_sinks.py tests/test_ros2.py tests/test_live_browser.py
+	$(BIN)/python -m pytest -m full tests/devices tests/app/test_live_browser.py
 
 parts: $(VENV)/.stamp
 	@$(MAKE) --no-print-directory $(VENV)/.vendors || echo "no makers' clients: their tests will be skipped" >&2
@@ -66,18 +66,18 @@ $(VENV)/.stamp: requirements.lock pyproject.toml
 	@$(PIP) install --no-deps --no-build-isolation --editable .
 	@touch $@
 
-$(VENV)/.vendors: tests/vendors/requirements.txt | $(VENV)/.stamp
-	@$(PIP) install --only-binary :all: --requirement tests/vendors/requirements.txt
+$(VENV)/.vendors: tests/devices/vendors/requirements.txt | $(VENV)/.stamp
+	@$(PIP) install --only-binary :all: --requirement tests/devices/vendors/requirements.txt
 	@touch $@
 
 # ROS 2 has an environment of its own: a start-up hook of these wheels runs every Python of it a second time. The rest of
 # what armload needs it finds where the project has it; the name puts the file after the hook.
-$(VENV_ROS)/.stamp: tests/ros/requirements.txt | $(VENV)/.stamp
+$(VENV_ROS)/.stamp: tests/devices/ros/requirements.txt | $(VENV)/.stamp
 	@echo "setting up $(VENV_ROS) (once; a minute)"
 	@rm -rf $(VENV_ROS)
 	@$(BIN)/python -m venv $(VENV_ROS)
 	@$(VENV_ROS)/bin/python -m pip --disable-pip-version-check --quiet install --no-deps --only-binary :all: \
-		--requirement tests/ros/requirements.txt
+		--requirement tests/devices/ros/requirements.txt
 	@$(BIN)/python -c 'import site; print("import site; site.addsitedir(%r)" % site.getsitepackages()[0])' \
 		> "$$($(VENV_ROS)/bin/python -c 'import site; print(site.getsitepackages()[0])')/zz_armload.pth"
 	@$(VENV_ROS)/bin/python -c 'import armload.arms, rclpy; rclpy.init(); rclpy.create_node("armload"); rclpy.shutdown()'

@@ -2,8 +2,8 @@
 
     python benchmarks/closed_loop.py [--seeds 8] [--quick]
 
-A simulated Panda under joint torque control at 1 kHz (`armload.simulate.JointImpedance`: inverse dynamics of the model,
-libfranka's example stiffness). Every seed is another arm that differs from its model as real ones do
+A simulated Panda under joint torque control at 1 kHz (`armload.simulation.JointImpedance`: inverse dynamics of the
+model, libfranka's example stiffness). Every seed is another arm that differs from its model as real ones do
 (`World.real_like`), with other motions. It runs empty for 20 s (the tare), then 6 s with a payload nobody declared;
 from these two logs the default method identifies it. A third motion is then followed with nothing declared, with what
 was identified, and with the truth. The residual is a momentum observer's of 20 1/s that knows the declared payload, on
@@ -19,13 +19,19 @@ import numpy as np
 from numpy.typing import NDArray
 from study_of_arms import ROOT, Study
 
-from armload.arms import Arm, FilteredRegression
-from armload.hybrid import HybridIdentifier
+from armload.arms import Arm
 from armload.inertia import InertialParameters
+from armload.lab.report.style import COLOURS, look, new_figure
 from armload.motion import Motion, random_motion
+from armload.posterior import HybridIdentifier
 from armload.recording import Recording
-from armload.report.style import COLOURS, look, new_figure
-from armload.simulate import JointImpedance, Sensors, World, torque_controlled
+from armload.regression import FilteredRegression
+from armload.simulation import (
+    JointImpedance,
+    Sensors,
+    World,
+    torque_controlled,
+)
 
 RESULT = ROOT / "benchmarks" / "results" / "closed_loop.json"
 FIGURE = ROOT / "docs" / "pictures" / "closed_loop.png"

@@ -16,10 +16,10 @@ import time
 from pathlib import Path
 
 from armload import arm
-from armload.dataset import build_dataset
+from armload.lab.dataset import build_dataset
 from armload.motion import taie2024
 from armload.payloads import container_loadings
-from armload.simulate import Run, Sensors, simulate_many
+from armload.simulation import Run, Sensors, simulate_many
 
 
 def main() -> None:

@@ -45,13 +45,14 @@ from threadpoolctl import threadpool_limits
 import armload.online
 from armload import Recording, __version__, arm, read_recording
 from armload.arms import payload_regressor
-from armload.cells import finished_cell, key_of, save_cell
-from armload.determined import Z95
+from armload.devices import Simulator
+from armload.inertia import Z95
+from armload.lab import save_cell
+from armload.lab.cells import finished_cell, key_of
 from armload.motion import random_motion, taie2024
 from armload.online import OnlineIdentifier
 from armload.payloads import draw_payload
-from armload.simulate import Sensors, World, simulate
-from armload.sources import Simulator
+from armload.simulation import Sensors, World, simulate
 
 HERE = Path(__file__).resolve().parent
 CELLS = HERE.parent / "out" / "events"

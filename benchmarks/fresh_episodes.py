@@ -24,14 +24,20 @@ from numpy.typing import NDArray
 from study_of_arms import ROOT, write_table
 
 from armload import Arm, arm
+from armload.app.cli.printing import console
+from armload.app.cli.train_hybrid import (
+    cells_table,
+    episodes_shown,
+    summary,
+    versions,
+)
 from armload.atomic import replacing
-from armload.cli.printing import console
-from armload.cli.train_hybrid import cells_table, episodes_shown, summary, versions
-from armload.hybrid import HybridModel, shipped_model
-from armload.hybrid.calibration import nearest
-from armload.hybrid.records import TIMES, Records
-from armload.hybrid.training import coverage_on, drawn_episodes, episode_records
-from armload.least_squares import solution_prior_std
+from armload.lab.training import Records
+from armload.lab.training.calibrating import nearest
+from armload.lab.training.hybrid import coverage_on, drawn_episodes, episode_records
+from armload.lab.training.records import TIMES
+from armload.posterior import HybridModel, shipped_model
+from armload.regression import solution_prior_std
 
 SEED = 1  # trainings have seed 0
 RESULTS = ROOT / "benchmarks" / "results"

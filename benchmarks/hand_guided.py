@@ -3,8 +3,9 @@
     python benchmarks/hand_guided.py [--seeds 6] [--quick]
 
 A simulated Panda (another real-like arm for every seed, a tare of the empty arm) holds a payload nobody declared. While
-its enabling button is pressed it compensates the gravity of what was declared (`armload.simulate.GravityCompensation`)
-and a person leads it: one hand at the flange, the other at the elbow, each a spring and damper towards a point that
+its enabling button is pressed it compensates the gravity of what was declared
+(`armload.simulation.GravityCompensation`) and a person leads it: one hand
+at the flange, the other at the elbow, each a spring and damper towards a point that
 follows a slow random path and wanders by about a centimetre. When the button is let go, the robot holds its pose. The
 joints' torque sensors see the hands as they see the payload. Each method is given
 
@@ -27,13 +28,19 @@ from numpy.typing import NDArray
 from study_of_arms import ROOT, Study
 
 from armload.arms import Arm
-from armload.identifier import Identifier
+from armload.estimators import Identifier
+from armload.identification import METHODS
 from armload.inertia import InertialParameters
-from armload.methods import METHODS
+from armload.lab.report.style import COLOURS, look, new_figure
 from armload.motion import FourierMotion, Motion, random_motion
 from armload.recording import Recording
-from armload.report.style import COLOURS, look, new_figure
-from armload.simulate import GravityCompensation, JointImpedance, Sensors, World, torque_controlled
+from armload.simulation import (
+    GravityCompensation,
+    JointImpedance,
+    Sensors,
+    World,
+    torque_controlled,
+)
 
 RESULT = ROOT / "benchmarks" / "results" / "hand_guided.json"
 FIGURE = ROOT / "docs" / "pictures" / "hand_guided.png"

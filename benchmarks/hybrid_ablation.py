@@ -15,11 +15,12 @@ from pathlib import Path
 import numpy as np
 
 from armload import __version__, arm
-from armload.determined import Z95
-from armload.hybrid import Calibration, MixturePrior, payload_mixture
-from armload.hybrid.calibration import nearest
-from armload.hybrid.records import TIMES
-from armload.hybrid.training import EPISODES, FOLDS, episode_records
+from armload.inertia import Z95
+from armload.lab.training import payload_mixture
+from armload.lab.training.calibrating import fit_calibration, nearest
+from armload.lab.training.hybrid import EPISODES, FOLDS, episode_records
+from armload.lab.training.records import TIMES
+from armload.posterior import MixturePrior
 
 RESULTS = Path(__file__).parent / "results" / "hybrid_ablation.json"
 SHOWN = (0.1, 1.0, 6.0)  # [s]
@@ -70,7 +71,7 @@ def main() -> None:
             used, learned = how
             # "trusted": the evidence is taken at its word; its widths are calibrated all the same
             kinds = () if learned == "trusted" else learned
-            calibration = Calibration.fit(train, used, learned=kinds, trusted=learned == "trusted", seed=k)
+            calibration = fit_calibration(train, used, learned=kinds, trusted=learned == "trusted", seed=k)
             for row in np.flatnonzero(held):
                 found = calibration.answer(records.evidence(int(row)), used)
                 error[row] = np.abs(found.mean - records.truth[row])

@@ -23,12 +23,11 @@ from sklearn.ensemble import BaggingRegressor
 from threadpoolctl import threadpool_limits
 
 from armload import __version__, arm
-from armload.hybrid import HybridIdentifier
-from armload.identifier import Identifier
-from armload.least_squares import FilteredRecursiveLeastSquares, SmoothPosteriorLeastSquares
+from armload.estimators import FilteredRecursiveLeastSquares, Identifier
 from armload.motion import random_motion
 from armload.payloads import test_payload
-from armload.simulate import Sensors, World, simulate
+from armload.posterior import HybridIdentifier, SmoothPosteriorLeastSquares
+from armload.simulation import Sensors, World, simulate
 
 HERE = Path(__file__).resolve().parent
 SAMPLE = 1e-3  # [s]

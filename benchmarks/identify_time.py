@@ -25,7 +25,7 @@ from armload import __version__, arm
 from armload.motion import random_motion
 from armload.payloads import test_payload
 from armload.recording import write_recording
-from armload.simulate import Sensors, World, simulate
+from armload.simulation import Sensors, World, simulate
 
 HERE = Path(__file__).resolve().parent
 TARE = 20.0  # [s]

@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from armload.learners import BaggingEnsemble, NetworkLearner
+from armload.ensembles import BaggingEnsemble, NetworkLearner
 
 ROWS, PAYLOADS, MEMBERS = 20_000, 77, 5
 SEEDS = 3  # of the comparison of losses

@@ -29,10 +29,15 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from armload import Arm, Recording, __version__, arm
-from armload.determined import Z95
-from armload.episodes import Episode, Recipe, draw_episodes, simulate_episodes
-from armload.hybrid import HybridIdentifier, HybridModel, shipped_model
-from armload.hybrid.model import POOLED
+from armload.inertia import Z95
+from armload.lab.episodes import (
+    Episode,
+    Recipe,
+    draw_episodes,
+    simulate_episodes,
+)
+from armload.posterior import HybridIdentifier, HybridModel, shipped_model
+from armload.posterior.model_file import POOLED
 
 HERE = Path(__file__).resolve().parent
 TIMES = (1.0, 3.0, 6.0, 15.0, 30.0, 60.0)  # [s] since the run began

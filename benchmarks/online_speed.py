@@ -41,14 +41,19 @@ from threadpoolctl import threadpool_limits
 
 from armload import Recording, __version__, arm
 from armload.arms import Arm
+from armload.devices import Replay, Simulator
+from armload.ensembles import (
+    BaggingEnsemble,
+    LearnedIdentifier,
+    NetworkLearner,
+    save_model,
+)
 from armload.inertia import InertialParameters
-from armload.learners import BaggingEnsemble, LearnedIdentifier, NetworkLearner, save_model
-from armload.least_squares import StreamingIdentifier
 from armload.motion import random_motion
 from armload.online import OnlineIdentifier
+from armload.posterior import StreamingIdentifier
 from armload.recording import Sample
-from armload.simulate import Sensors, World, simulate
-from armload.sources import Replay, Simulator
+from armload.simulation import Sensors, World, simulate
 
 RESULT = Path(__file__).resolve().parent / "results" / "online_speed.json"
 SAMPLE = 1e-3  # [s]

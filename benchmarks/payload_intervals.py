@@ -25,16 +25,17 @@ from fresh_episodes import RESULTS, SEED
 from numpy.typing import NDArray
 
 from armload import Arm, arm
+from armload.app.cli.train_hybrid import episodes_shown, versions
 from armload.atomic import replacing
-from armload.cli.train_hybrid import episodes_shown, versions
-from armload.determined import Z95, determined
-from armload.hybrid import HybridModel, shipped_model
-from armload.hybrid.calibration import nearest
-from armload.hybrid.identifier import std_alone
-from armload.hybrid.records import TIMES, Records
-from armload.hybrid.training import episode_records
-from armload.least_squares import payload_prior_std
+from armload.inertia import Z95, determined
+from armload.lab.training import Records
+from armload.lab.training.calibrating import nearest
+from armload.lab.training.hybrid import episode_records
+from armload.lab.training.records import TIMES
 from armload.payloads import solids
+from armload.posterior import HybridModel, shipped_model
+from armload.posterior.hybrid import std_alone
+from armload.regression import payload_prior_std
 
 MASS, SIDE, THICK = (0.3, 2.0), (0.2, 0.4), (0.002, 0.01)  # [kg, m]
 OFF, ALONG = 0.01, (0.01, 0.06)  # [m] centre off the flange's axis, and along it

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from armload import PosteriorLeastSquares, arm
 from armload.motion import random_motion, taie2024
 from armload.payloads import test_payload
-from armload.simulate import Sensors, World, simulate
+from armload.simulation import Sensors, World, simulate
 
 TARGET = Path(__file__).resolve().parents[1] / "docs" / "pictures" / "identify.png"
 SEED = 1

@@ -19,11 +19,10 @@ from scipy.signal import savgol_filter
 
 from armload import Recording, __version__, arm, read_recording
 from armload.arms import payload_regressor
-from armload.hybrid import HybridIdentifier
-from armload.identifier import Tared
-from armload.identify import identify
-from armload.least_squares import FilteredRecursiveLeastSquares, PosteriorLeastSquares, SmoothPosteriorLeastSquares
+from armload.estimators import FilteredRecursiveLeastSquares, Tared
+from armload.identification import identify
 from armload.payloads import test_payload
+from armload.posterior import HybridIdentifier, PosteriorLeastSquares, SmoothPosteriorLeastSquares
 
 HERE = Path(__file__).resolve().parent
 METHODS = ("hybrid", "map-gp", "map", "rls", "rls-filter")

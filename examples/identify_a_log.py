@@ -6,10 +6,10 @@ python examples/identify_a_log.py [LOG.csv]        (a Panda's log; without one, 
 import sys
 
 from armload import FilteredRecursiveLeastSquares, HybridIdentifier, arm, read_recording
-from armload.identify import identify
+from armload.identification import identify
 from armload.motion import taie2024
 from armload.payloads import test_payload
-from armload.simulate import simulate
+from armload.simulation import simulate
 
 panda = arm("panda")
 if len(sys.argv) > 1:

@@ -7,12 +7,13 @@ import sys
 from pathlib import Path
 
 from armload import ArmloadError, arm
-from armload.dataset import build_dataset, split_payloads
-from armload.identify import identify
-from armload.learners import BaggingEnsemble, held_out_error, save_model
+from armload.ensembles import BaggingEnsemble, save_model
+from armload.identification import identify
+from armload.lab.dataset import build_dataset, split_payloads
+from armload.lab.evaluation import held_out_error
 from armload.motion import random_motion, taie2024
 from armload.payloads import container_loadings
-from armload.simulate import Sensors, World, simulate
+from armload.simulation import Sensors, World, simulate
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out/learn")
 panda, motion = arm("panda"), taie2024()

@@ -1,13 +1,11 @@
 """armload: tell a robot arm what it is holding, from joint position, velocity and torque.
 
-    from armload import arm, read_recording
-    from armload.identify import identify
+    from armload import arm, identify, read_recording
 
     panda = arm("panda")
     print(identify(read_recording("run.csv", panda), panda))
 
-The names below are imported when they are first used, so that `import armload` is instant. `armload.identify` and
-`armload.simulate` are modules, with a function of the same name inside.
+The names below are imported when they are first used, so that `import armload` is instant.
 """
 
 from __future__ import annotations
@@ -18,50 +16,46 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
+from armload.version import __version__
 
 if TYPE_CHECKING:
-    from armload.answer import Identification
     from armload.arms import ARMS, Arm, arm
+    from armload.devices import open_source
+    from armload.ensembles import LearnedIdentifier, load_model, save_model
     from armload.errors import ArmloadError
-    from armload.hybrid import HybridIdentifier
-    from armload.identifier import Estimate, Identifier
+    from armload.estimators import Estimate, FilteredRecursiveLeastSquares, Identifier, RecursiveLeastSquares
+    from armload.identification import METHODS, Identification, identify
     from armload.inertia import InertialParameters
-    from armload.learners import LearnedIdentifier, load_model, save_model
-    from armload.least_squares import (
-        FilteredRecursiveLeastSquares,
-        PosteriorLeastSquares,
-        RecursiveLeastSquares,
-    )
-    from armload.methods import METHODS
     from armload.motion import FourierMotion, Motion, check_motion, taie2024
     from armload.online import OnlineIdentifier
     from armload.payloads import Payload, read_payload, write_payload
+    from armload.posterior import HybridIdentifier, PosteriorLeastSquares
     from armload.recording import Recording, Sample, read_recording, write_recording
-    from armload.simulate import Sensors, World
-    from armload.sources import open_source
+    from armload.simulation import Sensors, World, simulate
 
 _ROOMS = {
     "ARMS": "arms",
     "Arm": "arms",
     "arm": "arms",
     "ArmloadError": "errors",
-    "HybridIdentifier": "hybrid",
-    "Estimate": "identifier",
-    "Identifier": "identifier",
-    "METHODS": "methods",
-    "Identification": "answer",
+    "HybridIdentifier": "posterior",
+    "Estimate": "estimators",
+    "Identifier": "estimators",
+    "METHODS": "identification",
+    "Identification": "identification",
     "InertialParameters": "inertia",
-    "LearnedIdentifier": "learners",
-    "load_model": "learners",
-    "save_model": "learners",
-    "FilteredRecursiveLeastSquares": "least_squares",
-    "PosteriorLeastSquares": "least_squares",
-    "RecursiveLeastSquares": "least_squares",
+    "LearnedIdentifier": "ensembles",
+    "load_model": "ensembles",
+    "save_model": "ensembles",
+    "FilteredRecursiveLeastSquares": "estimators",
+    "PosteriorLeastSquares": "posterior",
+    "RecursiveLeastSquares": "estimators",
     "FourierMotion": "motion",
     "OnlineIdentifier": "online",
     "Motion": "motion",
     "check_motion": "motion",
+    "identify": "identification",
+    "simulate": "simulation",
     "taie2024": "motion",
     "Payload": "payloads",
     "read_payload": "payloads",
@@ -70,9 +64,9 @@ _ROOMS = {
     "Sample": "recording",
     "read_recording": "recording",
     "write_recording": "recording",
-    "Sensors": "simulate",
-    "World": "simulate",
-    "open_source": "sources",
+    "Sensors": "simulation",
+    "World": "simulation",
+    "open_source": "devices",
 }
 
 __all__ = [
@@ -100,11 +94,13 @@ __all__ = [
     "__version__",
     "arm",
     "check_motion",
+    "identify",
     "load_model",
     "open_source",
     "read_payload",
     "read_recording",
     "save_model",
+    "simulate",
     "taie2024",
     "write_payload",
     "write_recording",

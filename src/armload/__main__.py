@@ -2,6 +2,6 @@
 
 import sys
 
-from armload.cli import main
+from armload.app.cli import main
 
 sys.exit(main())

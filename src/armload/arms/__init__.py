@@ -1,16 +1,10 @@
 """Robot arms: their rigid-body model, and the regressors through which a payload shows in the joint torques."""
 
 from armload.arms.catalogue import ARMS, arm
-from armload.arms.filtered import FilteredRegression, first_order_lag
 from armload.arms.forward import ForwardDerivatives, ForwardDynamics
 from armload.arms.kinship import kinship, namesake
 from armload.arms.model import LINK_SPREAD, Arm, BodyMotion, Limits
-from armload.arms.regressors import (
-    MomentumRegressor,
-    full_arm_regressor,
-    momentum_regressor,
-    payload_regressor,
-)
+from armload.arms.regressors import MomentumRegressor, full_arm_regressor, momentum_regressor, payload_regressor
 from armload.arms.strength import poses, rated_effort
 
 __all__ = [
@@ -18,13 +12,11 @@ __all__ = [
     "LINK_SPREAD",
     "Arm",
     "BodyMotion",
-    "FilteredRegression",
     "ForwardDerivatives",
     "ForwardDynamics",
     "Limits",
     "MomentumRegressor",
     "arm",
-    "first_order_lag",
     "full_arm_regressor",
     "kinship",
     "momentum_regressor",

@@ -14,6 +14,7 @@ from armload.inertia.consistency import (
     pseudo_inertia,
     pseudo_inertia_to_phi,
 )
+from armload.inertia.determinacy import HELD, LIGHTEST_HELD, SHRINK, SMALL, Z95, determined, held
 from armload.inertia.orders import ORDERS, from_order, to_order
 from armload.inertia.parameters import (
     NAMES,
@@ -29,14 +30,21 @@ from armload.inertia.parameters import (
 from armload.inertia.projection import near_consistent
 
 __all__ = [
+    "HELD",
+    "LIGHTEST_HELD",
     "NAMES",
     "ORDERS",
+    "SHRINK",
+    "SMALL",
     "UNITS",
+    "Z95",
     "InertialParameters",
     "com_to_phi",
+    "determined",
     "frame_change_matrix",
     "from_log_cholesky",
     "from_order",
+    "held",
     "inertia_matrix",
     "is_consistent",
     "log_cholesky",

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from armload.cholesky import factor, invert, solve
+from armload.inertia.cholesky import factor, invert, solve
 from armload.inertia.consistency import nearest_consistent, pseudo_inertia
 
 _BASIS = np.ascontiguousarray(pseudo_inertia(np.eye(10)))  # J is linear in phi

@@ -4,6 +4,13 @@ from armload.online.engines import engine
 from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
 from armload.online.gate import Gate, Health
-from armload.online.identifier import OnlineIdentifier
+from armload.online.online_identifier import OnlineIdentifier
 
-__all__ = ["Event", "Gate", "Health", "OnlineEstimate", "OnlineIdentifier", "engine"]
+__all__ = [
+    "Event",
+    "Gate",
+    "Health",
+    "OnlineEstimate",
+    "OnlineIdentifier",
+    "engine",
+]

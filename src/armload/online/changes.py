@@ -24,8 +24,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from armload.least_squares.rows import Row
-from armload.least_squares.sequential import SequentialPosterior
+from armload.posterior.sequential import SequentialPosterior
+from armload.regression.row_stream import Row
 
 _WINDOWS = (16, 48)  # rows: 0.08 and 0.24 s
 LONGEST = max(_WINDOWS)

@@ -6,10 +6,15 @@ from pathlib import Path
 
 from armload.arms import Arm
 from armload.errors import IdentificationError
-from armload.hybrid import HybridModel, StreamingHybrid
-from armload.identifier import Identifier
-from armload.least_squares import PosteriorLeastSquares, SmoothPosteriorLeastSquares, StreamingIdentifier
-from armload.methods import METHODS, default_for
+from armload.estimators import Identifier
+from armload.identification import METHODS, default_for
+from armload.posterior import (
+    HybridModel,
+    PosteriorLeastSquares,
+    SmoothPosteriorLeastSquares,
+    StreamingHybrid,
+    StreamingIdentifier,
+)
 from armload.recording import Recording
 
 # names of the catalogue that need neither a motion known beforehand nor a model of their own
@@ -41,7 +46,7 @@ def engine(arm: Arm, tare: Recording | None = None, method: str | Path | None = 
         )
     if HybridModel.wrote(name):
         return StreamingHybrid(arm, tare, HybridModel.load(name))
-    from armload.learners import LearnedIdentifier, load_model
+    from armload.ensembles import LearnedIdentifier, load_model
 
     if tare is not None:
         raise IdentificationError(f"the trained model {name} cannot use a tare: leave it out, or use another method")

@@ -8,9 +8,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.determined import Z95
-from armload.identifier import Estimate
-from armload.inertia import is_consistent, phi_to_com
+from armload.estimators import Estimate
+from armload.inertia import Z95, is_consistent, phi_to_com
 from armload.online.event import Event
 from armload.online.gate import Health
 

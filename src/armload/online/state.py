@@ -25,7 +25,10 @@ from armload.errors import IdentificationError
 FORMAT = 4
 _PACKAGE = "armload."
 _NOT_SAVED = ("_worker", "_data", "_model", "_catching_up")  # threads, and what Pinocchio makes anew
-_MADE_ANEW = ("armload.arms.rows.MomentumRow", "armload.arms.forward.ForwardDynamics")  # of the arm alone
+_MADE_ANEW = (
+    "armload.arms.momentum_row.MomentumRow",
+    "armload.arms.forward.ForwardDynamics",
+)  # of the arm alone
 
 
 def save_state(state: Any, known: Mapping[str, Any], path: str | PathLike[str], origin: Mapping[str, Any]) -> Path:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from armload.identifier import Identifier
-from armload.least_squares import StreamingIdentifier
+from armload.estimators import Identifier
 from armload.online.event import Event
+from armload.posterior import StreamingIdentifier
 
 _KNOWN = 0.1  # standard deviation of the two masses, in a payload's own, below which a first guess is made better
 

@@ -21,14 +21,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from armload.identifier import Estimate
-from armload.least_squares import StreamingIdentifier, payload_prior_std
-from armload.least_squares.live import FAST
-from armload.least_squares.regression import REGRESSOR_RATE
-from armload.least_squares.streaming import Worker
+from armload.estimators import Estimate
 from armload.online.changes import LONGEST, ChangeDetector, Suspicion, foresee
 from armload.online.event import Event
+from armload.posterior import StreamingIdentifier
+from armload.posterior.live import FAST
+from armload.posterior.stream import Worker
 from armload.recording import Sample
+from armload.regression import payload_prior_std
+from armload.regression.information import REGRESSOR_RATE
 
 _FIRST = (0.5, 2.0)  # [s] of a run before which nothing is suspected, with a tare and without
 _TRANSIENT = 0.2  # [s] left out after a change: four times the lag of the regression

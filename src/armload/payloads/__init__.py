@@ -3,7 +3,6 @@
 A payload is about the origin and in the axes of the arm's payload frame.
 """
 
-from armload.payloads import solids
 from armload.payloads.container import container, container_loadings, test_payload
 from armload.payloads.families import FAMILIES, draw_payload, random_payload, random_payloads
 from armload.payloads.files import read_payload, write_payload
@@ -24,7 +23,6 @@ __all__ = [
     "random_payload",
     "random_payloads",
     "read_payload",
-    "solids",
     "test_payload",
     "write_payload",
 ]

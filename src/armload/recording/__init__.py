@@ -2,7 +2,6 @@
 
 from armload.recording.alignment import Alignment, same_motion
 from armload.recording.files import has_topics, read_recording, write_recording
-from armload.recording.plausibility import check_plausible
 from armload.recording.recording import CHANNELS, GAP, Recording, Sample
 
 __all__ = [
@@ -11,7 +10,6 @@ __all__ = [
     "Alignment",
     "Recording",
     "Sample",
-    "check_plausible",
     "has_topics",
     "read_recording",
     "same_motion",

@@ -1,0 +1,106 @@
+"""`armload dataset`: the paper's table, built by simulation."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from armload.app.cli.arguments import (
+    Parser,
+    add_arm_arguments,
+    arm_of,
+    at_least,
+    file_name,
+    motion_of,
+    whole_number,
+)
+from armload.errors import UsageError
+
+_EXAMPLES = """\
+examples:
+  armload dataset --out data/paper                                    (77 loadings × 3244 rows, as in the paper)
+  armload dataset --out data/wide --payloads random:200 --world real-like:3
+  armload dataset --out data/ur --robot ur10e --motion random:0 random:1 --payloads random:50 --rows 600
+
+--payloads is loadings (the container's 77), random:COUNT, or JSON files. An interrupted build goes on when it is
+started again. `armload train` learns from it.
+"""
+
+
+def parser() -> Parser:
+    """The arguments of `armload dataset`."""
+    parser = Parser(
+        prog="armload dataset",
+        description="Simulate every payload on every motion in every world; write one table with its provenance.",
+        epilog=_EXAMPLES,
+    )
+    parser.add_argument("--out", required=True, type=file_name, metavar="DIR", help="folder of the data set")
+    add_arm_arguments(parser, default="panda")
+    parser.add_argument(
+        "--motion",
+        nargs="+",
+        default=["taie2024"],
+        metavar="M",
+        help="taie2024, a JSON file, or random:SEED (default: taie2024)",
+    )
+    parser.add_argument(
+        "--payloads", nargs="+", default=["loadings"], metavar="P", help="see below (default: loadings)"
+    )
+    parser.add_argument(
+        "--world",
+        nargs="+",
+        default=["nominal"],
+        metavar="W",
+        help="nominal (the arm as its model says) or real-like:SEED (default: nominal)",
+    )
+    parser.add_argument(
+        "--rows", type=at_least(2), default=3244, metavar="N", help="rows of each run (default: 3244, the paper's)"
+    )
+    parser.add_argument(
+        "--noise",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="sensors as measured on real robots, or ideal ones (default: --noise)",
+    )
+    parser.add_argument("--seed", type=at_least(0), default=0, metavar="N", help="of noise and random payloads")
+    return parser
+
+
+def run(options: argparse.Namespace) -> None:
+    """Build the data set and say what it holds."""
+    from armload.lab.dataset import build_dataset
+    from armload.payloads import Payload, container_loadings, random_payloads, read_payload
+    from armload.simulation import Sensors, World
+
+    arm = arm_of(options)
+    payloads: list[Payload] = []
+    for name in options.payloads:
+        if name == "loadings":
+            payloads += container_loadings()
+        elif name.startswith("random:"):
+            payloads += random_payloads(whole_number(name, "payloads"), options.seed)
+        else:
+            payloads.append(read_payload(name))
+    worlds = []
+    for name in options.world:
+        if name == "nominal":
+            worlds.append(World.nominal(arm))
+        elif name.startswith("real-like:"):
+            worlds.append(World.real_like(arm, whole_number(name, "world")))
+        else:
+            raise UsageError(f"unknown world {name!r}: expected nominal or real-like:SEED")
+    sensors = None
+    if options.noise:
+        sensors = Sensors.of(arm)
+    dataset = build_dataset(
+        options.out,
+        arm,
+        [motion_of(name, arm) for name in options.motion],
+        payloads,
+        worlds=worlds,
+        sensors=sensors,
+        rows_per_run=options.rows,
+        seed=options.seed,
+        progress=sys.stderr.isatty(),
+    )
+    print(f"{options.out}: {dataset}")

@@ -1,0 +1,144 @@
+"""From an argument list to an exit code: which command runs, and how everything that can go wrong is said.
+
+| exit code | what happened                                             | stdout     | stderr                        |
+|-----------|-----------------------------------------------------------|------------|-------------------------------|
+| 0         | done                                                      | the answer | notes                         |
+| 1         | a bug in armload                                          |            | one line, with a hint         |
+| 2         | the input or the usage is wrong                           | empty      | one sentence that names where |
+| 130       | interrupted                                               |            | one line                      |
+| 141       | nobody reads the output any more (`armload … | head -1`)  |            | nothing                       |
+
+Each command is a module of this package with `parser()` and `run(arguments)`; it is imported when it is asked for, and
+imports what it needs when it runs, so that `armload --help` costs nothing.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import os
+import sys
+import traceback
+import warnings
+from collections.abc import Sequence
+
+from armload.app.cli.arguments import Parser, attach_values
+from armload.errors import ArmloadError, UsageError
+from armload.version import __version__
+
+COMMANDS = {
+    "demo": "the main job from end to end, in under three minutes: simulate, train, identify, compare, report",
+    "dataset": "build a data set of simulated runs: the paper's table of position, velocity, torque and payload",
+    "train": "train the hybrid for an arm, or an ensemble of trees or networks on a data set",
+    "identify": "tell from a log what the robot holds: mass, centre of mass, inertia, with 95 % intervals",
+    "live": "identify while the robot runs, or a simulated one, or a log: a page in the browser, or lines of JSON",
+    "export": "write what was identified in a controller's or simulator's form: Franka, UR, URDF, MJCF, SDF, ROS 2",
+    "methods": "list the methods of identification: when to use each, its source, and what is left out",
+    "report": "write an HTML report: figures of the log and of every method's estimate over time",
+    "benchmark": "measure every method on every population: errors over time, intervals, repeatability",
+    "reproduce": "run the paper's study again and put a verdict beside each of its claims",
+    "ros2": "ROS 2: joint states in and the payload out; or a simulated robot that takes trajectories",
+    "motion": "show, check, export or draw an excitation motion",
+}
+_EXAMPLES = """\
+examples:
+  armload demo
+  armload identify run.csv --robot panda
+  armload identify run.csv --robot ur10e --tare empty.csv --json
+  armload motion check taie2024 --robot panda
+
+`armload COMMAND --help` says more. ARMLOAD_TRACEBACK=1 (or --traceback) shows where an error came from.
+"""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command and return the exit code.
+
+    Args:
+        argv: the arguments after the program's name; None: those of this process.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    show_traceback = os.environ.get("ARMLOAD_TRACEBACK", "") not in ("", "0")
+    if "--traceback" in arguments:
+        arguments.remove("--traceback")
+        show_traceback = True
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # closed by whoever started us: what is said goes nowhere
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure") and (stream.encoding or "").lower().replace("-", "") != "utf8":
+            stream.reconfigure(errors="replace")  # a terminal that cannot show "m²" still gets the answer
+    with warnings.catch_warnings():
+        warnings.showwarning = _show_warning
+        code = _guarded(arguments, show_traceback)
+    try:
+        sys.stdout.flush()
+    except OSError:  # said already; the interpreter flushes once more when it ends: let that go nowhere
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return code
+
+
+def _guarded(arguments: list[str], show_traceback: bool) -> int:
+    """Run the command and say what went wrong, if anything did."""
+    try:
+        try:
+            code = _run(arguments)
+        except SystemExit as stop:  # argparse ends `--help` and `--version` so
+            code = stop.code if isinstance(stop.code, int) else 0
+        sys.stdout.flush()
+        return code
+    except KeyboardInterrupt:
+        return _fail("interrupted", 130, show_traceback)
+    except BrokenPipeError:
+        return 141
+    except ArmloadError as error:
+        return _fail(str(error), 2, show_traceback)
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        return _fail(f"{where}{error.strerror or error}", 2, show_traceback)
+    except Exception as error:
+        hint = "" if show_traceback else "; this is a bug: set ARMLOAD_TRACEBACK=1 (or --traceback) to see where"
+        return _fail(f"{type(error).__name__}: {str(error) or 'no message'}{hint}", 1, show_traceback)
+
+
+def _run(arguments: list[str]) -> int:
+    if not arguments:
+        raise UsageError(f"no command: expected one of {', '.join(COMMANDS)}; see 'armload --help'")
+    command = arguments[0]
+    if command.startswith("-"):
+        _overview().parse_args(arguments)
+        raise UsageError(f"no command before {command}: expected one of {', '.join(COMMANDS)}; see 'armload --help'")
+    if command not in COMMANDS:
+        near = difflib.get_close_matches(command, COMMANDS, 1)
+        raise UsageError(
+            f"unknown command {command!r}: expected one of {', '.join(COMMANDS)}"
+            + (f"; did you mean {near[0]!r}?" if near else "; see 'armload --help'")
+        )
+    module = importlib.import_module(f"armload.app.cli.{command}")
+    return module.run(module.parser().parse_args(attach_values(arguments[1:]))) or 0
+
+
+def _overview() -> Parser:
+
+    width = max(map(len, COMMANDS))
+    commands = "\n".join(f"  {name:<{width}}  {text}" for name, text in COMMANDS.items())
+    parser = Parser(
+        prog="armload",
+        usage="armload COMMAND …",
+        description="Tell a robot arm what it is holding, from joint position, velocity and torque.\n\n"
+        f"commands:\n{commands}",
+        epilog=_EXAMPLES,
+    )
+    parser.add_argument("--version", action="version", version=f"armload {__version__}")
+    return parser
+
+
+def _fail(message: str, code: int, show_traceback: bool) -> int:
+    if show_traceback:
+        traceback.print_exc()
+    print(f"armload: {' '.join(message.split())}", file=sys.stderr)
+    return code
+
+
+def _show_warning(message, category, filename, lineno, file=None, line=None) -> None:  # noqa: ARG001
+    print(f"armload: warning: {' '.join(str(message).split())}", file=file or sys.stderr)

@@ -1,0 +1,204 @@
+"""`armload export`: an identified payload in a controller's or simulator's own form."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from armload.app.cli.arguments import Parser, file_name, payload_of
+from armload.app.cli.printing import print_note
+
+if TYPE_CHECKING:
+    from armload.arms import Arm
+    from armload.devices import Load
+    from armload.inertia import InertialParameters
+
+# the names of armload.devices.FORMS, so that --help need not import them; a test compares
+_FORMS = ("franka", "franka-desk", "ur", "ur-payload", "urdf", "mjcf", "sdf", "ros2")
+_MAKERS = {"franka": ("panda", "fr3"), "ur": ("ur5e", "ur10e")}
+_EXAMPLES = """\
+examples:
+  armload identify run.csv --robot panda --json > held.json
+  armload export held.json --to franka --minus franka-hand    (Desk counts the hand already)
+  armload export held.json --to urdf --out payload.urdf
+  armload export held.json --to ur --robot my_ur.urdf --frame tool0
+  armload export franka-hand --to mjcf
+
+forms:
+  franka       Python for libfranka's setLoad, on top of Desk's end effector
+  franka-desk  end effector for Franka's Desk (JSON)
+  ur           URScript set_target_payload, everything on the flange
+  ur-payload   URScript set_payload (before software 5.10), without inertia
+  urdf, mjcf, sdf   a link, body or model
+  ros2         geometry_msgs/msg/InertiaStamped as YAML
+
+Nothing is sent to a robot.
+"""
+
+
+def parser() -> Parser:
+    """The arguments of `armload export`."""
+    parser = Parser(
+        prog="armload export",
+        description="Write an identified payload in a controller's or simulator's own form.",
+        epilog=_EXAMPLES,
+    )
+    parser.add_argument(
+        "result",
+        type=file_name,
+        metavar="RESULT",
+        help="what `armload identify --json` printed, a payload file, or franka-hand",
+    )
+    parser.add_argument("--to", required=True, choices=_FORMS, metavar="FORM", help=", ".join(_FORMS))
+    parser.add_argument("--out", type=file_name, metavar="FILE", help="write a file instead of printing")
+    parser.add_argument(
+        "--minus",
+        type=file_name,
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="a known part to take off first (JSON, or franka-hand); may be given several times",
+    )
+    parser.add_argument(
+        "--plus",
+        type=file_name,
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="a known part to add first, likewise",
+    )
+    parser.add_argument(
+        "--frame", metavar="F", help="link to write it about (default: a controller's flange, else that of RESULT)"
+    )
+    parser.add_argument(
+        "--robot", metavar="NAME|FILE.urdf", help="the arm, where frames differ (default: that of RESULT)"
+    )
+    parser.add_argument(
+        "--name", default="payload", metavar="N", help="name of the link, body or model (default: payload)"
+    )
+    return parser
+
+
+def run(options: argparse.Namespace) -> None:
+    """Read, combine, move, write."""
+    from armload.devices import CONTROLLERS, export_load
+    from armload.errors import SinkError
+    from armload.inertia import held
+
+    arm = None if options.robot is None else _named(options)
+    load = _load_of(options.result, arm)
+    arm = arm or _arm_of(load)
+    doubts = _doubts(options.minus, load)
+    for part in options.minus:
+        load = load - _part(part, load, arm)
+    for part in options.plus:
+        load = load + _part(part, load, arm)
+    nothing = load.std is not None and load.determined[0] and not held(load.parameters.mass, load.std[0], True)
+    frame = options.frame
+    if frame is None and arm is not None and (load.frame is None or (options.to in CONTROLLERS and not _on(load, arm))):
+        frame = arm.frame
+    load = load.about(frame, arm)
+    elsewhere = options.to in CONTROLLERS and load.frame is not None and not _is_flange(load.frame)
+    if elsewhere and options.frame is None:
+        raise SinkError(
+            f"the payload is about {load.frame!r} and a controller counts from its flange ({', '.join(_flanges())}): "
+            "name the arm and its flange with --robot FILE.urdf --frame FLANGE"
+        )
+    body = load.as_body()
+    if body is not load:
+        print_note(
+            "no body has the parameters that are left: the nearest one is written, with a mass of "
+            f"{body.parameters.mass:.4f} kg instead of {load.parameters.mass:.4f} kg"
+        )
+    text = export_load(body, options.to, options.out, options.name)
+    if nothing:
+        print_note("nothing seems to be held: the mass is within three standard deviations of zero")
+    if elsewhere:
+        print_note(f"a controller counts from its flange; these numbers are about {load.frame}, as was asked for")
+    for note in (*doubts, *_notes(body, options.to)):
+        print_note(note)
+    if options.out is None:
+        print(text, end="")
+    else:
+        print_note(f"{options.out}: {'; '.join(body.said())}")
+
+
+def _flanges() -> list[str]:
+    from armload.arms import ARMS
+
+    return sorted({str(facts["frame"]) for facts in ARMS.values()})
+
+
+def _is_flange(frame: str) -> bool:
+    """Whether a frame is called as a built-in arm's flange, with whatever prefix."""
+    from armload.payloads.hand import FLANGE
+
+    return frame.endswith((*_flanges(), FLANGE))
+
+
+def _on(load: Load, arm: Arm) -> bool:
+    """Whether a load is about a flange already that an arm knows by another name."""
+    return load.frame is not None and load.frame not in arm.frames and _is_flange(load.frame)
+
+
+def _named(options: argparse.Namespace) -> Arm:
+    from armload.arms import arm
+
+    return arm(options.robot, options.frame)
+
+
+def _load_of(name: str, arm: Arm | None) -> Load:
+    from armload.devices import Load, read_load
+
+    return Load(payload_of(name, arm)) if name in ("franka-hand", "test") else read_load(name)
+
+
+def _arm_of(load: Load) -> Arm | None:
+    """The arm that a result names; None where it is only known to whoever made it."""
+    from armload.arms import ARMS, arm
+
+    return arm(load.robot) if load.robot in ARMS else None
+
+
+def _part(name: str, load: Load, arm: Arm | None) -> InertialParameters:
+    """A part about the load's own frame; the Franka Hand sits on the flange, whatever that is called."""
+    from armload.devices import about
+    from armload.payloads import franka_hand
+    from armload.payloads.hand import FLANGE
+
+    if name == "franka-hand" and load.frame is not None and load.frame.endswith(FLANGE):
+        return franka_hand(load.frame).parameters
+    return about(payload_of(name, arm), load.frame, arm)
+
+
+def _doubts(parts: list[str], load: Load) -> list[str]:
+    """What to ask of whoever takes parts off a load: whether they are in it, and only once."""
+    doubts = [
+        f"{part} is taken off {parts.count(part)} times" for part in dict.fromkeys(parts) if parts.count(part) > 1
+    ]
+    if parts and load.lacks is not None:
+        asked = "is {} mounted beside it?" if load.relative_to == "tool" else "was {} mounted after it?"
+        doubts += [f"{load.lacks}; {asked.format(part)}" for part in dict.fromkeys(parts)]
+    return doubts
+
+
+def _notes(load: Load, to: str) -> list[str]:
+    from armload.devices import CONTROLLERS
+
+    notes = []
+    if load.undetermined:
+        notes.append(f"not determined by the log: {', '.join(load.undetermined)}; written as known beforehand")
+    maker = next((maker for maker, arms in _MAKERS.items() if load.robot in arms), None)
+    if maker is not None and to in CONTROLLERS and not to.startswith(maker):
+        notes.append(f"it was identified on a {load.robot}: another maker's flange may have other axes")
+    if to == "franka" and load.relative_to == "arm":
+        notes.append("this contains any hand that is mounted: take off what Desk counts already with --minus")
+    if to in ("ur", "ur-payload") and load.relative_to == "tool":
+        notes.append("a UR's payload is everything on the flange: add the tool with --plus")
+    if to in ("ur", "ur-payload") and load.relative_to in ("tare", "before"):
+        notes.append(
+            "a UR's payload is everything on the flange: add what was mounted at the tare, if any, with --plus"
+        )
+    if to in CONTROLLERS and load.frame is None:
+        notes.append("the payload names no frame: it is taken to be about the flange")
+    return notes

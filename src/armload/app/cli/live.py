@@ -1,0 +1,172 @@
+"""`armload live`: identify while the robot runs, on a page or as lines of JSON."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
+
+from armload.app.cli.arguments import (
+    Parser,
+    add_arm_arguments,
+    add_identifier_arguments,
+    arm_of,
+    at_least,
+    file_name,
+    payload_of,
+)
+from armload.app.cli.printing import print_note
+from armload.errors import ArmloadError, UsageError
+
+if TYPE_CHECKING:
+    from armload.arms import Arm
+
+_EXAMPLES = """\
+examples:
+  armload live                                            (a simulated Panda whose payload comes and goes)
+  armload live run.csv --robot panda --speed 2 --loop
+  armload live fr3://172.16.0.2 --record today.csv
+  armload live panda://172.16.0.2 --tare empty.csv --headless | tee estimates.jsonl
+  armload live panda://172.16.0.2 --tool franka-hand
+  armload live 'ur://192.168.0.10?torque_constants=12,12,10,11,11,11' --robot ur10e
+  armload live ros2:///joint_states --robot my_arm.urdf --frame tool0
+
+The page is for this machine only (http://127.0.0.1:8080) unless --host says otherwise: whoever can open it can read
+everything on it, switch the method and tare. Nothing is written to the robot.
+"""
+_ROBOTS = {"sim": "panda", "fr3": "fr3", "panda": "panda"}  # whose arm is plain from the source
+
+
+def _speed(text: str) -> float | None:
+    return None if text == "max" else at_least(0.01, float)(text)
+
+
+def parser() -> Parser:
+    """The arguments of `armload live`."""
+    parser = Parser(
+        prog="armload live",
+        description="Identify what the robot holds while it moves, on a page in the browser or as lines of JSON.",
+        epilog=_EXAMPLES,
+    )
+    parser.add_argument(
+        "source",
+        nargs="?",
+        default="sim",
+        type=file_name,
+        metavar="SOURCE",
+        help="sim (default), a log, fr3://ADDRESS, panda://ADDRESS, ur://ADDRESS or ros2:///TOPIC",
+    )
+    add_arm_arguments(parser, required=False)
+    add_identifier_arguments(parser)
+    parser.add_argument(
+        "--tool",
+        type=file_name,
+        metavar="FILE",
+        help="a mounted tool that is known (JSON, or franka-hand); the answer is what it carries",
+    )
+    parser.add_argument("--headless", action="store_true", help="no page: one JSON object per line on stdout")
+    parser.add_argument(
+        "--every",
+        type=at_least(0.0, float),
+        default=0.1,
+        metavar="S",
+        help="with --headless: seconds between lines (0.1)",
+    )
+    parser.add_argument(
+        "--record", type=file_name, metavar="FILE.csv", help="keep every sample in a log that does not exist yet"
+    )
+    parser.add_argument(
+        "--speed", type=_speed, default=1.0, metavar="X|max", help="of a log or the simulator (1: real time)"
+    )
+    parser.add_argument("--loop", action="store_true", help="replay a log again and again")
+    parser.add_argument("--topic", metavar="T", help="JointState topic of a bag, where it has several")
+    parser.add_argument(
+        "--duration", type=at_least(0.0, float), metavar="S", help="end after so many seconds of samples"
+    )
+    parser.add_argument("--host", default="127.0.0.1", metavar="H", help="interface of the page (127.0.0.1)")
+    parser.add_argument(
+        "--port",
+        type=at_least(0, int, 65535),
+        default=8080,
+        metavar="P",
+        help="of the page (8080, or the next free one)",
+    )
+    return parser
+
+
+def run(options: argparse.Namespace) -> int | None:
+    """Identify until the source ends (--headless) or somebody interrupts; 2 if an error was told meanwhile."""
+    from armload.app.page.session import Session
+    from armload.devices import open_source
+    from armload.recording import read_recording
+
+    options.robot = options.robot or _robot_of(options.source)
+    arm = _arm_of(options)
+    tare = None if options.tare is None else read_recording(options.tare, arm, topic=options.topic)
+    # the page takes time from its own process: what runs on the clock is read in another one
+    beside = True if not options.headless and options.speed is not None and options.speed <= 1.0 else None
+    source = open_source(
+        options.source,
+        arm,
+        record=options.record,
+        detached=beside,
+        speed=options.speed,
+        loop=options.loop,
+        topic=options.topic,
+    )
+    with source:
+        session = Session(source, arm, tare, options.method, _warn)
+        try:
+            return _print_lines(session, options) if options.headless else _serve(session, options)
+        finally:
+            session.close()
+
+
+def _arm_of(options: argparse.Namespace) -> Arm:
+    """The arm, with the tool that is mounted if one is known."""
+    arm = arm_of(options)
+    if options.tool is None:
+        return arm
+    if options.tare is not None:
+        raise UsageError(
+            "--tool and --tare together are for a log (armload identify), which finds out whether the tool was mounted "
+            "at the tare: on a live robot give one of them; with a tare, the answer is what was added since"
+        )
+    from armload.identification import plausible_tool
+
+    return arm.with_payload(plausible_tool(arm.in_frame(payload_of(options.tool, arm)), arm))
+
+
+def _warn(text: str) -> None:
+    print_note(f"warning: {text}")
+
+
+def _print_lines(session, options: argparse.Namespace) -> None:
+    from armload.app.cli.headless import lines
+
+    for line in lines(session, options.every, options.duration):
+        print(line, flush=True)
+
+
+def _serve(session, options: argparse.Namespace) -> int | None:
+    from armload.app.page.page import Page
+
+    page = Page(session, options.host, options.port)
+    try:
+        session.start(options.duration)
+        print_note(f"{session.source.name}: {page.url} (Ctrl-C ends it)")
+        page.serve()
+    except KeyboardInterrupt:  # the only way to end it
+        if session.error is not None and not isinstance(session.error, (ArmloadError, OSError)):
+            raise session.error from None  # a bug: whoever wants to see where asks for it
+        return 0 if session.error is None else 2  # which was told when it happened
+    finally:
+        page.close()
+
+
+def _robot_of(source: str) -> str:
+    """The robot where --robot does not name one."""
+    kind = urlsplit(source).scheme if "://" in source else source
+    if kind not in _ROBOTS:
+        raise UsageError(f"{source}: name the robot with --robot, such as --robot panda")
+    return _ROBOTS[kind]

@@ -1,0 +1,104 @@
+"""`armload methods`: the catalogue of estimators, when to use each, and what is left out."""
+
+from __future__ import annotations
+
+import argparse
+
+from armload.app.cli.arguments import Parser
+from armload.app.cli.printing import console, print_json, table
+
+_EXAMPLES = """\
+examples:
+  armload methods
+  armload methods --json
+  armload identify run.csv --robot panda --method rls-filter
+"""
+
+
+def parser() -> Parser:
+    """The arguments of `armload methods`."""
+    parser = Parser(
+        prog="armload methods",
+        description="List the methods of identification: when to use each, what it makes of a tare, where it is from.",
+        epilog=_EXAMPLES,
+    )
+    form = parser.add_mutually_exclusive_group()
+    form.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+    form.add_argument("--markdown", action="store_true", help="print the page docs/methods.md")
+    return parser
+
+
+def run(options: argparse.Namespace) -> None:
+    """Print the catalogue."""
+    from armload.identification import DEFAULT, LEFT_OUT, METHODS
+
+    if options.json:
+        shown = ("name", "title", "when", "source", "tare", "prior", "needs")
+        print_json(
+            {
+                "methods": [{field: getattr(method, field) for field in shown} for method in METHODS.values()],
+                "default": DEFAULT,
+                "left_out": [{"what": what, "why": why} for what, why in LEFT_OUT.items()],
+            }
+        )
+        return
+    if options.markdown:
+        print(page(), end="")
+        return
+    out = console()
+    rows = table("methods, best first", "name", "when to use", "tare", "source", left=4)
+    for method in METHODS.values():
+        name = method.name + (" (default)" if method.name == DEFAULT else "")
+        needs = f"; needs {_NEEDS[method.needs]}" if method.needs else ""
+        rows.add_row(name, f"{method.title}\n→ {method.when}{needs}", method.tare, method.source)
+    for column, width in zip(rows.columns, (None, 90, None, 44), strict=True):
+        column.max_width = width
+    out.print(rows)
+    left_out = table("left out of the paper's related work (its reference numbers)", "what", "why", left=2)
+    for what, why in LEFT_OUT.items():
+        left_out.add_row(*(text.replace("[", "\\[") for text in (what, why)))
+    for column in left_out.columns:
+        column.max_width = 80
+    out.print(left_out)
+
+
+def page() -> str:
+    """docs/methods.md: the same catalogue as Markdown."""
+    from armload.identification import DEFAULT, LEFT_OUT, METHODS
+
+    lines = [
+        "# Methods",
+        "",
+        "Written by `armload methods --markdown`. Every method takes the same log and gives the same ten parameters",
+        "with error bars: `armload identify LOG --method NAME`, in Python `METHODS[NAME].make(arm, tare)`. They stand",
+        "in the order of recommendation; [results](results.md) measures the main ones.",
+        "",
+        "| name | what it is | when to use it | tare | source |",
+        "|---|---|---|---|---|",
+    ]
+    for method in METHODS.values():
+        name = f"`{method.name}`" + (" (default)" if method.name == DEFAULT else "")
+        needs = f"; needs {_NEEDS[method.needs]}" if method.needs else ""
+        lines.append(f"| {name} | {method.title} | {method.when}{needs} | {method.tare} | {method.source} |")
+    lines += [
+        "",
+        "What a method makes of a tare, an earlier log of the same arm:",
+        "",
+        *(f"- **{name}**: {text}." for name, text in _TARES.items()),
+        "",
+        "## Left out",
+        "",
+        "What the paper's related work names (its reference numbers) and armload does not build:",
+        "",
+        *(f"- **{what}**: {why}." for what, why in LEFT_OUT.items()),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+_NEEDS = {"tare": "a tare", "training": "a trained model's file", "motion": "the commanded motion (Python only)"}
+_TARES = {
+    "own equation": "the tare, of any motion, is one more log in the same equations",
+    "virtual calibration": "what the method says of the tare is subtracted from what it says of the run",
+    "same motion": "the tare follows the run's own motion, and is subtracted sample by sample",
+    "none": "the method cannot use one",
+}

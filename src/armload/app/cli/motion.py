@@ -1,0 +1,209 @@
+"""`armload motion`: excitation motions shown, checked against an arm, exported for a robot, or drawn at random."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from armload.app.cli.arguments import (
+    Parser,
+    add_arm_arguments,
+    arm_of,
+    at_least,
+    file_name,
+    motion_of,
+    payload_of,
+)
+from armload.app.cli.printing import (
+    console,
+    print_json,
+    print_note,
+    table,
+    working,
+)
+from armload.errors import UsageError
+
+if TYPE_CHECKING:
+    from armload.arms import Arm
+    from armload.motion import Motion, MotionCheck
+
+NOT_ALLOWED = 3  # exit code of a check that says no
+
+_EXAMPLES = """\
+examples:
+  armload motion show taie2024
+  armload motion check mine.json --robot panda --payload tool.json
+  armload motion check run.csv --robot ur10e --tare empty.csv
+  armload motion random --robot ur10e --seed 3 --out excite.json
+  armload motion export excite.json --format ur --out excite.script
+  armload motion export taie2024 --format ros2 --robot panda --out excite.yaml
+
+MOTION is taie2024, a JSON file, or random:SEED. `check` says whether the arm may run a motion, exits with 3 if not, and
+says which parameters of a payload it can tell, and how well; it takes a log (CSV, Parquet, NPZ, ROS bag) as well.
+"""
+
+
+def parser() -> Parser:
+    """The arguments of `armload motion`."""
+    parser = Parser(
+        prog="armload motion", description="Show, check, export or draw an excitation motion.", epilog=_EXAMPLES
+    )
+    actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
+
+    show = actions.add_parser("show", help="what each joint does", description="Show what each joint does.")
+    show.add_argument("motion", metavar="MOTION", help="taie2024, a JSON file, or random:SEED")
+    add_arm_arguments(show, default="panda")
+
+    check = actions.add_parser(
+        "check",
+        help="limits, torque with a payload, the floor, the arm itself; what it tells about a payload",
+        description="Check a motion against the arm's limits, the torque with a payload, the floor and the arm itself, "
+        "or a log against the limits; say which parameters of a payload it can tell, and how well: the Bayesian "
+        "Cramér-Rao bound.",
+    )
+    check.add_argument("motion", metavar="LOG|MOTION", help="a log, or taie2024, a JSON file, or random:SEED")
+    add_arm_arguments(check)
+    check.add_argument(
+        "--payload",
+        metavar="FILE",
+        help="what the arm carries: a JSON file, franka-hand, none, or rated (default: the maker's rated payload); "
+        "for motions only",
+    )
+    check.add_argument(
+        "--tare",
+        metavar="LOG|MOTION",
+        help="an earlier run of the arm, with anything mounted (default: the same motion again)",
+    )
+    check.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+
+    export = actions.add_parser(
+        "export",
+        help="a table (csv), a ROS 2 trajectory (ros2) or a program for UR robots (ur)",
+        description="Write a motion as a file that a robot's own tools read. Check it first, and run it slowly first.",
+    )
+    export.add_argument("motion", metavar="MOTION", help="taie2024, a JSON file, or random:SEED")
+    add_arm_arguments(export, default="panda")
+    export.add_argument("--format", required=True, choices=("csv", "ros2", "ur"))
+    export.add_argument("--rate", type=at_least(1e-3, float, 1e4), metavar="HZ", help="samples per second")
+    export.add_argument("--out", required=True, type=file_name, metavar="FILE")
+
+    random = actions.add_parser(
+        "random",
+        help="draw a motion the arm may run, from rest to rest",
+        description="Draw a random motion, from rest to rest, that the arm may run with its rated payload.",
+    )
+    add_arm_arguments(random)
+    random.add_argument("--seed", type=at_least(0), default=0, metavar="N", help="same seed, same motion (default: 0)")
+    random.add_argument(
+        "--duration", type=at_least(0.1, float, 3600), default=6.0, metavar="S", help="in seconds (default: 6)"
+    )
+    random.add_argument("--harmonics", type=at_least(2), default=5, metavar="K", help="(default: 5)")
+    random.add_argument("--out", required=True, type=file_name, metavar="FILE", help="JSON file to write")
+    return parser
+
+
+def run(options: argparse.Namespace) -> int:
+    """Do the action."""
+    return {"show": _show, "check": _check, "export": _export, "random": _random}[options.action](options)
+
+
+def _show(options: argparse.Namespace) -> int:
+    import numpy as np
+
+    motion = motion_of(options.motion, arm_of(options))
+    q, dq, ddq = motion(np.linspace(0.0, motion.duration, 1001))
+    rows = table(
+        f"{motion.name}: {motion.n} joints, {motion.duration:g} s",
+        "joint",
+        "from [rad]",
+        "to [rad]",
+        "fastest [rad/s]",
+        "hardest [rad/s²]",
+    )
+    peaks = zip(q.min(axis=0), q.max(axis=0), abs(dq).max(axis=0), abs(ddq).max(axis=0), strict=True)
+    for k, values in enumerate(peaks, start=1):
+        rows.add_row(str(k), *(f"{value:.3f}" for value in values))
+    console().print(rows)
+    if note := getattr(motion, "note", ""):
+        print(note)
+    return 0
+
+
+def _check(options: argparse.Namespace) -> int:
+    from armload.app.cli import motion_check as said
+    from armload.inertia import NAMES, UNITS
+    from armload.posterior import advise, bound
+    from armload.recording import Recording
+
+    arm = arm_of(options)
+    run = said.run_of(options.motion, arm)
+    tare = run if options.tare is None else said.run_of(options.tare, arm)
+    result, carried = None, ""
+    with working("checking"):
+        if isinstance(run, Recording):
+            if options.payload is not None:
+                raise UsageError("--payload is for motions: a log was made with whatever the arm carried; leave it out")
+            problems = said.passed(run, arm)
+        else:
+            result, carried = _limits(options.payload or "rated", arm, run)
+            problems = result.problems
+        alone, tared = bound(arm, run), bound(arm, run, tare=tare)
+        advice = advise(arm, run, tare) if options.tare else advise(arm, run)
+    if options.json:
+        print_json(
+            {
+                **said.check_fields(run, result, problems),
+                "robot": arm.name,
+                "frame": str(arm.frame),
+                "parameters": NAMES,
+                "units": UNITS,
+                "prior_half_width": alone.prior_half_width.tolist(),
+                "without_tare": said.bound_fields(alone),
+                "with_tare": said.bound_fields(tared),
+                "advice": None if advice is None else str(advice),
+            }
+        )
+        return NOT_ALLOWED if problems else 0
+    if isinstance(run, Recording):
+        said.print_passed(run, arm, problems)
+    else:
+        print(f"{result}\ntorque with {carried}")
+    for found in (alone, tared):
+        print()
+        said.print_bound(found)
+    said.print_advice(tared if options.tare else alone, advice)
+    return NOT_ALLOWED if problems else 0
+
+
+def _limits(payload_name: str, arm: Arm, motion: Motion) -> tuple[MotionCheck, str]:
+    """The check with a payload by name, and in words what is carried."""
+    from armload.motion import check_motion, rated_load
+
+    if payload_name == "rated":
+        payload = rated_load(arm)
+        carried = "the rated payload" if payload is not None else "nothing (its rated payload is not known)"
+    else:
+        payload = None if payload_name == "none" else arm.in_frame(payload_of(payload_name, arm))
+        carried = "nothing" if payload is None else payload_name
+    return check_motion(arm, motion, payload), carried
+
+
+def _export(options: argparse.Namespace) -> int:
+    from armload.motion import export_motion
+
+    arm = arm_of(options)
+    motion = motion_of(options.motion, arm)
+    export_motion(motion, options.out, options.format, options.rate, joint_names=arm.joint_names)
+    print_note(f"wrote {options.out}; check the motion before a robot runs it (armload motion check)")
+    return 0
+
+
+def _random(options: argparse.Namespace) -> int:
+    from armload.motion import random_motion, save_motion
+
+    arm = arm_of(options)
+    with working("looking for a motion"):
+        motion = random_motion(arm, options.seed, duration=options.duration, harmonics=options.harmonics)
+    save_motion(options.out, motion)
+    print_note(f"wrote {motion.name} to {options.out}")
+    return 0

@@ -1,0 +1,159 @@
+"""What `armload motion check` says: may the arm run it, and what does it tell about a payload."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from armload.app.cli.printing import console, table
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from armload.arms import Arm
+    from armload.motion import Motion, MotionCheck
+    from armload.posterior import Advice, Bound
+    from armload.recording import Recording
+
+_LOGS = (".csv", ".parquet", ".npz", ".bag", ".db3", ".mcap")
+
+
+def run_of(name: str, arm: Arm) -> Recording | Motion:
+    """A log by the suffix of its file (or the folder of a bag), else a motion."""
+    from armload.app.cli.arguments import motion_of
+    from armload.identification import check_plausible
+    from armload.recording import read_recording
+
+    path = Path(name)
+    if path.suffix.lower() not in _LOGS and not path.is_dir():
+        return motion_of(name, arm)
+    log = read_recording(path, arm)
+    check_plausible(log, arm)
+    return log
+
+
+def passed(log: Recording, arm: Arm) -> list[str]:
+    """One sentence for each limit of position or velocity that the measured motion passes."""
+    import numpy as np
+
+    limits = arm.limits
+    beyond = {
+        "position": (np.maximum(limits.position_low - log.q, log.q - limits.position_high), log.q, "rad"),
+        "velocity": (np.abs(log.dq) - limits.velocity, log.dq, "rad/s"),
+    }
+    return [
+        f"{arm.joint_names[j]} passes its {name} limit by {over[k, j]:.3g} {unit} at t = {log.t[k]:.2f} s "
+        f"({value[k, j]:.4g} {unit})"
+        for name, (over, value, unit) in beyond.items()
+        for j, k in enumerate(over.argmax(axis=0))
+        if over[k, j] > 0.0
+    ]
+
+
+def print_passed(log: Recording, arm: Arm, problems: list[str]) -> None:
+    """What a log leaves of the limits, as measured."""
+    import numpy as np
+
+    room = np.minimum(log.q - arm.limits.position_low, arm.limits.position_high - log.q).min(axis=0)
+    speed = arm.limits.velocity - np.abs(log.dq).max(axis=0)
+    rows = table(
+        f"{log.source} on {arm.name}, {log.duration:.2f} s: what was left to each limit, as measured",
+        "joint",
+        "position [rad]",
+        "velocity [rad/s]",
+    )
+    for name, left, slower in zip(arm.joint_names, room, speed, strict=True):
+        rows.add_row(name, *("no limit" if np.isinf(x) else f"{x:.2f}" for x in (left, slower)))
+    console().print(rows)
+    print("the arm stayed within its limits" if not problems else "the arm passed its limits:")
+    for problem in problems:
+        print(f"- {problem}")
+
+
+def print_bound(found: Bound) -> None:
+    """A row per parameter: what was known before, what the run leaves of it, and whether that determines it."""
+    from armload.inertia import NAMES, UNITS
+
+    tare = "a tare on the same motion" if found.tare == found.name else f"the tare {found.tare}"
+    after = "without a tare" if found.tare is None else f"after {tare}"
+    rows = table(
+        f"what it tells about a payload, {after}: 95 % half-width at best",
+        "parameter",
+        "unit",
+        "before",
+        *(f"{t:.3g} s" for t in found.times),
+        "determined",
+        left=2,
+    )
+    for k, (name, unit) in enumerate(zip(NAMES, UNITS, strict=True)):
+        widths = [f"{width:.5f}" for width in (found.prior_half_width[k], *found.half_width[:, k])]
+        rows.add_row(name, unit, *widths, _since(found, k))
+    console().print(rows)
+    condition = found.condition[-1]
+    said = f"{condition:.3g}" if math.isfinite(condition) else "infinite: some combinations leave no trace"
+    print(f"condition number of the payload's regressor (columns scaled by 1, L, L², L = 0.15 m): {said}")
+
+
+def print_advice(found: Bound, advice: Advice | None) -> None:
+    """What the figures rest on; one line on what the run does not determine, and what would change that."""
+    from armload.inertia import NAMES
+
+    print("at best: an arm and a noise as expected (a milder arm is known better), a torque whose scale is right")
+    missing = [name for name, known in zip(NAMES, found.determined[-1], strict=True) if not known]
+    if not missing:
+        return
+    more = advice or "no joint alone, moved more, would change that"
+    which = "without a tare" if found.tare is None else "after this tare"
+    print(f"{which} not determined: {', '.join(missing)}; {more}")
+
+
+def _since(found: Bound, k: int) -> str:
+    """From which of the times on a parameter is determined."""
+    if not found.determined[-1, k]:
+        return "no"
+    return f"yes, after {found.times[found.determined[:, k].argmax()]:.3g} s"
+
+
+def check_fields(run: Recording | Motion, result: MotionCheck | None, problems: list[str]) -> dict[str, Any]:
+    """Name, duration, limits of the JSON; a margin of null: there is no such limit."""
+    from armload.recording import Recording
+
+    if isinstance(run, Recording):
+        return {
+            "kind": "log",
+            "name": run.source,
+            "duration": run.duration,
+            "within_limits": not problems,
+            "problems": problems,
+        }
+    assert result is not None
+    return {
+        "kind": "motion",
+        "name": run.name,
+        "duration": run.duration,
+        "within_limits": result.ok,
+        "problems": problems,
+        "peak": {name: value.tolist() for name, value in result.peak.items()},
+        "margin": {name: finite(value) for name, value in result.margin.items()},
+        "floor_clearance": finite(result.floor_clearance),
+        "self_clearance": finite(result.self_clearance),
+    }
+
+
+def bound_fields(found: Bound) -> dict[str, Any]:
+    """What a run leaves, as JSON; half-widths in the order of `parameters`, a row per time."""
+    return {
+        "tare": found.tare,
+        "times": found.times.tolist(),
+        "half_width": found.half_width.tolist(),
+        "determined": found.determined.tolist(),
+        "condition": finite(found.condition),
+    }
+
+
+def finite(value: np.ndarray | float) -> Any:
+    """A number, or a list of them, with null for what is infinite."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return [x if math.isfinite(x) else None for x in value.tolist()]

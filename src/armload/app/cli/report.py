@@ -1,0 +1,172 @@
+"""`armload report`: one log through every method, as an HTML file."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from armload.app.cli.arguments import (
+    Parser,
+    add_arm_arguments,
+    arm_of,
+    arm_of_dataset,
+    at_least,
+    file_name,
+    payload_of,
+)
+from armload.app.cli.printing import print_note, print_table, working
+from armload.errors import UsageError
+
+if TYPE_CHECKING:
+    from armload.arms import Arm
+    from armload.ensembles import LearnedModel
+    from armload.estimators import Identifier
+    from armload.lab.report import Section
+    from armload.recording import Recording
+
+_POINTS = 40  # estimates drawn along the log
+
+_EXAMPLES = """\
+examples:
+  armload report run.csv --robot panda --out run.html
+  armload report out/demo/run.csv --robot panda --tare out/demo/tare.csv --truth test --out run.html
+  armload report run.csv --robot panda --model trees.safetensors networks.safetensors --out run.html
+  armload report --dataset data/paper --model trees.safetensors --out test.html
+
+With --truth the report shows errors too, beside two baselines. With --dataset it shows them for runs with payloads that
+`armload train` held out for testing (with the same --seed). A trained ensemble answers for all that the arm holds, as
+in its training: the tare is not subtracted from it.
+"""
+
+
+def parser() -> Parser:
+    """The arguments of `armload report`."""
+    parser = Parser(
+        prog="armload report",
+        description="Write an HTML report: motion and torques of a log, and every method's estimate over time.",
+        epilog=_EXAMPLES,
+    )
+    parser.add_argument("log", nargs="?", type=file_name, metavar="LOG", help="log of a motion with the payload")
+    add_arm_arguments(parser, required=False)
+    parser.add_argument(
+        "--tare", type=file_name, metavar="LOG0", help="an earlier log of the arm; the payload is what was added"
+    )
+    parser.add_argument("--truth", metavar="FILE", help="the payload, where it is known (JSON, franka-hand or test)")
+    parser.add_argument("--dataset", metavar="DIR", help="take runs of a data set instead of LOG")
+    parser.add_argument("--runs", type=at_least(1), default=8, metavar="N", help="of the data set (default: 8)")
+    parser.add_argument("--seed", type=at_least(0), default=0, metavar="N", help="of the data set's split (default: 0)")
+    parser.add_argument("--model", nargs="+", default=[], metavar="FILE", help="trained models to show too")
+    parser.add_argument("--topic", metavar="T", help="JointState topic of a bag, where it has several")
+    parser.add_argument("--out", required=True, type=file_name, metavar="FILE.html", help="file to write")
+    return parser
+
+
+def run(options: argparse.Namespace) -> None:
+    """Run every method, write the report, print its first tables."""
+    from armload.lab.report import write_report
+
+    if (options.log is None) == (options.dataset is None):
+        raise UsageError("expected either a LOG or --dataset DIR; see 'armload report --help'")
+    if options.log is not None and options.robot is None:
+        raise UsageError("the following arguments are required: --robot; see 'armload report --help'")
+    with working("reading") as say:
+        sections, title = (_of_log if options.dataset is None else _of_dataset)(options, say)
+        write_report(options.out, sections, title)
+    for table in sections[0].tables:
+        print_table(table)
+    print(f"wrote {options.out}")
+
+
+def _of_log(options: argparse.Namespace, say: Callable[[str], None]) -> tuple[list[Section], str]:
+    from armload.identification import check_plausible
+    from armload.lab.evaluation import EvaluationRun, compare
+    from armload.lab.report import default_report, log_report
+    from armload.recording import read_recording
+
+    arm = arm_of(options)
+    truth = None if options.truth is None else arm.in_frame(payload_of(options.truth, arm))
+    log = read_recording(options.log, arm, topic=options.topic)
+    tare = None if options.tare is None else read_recording(options.tare, arm, topic=options.topic)
+    for recording in (log, tare):
+        if recording is not None:
+            check_plausible(recording, arm)
+            for note in recording.notes:
+                print_note(note)
+    methods, title = _methods(arm, log, options.model), f"{Path(options.log).name} on {arm.name}"
+    about = f"The log `{options.log}`" + (
+        f", relative to what was mounted in the tare `{options.tare}`." if tare else ", without a tare."
+    )
+    if truth is None:
+        traces = {}
+        for name, make in methods.items():
+            say(name)
+            traces[name] = make(tare).trace(log, every=max(1, len(log) // _POINTS))
+        return log_report(log, arm, traces, introduction=about), title
+    runs = [EvaluationRun(log, truth, Path(options.log).name, tare)]
+    comparison = compare(methods, runs, split="the log is in nobody's training, as far as known", progress=say)
+    return default_report(comparison, runs, arm, introduction=about), title
+
+
+def _of_dataset(options: argparse.Namespace, say: Callable[[str], None]) -> tuple[list[Section], str]:
+    import numpy as np
+
+    from armload.lab.dataset import open_dataset, split_payloads
+    from armload.lab.evaluation import EvaluationRun, compare
+    from armload.lab.report import default_report
+
+    dataset = open_dataset(options.dataset)
+    arm, split = arm_of_dataset(dataset, options.robot), split_payloads(dataset, options.seed)
+    names = [payload["name"] for payload in dataset.provenance["payloads"]]
+    held_out = np.unique(dataset.run[split.test])[: options.runs]
+    runs = [
+        EvaluationRun(dataset.recording(k), dataset.truth(k), f"{names[dataset.payload[dataset.run == k][0]]}, run {k}")
+        for k in held_out
+    ]
+    comparison = compare(
+        _methods(arm, runs[0].recording, options.model),
+        runs,
+        training=[dataset.truth(k) for k in np.unique(dataset.run[split.train])],
+        split=f"by payload with seed {options.seed}; the first {len(runs)} test runs of {options.dataset}",
+        progress=say,
+    )
+    about = f"Runs of the data set `{options.dataset}` with payloads held out for testing. {dataset}."
+    return default_report(comparison, runs, arm, introduction=about), f"{options.dataset} on {arm.name}"
+
+
+def _methods(arm: Arm, log: Recording, models: list[str]) -> dict[str, Callable[[Recording | None], Identifier]]:
+    """Every method by name, each to be told of the tare."""
+    from armload.ensembles import load_model
+    from armload.estimators import FilteredRecursiveLeastSquares, RecursiveLeastSquares
+    from armload.identification import METHODS, default_for
+    from armload.posterior import HybridIdentifier, HybridModel, PosteriorLeastSquares
+
+    default = METHODS[default_for(arm)]
+    methods: dict[str, Callable[[Recording | None], Identifier]] = {
+        default.name: partial(default.make, arm),
+        "map": partial(PosteriorLeastSquares, arm),
+        "rls": partial(_tared, RecursiveLeastSquares, arm),
+        "rls-filter": partial(_tared, FilteredRecursiveLeastSquares, arm),
+    }
+    for path in models:
+        if HybridModel.wrote(path):
+            methods[Path(path).stem] = partial(HybridIdentifier, arm, model=HybridModel.load(path))
+            continue
+        model = load_model(path)
+        model.check(arm, log)
+        methods[Path(path).stem] = partial(_learned, model, arm)
+    return methods
+
+
+def _tared(kind: Callable[..., Identifier], arm: Arm, tare: Recording | None) -> Identifier:
+    from armload.estimators import Tared
+
+    return kind(arm) if tare is None else Tared(kind(arm), tare)
+
+
+def _learned(model: LearnedModel, arm: Arm, _: Recording | None) -> Identifier:
+    from armload.ensembles import LearnedIdentifier
+
+    return LearnedIdentifier(model, arm)

@@ -1,0 +1,177 @@
+"""`armload ros2`: armload among ROS 2 nodes, as the one that identifies or as a simulated robot."""
+
+from __future__ import annotations
+
+import argparse
+
+from armload.app.cli.arguments import (
+    Parser,
+    add_arm_arguments,
+    add_identifier_arguments,
+    arm_of,
+    at_least,
+    file_name,
+    motion_of,
+    payload_of,
+    whole_number,
+)
+from armload.app.cli.printing import print_note
+from armload.errors import UsageError
+
+_EXAMPLES = """\
+examples:
+  armload ros2 simulate --robot panda --payload test --motion taie2024
+  armload ros2 node --robot panda
+  armload ros2 node --robot panda --topic /franka/joint_states --tare empty.csv
+  armload motion export taie2024 --format ros2 --robot panda --out excite.yaml
+  ros2 topic pub --once /joint_trajectory_controller/joint_trajectory \\
+      trajectory_msgs/msg/JointTrajectory "$(cat excite.yaml)"
+
+Both need a Python with ROS 2 (rclpy), see docs/ros2.md, and run until Ctrl-C. Effort is joint torque in N·m.
+"""
+
+
+def parser() -> Parser:
+    """The arguments of `armload ros2`."""
+    parser = Parser(
+        prog="armload ros2",
+        description="Identify the payload from joint states on ROS 2, or be a simulated robot there.",
+        epilog=_EXAMPLES,
+    )
+    actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
+
+    node = actions.add_parser(
+        "node",
+        help="joint states in, the payload out",
+        description="Subscribe to sensor_msgs/JointState and publish the payload as geometry_msgs/InertiaStamped.",
+    )
+    add_arm_arguments(node)
+    node.add_argument(
+        "--topic", type=file_name, default="/joint_states", metavar="T", help="of the joint states (/joint_states)"
+    )
+    node.add_argument(
+        "--publish", type=file_name, default="/payload/inertia", metavar="T", help="of the payload (/payload/inertia)"
+    )
+    add_identifier_arguments(node)
+    node.add_argument(
+        "--rate", type=at_least(0.01, float, 1000.0), default=10.0, metavar="HZ", help="messages per second (10)"
+    )
+    node.add_argument(
+        "--timeout",
+        type=at_least(0.1, float),
+        metavar="S",
+        help="end with an error after so many seconds without joint states (default: wait)",
+    )
+
+    simulate = actions.add_parser(
+        "simulate",
+        help="a simulated robot: joint states out, trajectories in",
+        description="Publish the joint states of a simulated arm with a payload that its controller does not know, and "
+        "obey trajectory_msgs/JointTrajectory.",
+    )
+    add_arm_arguments(simulate)
+    simulate.add_argument(
+        "--payload", type=file_name, metavar="FILE", help="what it holds: a JSON file, franka-hand, or test (nothing)"
+    )
+    simulate.add_argument(
+        "--motion",
+        metavar="MOTION",
+        help="taie2024, a JSON file, or random:SEED, repeated until a trajectory comes (default: stand)",
+    )
+    simulate.add_argument(
+        "--world", default="nominal", metavar="W", help="the arm as it is: nominal, or real-like:SEED (nominal)"
+    )
+    simulate.add_argument(
+        "--noise", action=argparse.BooleanOptionalAction, default=True, help="sensors as measured on real robots"
+    )
+    simulate.add_argument(
+        "--rate", type=at_least(20.0, float, 1000.0), default=200.0, metavar="HZ", help="joint states per second (200)"
+    )
+    simulate.add_argument(
+        "--topic", type=file_name, default="/joint_states", metavar="T", help="of the joint states (/joint_states)"
+    )
+    simulate.add_argument(
+        "--command",
+        type=file_name,
+        default="/joint_trajectory_controller/joint_trajectory",
+        metavar="T",
+        help="of the trajectories (/joint_trajectory_controller/joint_trajectory)",
+    )
+    simulate.add_argument("--seed", type=at_least(0), default=0, metavar="N", help="of the sensors' noise (0)")
+    return parser
+
+
+def run(options: argparse.Namespace) -> None:
+    """Run the node until somebody interrupts."""
+    {"node": _node, "simulate": _simulate}[options.action](options)
+
+
+def _node(options: argparse.Namespace) -> None:
+    from armload.devices import Ros2Source
+    from armload.devices.ros2 import PayloadNode
+    from armload.inertia import InertialParameters
+    from armload.online import OnlineIdentifier
+    from armload.recording import read_recording
+
+    arm = arm_of(options)
+    tare = None if options.tare is None else read_recording(options.tare, arm)
+    identifier = OnlineIdentifier(arm, tare, options.method)
+    begun = False
+
+    def tell(body: InertialParameters) -> None:
+        nonlocal begun
+        if not begun:
+            print_note(f"publishing {options.publish}: {body.mass:.3f} kg about {body.frame} to begin with")
+            begun = True
+
+    print_note(f"waiting for {options.topic}; method {identifier.method}")
+    try:
+        with Ros2Source(options.topic, arm, timeout=options.timeout, node="armload_payload") as source:
+            print_note(f"{options.topic}: {arm.n} joints of {arm.name} at {source.rate:.0f} Hz")
+            node = PayloadNode(source, lambda sample: identifier.update(*sample), options.publish, rate=options.rate)
+            node.run(tell)
+    finally:
+        identifier.close()
+
+
+def _simulate(options: argparse.Namespace) -> None:
+    import numpy as np
+
+    from armload.devices import Ros2Connection
+    from armload.devices.ros2 import RobotNode
+    from armload.simulation import Sensors, World
+
+    arm = arm_of(options)
+    sensors = None
+    if options.noise:
+        sensors = Sensors.of(arm)
+    if options.world == "nominal":
+        world = World.nominal(arm)
+    elif options.world.startswith("real-like:"):
+        world = World.real_like(arm, whole_number(options.world, "world"))
+    else:
+        raise UsageError(f"unknown world {options.world!r}: expected nominal or real-like:SEED")
+    limits = arm.limits
+    middle = 0.5 * (limits.position_low + limits.position_high)
+    stand = np.where(np.isfinite(middle), middle, 0.0)
+    payload = None if options.payload is None else payload_of(options.payload, arm)
+    first = stand if options.motion is None else motion_of(options.motion, arm)
+    connection = Ros2Connection("armload_robot")
+    try:
+        node = RobotNode(
+            arm,
+            connection,
+            first,
+            payload,
+            world=world,
+            sensors=sensors,
+            rate=options.rate,
+            seed=options.seed,
+            states=options.topic,
+            commands=options.command,
+            say=print_note,
+        )
+        print_note(f"{arm.name} on {options.topic}, {options.rate:g} Hz; trajectories on {options.command}")
+        node.run()
+    finally:
+        connection.close()

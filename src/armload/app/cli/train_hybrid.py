@@ -1,0 +1,250 @@
+"""`armload train --method hybrid`: the learned parts of the hybrid for any arm, from episodes simulated here."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shlex
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from armload.app.cli.printing import (
+    console,
+    print_json,
+    print_note,
+    table,
+)
+
+if TYPE_CHECKING:
+    from rich.table import Table as RichTable
+
+    from armload.arms import Arm
+    from armload.lab.training import Coverage
+
+_EVERY = 20.0  # [s] between two lines of progress
+_WORST, _FEWEST = 3, 20  # cells named; episodes that one must rest on
+_PACKAGES = ("armload", "jax", "joblib", "mujoco", "numpy", "pin", "scikit-learn", "scipy")
+
+
+def run(options: argparse.Namespace) -> None:
+    """Simulate what is missing, learn, say how well the intervals held, save the model."""
+    import joblib
+
+    from armload.arms import arm
+    from armload.lab.training import train_hybrid
+    from armload.lab.training.hybrid import EPISODES
+    from armload.posterior.model_file import ENOUGH
+
+    robot = arm(options.robot, options.frame)
+    episodes, jobs = options.episodes or EPISODES, options.jobs or joblib.cpu_count()
+    work = Path(options.work or f"out/hybrid-{robot.name}")
+    out = Path(options.out or f"out/hybrid-{robot.name}.safetensors")
+    resumed = any(work.glob("episodes-*.npz"))
+    print_note(
+        f"training a hybrid for {robot.name} about {robot.frame}: {episodes} episodes, {jobs} at a time, "
+        f"{'going on from' if resumed else 'kept in'} {work}"
+    )
+    began = time.perf_counter()
+    with episodes_shown() as progress:
+        model, coverage = train_hybrid(
+            robot, episodes=episodes, seed=options.seed, folder=work, jobs=jobs, progress=progress
+        )
+    found = summary(robot, coverage)
+    model = replace(model, provenance={**model.provenance, **found, "versions": versions()})
+    model.save(out)
+    report = {
+        "command": _command(options, episodes),
+        "seeds": [options.seed],
+        **found,
+        "versions": versions(),
+        "jobs": jobs,
+        "resumed": resumed,
+        "wall_s": round(time.perf_counter() - began, 1),
+    }
+    if options.report:
+        path = Path(options.report)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(report, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    if not model.calibrated:
+        few = f"{episodes} episodes are too few to set the widths by, expected {ENOUGH} or more"
+        missed = f"{100 * coverage.pooled:.1f} % is not the 95 % that was asked for"
+        print_note(
+            f"{few if episodes < ENOUGH else missed}: `armload identify` will call the intervals of this model "
+            f"approximate; train on more than {episodes} episodes"
+        )
+    if options.json:
+        print_json(report | {"out": str(out)})
+        return
+    console().print(cells_table(coverage))
+    print("\n".join(said(coverage)))
+    frame = "" if options.frame is None else f" --frame {options.frame}"
+    print(f"wrote {out}; use it with: armload identify LOG --robot {options.robot}{frame} --method {out}")
+
+
+def _command(options: argparse.Namespace, episodes: int) -> str:
+    """What gives the same model again."""
+    words = ["armload", "train", "--method", "hybrid", "--robot", options.robot, "--episodes", str(episodes)]
+    words += ["--seed", str(options.seed)] + ([] if options.frame is None else ["--frame", options.frame])
+    return shlex.join(words)
+
+
+def summary(robot: Arm, coverage: Coverage) -> dict[str, Any]:
+    """What the intervals were found to be worth, ready for JSON; null where no episode was."""
+    from armload.inertia import NAMES
+    from armload.lab.training.records import TIMES
+    from armload.posterior.evidence import KINDS
+
+    return {
+        "robot": robot.name,
+        "frame": str(robot.frame),
+        "episodes": coverage.episodes,
+        "pooled": round(coverage.pooled, 4),
+        "compared_with": list(KINDS),
+        "times": list(TIMES),
+        "parameters": list(NAMES),
+        "cells": _plain(coverage.cells.tolist()),
+        "ratio": _plain(coverage.ratio.tolist()),
+        "counts": coverage.counts.tolist(),
+    }
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_plain(part) for part in value]
+    return round(value, 4) if value == value else None
+
+
+def versions() -> dict[str, str]:
+    """Versions of what can change a trained number."""
+    from importlib.metadata import version
+    from platform import python_version
+
+    return {"python": python_version(), **{name: version(name) for name in _PACKAGES}}
+
+
+def cells_table(coverage: Coverage) -> RichTable:
+    """Share of held-out truths inside their interval: a row for each kind of comparison and time."""
+    import numpy as np
+
+    from armload.inertia import NAMES
+    from armload.lab.training.records import TIMES
+    from armload.posterior.evidence import KINDS
+
+    rows = table(
+        "share of held-out truths inside their 95 % interval [%]",
+        "compared with",
+        "after",
+        "episodes",
+        *NAMES,
+        "half-width / error",
+        left=1,
+    )
+    for kind, name in enumerate(KINDS):
+        for b, t in enumerate(TIMES):
+            cells, ratio = coverage.cells[kind, b], coverage.ratio[kind, b]
+            if not np.isnan(cells).all():
+                shown = [f"{100 * share:.1f}" for share in cells]
+                rows.add_row(
+                    name, f"{t:g} s", str(coverage.counts[kind, b]), *shown, f"{ratio.min():.1f}–{ratio.max():.1f}"
+                )
+        rows.add_section()
+    return rows
+
+
+def said(coverage: Coverage) -> list[str]:
+    """The pooled coverage, the cells where it is lowest and those where the intervals are widest, in words.
+
+    Cells of a few episodes are left out: their share says nothing.
+    """
+    import numpy as np
+
+    few = coverage.counts[..., None] < _FEWEST
+    lines = [
+        f"pooled coverage {100 * coverage.pooled:.1f} % on {coverage.episodes} episodes, each answered by a model that "
+        "had not seen it (cross-validated)"
+    ]
+    for what, values, unit, sign in (
+        ("lowest coverage", 100 * coverage.cells, " %", 1.0),
+        ("widest intervals, mean half-width over mean absolute error", coverage.ratio, "", -1.0),
+    ):
+        values = np.where(few, np.nan, values)
+        order = np.argsort(sign * values, axis=None)[: min(_WORST, int(np.isfinite(values).sum()))]
+        named = [f"{values.flat[k]:.1f}{unit} {_cell(np.unravel_index(k, values.shape))}" for k in order]
+        if named:
+            lines.append(f"{what}: {', '.join(named)}")
+    return lines
+
+
+def _cell(where: Any) -> str:
+    from armload.inertia import NAMES
+    from armload.lab.training.records import TIMES
+    from armload.posterior.evidence import KINDS
+
+    kind, b, k = (int(x) for x in where)
+    return f"({NAMES[k]}, {TIMES[b]:g} s, {KINDS[kind]})"
+
+
+@contextmanager
+def episodes_shown() -> Iterator[Callable[[int, int], None]]:
+    """Called as show(done, total): a bar with the time that remains on a terminal, now and then a line elsewhere."""
+    if not sys.stderr.isatty():
+        yield _Lines()
+        return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left:"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True, speed_estimate_period=300.0) as bar:
+        task = bar.add_task("episodes", total=None)
+
+        def show(done: int, total: int) -> None:
+            what = "episodes" if done < total else "learning"
+            bar.update(task, completed=done, total=total, description=what)
+
+        yield show
+
+
+_LEARNING = "learning from the episodes, and checking on those left out"
+
+
+class _Lines:
+    """Progress as lines on stderr: at the beginning, at the end and every now and then."""
+
+    def __init__(self) -> None:
+        self._first: tuple[int, float] | None = None
+        self._last = 0.0
+
+    def __call__(self, done: int, total: int) -> None:
+        now = time.perf_counter()
+        if done == total:
+            print_note(f"{total} episodes; {_LEARNING}")
+        elif self._first is None or now - self._last >= _EVERY:
+            print_note(f"{done} of {total} episodes{self._left(done, total, now)}")
+            self._last = now
+        self._first = self._first or (done, now)
+
+    def _left(self, done: int, total: int, now: float) -> str:
+        """How long the rest takes at the pace since the first call: what was read back does not count."""
+        if self._first is None or done <= self._first[0]:
+            return ""
+        seconds = (now - self._first[1]) * (total - done) / (done - self._first[0])
+        return f", about {seconds / 60:.0f} min left" if seconds >= 90 else f", about {seconds:.0f} s left"

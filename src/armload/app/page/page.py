@@ -1,0 +1,207 @@
+"""The page: what the session knows, in a browser (viser). It looks ten times a second and is waited for by nobody.
+
+viser keeps what it was told, so that whoever opens the page later sees what everybody sees.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import io
+import socket
+import threading
+import time
+from typing import Any
+
+from armload.app.page import tables
+from armload.app.page.curves import (
+    GROUPS,
+    bands_of,
+    data_of,
+    legend_of,
+    series_of,
+)
+from armload.app.page.download import ENDINGS, file_of
+from armload.app.page.scene import Scene
+from armload.app.page.session import Session
+from armload.errors import ArmloadError, UsageError
+from armload.identification import METHODS, default_for
+
+_NUMBERS, _CURVES = 3, 8  # pictures from which on numbers and curves follow
+SPANS = {
+    "last 30 s": 30.0,
+    "last 2 min": 120.0,
+    "last 10 min": 600.0,
+    "last hour": 3600.0,
+    "everything": float("inf"),
+}
+_KEY = (
+    '<div style="font-size:12px;padding:2px 8px;color:var(--mantine-color-dimmed)">line: estimate, shaded: 95 % '
+    "interval, dashed: truth where it is known. In the picture: box of the same mass and inertia (grey: not all "
+    "determined), red: 95 % region of the centre of mass, green outline: truth.</div>"
+)
+
+
+class Page:
+    """A server and what it shows.
+
+    Args:
+        session: started by whoever made it.
+        host: the interface to listen on. port: if it is taken, the next free one; 0: any.
+        period: between two pictures [s].
+
+    Attributes:
+        url: where to find the page.
+
+    Raises:
+        UsageError: viser is not installed, or there is no such interface.
+    """
+
+    def __init__(self, session: Session, host: str = "127.0.0.1", port: int = 8080, period: float = 1 / 15) -> None:
+        self.session, self.period = session, period
+        self._server = server = _serve(host, port, f"armload · {session.source.name}")
+        self.url = f"http://{'localhost' if host in ('', '0.0.0.0') else host}:{server.get_port()}"
+        self._stop = threading.Event()
+        self._ticks = 0
+        self.scene = Scene(server.scene, session.arm)
+        reach = self.scene.reach
+        server.initial_camera.position = (0.85 * reach, -0.7 * reach, 0.6 * reach)
+        server.initial_camera.look_at = (0.15 * reach, 0.0, 0.32 * reach)
+        server.gui.configure_theme(show_logo=False, show_share_button=False)
+        self._build_curves(server.gui)
+        self._build_panel(server.gui)
+
+    def serve(self) -> None:
+        """Show the session until `close` or Ctrl-C."""
+        due = time.monotonic()
+        while not self._stop.is_set():
+            if self._server.get_clients():
+                self.show()
+            due = max(due + self.period, time.monotonic())
+            self._stop.wait(due - time.monotonic())
+
+    def show(self) -> None:
+        """Bring what is seen up to date."""
+        session = self.session
+        sample, estimate = session.sample, session.estimate
+        numbers, curves = self._ticks % _NUMBERS == 0, self._ticks % _CURVES == 0
+        self._ticks += 1
+        with self._server.atomic():
+            truth = None if estimate is None else session.truth(estimate.t)
+            if sample is not None and estimate is not None:
+                self.scene.show(sample, estimate, truth)
+            if numbers:
+                self._headline.content = tables.headline(estimate, truth)
+                self._table.content = tables.parameters(estimate, truth)
+                self._events.content = tables.events(session.log)
+                self._stream.content = tables.stream(session.source.name, estimate, session.lost)
+            if curves:
+                t, rows = session.history.last(SPANS[self._span.value])
+                for group, plot in zip(GROUPS, self._plots, strict=True):
+                    plot.data = data_of(group, t, rows)
+
+    def close(self) -> None:
+        """Stop serving; nothing happens the second time."""
+        if not self._stop.is_set():
+            self._stop.set()
+            with contextlib.redirect_stdout(io.StringIO()):  # viser says goodbye on stdout
+                self._server.stop()
+
+    # ------------------------------------------------------------------ what is on it
+
+    def _build_curves(self, gui: Any) -> None:
+        panel = gui.add_panel()
+        self._plots = []
+        with panel.add_tab("Ten parameters over time"):
+            self._span = gui.add_dropdown("Time [s]", tuple(SPANS), initial_value="last 30 s")
+            for group in GROUPS:
+                gui.add_html(f'<div style="font-size:13px;padding:2px 8px 0">{legend_of(group)}</div>')
+                plot = gui.add_uplot(
+                    data_of(group, *self.session.history.last(1.0)),
+                    series_of(group),
+                    bands=bands_of(group),
+                    scales={"x": {"time": False}, "y": {"auto": True}},
+                    axes=({"size": 24, "gap": 2, "ticks": {"size": 4}}, {"size": 58, "gap": 3, "ticks": {"size": 4}}),
+                    legend={"show": False},
+                    padding=(8, 14, 0, 0),
+                    height=122,
+                )
+                self._plots.append(plot)
+            gui.add_html(_KEY)
+        panel.dock_left()
+        panel.set_width(400)
+
+    def _build_panel(self, gui: Any) -> None:
+        session = self.session
+        self._headline = gui.add_html(tables.headline(None))
+        self._table = gui.add_html("")
+        methods = methods_for(session)
+        with gui.add_folder("Identification"):
+            self._method = gui.add_dropdown("Method", methods, initial_value=session.method)
+            again = gui.add_button_group(" ", ("Start anew", "Tare"), hint="Tare: what is held now counts as nothing")
+        with gui.add_folder("Export"):
+            self._form = gui.add_dropdown("Form", tuple(ENDINGS), initial_value="urdf")
+            export = gui.add_button("Download")
+        with gui.add_folder("Events"):
+            self._events = gui.add_html(tables.events(()))
+        self._stream = gui.add_html(tables.stream(session.source.name, None))
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(400)
+
+        @self._method.on_update
+        def _(event: Any) -> None:
+            if event.client is None or event.target.value == session.method:
+                return  # we set it ourselves
+            if not _told(event.client, "Method", lambda: session.use(event.target.value)):
+                self._method.value = session.method
+
+        @again.on_click
+        def _(event: Any) -> None:
+            what = session.take_tare if event.target.value == "Tare" else session.reset
+            _told(event.client, event.target.value, what)
+
+        @export.on_click
+        def _(event: Any) -> None:
+            def send() -> None:
+                name, text = file_of(session.estimate, session.arm, self._form.value)
+                event.client.send_file_download(name, text.encode(), save_immediately=True)
+
+            _told(event.client, "Download", send)
+
+
+def methods_for(session: Session) -> tuple[str, ...]:
+    """Names of the methods a session can be switched to: those that need nothing but its samples and its tare."""
+    names = [
+        name
+        for name, method in METHODS.items()
+        if (method.needs == "" or (method.needs == "tare" and session.tare is not None))
+        and (name != "hybrid" or default_for(session.arm) == "hybrid")
+    ]
+    return tuple(names) if session.method in names else (session.method, *names)
+
+
+def _told(client: Any, title: str, action: Any) -> bool:
+    """Do what somebody at the page asked for; if it cannot be done, say so there."""
+    try:
+        action()
+    except ArmloadError as error:
+        client.add_notification(title, str(error), color="red", auto_close_seconds=10.0)
+        return False
+    return True
+
+
+def _serve(host: str, port: int, label: str) -> Any:
+    try:
+        viser: Any = importlib.import_module("viser")
+    except ImportError:
+        raise UsageError(
+            "the page needs viser, which is not installed: pip install 'armload[live]', or use --headless"
+        ) from None
+    try:
+        socket.create_server((host, 0)).close()  # viser would try one port after another, for ever
+    except OSError as error:
+        raise UsageError(f"no page can be served at {host!r}: {error.strerror or error}; try 127.0.0.1") from None
+    with contextlib.redirect_stdout(io.StringIO()):
+        server = viser.ViserServer(host, port, label, verbose=False)
+    server.request_share_url = lambda *_, **__: None  # the page leaves this machine only if somebody forwards it
+    return server

@@ -1,0 +1,93 @@
+"""Whether a live stream is what it claims to be: the checks of a log, on what was seen lately, a few times."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from armload.app.page.recent import Recent
+from armload.arms import Arm
+from armload.errors import ArmloadError
+from armload.identification import check_plausible
+from armload.online import Health, OnlineEstimate
+from armload.recording import Sample
+
+_SAID = "the samples are not plausible, the answer is not to be trusted"
+_AFTER = (3.0, 6.0, 12.0, 24.0)  # [s] of motion: the more was seen, the surer are the checks
+_SINCE = 2.0  # [s] of these since the last interruption or change of payload, at least
+_LOOKED_AT = 15.0  # [s] at most
+_STEP, _MOVED = 0.25, 0.01  # [s] between two looks at the joints; [rad] that one has to move meanwhile
+
+
+class Plausibility:
+    """Checks the samples a session has kept once the arm has moved for 3 s, and again after 6, 12 and 24 s.
+
+    Args:
+        arm: the arm. name: what the stream is called in messages.
+
+    Attributes:
+        doubt: what the last check said, one sentence; None: nothing.
+    """
+
+    def __init__(self, arm: Arm, name: str) -> None:
+        # what is attached is a payload to the checks; and a model computes in a memory that two threads must not share
+        self._arm, self._name = replace(arm, attached=None), name
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the stream."""
+        self.doubt: str | None = None
+        self._moved, self._checks = 0.0, 0
+        self._breaks = 0  # pauses and jumps so far
+        self.forget()
+
+    def forget(self) -> None:
+        """The payload has changed, or the stream was interrupted: what was seen before does not belong to the rest."""
+        self._since = 0.0  # [s] of motion since
+        self._first: float | None = None  # time of the first sample looked at since [s]
+        self._looked: Sample | None = None
+
+    def look(self, sample: Sample, health: Health, recent: Recent) -> bool:
+        """Take notice of a sample that could be used; whether `doubt` came or went."""
+        breaks = health.pauses + health.clock_jumps + health.left_out["jump"]
+        if breaks != self._breaks:
+            self._breaks = breaks
+            self.forget()
+        last = self._looked
+        if last is not None and 0.0 <= sample.t - last.t < _STEP:
+            return False
+        self._looked = sample
+        self._first = sample.t if self._first is None else self._first
+        if last is None or self._checks == len(_AFTER) or not 0.0 < sample.t - last.t < 2.0 * _STEP:
+            return False
+        if np.abs(np.subtract(sample.q, last.q)).max() > _MOVED:  # dq may be what is wrong
+            self._moved += sample.t - last.t
+            self._since += sample.t - last.t
+        if self._moved < _AFTER[self._checks] or self._since < _SINCE:
+            return False
+        self._checks += 1
+        return self._check(recent)
+
+    def look_at_last(self, recent: Recent) -> bool:
+        """The stream has ended: check what there is of one that never was; whether `doubt` came or went."""
+        return self._checks == 0 and self._since > 0.0 and self._check(recent)
+
+    def qualified(self, estimate: OnlineEstimate) -> OnlineEstimate:
+        """The estimate with what is to be said of samples that cannot be right: no interval holds then."""
+        if self.doubt is None:
+            return estimate
+        return OnlineEstimate.of({**vars(estimate), "calibrated": False, "notes": (*estimate.notes, self.doubt)})
+
+    def _check(self, recent: Recent) -> bool:
+        assert self._looked is not None
+        assert self._first is not None
+        log, before = recent.recording(min(_LOOKED_AT, self._looked.t - self._first)), self.doubt
+        if log is None:
+            return False
+        try:
+            check_plausible(replace(log, source=self._name), self._arm)
+            self.doubt = None
+        except ArmloadError as error:
+            self.doubt = f"{_SAID}: {error}"
+        return (self.doubt is None) != (before is None)

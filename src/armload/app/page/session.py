@@ -1,0 +1,276 @@
+"""From a source to the newest state: the loop that identifies, and what others may ask of it meanwhile.
+
+The loop runs in one thread and never waits for anybody. Whoever looks takes the newest estimate as it is; whoever wants
+something changed leaves an order, which is carried out between two samples.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from queue import SimpleQueue
+
+import numpy as np
+
+from armload.app.page.history import History
+from armload.app.page.plausible import Plausibility
+from armload.app.page.recent import Recent
+from armload.arms import Arm
+from armload.devices import Source
+from armload.errors import IdentificationError, SourceError
+from armload.inertia import Z95, InertialParameters
+from armload.online import Event, OnlineEstimate, OnlineIdentifier
+from armload.recording import Recording, Sample
+
+_AGAIN = 10.0  # [s] between two warnings of samples that cannot be used
+_TARE_LONGEST, _TARE_SHORTEST = 30.0, 3.0  # [s] of what was just seen that a tare is made of
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A line of the log: what happened, and when on the stream's clock [s]; `event`, if it was a change of payload.
+
+    warning: something is wrong.
+    """
+
+    t: float
+    text: str
+    event: Event | None = None
+    warning: bool = False
+
+
+class Session:
+    """A source and the identifier it feeds.
+
+    >>> from armload.arms import arm
+    >>> from armload.devices import open_source
+    >>> panda = arm("panda")
+    >>> session = Session(open_source("sim", panda, speed=None, duration=0.5), panda, method="map")
+    >>> session.run()
+    >>> session.estimate.n_samples > 400, session.estimate.method, session.log[-1].text
+    (True, 'map', 'the source has ended')
+
+    Args:
+        source: closed with the session.
+        arm: the bare arm, or with a tool that is known. tare: an earlier log of it. method: see `OnlineIdentifier`.
+        warn: told at once what is wrong with the stream, also what it ended with in a thread of its own (`start`).
+
+    Attributes:
+        sample: the newest that could be used. estimate: the newest. None before the first.
+        history: rows (30,) of phi, half-widths of the 95 % intervals and the truth, NaN where nobody knows it.
+        log: what happened, the last 200 entries.
+        ended: the source has ended. error: what it ended with, if that was one.
+
+    Raises:
+        ArmloadError: an unknown method, a model of another arm, or a tare that is none of this arm.
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        arm: Arm,
+        tare: Recording | None = None,
+        method: str | Path | None = None,
+        warn: Callable[[str], None] | None = None,
+    ) -> None:
+        self.source, self.arm, self.tare = source, arm, tare
+        self._warn_too = warn or (lambda _: None)
+        # what was held while the tare was recorded; None: nobody knows
+        self._tared = InertialParameters.zero(arm.frame) if tare is None else None
+        self._identifier = self._made(tare, method)
+        self.sample: Sample | None = None
+        self.estimate: OnlineEstimate | None = None
+        self.history = History(30)
+        self.log: deque[Entry] = deque(maxlen=200)
+        self.ended = False
+        self.error: Exception | None = None
+        self._orders: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self._recent = Recent(arm.n)
+        self._plausibility = Plausibility(arm, source.name)
+        self._trouble = False  # whether it is told that samples cannot be used
+        self._warned = -np.inf  # and when it last was, on the stream's clock
+        self._thread: threading.Thread | None = None
+        self._stop = False
+
+    @property
+    def method(self) -> str:
+        """The name of the method at work."""
+        return self._identifier.method
+
+    @property
+    def lost(self) -> int:
+        """Samples the source had to drop because the identifier was too slow."""
+        return int(getattr(self.source, "lost", 0))
+
+    # ------------------------------------------------------------------ the loop
+
+    def estimates(self, duration: float | None = None) -> Iterator[OnlineEstimate]:
+        """One estimate per sample, until the source ends or has told of `duration` [s].
+
+        Raises:
+            SourceError: the connection was lost.
+        """
+        first: float | None = None
+        for sample in self.source:
+            while not self._orders.empty():
+                self._orders.get()()
+            estimate = self._take(sample)
+            yield estimate
+            if first is None and math.isfinite(sample.t):
+                first = sample.t
+            if self._stop or (duration is not None and first is not None and sample.t - first >= duration):
+                break
+        if self._plausibility.look_at_last(self._recent):
+            self._doubted()
+            if self.estimate is not None:
+                self.estimate = self._plausibility.qualified(self.estimate)
+        self._say("the source has ended")
+        self.ended = True
+
+    def run(self, duration: float | None = None) -> None:
+        """The same to the end, for those who look at the newest estimate."""
+        for _ in self.estimates(duration):
+            pass
+
+    def start(self, duration: float | None = None) -> None:
+        """The same in a thread of its own; an error is kept in `error` and told in the log."""
+
+        def loop() -> None:
+            try:
+                self.run(duration)
+            except Exception as error:
+                self.error, self.ended = error, True
+                self._warn(str(error))
+
+        self._thread = threading.Thread(target=loop, name="armload-session", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the loop and close source and identifier."""
+        self._stop = True
+        self.source.close()
+        if self._thread is not None:
+            self._thread.join(5.0)
+        self._identifier.close()
+
+    def _take(self, sample: Sample) -> OnlineEstimate:
+        before, used = self.estimate, self._identifier.health.used
+        estimate = self._identifier.update(*sample)
+        if estimate.event is not None and (before is None or estimate.event != before.event):
+            self._tell(estimate.event)
+        usable = estimate.health.used > used
+        if usable:
+            self._recent.append(sample)
+            if self._plausibility.look(sample, estimate.health, self._recent):
+                self._doubted()
+        estimate = self._plausibility.qualified(estimate)
+        self.sample, self.estimate = sample if usable else self.sample, estimate
+        if self._trouble or self._identifier.trouble is not None:
+            self._listen(self._identifier.trouble)
+        if usable and self.history.due(estimate.t):
+            truth = self.truth(estimate.t)
+            known = np.full(10, np.nan) if truth is None else truth.phi
+            self.history.append(estimate.t, np.concatenate([estimate.phi, Z95 * estimate.std, known]))
+        return estimate
+
+    def _doubted(self) -> None:
+        doubt = self._plausibility.doubt
+        self._say("the samples are plausible now") if doubt is None else self._warn(doubt)
+
+    def _listen(self, trouble: str | None) -> None:
+        """Tell that samples cannot be used, and that they can again; not each time of a stream that stutters."""
+        now = 0.0 if self.estimate is None else self.estimate.t
+        if trouble is None:
+            self._trouble = False
+            self._say("samples can be used again")
+        elif not self._trouble and not 0.0 <= now - self._warned < _AGAIN:
+            self._trouble, self._warned = True, now
+            self._warn(trouble)
+
+    def _tell(self, event: Event) -> None:
+        """Into the log; what a change was is known a little later, in place of the first guess."""
+        entry = Entry(event.t, str(event), event)
+        for k, known in enumerate(self.log):
+            if known.event is not None and known.event.t == event.t:
+                self.log[k] = entry
+                return
+        self._recent.clear()
+        self._plausibility.forget()
+        self.log.append(entry)
+
+    def truth(self, t: float) -> InertialParameters | None:
+        """What was added since the tare, or is held at all, at time t [s]; None where the source does not know."""
+        held, tared = self.source.truth(t), self._tared
+        return None if held is None or tared is None else held - tared
+
+    # ------------------------------------------------------------------ orders, from any thread
+
+    def use(self, method: str | Path) -> None:
+        """Go on with another method, from nothing.
+
+        Raises:
+            ArmloadError: the method cannot be used here; the present one goes on.
+        """
+        self._exchange(self.tare, method, f"method {method}", self._tared)
+
+    def reset(self) -> None:
+        """Forget the stream so far; the next sample is the first."""
+        self._running()
+
+        def order() -> None:
+            self._identifier.reset()
+            self._recent.clear()
+            self._plausibility.reset()
+            self._say("started anew")
+
+        self._orders.put(order)
+
+    def take_tare(self) -> None:
+        """What is held now counts as nothing: the last half minute becomes the tare.
+
+        Raises:
+            ArmloadError: too little was seen since the payload last changed, or the method can use no tare.
+        """
+        self._running()
+        tare = self._recent.recording(_TARE_LONGEST)
+        seen = 0.0 if tare is None else tare.duration
+        if tare is None or seen < _TARE_SHORTEST:
+            raise IdentificationError(
+                f"{seen:.1f} s were seen since the payload changed: a tare needs at least {_TARE_SHORTEST:.0f} s of "
+                "motion; wait and try again"
+            )
+        self._exchange(tare, self.method, f"tared with the last {seen:.0f} s", self.source.truth(float(tare.t[-1])))
+
+    def _exchange(
+        self, tare: Recording | None, method: str | Path, text: str, tared: InertialParameters | None
+    ) -> None:
+        self._running()
+        identifier = self._made(tare, method)
+
+        def order() -> None:
+            self._identifier.close()
+            self._identifier, self.tare, self._tared = identifier, tare, tared
+            self._recent.clear()
+            self._plausibility.forget()
+            self._say(text)
+
+        self._orders.put(order)
+
+    def _running(self) -> None:
+        if self.ended:
+            raise SourceError(f"{self.source.name} has ended: open it again")
+
+    def _made(self, tare: Recording | None, method: str | Path | None) -> OnlineIdentifier:
+        # an arm's model computes in a memory of its own, which two threads must not share
+        return OnlineIdentifier(replace(self.arm), tare, method)
+
+    def _say(self, text: str, warning: bool = False) -> None:
+        self.log.append(Entry(0.0 if self.estimate is None else self.estimate.t, text, warning=warning))
+
+    def _warn(self, text: str) -> None:
+        self._say(text, warning=True)
+        self._warn_too(text)

@@ -1,0 +1,141 @@
+"""The numbers of the page as HTML: what is held and how well it is known, what happened, how the stream is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from html import escape
+
+import numpy as np
+
+from armload.app.page.session import Entry
+from armload.app.page.shapes import CHI2_95, com_region
+from armload.inertia import NAMES, UNITS, Z95, InertialParameters
+from armload.online import OnlineEstimate
+from armload.online.listening import UNUSED
+
+_DIM = "color:var(--mantine-color-dimmed)"
+_TEXT = "font-size:13px;line-height:1.45;font-variant-numeric:tabular-nums;padding:2px 8px"
+_WARNING = ' style="color:var(--mantine-color-red-text)"'
+_DECIMALS = (3, 4, 4, 4, 5, 5, 5, 5, 5, 5)
+
+
+def headline(estimate: OnlineEstimate | None, truth: InertialParameters | None = None) -> str:
+    """Mass and centre of mass, large, and the state of the identification."""
+    if estimate is None:
+        return f'<div style="{_TEXT}" data-armload="state">waiting for the first sample</div>'
+    mass = "—"
+    if estimate.determined[0]:
+        mass = f"{estimate.phi[0]:.3f} ± {Z95 * estimate.std[0]:.3f} kg"
+    lines = [
+        f'<div style="font-size:22px;font-weight:600" data-armload="mass">{mass}</div>',
+        f'<div data-armload="com">{_com(estimate)}</div>',
+        f'<div style="{_DIM}" data-armload="truth">{_truth(truth)}</div>' if truth is not None else "",
+        f'<div data-armload="state">{escape(state_of(estimate))}</div>',
+        f'<div style="{_DIM}">{escape(rests_on(estimate))}</div>',
+    ]
+    return f'<div style="{_TEXT}">{"".join(lines)}</div>'
+
+
+def state_of(estimate: OnlineEstimate) -> str:
+    """In a few words: whether anything is held, and what keeps it from being known better."""
+    if estimate.settling:
+        words = ["the payload has just changed"]
+    elif estimate.determined[0]:
+        words = ["a payload is held" if estimate.held else "nothing is held"]
+    else:
+        unused = any(note.startswith(UNUSED) for note in estimate.notes)  # nobody knows whether it moves
+        words = ["mass undetermined yet" if estimate.moving or unused else "mass undetermined: move the arm"]
+    told = any(note.startswith((UNUSED, "standing")) for note in estimate.notes)
+    if estimate.determined[0] and not (estimate.moving or told):
+        words.append("the arm stands still")
+    words += [note for note in estimate.notes if "moving" not in note and "has changed" not in note]
+    return "; ".join(words)
+
+
+def rests_on(estimate: OnlineEstimate) -> str:
+    """Method, kind of intervals, how long this payload has been seen, and what the answer is relative to."""
+    relative = {"arm": "bare arm", "tare": "tare", "before": "empty arm before"}.get(
+        estimate.relative_to, estimate.relative_to
+    )
+    kind = "calibrated" if estimate.calibrated else "approximate"
+    seen = max(estimate.t - estimate.since, 0.0)
+    return f"{estimate.method}, 95 % intervals {kind}, {seen:.0f} s of this payload, relative to the {relative}"
+
+
+def parameters(estimate: OnlineEstimate | None, truth: InertialParameters | None = None) -> str:
+    """The ten parameters with intervals and units; what the stream does not determine is said to be so."""
+    if estimate is None:
+        return ""
+    head = "".join(
+        f'<th style="text-align:{side};font-weight:600;padding:0 4px">{text}</th>'
+        for text, side in (("", "left"), ("value", "right"), ("± 95 %", "right"), ("unit", "left"))
+    )
+    if truth is not None:
+        head += '<th style="text-align:right;font-weight:600;padding:0 4px">truth</th>'
+    rows = []
+    for k, name in enumerate(NAMES):
+        known, digits, half = bool(estimate.determined[k]), _DECIMALS[k], Z95 * float(estimate.std[k])
+        cells = [
+            ("left", name),
+            ("right", f"{estimate.phi[k]:+.{digits}f}"),
+            ("right", f"{half:.{digits}f}" if known and np.isfinite(half) else "undetermined"),
+            ("left", UNITS[k]),
+        ]
+        if truth is not None:
+            cells.append(("right", f"{truth.phi[k]:+.{digits}f}"))
+        row = "".join(f'<td style="text-align:{side};padding:0 4px">{text}</td>' for side, text in cells)
+        rows.append(f'<tr data-armload="phi{k}" style="{"" if known else _DIM}">{row}</tr>')
+    return (
+        f'<div style="{_TEXT}"><table style="width:100%;border-collapse:collapse;white-space:nowrap">'
+        f"<tr>{head}</tr>{''.join(rows)}</table></div>"
+    )
+
+
+def events(log: Iterable[Entry], most: int = 6) -> str:
+    """The last lines of the log, the newest first."""
+    last = list(log)[-most:][::-1]
+    if not last:
+        return f'<div style="{_TEXT};{_DIM}" data-armload="log">nothing has happened yet</div>'
+    lines = "".join(
+        f'<div{_WARNING if entry.warning else ""}><span style="{_DIM}">{entry.t:.1f} s</span>&ensp;'
+        f"{escape(said(entry))}</div>"
+        for entry in last
+    )
+    return f'<div style="{_TEXT}" data-armload="log">{lines}</div>'
+
+
+def said(entry: Entry) -> str:
+    """A line of the log without its time, which stands before it."""
+    return entry.text if entry.event is None else entry.event.kind
+
+
+def stream(name: str, estimate: OnlineEstimate | None, lost: int = 0) -> str:
+    """Where samples come from, how many counted, and why others were left out."""
+    if estimate is None:
+        return f'<div style="{_TEXT};{_DIM}" data-armload="health">{escape(name)}</div>'
+    said = f"{name}: t = {estimate.t:.1f} s, {estimate.health}"
+    if lost:
+        said += f"; {lost} lost: this machine is too busy"
+    return f'<div style="{_TEXT};{_DIM}" data-armload="health">{escape(said)}</div>'
+
+
+def _com(estimate: OnlineEstimate) -> str:
+    if not estimate.determined[:4].all() or estimate.phi[0] <= 0 or not np.isfinite(estimate.covariance[:4, :4]).all():
+        return f'<span style="{_DIM}">centre of mass undetermined</span>'
+    r = 1000 * estimate.phi[1:4] / estimate.phi[0]
+    half = 1000 * com_std(estimate) * Z95
+    values = ", ".join(f"{x:+.1f}&#8239;±&#8239;{h:.1f}" for x, h in zip(r, half, strict=True))
+    return f"centre of mass ({values}) mm"
+
+
+def com_std(estimate: OnlineEstimate) -> np.ndarray:
+    """Standard deviations (3,) of the centre of mass along the frame's axes [m], to first order."""
+    region = com_region(estimate.phi, estimate.covariance)
+    return np.sqrt(np.einsum("ij,j->i", region.axes**2, region.lengths**2) / CHI2_95)
+
+
+def _truth(truth: InertialParameters) -> str:
+    if truth.mass == 0.0:
+        return "truth: nothing is held"
+    r = ", ".join(f"{1000 * x:+.1f}" for x in truth.com)
+    return f"truth: {truth.mass:.3f} kg, ({r}) mm"

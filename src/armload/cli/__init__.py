@@ -1,5 +1,0 @@
-"""The command line, `armload identify LOG --robot panda` and the rest: it reads, calls, prints and computes nothing."""
-
-from armload.cli.entry import main
-
-__all__ = ["main"]

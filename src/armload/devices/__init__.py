@@ -1,0 +1,48 @@
+"""Robots, simulators and files: reading their samples, writing a payload to them, one folder for each make."""
+
+from armload.devices.detached import Detached
+from armload.devices.files.source import Replay
+from armload.devices.forms import CONTROLLERS, FORMS, Form, export_load
+from armload.devices.franka.form import FrankaLoad, franka_load
+from armload.devices.franka.source import FrankaSource
+from armload.devices.guard import check_writable, flange_of, is_moving
+from armload.devices.load import Load, about, read_load
+from armload.devices.opening import open_source
+from armload.devices.recorder import Recorded, Recorder
+from armload.devices.ring import Ring, RingReader
+from armload.devices.ros2.connection import Ros2Connection
+from armload.devices.ros2.source import Ros2Source
+from armload.devices.simulator.source import Simulator
+from armload.devices.source import Source
+from armload.devices.ur.form import URPayload, ur_payload
+from armload.devices.ur.source import URSource
+
+__all__ = [
+    "CONTROLLERS",
+    "FORMS",
+    "Detached",
+    "Form",
+    "FrankaLoad",
+    "FrankaSource",
+    "Load",
+    "Recorded",
+    "Recorder",
+    "Replay",
+    "Ring",
+    "RingReader",
+    "Ros2Connection",
+    "Ros2Source",
+    "Simulator",
+    "Source",
+    "URPayload",
+    "URSource",
+    "about",
+    "check_writable",
+    "export_load",
+    "flange_of",
+    "franka_load",
+    "is_moving",
+    "open_source",
+    "read_load",
+    "ur_payload",
+]

@@ -1,0 +1,232 @@
+"""A source whose reader lives in its own process, so that neither can hold up or take down the other.
+
+`read_once` of Franka's Python client holds the interpreter while it waits: next to a busy thread it falls to 655
+samples per second. So the reader is alone with the robot and puts samples into a ring in shared memory
+(`sources.ring`); it also writes the record, where one is asked for. A byte through a pipe wakes whoever waits for a
+sample; the pipe's end says that the reader is gone, at once and whatever ended it. The other way round the reader's
+standard input ends with this process. The shared memory has no name and needs no clearing away.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import select
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armload.arms import Arm
+from armload.devices.franka.source import FrankaStatus
+from armload.devices.order import arm_to_json, payloads_to_json
+from armload.devices.ring import Ring, RingReader
+from armload.devices.source import Source
+from armload.errors import SourceError
+from armload.inertia import InertialParameters
+from armload.recording import Sample
+
+_TO_START = 60.0  # [s] to import what is needed, and to open what is no robot
+# [s] until a robot has taken the connection: it needs milliseconds, two lost packets cost three seconds. The clients
+# wait a minute and longer. The limit is here, and nothing tries the robot's port beforehand, because a Franka takes one
+# connection at a time: it may still be busy with the trial when the client comes. What is broken off is the client's
+# own connection, as when any client is ended.
+_TO_CONNECT = 10.0
+_TO_OBEY = 10.0  # [s]
+_TO_END = 3.0  # [s]
+
+
+class Detached(Source):
+    """Any source of `open_source`, read in another process.
+
+    A consumer that is slower than the source loses the oldest samples of the ring (`lost` counts them); the record has
+    them all. Files and simulators therefore run on the clock: speed None (as fast as possible) is refused.
+
+    Args:
+        spec: what to open, see `open_source`.
+        arm: whose samples they are.
+        record: a `.csv` file to keep every sample in (`Recorder`), written by the reader's process.
+        capacity: samples the ring holds.
+        options: of `open_source`, as JSON can hold them.
+
+    Attributes:
+        process: the reader's process.
+
+    Raises:
+        SourceError: the source cannot be opened; the message is the reader's.
+    """
+
+    def __init__(
+        self,
+        spec: str,
+        arm: Arm,
+        *,
+        record: str | Path | None = None,
+        capacity: int = 8192,
+        **options: Any,
+    ) -> None:
+        if options.get("speed", 1.0) is None:
+            raise SourceError(
+                f"{spec} as fast as possible would overrun the ring of its reader: give a speed, or read it in this "
+                "process (detached=False)"
+            )
+        self.name = spec
+        self._closed = False
+        self._twin: Source | None = None
+        self._waiting = threading.Lock()  # held while the ring and the pipes are in use
+        self._ring = Ring.create(1 + 3 * arm.n, capacity)
+        self._reader = RingReader(self._ring)
+        self._wake, wake = os.pipe()
+        self._status, status = os.pipe()
+        self._heard = b""
+        self._listening = threading.Lock()  # held while events are read
+        self._last: dict[str, Any] | None = None  # how it ended
+        self._calls = 0
+        command = [sys.executable, "-P", "-m", "armload.devices.reader_process"]
+        theirs = (self._ring.descriptor, wake, status)
+        try:
+            self.process = subprocess.Popen(
+                [*command, *map(str, theirs)],
+                stdin=subprocess.PIPE,
+                stdout=2,  # what a vendor's client prints must not mix with our own output
+                pass_fds=theirs,
+            )
+        finally:
+            os.close(wake)
+            os.close(status)
+        told = {**options, "payloads": payloads_to_json(options["payloads"])} if options.get("payloads") else options
+        order = {"spec": spec, "arm": arm_to_json(arm), "options": told}
+        self._send({**order, "record": None if record is None else str(record)})
+        connecting = False
+        try:
+            event = self._event(_TO_START)
+            if connecting := event["event"] == "connecting":
+                event = self._event(_TO_CONNECT, event["message"])
+            if event["event"] != "ready":
+                raise SourceError(event.get("message", f"{spec} ended before its first sample"))
+        except BaseException:
+            if connecting:  # the client holds the reader's interpreter: it cannot hear that it should end
+                self.process.kill()
+            self.close()
+            raise
+        self.name, self.n, self.rate = event["name"], event["n"], event["rate"]
+        if spec == "sim":
+            from armload.devices.opening import open_source
+
+            self._twin = open_source(spec, arm, detached=False, **options)  # never run: it knows the truth
+
+    @property
+    def lost(self) -> int:
+        """Samples this process was too slow to take."""
+        return self._reader.lost
+
+    def __iter__(self) -> Iterator[Sample]:
+        n = self.n
+        while True:
+            with self._waiting:
+                if self._closed:
+                    return
+                rows = self._reader.read()
+                if not len(rows) and not os.read(self._wake, 1 << 16) and self._reader.next >= self._ring.written:
+                    return self._say_how_it_ended()
+            for row in rows:
+                yield Sample(float(row[0]), row[1 : n + 1], row[n + 1 : 2 * n + 1], row[2 * n + 1 :])
+
+    def read_once(self) -> FrankaStatus:
+        """See `FrankaSource.read_once`; waits for the answer.
+
+        Raises:
+            SourceError: the source is no Franka robot, or did not answer.
+        """
+        return FrankaStatus(*self._call("read_once"))
+
+    def set_load(self, mass: float, com: ArrayLike, inertia: ArrayLike) -> None:
+        """See `FrankaSource.set_load`, over the reader's connection: a robot takes no second one.
+
+        Raises:
+            SourceError: the source has no load to set, the robot refused it, or did not answer.
+        """
+        self._call("set_load", float(mass), np.ravel(com).tolist(), np.ravel(inertia).tolist())
+
+    def truth(self, t: float) -> InertialParameters | None:
+        """What the source knows."""
+        return None if self._twin is None else self._twin.truth(t)
+
+    def close(self) -> None:
+        """End the reader's process and let go of the memory."""
+        if self._closed:
+            return
+        self._closed = True
+        stdin = self.process.stdin
+        assert stdin is not None
+        with contextlib.suppress(OSError):
+            stdin.close()
+        try:
+            self.process.wait(_TO_END)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+        with self._waiting:  # whoever waited for a sample has seen the pipe end
+            os.close(self._wake)
+            os.close(self._status)
+            self._ring.close()
+
+    def _say_how_it_ended(self) -> None:
+        try:
+            while self._last is None:
+                self._event(_TO_END)
+        except SourceError:
+            if self._closed:  # it was made to end
+                return
+            raise
+        if self._last["event"] == "error" and not self._closed:
+            raise SourceError(self._last["message"])
+
+    def _call(self, method: str, *arguments: Any) -> Any:
+        self._calls += 1
+        number = self._calls
+        self._send({"call": method, "number": number, "arguments": arguments})
+        event = self._event(_TO_OBEY)
+        while event is not self._last and event.get("number") != number:  # a call that was given up is answered late
+            event = self._event(_TO_OBEY)
+        if event["event"] != "answer":
+            raise SourceError(event.get("message", f"{self.name} ended before it answered"))
+        return event["value"]
+
+    def _send(self, order: dict[str, Any]) -> None:
+        stdin = self.process.stdin
+        assert stdin is not None
+        try:
+            stdin.write((json.dumps(order) + "\n").encode())
+            stdin.flush()
+        except (OSError, ValueError):
+            raise SourceError(f"the reader of {self.name} has ended: open the source again") from None
+
+    def _event(self, seconds: float, silent: str | None = None) -> dict[str, Any]:
+        """The reader's next event; how it ended, again and again, once it has told. silent: the error if none comes."""
+        until = time.monotonic() + seconds
+        with self._listening:
+            if self._last is not None:
+                return self._last
+            while b"\n" not in self._heard:
+                left = until - time.monotonic()
+                if left <= 0 or not select.select([self._status], [], [], left)[0]:
+                    raise SourceError(silent or f"the reader of {self.name} did not answer within {seconds:.0f} s")
+                heard = os.read(self._status, 1 << 16)
+                if not heard:
+                    how = self.process.wait()
+                    ended = f"was killed by signal {-how}" if how < 0 else f"ended with exit code {how}"
+                    raise SourceError(f"the reader of {self.name} {ended}: open the source again")
+                self._heard += heard
+            line, self._heard = self._heard.split(b"\n", 1)
+            event = json.loads(line)
+            if event["event"] in ("ended", "error"):
+                self._last = event
+            return event

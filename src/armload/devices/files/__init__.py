@@ -1,0 +1,1 @@
+"""Files: logs as live streams, descriptions as a payload's form."""

@@ -1,0 +1,68 @@
+"""Every form a load can be written in, by name: what `armload export --to` takes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from armload.atomic import replacing
+from armload.devices.files.form import mjcf_text, sdf_text, urdf_text
+from armload.devices.franka.form import desk_text, set_load_text
+from armload.devices.load import Load
+from armload.devices.ros2.form import inertia_stamped_text
+from armload.devices.ur.form import set_payload_text, set_target_payload_text
+from armload.errors import SinkError
+
+
+class Form(NamedTuple):
+    """One form: what it is, and the text of a load in it, given the load and the name of its link."""
+
+    what: str
+    text: Callable[[Load, str], str]
+
+
+FORMS = {
+    "franka": Form("Python for libfranka's setLoad, on top of Desk's end effector", lambda a, _: set_load_text(a)),
+    "franka-desk": Form("end effector for Franka's Desk (JSON)", lambda a, _: desk_text(a)),
+    "ur": Form("URScript set_target_payload, everything on the flange", lambda a, _: set_target_payload_text(a)),
+    "ur-payload": Form("URScript set_payload (before 5.10), no inertia", lambda a, _: set_payload_text(a)),
+    "urdf": Form("URDF: a link and a fixed joint to the frame", urdf_text),
+    "mjcf": Form("MuJoCo: a body", mjcf_text),
+    "sdf": Form("SDF: a model with one link", sdf_text),
+    "ros2": Form("ROS 2 geometry_msgs/msg/InertiaStamped (YAML)", lambda a, _: inertia_stamped_text(a)),
+}
+CONTROLLERS = ("franka", "franka-desk", "ur", "ur-payload")  # their forms are about the flange
+
+
+def export_load(load: Load, to: str, path: str | Path | None = None, name: str = "payload") -> str:
+    """The text of a load in a controller's or simulator's own form.
+
+    >>> from armload.payloads import franka_hand
+    >>> print(export_load(Load(franka_hand().parameters), "ur-payload"), end="")
+    # payload about panda_link8
+    set_payload(0.73, [-0.00707106781187, 0.00707106781187, 0.03])
+
+    Args:
+        load: about the frame the form wants (the flange, for a controller); a body that can exist.
+        to: one of `FORMS`.
+        path: a file to write it to, complete or not at all; None: only return it.
+        name: name of the link, body or model in a description.
+
+    Raises:
+        SinkError: an unknown form, a load that no body can have, or a file that cannot be written.
+    """
+    if to not in FORMS:
+        raise SinkError(f"unknown form {to!r}: expected one of {', '.join(FORMS)}")
+    if not load.consistent:
+        raise SinkError(
+            "no body can have these parameters: take the nearest one, load.as_body(), or identify on a faster motion"
+        )
+    text = FORMS[to].text(load, name)
+    if path is not None:
+        try:
+            with replacing(path) as temporary:
+                temporary.write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise SinkError(f"{path} cannot be written: {error.strerror or error}") from None
+    return text

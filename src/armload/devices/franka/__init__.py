@@ -1,0 +1,1 @@
+"""Franka arms: reading their state, writing a load, its form."""

@@ -1,0 +1,76 @@
+"""Franka's forms: the three arguments of `setLoad`, and an end effector for Desk.
+
+Both want the centre of mass in the flange frame (`panda_link8`, `fr3_link8`: link 7 + 0.107 m along z) and the inertia
+about the centre of mass in the flange's axes, nine numbers **column by column**. A load counts on top of the end
+effector that Desk has: what Desk counts already must be taken off. Sources: libfranka, `Robot::setLoad`; Franka's "End
+effector commissioning" (RIDE CLI 1.1.1: `endeffector-config.json` with mass, centerOfMass, inertia and transformation,
+matrices column based) and the file of that name in frankaemika/external_gripper_example.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armload.devices.load import Load, numbers_of
+from armload.errors import SinkError
+from armload.inertia import InertialParameters
+
+
+class FrankaLoad(NamedTuple):
+    """`setLoad(mass, F_x_Cload, load_inertia)`: [kg], (3,) [m], (9,) column by column [kg·m²]."""
+
+    mass: float
+    com: list[float]
+    inertia: list[float]
+
+
+def franka_load(parameters: InertialParameters) -> FrankaLoad:
+    """The arguments of `setLoad` for parameters about the flange.
+
+    >>> load = InertialParameters.from_com(2.0, (0, 0, 0.1), [[1, 2e-1, 0], [2e-1, 2, 0], [0, 0, 2.5]])
+    >>> franka_load(load).inertia
+    [1.0, 0.2, 0.0, 0.2, 2.0, 0.0, 0.0, 0.0, 2.5]
+    """
+    numbers = numbers_of(parameters, "franka")
+    return FrankaLoad(numbers[0], numbers[1:4], numbers[4:])
+
+
+def set_load_text(load: Load) -> str:
+    """Python for a robot at rest: `robot` is a `Robot` of pylibfranka (FR3) or panda_py.libfranka (Panda)."""
+    mass, com, inertia = franka_load(load.parameters)
+    return "\n".join(
+        [
+            *(f"# {line}" for line in load.said()),
+            f"mass = {mass!r}  # [kg]",
+            f"F_x_Cload = {com!r}  # [m] centre of mass in the flange frame",
+            f"load_inertia = {inertia!r}  # [kg·m²] about it, in the flange's axes, column by column",
+            "robot.set_load(mass, F_x_Cload, load_inertia)  # at rest only",
+            "",
+        ]
+    )
+
+
+def desk_text(load: Load, transformation: ArrayLike | None = None) -> str:
+    """An end effector as JSON, for Desk's settings: the load as the end effector itself.
+
+    Args:
+        load: about the flange.
+        transformation: pose (4, 4) of the end effector's frame (the tool centre point) in the flange [m]; default: the
+            flange itself. Enter it in Desk afterwards if it is not known here.
+    """
+    T = np.eye(4) if transformation is None else np.asarray(transformation, dtype=float)
+    R = T[:3, :3] if T.shape == (4, 4) else np.zeros((3, 3))
+    if not (np.allclose(R @ R.T, np.eye(3), atol=1e-6) and np.linalg.det(R) > 0 and np.array_equal(T[3], [0, 0, 0, 1])):
+        raise SinkError("transformation is not a pose: expected 4 rows of 4 numbers, the last one 0 0 0 1")
+    mass, com, inertia = franka_load(load.parameters)
+    content = {
+        "mass": mass,
+        "centerOfMass": com,
+        "inertia": inertia,
+        "transformation": T.flatten(order="F").tolist(),
+    }
+    return json.dumps(content) + "\n"

@@ -1,0 +1,149 @@
+"""Franka robots through libfranka: FR3 (`pylibfranka`, the maker's) and Panda (`panda-python`, with libfranka 0.9).
+
+Both clients have the same names, and both hold the interpreter while they wait for a state: read them in a process of
+their own (`Detached`, which `open_source` does). `RealtimeConfig.kIgnore` needs no real-time kernel: nothing is
+controlled here. The torque is `tau_J`, the sensors behind the gears: rigid body and friction, gravity included,
+whatever load the robot was told. The time is the robot's own, in milliseconds since it was switched on: gaps are lost
+packets.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armload.arms import Arm
+from armload.devices.source import Source
+from armload.errors import SourceError
+from armload.recording import Sample
+
+
+class _System(NamedTuple):
+    called: str
+    module: str
+    package: str
+    extra: str
+    other: str
+
+
+SYSTEMS = {
+    "fr3": _System("FR3", "pylibfranka", "pylibfranka", "franka", "a Panda is panda://ADDRESS"),
+    "panda": _System("Panda", "panda_py.libfranka", "panda-python", "panda", "an FR3 is fr3://ADDRESS"),
+}
+
+
+class FrankaStatus(NamedTuple):
+    """What the robot says of itself: velocity (n,) [rad/s], and the masses it was told to count with [kg]."""
+
+    dq: list[float]
+    m_ee: float
+    m_load: float
+
+
+class FrankaSource(Source):
+    """A Franka robot at 1 kHz; the robot takes one connection at a time.
+
+    An address that does not answer holds up the client for a minute or longer: `Detached` waits less.
+
+    Args:
+        address: host name or IP address of the robot.
+        arm: an arm of 7 joints.
+        system: "fr3" or "panda".
+
+    Attributes:
+        robot: the maker's client.
+
+    Raises:
+        SourceError: the client is not installed, or the robot cannot be reached.
+    """
+
+    rate = 1000.0
+
+    def __init__(self, address: str, arm: Arm, system: str = "fr3") -> None:
+        facts = SYSTEMS[system]
+        if arm.n != 7:
+            raise SourceError(f"{arm.name} has {arm.n} joints: a {facts.called} has 7; name the arm that is there")
+        self.name, self.n = f"{system}://{address}", arm.n
+        self._closed = False
+        client = load_client(system)
+        try:
+            self.robot: Any = client.Robot(address, client.RealtimeConfig.kIgnore)
+        except Exception as error:  # the maker's errors have no common base in Python
+            raise SourceError(unreachable(address, _said(error), system)) from None
+
+    def __iter__(self) -> Iterator[Sample]:
+        while not self._closed:
+            state = self._state()
+            yield Sample(state.time.to_sec(), np.array(state.q), np.array(state.dq), np.array(state.tau_J))
+
+    def close(self) -> None:
+        """Let go of the robot."""
+        self._closed = True
+        self.robot = None
+
+    def read_once(self) -> FrankaStatus:
+        """The robot's present velocity and the masses it counts with."""
+        state = self._state()
+        return FrankaStatus([float(x) for x in state.dq], float(state.m_ee), float(state.m_load))
+
+    def set_load(self, mass: float, com: ArrayLike, inertia: ArrayLike) -> None:
+        """Tell the robot what it holds, over this connection; only at rest. `armload.devices` asks before it writes.
+
+        Args:
+            mass: [kg].
+            com: centre of mass (3,) in the flange frame [m].
+            inertia: about the centre of mass in the flange's axes, 9 numbers column by column [kg·m²].
+
+        Raises:
+            SourceError: the robot refused it.
+        """
+        try:
+            self._robot().set_load(float(mass), np.ravel(com).tolist(), np.ravel(inertia).tolist())
+        except Exception as error:
+            raise SourceError(f"{self.name} refused the load: {_said(error)}") from None
+
+    def _robot(self) -> Any:
+        robot = self.robot  # may be let go by another thread
+        if robot is None:
+            raise SourceError(f"{self.name} is closed: open it again")
+        return robot
+
+    def _state(self) -> Any:
+        robot = self._robot()
+        try:
+            return robot.read_once()
+        except Exception as error:
+            raise SourceError(f"{self.name} was lost: {_said(error)}") from None
+
+
+def load_client(system: str) -> Any:
+    """The maker's client for "fr3" or "panda".
+
+    Raises:
+        SourceError: it is not installed.
+    """
+    facts = SYSTEMS[system]
+    try:
+        return importlib.import_module(facts.module)
+    except ImportError as error:
+        raise SourceError(
+            f"a {facts.called} is read through {facts.package}, which cannot be imported ({error}): "
+            f"pip install 'armload[{facts.extra}]'"
+        ) from None
+
+
+def unreachable(address: str, why: str, system: str) -> str:
+    """What to say of a robot that cannot be connected to."""
+    facts = SYSTEMS[system]
+    return (
+        f"the {facts.called} at {address} cannot be reached ({why}): check its address, that its joints are unlocked "
+        f"and FCI is activated in Desk, and that no other client is connected; {facts.other}"
+    )
+
+
+def _said(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__

@@ -1,0 +1,218 @@
+"""A `Load`: what is to be told to a controller, and how far it is known."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm
+from armload.errors import SinkError
+from armload.identification import Identification
+from armload.inertia import NAMES, Z95, InertialParameters, is_consistent, nearest_consistent, to_order
+from armload.online import OnlineEstimate
+from armload.payloads.files import payload_from, read_content
+
+_KNOWN = (True,) * 10
+_RELATIVE = {"before": "empty arm before"}  # what reads otherwise than it is called
+_MISFIT = 3.0  # standard deviations between what is left and the nearest body, beyond which too much was taken off
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """A payload on its way to a controller or a simulator.
+
+    What was measured, minus the hand it was measured with, is again a load:
+
+    >>> from armload.payloads import franka_hand, test_payload
+    >>> measured = Load(test_payload().parameters + franka_hand().parameters)
+    >>> part = measured - franka_hand().parameters
+    >>> round(part.parameters.mass, 3)
+    1.48
+
+    Args:
+        parameters: phi about the origin and in the axes of its frame.
+        determined: for each of the ten, whether it was measured; all of them for a payload that is known.
+        robot: name of the arm it was identified on.
+        relative_to: "arm" (everything on the flange), "tool", "tare" or "before" (what was added), None where
+            nobody said.
+        std: standard deviation of phi (10,), where it was measured.
+    """
+
+    parameters: InertialParameters
+    determined: tuple[bool, ...] = field(default=_KNOWN, repr=False)
+    robot: str | None = None
+    relative_to: str | None = None
+    std: NDArray[np.float64] | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        determined = tuple(bool(x) for x in self.determined)
+        if len(determined) != 10:
+            raise SinkError(f"determined has {len(determined)} entries: expected 10, one for each parameter")
+        object.__setattr__(self, "determined", determined)
+
+    @classmethod
+    def of(cls, result: Load | Identification | OnlineEstimate, arm: Arm | None = None) -> Load:
+        """The load that was identified, in a log or, on `arm`, on a live robot; a load is returned as it is."""
+        if isinstance(result, Load):
+            return result
+        if isinstance(result, OnlineEstimate):
+            known = tuple(bool(x) for x in result.determined)
+            return cls(result.parameters, known, None if arm is None else arm.name, result.relative_to, result.std)
+        std = (np.array(result.phi_high) - np.array(result.phi_low)) / (2 * Z95)
+        return cls(result.parameters, tuple(result.determined), result.robot, result.relative_to, std)
+
+    @property
+    def frame(self) -> str | None:
+        """The frame the parameters are about."""
+        return self.parameters.frame
+
+    @property
+    def consistent(self) -> bool:
+        """Whether a body with these parameters can exist."""
+        return is_consistent(self.parameters.phi)
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Names of the parameters that were not measured."""
+        return tuple(name for name, known in zip(NAMES, self.determined, strict=True) if not known)
+
+    @property
+    def lacks(self) -> str | None:
+        """What is not in the load, in words, and so cannot be taken off it; None: it holds everything, as far as known.
+
+        >>> Load(InertialParameters.zero(), relative_to="tare").lacks
+        'relative to the tare: what was mounted then is not in it'
+        """
+        if self.relative_to in (None, "arm"):
+            return None
+        what = "the tool" if self.relative_to == "tool" else "what was mounted then"
+        return f"relative to the {_RELATIVE.get(self.relative_to, self.relative_to)}: {what} is not in it"
+
+    def __sub__(self, other: InertialParameters) -> Load:
+        left = self._changed(self.parameters - other, "tool")
+        if self.lacks is not None and left._is_no_body():
+            raise SinkError(
+                f"what is left has a mass of {left.parameters.mass:.4g} kg and is no body: {self.lacks}; do not take "
+                "it off again"
+            )
+        return left
+
+    def __add__(self, other: InertialParameters) -> Load:
+        return self._changed(self.parameters + other, "arm")
+
+    def about(self, frame: str | None, arm: Arm | None = None) -> Load:
+        """The same load about another frame fixed to the arm's last moving link; see `about`."""
+        moved = about(self.parameters, frame, arm)
+        same = self.frame in (None, frame) or frame is None
+        return replace(self, parameters=moved, std=self.std if same else None)
+
+    def as_body(self) -> Load:
+        """The nearest load that a body can have, in units of its standard deviations; itself where it is one.
+
+        Raises:
+            SinkError: its mass is not above zero.
+        """
+        if self.parameters.mass <= 0:
+            raise SinkError(
+                f"the payload has a mass of {self.parameters.mass:.4g} kg: expected a mass above 0; check what was "
+                "taken off, and what it was measured relative to"
+            )
+        if self.consistent:
+            return self
+        return replace(self, parameters=InertialParameters(self._nearest(), self.frame))
+
+    def said(self) -> tuple[str, ...]:
+        """What to write above the numbers: whose load, about which frame, and what was not measured."""
+        what = f"payload of {self.robot}" if self.robot else "payload"
+        if self.frame:
+            what += f" about {self.frame}"
+        if self.relative_to:
+            what += f", relative to the {_RELATIVE.get(self.relative_to, self.relative_to)}"
+        lines = [_line(what)]
+        if self.undetermined:
+            lines.append(f"not determined by the log: {', '.join(self.undetermined)}; known beforehand, not measured")
+        return tuple(lines)
+
+    def _nearest(self) -> NDArray[np.float64]:
+        information = None if self.std is None else np.diag(1.0 / np.maximum(self.std, 1e-9) ** 2)
+        return nearest_consistent(self.parameters.phi, information)
+
+    def _is_no_body(self) -> bool:
+        """Whether no body with a mass has these parameters, nor any within the error bars."""
+        if self.parameters.mass <= 0 or self.consistent or self.std is None:
+            return self.parameters.mass <= 0 or not self.consistent
+        away = (self._nearest() - self.parameters.phi) / np.maximum(self.std, 1e-9)
+        return float(np.linalg.norm(away)) > _MISFIT
+
+    def _changed(self, parameters: InertialParameters, relative_to: str) -> Load:
+        return replace(self, parameters=parameters, relative_to=relative_to if self.relative_to else None)
+
+
+def about(parameters: InertialParameters, frame: str | None, arm: Arm | None = None) -> InertialParameters:
+    """Parameters about another frame of the arm's last moving link; parameters without a named frame take the name.
+
+    Args:
+        parameters: about their own frame.
+        frame: the frame wanted; None: as they are.
+        arm: the arm whose description holds both frames; needed where they differ.
+
+    Raises:
+        SinkError: the frames differ and no arm is given.
+        ArmError: the arm has no such frame, or joints lie between the two.
+    """
+    if frame is None or parameters.frame == frame:
+        return parameters
+    if parameters.frame is None:
+        return InertialParameters(parameters.phi, frame)
+    if arm is None:
+        raise SinkError(
+            f"the parameters are about {parameters.frame!r} and wanted about {frame!r}: name the robot whose "
+            "description holds both frames"
+        )
+    return replace(arm, frame=frame, attached=None).in_frame(parameters)
+
+
+def numbers_of(parameters: InertialParameters, order: str) -> list[float]:
+    """The numbers in another program's order, to 14 decimals: 1.48 then reads 1.48, and 0 reads 0."""
+    return [round(float(x), 14) + 0.0 for x in to_order(parameters, order)]
+
+
+def read_load(path: str | Path) -> Load:
+    """The load in a file: what `armload identify --json` printed, or a payload file (which is known, not measured).
+
+    Raises:
+        PayloadError: the file is missing or malformed, or no body can have its parameters.
+        SinkError: the fields of an identification in it are malformed.
+    """
+    content = read_content(path)
+    parameters = payload_from(content, path).parameters
+    determined = content.get("determined")
+    if determined is None:
+        return Load(parameters, robot=_text(content, "robot", path), relative_to=_text(content, "relative_to", path))
+    if not isinstance(determined, list) or len(determined) != 10 or any(not isinstance(x, bool) for x in determined):
+        raise SinkError(f"{path}: determined is {json.dumps(determined)[:80]}, expected 10 times true or false")
+    std = None
+    try:
+        low, high = (np.array(content[key], dtype=float) for key in ("phi_low", "phi_high"))
+        if low.shape == high.shape == (10,) and np.all(np.isfinite(high - low)) and np.all(high >= low):
+            std = (high - low) / (2 * Z95)
+    except (KeyError, TypeError, ValueError):
+        pass  # written by hand: the numbers themselves are enough
+    return Load(parameters, tuple(determined), _text(content, "robot", path), _text(content, "relative_to", path), std)
+
+
+def _text(content: dict[str, Any], key: str, path: str | Path) -> str | None:
+    value = content.get(key)
+    if value is not None and not isinstance(value, str):
+        raise SinkError(f"{path}: {key} is {json.dumps(value)[:80]}, expected text")
+    return value
+
+
+def _line(text: str) -> str:
+    """The text on one line and without what would end a comment."""
+    return " ".join(text.replace("--", "- -").split())

@@ -1,0 +1,175 @@
+"""Sources by name: what the command line and a reader's own process are given."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+from armload.arms import Arm
+from armload.devices.detached import Detached
+from armload.devices.files.source import Replay
+from armload.devices.franka import source as franka
+from armload.devices.franka.source import FrankaSource
+from armload.devices.recorder import Recorded
+from armload.devices.ros2.source import Ros2Source
+from armload.devices.simulator.source import Simulator
+from armload.devices.source import Source
+from armload.devices.ur import source as ur
+from armload.devices.ur.source import URSource
+from armload.errors import SourceError
+from armload.payloads import draw_payload
+from armload.simulation import Sensors, World
+
+SCHEMES = ("fr3", "panda", "ur", "ros2")
+_ALONE = ("fr3", "panda", "ur")  # read in a process of their own unless told otherwise
+
+
+def open_source(
+    spec: str | Path,
+    arm: Arm,
+    *,
+    record: str | Path | None = None,
+    detached: bool | None = None,
+    speed: float | None = 1.0,
+    loop: bool = False,
+    topic: str | None = None,
+    torque_constants: Sequence[float] | None = None,
+    payloads: Sequence[tuple[float, Any]] | None = None,
+    world: str = "real-like",
+    sensors: bool = True,
+    rate: float = 1000.0,
+    duration: float | None = None,
+    seed: int = 0,
+) -> Source:
+    """Open a robot, a simulator or a recording as a stream of samples.
+
+    | spec | what |
+    |---|---|
+    | `run.csv` (or any other recording) | replay |
+    | `sim` | the simulator |
+    | `fr3://ADDRESS`, `panda://ADDRESS` | a Franka robot |
+    | `ur://ADDRESS`, `ur://ADDRESS?torque_constants=12,12,10,11,11,11` | a UR arm |
+    | `ros2:///joint_states` | a ROS 2 topic |
+
+    >>> from armload.arms import arm
+    >>> with open_source("sim", arm("panda"), speed=None, duration=0.01) as source:
+    ...     source.name, sum(1 for _ in source) > 5
+    ('simulated panda', True)
+
+    Args:
+        spec: see the table.
+        arm: whose samples they are.
+        record: a `.csv` file to keep every sample in (`Recorder`).
+        detached: read in a process of its own (`Detached`); None: Franka and UR robots are.
+        speed: of a replay or the simulator: 1 real time, None as fast as possible.
+        loop: replay again and again.
+        topic: of a bag.
+        torque_constants: of a UR arm (6,) [N·m/A].
+        payloads: of the simulator: (time [s], payload) pairs; None: another one every 20 s for an hour, with pauses.
+        world: of the simulator: "nominal", "real-like" or "beyond".
+        sensors: of the simulator: what real sensors add; False: ideal ones.
+        rate, duration, seed: of the simulator: [Hz], [s] (None: for ever), of world, sensors and payloads.
+
+    Raises:
+        SourceError: no such source, it cannot be reached, or its client is not installed.
+        RecordingError: the recording cannot be read, or the record not be written.
+    """
+    name = str(spec)
+    scheme = urlsplit(name).scheme if "://" in name else ""
+    if scheme and scheme not in SCHEMES:
+        raise SourceError(
+            f"{name}: unknown kind of source {scheme!r}: expected {', '.join(f'{s}://' for s in SCHEMES)}, sim, or the "
+            "path of a recording"
+        )
+    if detached or (detached is None and scheme in _ALONE):
+        return Detached(
+            name,
+            arm,
+            record=record,
+            speed=speed,
+            loop=loop,
+            topic=topic,
+            torque_constants=None if torque_constants is None else [float(x) for x in torque_constants],
+            payloads=payloads,
+            world=world,
+            sensors=sensors,
+            rate=rate,
+            duration=duration,
+            seed=seed,
+        )
+    if scheme:
+        source = _robot(name, arm, torque_constants)
+    elif name == "sim":
+        source = _simulator(arm, payloads, world, sensors, rate=rate, speed=speed, duration=duration, seed=seed)
+    else:
+        source = Replay(name, arm, speed=speed, loop=loop, topic=topic)
+    if record is None:
+        return source
+    try:
+        return Recorded(source, record)
+    except BaseException:
+        source.close()
+        raise
+
+
+def prepare(spec: str) -> str | None:
+    """Load the client a robot is read through, ahead of `open_source`: loading may take seconds, an answer does not.
+
+    Returns:
+        What to say of a robot that then does not answer; None: a source that may take its time, or has no client here.
+    """
+    parts = urlsplit(spec if "://" in spec else "")
+    if parts.scheme not in _ALONE or not parts.hostname:
+        return None
+    silent = "it does not answer"
+    with contextlib.suppress(SourceError):  # said again when it is opened, after what else may be wrong
+        if parts.scheme == "ur":
+            ur.load_client()
+            return ur.unreachable(parts.hostname, silent)
+        franka.load_client(parts.scheme)
+        return franka.unreachable(parts.hostname, silent, parts.scheme)
+    return None
+
+
+def _robot(name: str, arm: Arm, torque_constants: Sequence[float] | None) -> Source:
+    parts = urlsplit(name)
+    if parts.scheme == "ros2":
+        return Ros2Source(parts.netloc + parts.path, arm)  # ros2://joint_states is meant well
+    if not parts.hostname:
+        raise SourceError(
+            f"{name} names no robot: expected {parts.scheme}://ADDRESS, such as {parts.scheme}://172.16.0.2"
+        )
+    asked = parse_qs(parts.query, keep_blank_values=True)
+    stray = [key for key in asked if (parts.scheme, key) != ("ur", "torque_constants")]
+    if stray:
+        raise SourceError(f"{name}: unknown option {stray[0]!r}: expected the address, with ur:// ?torque_constants=…")
+    if parts.scheme == "ur":
+        given = asked.get("torque_constants")
+        if given:
+            try:
+                torque_constants = [float(x) for x in given[-1].split(",")]
+            except ValueError:
+                raise SourceError(
+                    f"{name}: torque_constants are {given[-1]!r}: expected six numbers in N·m/A"
+                ) from None
+        return URSource(parts.hostname, arm, torque_constants)
+    return FrankaSource(parts.hostname, arm, parts.scheme)
+
+
+def _simulator(
+    arm: Arm, payloads: Sequence[tuple[float, Any]] | None, world: str, sensors: bool, seed: int, **more: Any
+) -> Source:
+    worlds = {"nominal": lambda: None, "real-like": lambda: World.real_like(arm, seed)}
+    worlds["beyond"] = lambda: World.beyond(arm, seed)
+    if world not in worlds:
+        raise SourceError(f"there is no world {world!r}: expected one of {', '.join(worlds)}")
+    if payloads is None:
+        rated = {} if arm.rated_payload is None else {"rated": arm.rated_payload}
+        payloads = []
+        for k in range(180):
+            payloads += [(5.0 + 20.0 * k, draw_payload("boxes", seed + k, **rated)), (20.0 + 20.0 * k, None)]
+    seen = Sensors.of(arm) if sensors else None
+    return Simulator(arm, payloads=payloads, world=worlds[world](), sensors=seen, seed=seed, **more)

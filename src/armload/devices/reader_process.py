@@ -1,0 +1,155 @@
+"""The reader's own process: takes samples from a source, keeps them, and puts them into the ring.
+
+Started by `Detached` as `python -m armload.devices.reader_process RING WAKE STATUS` (three inherited file descriptors).
+Its standard input brings one JSON object per line, first what to open, then commands; when it ends, so does the reader:
+that is how it learns that whoever started it has ended, in whatever way. RING is the ring, WAKE a pipe that gets one
+byte per sample, STATUS a pipe with one JSON object per event: connecting (to a robot; with what to say if nothing
+follows), ready, ended, error, or what became of a command.
+
+A sample is recorded first and handed on then: what anybody has seen is in the record.
+
+Clients print of their own accord: what goes to the descriptors of standard output and standard error goes nowhere here,
+unless ARMLOAD_TRACEBACK=1. What Python has to say, such as where a bug is, goes to the starter's standard error.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import json
+import os
+import queue
+import select
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from armload.devices.opening import open_source, prepare
+from armload.devices.order import arm_from_json, payloads_from_json
+from armload.devices.recorder import Recorder
+from armload.devices.ring import Ring
+from armload.devices.source import Source
+from armload.errors import ArmloadError, SourceError
+
+_CALLS = ("read_once", "set_load")  # what may be asked of the source from outside
+_PATIENCE = 1.0  # [s] a source may take to end before the process does
+_PR_SET_PDEATHSIG = 1  # of prctl(2): the signal this process gets when the thread that started it ends
+
+
+class _Reader:
+    """One run of the process."""
+
+    def __init__(self, ring: int, wake: int, status: int) -> None:
+        self.ring = Ring(ring)
+        self.wake = wake
+        self.status = status
+        self.commands: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
+        os.set_blocking(wake, False)
+
+    def tell(self, **event: Any) -> None:
+        with contextlib.suppress(BrokenPipeError):
+            os.write(self.status, (json.dumps(event) + "\n").encode())
+
+    def run(self) -> None:
+        lines = _lines(sys.stdin.fileno())
+        order = json.loads(next(lines))
+        arm, options = arm_from_json(order["arm"]), order["options"]
+        if options.get("payloads"):
+            options["payloads"] = payloads_from_json(options["payloads"])
+        try:
+            with contextlib.ExitStack() as stack:
+                if (silent := prepare(order["spec"])) is not None:
+                    self.tell(event="connecting", message=silent)
+                    with _ended_with_its_starter():
+                        source = open_source(order["spec"], arm, detached=False, **options)
+                else:
+                    source = open_source(order["spec"], arm, detached=False, **options)
+                stack.enter_context(source)
+                record = order["record"]
+                recorder = None if record is None else stack.enter_context(Recorder(record, source.n))
+                threading.Thread(target=self.listen, args=(source, lines), daemon=True).start()
+                self.tell(event="ready", name=source.name, n=source.n, rate=source.rate)
+                self.pass_on(source, recorder)
+            self.tell(event="ended")
+        except (ArmloadError, OSError) as error:
+            self.tell(event="error", message=str(error))
+
+    def pass_on(self, source: Source, recorder: Recorder | None) -> None:
+        row = np.empty(self.ring.columns)
+        for sample in source:
+            if recorder is not None:
+                recorder.append(sample)
+            row[0] = sample.t
+            row[1:] = np.concatenate(sample[1:])
+            self.ring.write(row)
+            with contextlib.suppress(BlockingIOError, BrokenPipeError):  # nobody is waiting, or nobody is there
+                os.write(self.wake, b".")
+            while not self.commands.empty():
+                self.obey(source, self.commands.get())
+
+    def obey(self, source: Source, command: dict[str, Any]) -> None:
+        method = command["call"]
+        try:
+            if method not in _CALLS or not hasattr(source, method):
+                raise SourceError(f"{source.name} has no {method}: only a Franka robot has")
+            value = getattr(source, method)(*command["arguments"])
+            self.tell(event="answer", number=command["number"], value=value)
+        except ArmloadError as error:
+            self.tell(event="refused", number=command["number"], message=str(error))
+
+    def listen(self, source: Source, lines: Iterator[bytes]) -> None:
+        """Take commands until standard input ends; then end the source, and if it does not, the process."""
+        for line in lines:
+            self.commands.put(json.loads(line))
+        watch = threading.Timer(_PATIENCE, os._exit, [0])  # the record needs no closing
+        watch.daemon = True
+        watch.start()
+        with contextlib.suppress(SourceError):
+            source.close()
+
+
+@contextlib.contextmanager
+def _ended_with_its_starter() -> Iterator[None]:
+    """While a client connects it may hold the interpreter for a minute: Linux itself ends the reader meanwhile."""
+    prctl = ctypes.CDLL(None).prctl if sys.platform == "linux" else None
+    if prctl is not None:
+        prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        hung_up = select.poll()
+        hung_up.register(sys.stdin.fileno(), 0)
+        if hung_up.poll(0):  # it ended before it could be followed
+            sys.exit()
+    try:
+        yield
+    finally:
+        if prctl is not None:
+            prctl(_PR_SET_PDEATHSIG, 0)
+
+
+def _silence_clients() -> None:
+    """Keep Python's own standard error, and let the descriptors that compiled clients print to lead nowhere."""
+    if os.environ.get("ARMLOAD_TRACEBACK", "") not in ("", "0"):
+        return
+    sys.stderr = os.fdopen(os.dup(2), "w", buffering=1, errors="backslashreplace")
+    with open(os.devnull, "wb") as nowhere:
+        os.dup2(nowhere.fileno(), 1)
+        os.dup2(nowhere.fileno(), 2)
+
+
+def _lines(descriptor: int) -> Iterator[bytes]:
+    """Lines of a pipe as they come, without the locks of a buffered file, which a thread may hold when all ends."""
+    heard = b""
+    while more := os.read(descriptor, 1 << 16):
+        heard += more
+        while b"\n" in heard:
+            line, heard = heard.split(b"\n", 1)
+            yield line
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to the whole group: the one who started us decides
+    _silence_clients()
+    _Reader(*map(int, sys.argv[1:4])).run()

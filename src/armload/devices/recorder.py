@@ -1,0 +1,189 @@
+"""What was seen, kept: every sample goes to the operating system before the next one comes.
+
+A record is an ordinary CSV log (`read_recording` reads it) that only ever grows by whole lines. Each line is handed
+over by itself, so that a process killed at any moment loses nothing that it had seen; a machine that loses its power
+loses what its disk had not written, and the reader drops a last line that was cut off.
+
+A log must be finite and strictly increasing in time. What is not goes to a file beside it: `run.csv` keeps its bad
+samples in `run.bad.jsonl`, one JSON object per line: `why`, and t, q, dq and tau as they came. JSON has no numbers that
+are not finite: they are the strings "NaN", "Infinity" and "-Infinity", which `float` understands. If the robot's clock
+starts anew (two samples running before the last one kept), the log goes on in `run.2.csv`, `run.3.csv`, …
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+from armload.devices.source import Source
+from armload.errors import RecordingError
+from armload.inertia import InertialParameters
+from armload.recording import Sample
+from armload.recording.columns import column_names
+
+
+class Recorder:
+    """A log that can be read at any moment, whatever becomes of the process that writes it.
+
+    Args:
+        path: a `.csv` file that does not exist yet, nor what may come beside it: nothing is ever written over.
+        n: joints.
+
+    Attributes:
+        kept: samples in the log, all its parts together.
+        bad: samples in the file beside it.
+        paths: the parts of the log, the first one as named.
+
+    Raises:
+        RecordingError: the file exists, is no .csv, or cannot be written.
+    """
+
+    def __init__(self, path: str | Path, n: int) -> None:
+        self.path = Path(path)
+        if self.path.suffix.lower() != ".csv":
+            raise RecordingError(f"a record is written as CSV: expected a name that ends in .csv, found {self.path}")
+        self.n = n
+        self.kept = 0
+        self.bad = 0
+        self.paths: list[Path] = []
+        self._bad_lines: _Lines | None = None
+        self._last = -math.inf
+        self._late = math.inf  # time of the sample before, if it was a late one
+        for beside in (self._path_of_part(2), self._path_of_bad()):  # not known only when it is needed
+            if beside.exists():
+                raise RecordingError(f"{beside} exists, and belongs to another record: choose another name than {path}")
+        self._lines = self._next_part()
+
+    def append(self, sample: Sample) -> None:
+        """Keep one sample.
+
+        Raises:
+            RecordingError: the disk is full or gone; what was written before can be read.
+        """
+        t, q, dq, tau = sample
+        row = [float(t), *np.ravel(q).tolist(), *np.ravel(dq).tolist(), *np.ravel(tau).tolist()]
+        if len(row) != 1 + 3 * self.n or np.size(q) != self.n or np.size(dq) != self.n:
+            return self._refuse(sample, f"not {self.n} joints")
+        if not all(map(math.isfinite, row)):
+            return self._refuse(sample, "not finite")
+        if row[0] <= self._last:
+            anew, self._late = row[0] > self._late, row[0]
+            if not anew:
+                return self._refuse(sample, f"not after t = {self._last!r} s")
+            self._lines.close()
+            self._lines = self._next_part()
+        self._lines.append(",".join(map(repr, row)))
+        self._last, self._late = row[0], math.inf
+        self.kept += 1
+        return None
+
+    def close(self) -> None:
+        """Close the files; nothing happens the second time."""
+        self._lines.close()
+        if self._bad_lines is not None:
+            self._bad_lines.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _next_part(self) -> _Lines:
+        path = self._path_of_part(len(self.paths) + 1)
+        lines = _Lines(path)
+        lines.append(",".join(column_names(self.n)))
+        self.paths.append(path)
+        return lines
+
+    def _path_of_part(self, part: int) -> Path:
+        return self.path if part == 1 else self.path.with_name(f"{self.path.stem}.{part}{self.path.suffix}")
+
+    def _path_of_bad(self) -> Path:
+        return self.path.with_name(f"{self.path.stem}.bad.jsonl")
+
+    def _refuse(self, sample: Sample, why: str) -> None:
+        if self._bad_lines is None:
+            self._bad_lines = _Lines(self._path_of_bad())
+        values = {name: _strict(np.asarray(value).tolist()) for name, value in sample._asdict().items()}
+        self._bad_lines.append(json.dumps({"why": why, **values}, allow_nan=False))
+        self.bad += 1
+
+
+class Recorded(Source):
+    """A source whose samples are kept as they pass.
+
+    Args:
+        source: any source; closed with this one.
+        path: of the log, see `Recorder`.
+    """
+
+    def __init__(self, source: Source, path: str | Path) -> None:
+        self.recorder = Recorder(path, source.n)
+        self.source = source
+        self.name, self.n, self.rate = source.name, source.n, source.rate
+
+    def __iter__(self) -> Iterator[Sample]:
+        for sample in self.source:
+            self.recorder.append(sample)
+            yield sample
+
+    def close(self) -> None:
+        """Close the source and the log."""
+        self.source.close()
+        self.recorder.close()
+
+    def truth(self, t: float) -> InertialParameters | None:
+        """What the source knows."""
+        return self.source.truth(t)
+
+
+def _strict(value: Any) -> Any:
+    """Numbers, however nested, as strict JSON can hold them."""
+    if isinstance(value, list):
+        return [_strict(each) for each in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
+    return value
+
+
+class _Lines:
+    """A text file that grows by whole lines, one system call each."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._file: int | None = None
+        try:
+            self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND | os.O_CLOEXEC, 0o644)
+        except FileExistsError:
+            raise RecordingError(f"{path} exists: a record is never written over; choose another name") from None
+        except OSError as error:
+            raise RecordingError(f"{path} cannot be written: {error.strerror}") from None
+        self._size = 0
+
+    def append(self, line: str) -> None:
+        if self._file is None:
+            raise RecordingError(f"{self.path} is closed: nothing more can be kept in it")
+        data = (line + "\n").encode()
+        try:
+            written = os.write(self._file, data)
+            if written < len(data):
+                os.ftruncate(self._file, self._size)
+                raise RecordingError(f"{self.path} cannot grow beyond {self._size} bytes: the disk is full")
+        except OSError as error:
+            raise RecordingError(f"{self.path} cannot be written: {error.strerror}") from None
+        self._size += written
+
+    def close(self) -> None:
+        if self._file is not None:
+            os.close(self._file)
+            self._file = None

@@ -1,0 +1,23 @@
+"""armload among ROS 2 nodes: joint states in and the payload out; a simulated robot that takes trajectories."""
+
+from armload.devices.ros2.announcement import announced
+from armload.devices.ros2.commanded import CommandedMotion
+from armload.devices.ros2.connection import Ros2Connection
+from armload.devices.ros2.messages import message_of, parameters_of
+from armload.devices.ros2.payload_node import PayloadNode
+from armload.devices.ros2.robot_node import RobotNode
+from armload.devices.ros2.source import Ros2Source
+from armload.devices.ros2.trajectory import TrajectoryMotion, read_trajectory
+
+__all__ = [
+    "CommandedMotion",
+    "PayloadNode",
+    "RobotNode",
+    "Ros2Connection",
+    "Ros2Source",
+    "TrajectoryMotion",
+    "announced",
+    "message_of",
+    "parameters_of",
+    "read_trajectory",
+]

@@ -1,0 +1,123 @@
+"""A robot (or a simulator, or a bag that is played) on ROS 2: the sensor_msgs/JointState messages of one topic."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from armload.arms import Arm
+from armload.devices.ros2.connection import SENSOR_DEPTH, Ros2Connection
+from armload.devices.ros2.joint_states import JointStates
+from armload.devices.source import Source
+from armload.errors import SourceError
+from armload.recording import Sample
+
+_LOOK = 0.1  # [s] at most between two looks at whether the source was closed or interrupted
+_TO_TELL_THE_RATE = 5  # samples
+
+
+class Ros2Source(Source):
+    """The joint states of an arm on a ROS 2 topic.
+
+    The subscription is best effort, so that it hears reliable publishers too, and keeps the last 1000 messages while
+    an identifier is busy. Joints are mapped by name; see `JointStates` for times and for what is missing.
+
+    Args:
+        topic: of sensor_msgs/JointState messages, such as /joint_states.
+        arm: whose joints.
+        rate: samples per second [Hz]; None: measured from the first five, which opening then waits for.
+        timeout: longest time without a sample [s]; None: wait for ever.
+        node: name of the ROS 2 node.
+
+    Attributes:
+        connection: the node, for whoever has something to publish.
+
+    Raises:
+        SourceError: no ROS 2, no such topic name, nothing to hear in time, joints or efforts missing.
+    """
+
+    def __init__(
+        self,
+        topic: str,
+        arm: Arm,
+        *,
+        rate: float | None = None,
+        timeout: float | None = 10.0,
+        node: str = "armload",
+    ) -> None:
+        self.name, self.n = topic, arm.n
+        self._arm, self._timeout, self._closed = arm, timeout, False
+        self._states = JointStates(arm, topic)
+        self._heard: deque[tuple[Any, int]] = deque(maxlen=SENSOR_DEPTH)
+        self._first: deque[Sample] = deque()
+        self.connection = Ros2Connection(node)
+        try:
+            self.connection.subscribe(self.connection.JointState, topic, self._hear, sensor=True)
+            self.rate = self._measured_rate() if rate is None else float(rate)
+        except BaseException:
+            self.close()
+            raise
+
+    def __iter__(self) -> Iterator[Sample]:
+        """The samples as they come; ends after `close`.
+
+        Raises:
+            SourceError: nothing was heard for `timeout` seconds, or the first message lacks velocities or efforts.
+        """
+        while not self._closed:
+            sample = self._first.popleft() if self._first else self._next()
+            if sample is not None:
+                yield sample
+
+    def stamp(self, t: float) -> int:
+        """The header's stamp of the sample at time t, since 1970 [ns]."""
+        return self._states.stamp(t)
+
+    def close(self) -> None:
+        """Leave the topic; nothing happens the second time."""
+        self._closed = True
+        self.connection.close()
+
+    def _hear(self, message: Any, received: int) -> None:
+        self._heard.append((message, received))
+
+    def _next(self) -> Sample | None:
+        """The next sample of the arm; None: closed meanwhile."""
+        begun = time.monotonic()
+        while not self._closed:
+            while self._heard:
+                sample = self._states.sample(*self._heard.popleft())
+                if sample is not None:
+                    return sample
+            waited = time.monotonic() - begun
+            if self._timeout is not None and waited > self._timeout:
+                raise SourceError(self._silence())
+            self.connection.spin(_LOOK)
+        return None
+
+    def _measured_rate(self) -> float:
+        while len(self._first) < _TO_TELL_THE_RATE:
+            sample = self._next()
+            assert sample is not None  # nobody can close what is still being opened
+            self._first.append(sample)
+        steps = np.diff([sample.t for sample in self._first])
+        steps = steps[steps > 0]
+        return float(1.0 / np.median(steps)) if len(steps) else float("nan")
+
+    def _silence(self) -> str:
+        missing = [name for name in self._arm.joint_names if name not in self._states.others]
+        if not self._states.others:
+            return (
+                f"no joint states on {self.name} for {self._timeout:g} s: expected a publisher of "
+                "sensor_msgs/JointState; check the topic's name, ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE"
+            )
+        found = ", ".join(sorted(self._states.others)[:20])
+        lacking = f"without {', '.join(missing)}" if missing else "that never come in one message"
+        return (
+            f"{self.name} had only the joints {found} for {self._timeout:g} s, {lacking}: expected all of "
+            f"{self._arm.name}'s; name the right robot or topic"
+        )

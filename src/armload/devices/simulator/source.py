@@ -1,0 +1,151 @@
+"""The simulator as a source: an arm that goes on moving while its payload comes, goes and changes.
+
+The physics is `simulate.ContinuedRun`: pieces of a quarter of a second, rolled out natively when they are due, so that
+it can go on for days. What the sensors add is made piece by piece too; a piece is observed together with the end of the
+one before it, from which its lags reach back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm
+from armload.devices.pace import Pace
+from armload.devices.source import Source
+from armload.errors import PayloadError
+from armload.inertia import InertialParameters
+from armload.motion import EndlessMotion, Motion, random_motion, taie2024
+from armload.recording import Recording, Sample
+from armload.simulation import (
+    ContinuedRun,
+    Sensors,
+    World,
+    is_panda,
+)
+
+_PIECE = 0.25  # [s]
+_BEFORE = 0.05  # [s] of the piece before that the sensors still see: more than their lags
+
+
+class Simulator(Source):
+    """A simulated arm, for ever or for a time.
+
+    >>> from armload.arms import arm
+    >>> from armload.payloads import test_payload
+    >>> panda = arm("panda")
+    >>> with Simulator(panda, payloads=[(1.0, test_payload())], speed=None, duration=1.5, rate=100.0) as simulator:
+    ...     samples = list(simulator)
+    >>> len(samples), simulator.truth(0.5).mass, round(simulator.truth(1.2).mass, 3) > 0
+    (150, 0.0, True)
+
+    Args:
+        arm: as its controller and the identification know it.
+        motion: repeated endlessly; None: the published excitation on a Panda, a random one elsewhere.
+        payloads: (time [s], payload) pairs in the order of time: from that time on the arm holds this payload, None
+            nothing. Before the first it holds nothing.
+        world: the arm as it really is; None: nominal.
+        sensors: None: ideal.
+        rate: [Hz].
+        speed: 1: real time; 2: twice as fast; None: as fast as possible.
+        duration: [s]; None: for ever.
+        seed: of the sensors' noise and of a random motion.
+
+    Raises:
+        PayloadError: times out of order, or a payload that is none.
+        MotionError: the motion cannot be repeated, or is of another arm.
+        SourceError: the speed is not a positive number.
+    """
+
+    def __init__(
+        self,
+        arm: Arm,
+        motion: Motion | None = None,
+        payloads: Sequence[tuple[float, Any]] = (),
+        *,
+        world: World | None = None,
+        sensors: Sensors | None = None,
+        rate: float = 1000.0,
+        speed: float | None = 1.0,
+        duration: float | None = None,
+        seed: int = 0,
+    ) -> None:
+        if motion is None:
+            motion = taie2024() if is_panda(arm) else random_motion(arm, seed)
+        self.arm = arm
+        self.motion = EndlessMotion(motion)
+        self.name = f"simulated {arm.name}"
+        self.n = arm.n
+        self.rate = rate
+        self._times, self._payloads = _schedule(payloads, arm)
+        self._world, self._sensors, self._seed = world, sensors, seed
+        self._end = None if duration is None else round(duration * rate)
+        self._pace = Pace(speed)
+
+    def __iter__(self) -> Iterator[Sample]:
+        for t, q, dq, tau in self._pieces():
+            for row in zip(t.tolist(), q, dq, tau, strict=True):
+                if not self._pace.wait(row[0]):
+                    return
+                yield Sample(*row)
+
+    def close(self) -> None:
+        """End the simulation; an iteration that waits ends at once."""
+        self._pace.stop()
+
+    def truth(self, t: float) -> InertialParameters:
+        """What the arm holds at time t; ten zeros where it holds nothing."""
+        return self._payloads[int(np.searchsorted(self._times, t, side="right")) - 1]
+
+    def _pieces(self) -> Iterator[tuple[NDArray, NDArray, NDArray, NDArray]]:
+        """The run, as the sensors show it, in pieces that end where the payload changes."""
+        changes = np.ceil(np.maximum(self._times, 0.0) * self.rate - 1e-9).astype(
+            int
+        )  # rows; what changes in one, the last wins
+        start = int(np.searchsorted(changes, 0, side="right")) - 1
+        run = ContinuedRun(
+            self.arm, self.motion, self._payloads[start], world=self._world, rate=self.rate, seed=self._seed
+        )
+        row, piece, before = 0, max(2, round(_PIECE * self.rate)), None
+        while self._end is None or row < self._end:
+            k = int(np.searchsorted(changes, row, side="right"))
+            if row and changes[k - 1] == row:
+                run.hold(self._payloads[k - 1])
+            stops = [row + piece, *changes[k : k + 1].tolist(), *([] if self._end is None else [self._end])]
+            exact = run.advance(min(stops) - row)
+            seen, before = (exact, None) if self._sensors is None else self._observed(exact, before, row)
+            yield seen
+            row = min(stops)
+
+    def _observed(self, exact: tuple, before: tuple | None, row: int) -> tuple[tuple, tuple]:
+        """What the sensors make of a piece that follows another, and what the next one has to see of both."""
+        assert self._sensors is not None
+        t, q, dq, tau = exact if before is None else map(np.concatenate, zip(before, exact, strict=True))
+        behind = tuple(x[-max(2, round(_BEFORE * self.rate)) :] for x in (t, q, dq, tau))
+        if len(t) < 2:  # one sample alone has no lag and no spectrum
+            return exact, behind
+        seed = int(np.random.SeedSequence([self._seed, row]).generate_state(1)[0])
+        log = self._sensors.observe(Recording(t, q, dq, tau), seed)
+        new = log.t > (exact[0][0] - 0.5 / self.rate)  # stamps jitter by less than half a sample
+        return (log.t[new], log.q[new], log.dq[new], log.tau[new]), behind
+
+
+def _schedule(payloads: Sequence[tuple[float, Any]], arm: Arm) -> tuple[NDArray, list[InertialParameters]]:
+    """Times, the first before all others, and what is held from each on."""
+    times, held = [-np.inf], [InertialParameters(np.zeros(10), arm.frame)]
+    for t, payload in payloads:
+        parameters = getattr(payload, "parameters", payload)
+        if parameters is None:
+            parameters = held[0]
+        if not isinstance(parameters, InertialParameters):
+            raise PayloadError(
+                f"the payload at {t} s is a {type(payload).__name__}: expected InertialParameters, a Payload or None"
+            )
+        if not (np.isfinite(t) and t > times[-1]):
+            raise PayloadError(f"a payload comes at {t} s after one at {times[-1]} s: expected increasing times")
+        times.append(float(t))
+        held.append(InertialParameters(parameters.phi, arm.frame))
+    return np.array(times), held

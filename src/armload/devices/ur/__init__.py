@@ -1,0 +1,1 @@
+"""Universal Robots arms: reading their state, writing a payload, its form."""

@@ -1,0 +1,82 @@
+"""Writing a payload to a Universal Robots arm: guarded `setTargetPayload`, everything on the flange."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+from numpy.typing import ArrayLike
+
+from armload.arms import Arm
+from armload.devices.guard import check_writable, reason_of, stands_still
+from armload.devices.load import Load
+from armload.devices.ur.form import URPayload, ur_payload
+from armload.errors import SinkError
+from armload.identification import Identification
+
+
+class URControl(Protocol):
+    """What is needed of ur-rtde's `RTDEControlInterface`."""
+
+    def setTargetPayload(self, mass: float, cog: list[float], inertia: list[float], /) -> Any:
+        """Tell the controller the payload; False if it did not take it."""
+
+
+class URReceive(Protocol):
+    """What is needed of ur-rtde's `RTDEReceiveInterface`."""
+
+    def getActualQd(self) -> ArrayLike:
+        """Measured joint velocities [rad/s]."""
+        ...
+
+    def isConnected(self) -> bool:
+        """Whether they are new ones."""
+        ...
+
+
+def set_load(
+    control: URControl,
+    receive: URReceive,
+    result: Load | Identification,
+    arm: Arm,
+    *,
+    write: bool = False,
+    flange: str | None = None,
+    allow_undetermined_inertia: bool = False,
+) -> URPayload:
+    """Tell a Universal Robots arm what is on its flange, and return what was told.
+
+    Its controller knows of no tool beside the payload: a load relative to a tool or a tare lacks what was mounted then,
+    and is refused until that is added.
+
+    Args:
+        control, receive: the vendor's clients.
+        result: what was identified.
+        arm: the robot's arm.
+        write, flange, allow_undetermined_inertia: see `check_writable`.
+
+    Raises:
+        SinkError: the load must not be written (see `check_writable`), or the robot refused it.
+    """
+    try:
+        if not receive.isConnected():  # the client would go on giving its last values
+            raise ConnectionError("the connection is lost")
+        moving = not stands_still(receive.getActualQd)
+    except Exception as error:  # the vendor's own exceptions have no common base
+        raise SinkError(f"the robot's state cannot be read, so no payload is written: {reason_of(error)}") from error
+    told = ur_payload(
+        check_writable(
+            result,
+            arm,
+            moving=moving,
+            write=write,
+            flange=flange,
+            allow_undetermined_inertia=allow_undetermined_inertia,
+        )
+    )
+    try:
+        taken = control.setTargetPayload(*told)
+    except Exception as error:
+        raise SinkError(f"the robot refused the payload: {reason_of(error)}") from error
+    if taken is False:
+        raise SinkError("the robot refused the payload: setTargetPayload returned False")
+    return told

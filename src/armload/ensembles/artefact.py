@@ -1,0 +1,227 @@
+"""Saved models: one safetensors file with the members' arrays and, as JSON in its header, where they belong.
+
+Nothing in the file is executed when it is read. The header names the arm, the frame and the motions the model was
+trained on, because a learned payload model answers for these alone.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import fields
+from importlib.metadata import PackageNotFoundError, version
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armload.arms import Arm
+from armload.atomic import replacing
+from armload.ensembles.compiled import (
+    Beside,
+    Compiled,
+    CompiledNetworks,
+    CompiledTrees,
+    Together,
+)
+from armload.ensembles.kernel import CompiledSupportVectors
+from armload.ensembles.trained_model import LearnedModel
+from armload.errors import ArmloadError, ModelError
+from armload.inertia import NAMES
+from armload.motion import Motion, MotionFingerprint
+from armload.recording.columns import column_names
+
+if TYPE_CHECKING:
+    from armload.ensembles.bagging import Ensemble
+
+FORMAT = 1
+_HEADER = "armload"
+_LEAVES: dict[str, type[Compiled]] = {
+    "trees": CompiledTrees,
+    "networks": CompiledNetworks,
+    "support vectors": CompiledSupportVectors,
+}
+_BRANCHES: dict[str, type[Beside] | type[Together]] = {"beside": Beside, "together": Together}
+
+
+def save_model(
+    path: str | PathLike[str],
+    model: Ensemble,
+    *,
+    arm: Arm,
+    motion: Motion | MotionFingerprint | Sequence[Motion | MotionFingerprint] | None,
+    dataset_hash: str,
+    frame: str | None = None,
+    error_std: ArrayLike | None = None,
+    notes: str = "",
+) -> LearnedModel:
+    """Write a fitted ensemble to one .safetensors file and return it as loaded from there.
+
+    Args:
+        path: the file; replaced as a whole, or not at all.
+        model: a fitted `BaggingEnsemble`, `TwoStage` or `MixedEnsemble` with features (t, q, dq, tau) and ten outputs.
+        arm: the arm of the training data.
+        motion: the motion, or motions, of the training data, or their fingerprints. None: the model is meant for any
+            motion, and no recording is refused for its motion.
+        dataset_hash: `Dataset.hash` of the training data.
+        frame: the payload frame; must be the arm's. Default: the arm's.
+        error_std: (10,) root-mean-square error on payloads held out from training (`held_out_error`). None: unknown;
+            the model then gives no interval but that of its training payloads.
+        notes: anything worth remembering.
+
+    Raises:
+        ModelError: the model is not fitted, has other columns, or the frame is not the arm's.
+    """
+    compiled: Compiled | None = getattr(model, "compiled_", None)
+    if compiled is None:
+        raise ModelError(f"{type(model).__name__} is not fitted: call fit before saving it")
+    if compiled.n_features != 1 + 3 * arm.n or compiled.n_outputs != 10:
+        raise ModelError(
+            f"the model maps {compiled.n_features} features to {compiled.n_outputs} outputs: a payload model of "
+            f"{arm.name} has {1 + 3 * arm.n} (t, q, dq, tau) and 10"
+        )
+    if frame not in (None, arm.frame):
+        raise ModelError(f"frame is {frame!r}: the arm's payload frame is {arm.frame!r}; set the arm to that frame")
+    motions = motion if isinstance(motion, Sequence) else () if motion is None else (motion,)
+    prints = [m if isinstance(m, MotionFingerprint) else MotionFingerprint.of(m) for m in motions]
+    tensors: dict[str, NDArray] = {}
+    header = {
+        "format": FORMAT,
+        "kind": model.kind_name,
+        "arm": {"name": arm.name, "fingerprint": arm.fingerprint, "joints": list(arm.joint_names)},
+        "frame": arm.frame,
+        "motions": [m.to_dict() for m in prints],
+        "dataset_hash": dataset_hash,
+        "features": column_names(arm.n),
+        "phi_mean": model.y_mean_.tolist(),
+        "phi_std": model.y_std_.tolist(),
+        "error_std": None if error_std is None else np.asarray(error_std, dtype=float).tolist(),
+        "settings": {k: v for k, v in model.get_params().items() if isinstance(v, str | int | float | bool | None)}
+        | {"members": compiled.n_members},
+        "epochs": None if model.epochs_ is None else model.epochs_.tolist(),
+        "versions": _versions(),
+        "notes": notes,
+        "structure": take_apart(compiled, "", tensors),
+    }
+    from safetensors.numpy import save
+
+    header["sha256"] = _digest(header, tensors)
+    path = Path(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(path) as part:
+            part.write_bytes(save(tensors, {_HEADER: json.dumps(header)}))
+    except OSError as error:
+        raise ModelError(f"the model cannot be written to {path}: {error.strerror}") from None
+    return load_model(path)
+
+
+def load_model(path: str | PathLike[str]) -> LearnedModel:
+    """Read a model written by `save_model`.
+
+    Raises:
+        ModelError: missing, truncated, altered or foreign file, or one of a newer armload.
+    """
+    from safetensors import SafetensorError, safe_open
+
+    path = Path(path)
+    try:
+        with safe_open(path, framework="np") as file:
+            text = (file.metadata() or {}).get(_HEADER)
+            tensors = {name: np.ascontiguousarray(file.get_tensor(name)) for name in file.keys()}  # noqa: SIM118
+    except FileNotFoundError:
+        raise ModelError(f"no model at {path}: expected a .safetensors file written by armload") from None
+    except (SafetensorError, OSError, ValueError, TypeError) as error:
+        raise ModelError(
+            f"{path} is not a readable model ({' '.join(str(error).split())}): expected a .safetensors file written by "
+            "armload; copy it again"
+        ) from None
+    if text is None:
+        raise ModelError(f"{path} is a safetensors file without armload's header: expected a model armload saved")
+    try:
+        header = json.loads(text)
+        found = header["format"]
+        if found != FORMAT:
+            raise ModelError(f"{path} has model format {found}: this armload reads {FORMAT}; update armload")
+        digest = header.pop("sha256")
+        if digest != _digest(header, tensors):
+            raise ModelError(f"{path} was altered after it was saved (its SHA-256 differs): copy it again")
+        compiled = put_together(header["structure"], "", tensors)
+        arm = header["arm"]
+        model = LearnedModel(
+            compiled=compiled,
+            kind=header["kind"],
+            arm_name=arm["name"],
+            arm_fingerprint=arm["fingerprint"],
+            joint_names=tuple(arm["joints"]),
+            frame=header["frame"],
+            motions=tuple(MotionFingerprint.from_dict(m) for m in header["motions"]),
+            dataset_hash=header["dataset_hash"],
+            phi_mean=np.array(header["phi_mean"], dtype=float),
+            phi_std=np.array(header["phi_std"], dtype=float),
+            error_std=None if header["error_std"] is None else np.array(header["error_std"], dtype=float),
+            settings=header["settings"],
+            epochs=header["epochs"],
+            versions=header["versions"],
+            notes=header["notes"],
+            source=str(path),
+        )
+        if header["features"] != model.features or compiled.n_features != len(model.features):
+            raise ValueError(f"{compiled.n_features} features, named {', '.join(map(str, header['features']))}")
+        sizes = {len(x) for x in (model.phi_mean, model.phi_std, model.error_std) if x is not None}
+        if sizes | {compiled.n_outputs} != {len(NAMES)}:
+            raise ValueError(f"{compiled.n_outputs} outputs")
+    except ModelError:
+        raise
+    except (ArmloadError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise ModelError(f"{path} holds a model armload cannot use ({error}): save or copy it again") from None
+    return model
+
+
+def take_apart(compiled: Compiled, prefix: str, tensors: dict[str, NDArray]) -> dict[str, Any]:
+    """The tree of parts as plain data; their arrays go to `tensors`, named by their place."""
+    for kind, branch in _BRANCHES.items():
+        if isinstance(compiled, branch):
+            parts = [take_apart(part, f"{prefix}{k}.", tensors) for k, part in enumerate(compiled.parts)]
+            return {"type": kind, "parts": parts}
+    kind = next(kind for kind, leaf in _LEAVES.items() if isinstance(compiled, leaf))
+    out: dict[str, Any] = {"type": kind}
+    for field in fields(compiled):  # type: ignore[arg-type]
+        value = getattr(compiled, field.name)
+        if isinstance(value, np.ndarray):
+            tensors[prefix + field.name] = np.ascontiguousarray(value)
+        else:
+            out[field.name] = value
+    return out
+
+
+def put_together(structure: dict[str, Any], prefix: str, tensors: dict[str, NDArray]) -> Compiled:
+    kind = structure["type"]
+    if kind in _BRANCHES:
+        parts = [put_together(part, f"{prefix}{k}.", tensors) for k, part in enumerate(structure["parts"])]
+        return _BRANCHES[kind](parts)
+    leaf = _LEAVES[kind]
+    values = {f.name: tensors.get(prefix + f.name, structure.get(f.name)) for f in fields(leaf)}  # type: ignore[arg-type]
+    compiled = leaf(**values)
+    compiled.validate()
+    return compiled
+
+
+def _digest(header: dict[str, Any], tensors: dict[str, NDArray]) -> str:
+    digest = hashlib.sha256(json.dumps(header, sort_keys=True).encode())
+    for name in sorted(tensors):
+        digest.update(f"{name} {tensors[name].dtype} {tensors[name].shape}".encode() + tensors[name].tobytes())
+    return digest.hexdigest()
+
+
+def _versions() -> dict[str, str]:
+    out = {}
+    for package in ("armload", "numpy", "scikit-learn", "jax"):
+        try:
+            out[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return out

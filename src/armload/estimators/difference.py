@@ -1,0 +1,163 @@
+"""Torque difference with a tare along the same motion: what the arm does wrong it does wrong in both runs.
+
+With the same motion the arm's own mismatch (friction, offsets, links, whatever no model holds) is nearly the same
+torque at the same place of both runs, and goes with their difference:
+
+    r_run(t) − r_tare(t + shift) = W_run(t)·phi + e,      r = F[tau − tau_bare]
+
+each r from the acceleration-free filtered regression of its own log. The nominal arm is taken off both, because under a
+payload that the controller does not know the two motions differ by milliradians. `recording.alignment` finds the
+shift from the joint positions. Joints are weighed by the long-run variance of their residual (`autocorrelation`).
+
+Sources: Atkeson, An & Hollerbach, IJRR 1986 (difference of torques with and without load); filtered momentum form: see
+`arms.filtered`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm, momentum_regressor, rated_effort
+from armload.errors import IdentificationError
+from armload.estimators.normal import NormalLeastSquares
+from armload.recording import GAP, Recording
+from armload.recording.alignment import LEAST, TOLERANCE, Aligned, MotionTracker, align
+from armload.regression.filtered import Lag, filtered_regressor
+from armload.regression.information import REGRESSOR_RATE
+
+_SETTLED = 7.99  # time constants after which a lag has forgotten where it started
+_RESOLUTION = 1e-5  # of the effort limit: two logs differ by so much at least
+_PRIOR_BLOCKS = 8.0  # weight of the rows' own variance, in blocks
+
+
+class _FilteredRows:
+    """r and W of a log at `REGRESSOR_RATE`, torque at its full rate, piece by piece; NaN in r until the lags settle."""
+
+    def __init__(self, arm: Arm, gain: float) -> None:
+        self.arm, self.gain = arm, gain
+        self._torque, self._bare, self._regressor = Lag(gain), Lag(gain), Lag(gain)
+        self._start: float | None = None
+        self._last = -np.inf
+
+    def __call__(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+        """Row indices (M,), r (M, n) and W (M, n, 10) of the next N samples."""
+        if self._start is None:
+            self._start = float(t[0])
+        lagged = self._torque(t, tau)
+        rows = []
+        for k, now in enumerate(t):
+            if now - self._last >= 0.9 / REGRESSOR_RATE:
+                rows.append(k)
+                self._last = now
+        if not rows:
+            return np.empty(0, dtype=int), np.empty((0, self.arm.n)), np.empty((0, self.arm.n, 10))
+        index = np.array(rows)
+        t, q, dq = t[index], q[index], dq[index]
+        p, drift = self.arm.momentum(q, dq)
+        r = lagged[index] - self.gain * p - self._bare(t, drift - self.gain * p, initial=-self.gain * p[0])
+        r[t < self._start + _SETTLED / self.gain] = np.nan
+        Y = momentum_regressor(self.arm.frame_motion(q), dq)
+        return index, r, filtered_regressor(t, Y.momentum, Y.drift, self._regressor)
+
+
+class DifferenceLeastSquares(NormalLeastSquares):
+    """Weighted least squares on the torque difference with a tare along the same motion.
+
+    What was mounted at the tare counts as part of the arm; the answer is what was added since. In a stream, samples
+    that the tare does not show are passed over; `trace`, `at` and `run` refuse a log of another motion first. The
+    covariance knows nothing of the torque's own calibration, which scales the answer: about 2 % where torque is motor
+    current.
+
+    >>> from armload.arms import arm
+    >>> from armload.motion import taie2024
+    >>> from armload.simulation import simulate
+    >>> panda = arm("panda")
+    >>> DifferenceLeastSquares(panda, simulate(panda, taie2024(), rate=100.0)).name
+    'difference'
+
+    Args:
+        arm: the bare arm.
+        tare: an earlier log of the same arm along the same motion.
+        gain: λ of the lag [1/s].
+
+    Raises:
+        IdentificationError: the tare is of another arm.
+    """
+
+    name = "difference"
+
+    def __init__(self, arm: Arm, tare: Recording, gain: float = 20.0) -> None:
+        self.arm, self.gain, self.tare = arm, gain, tare
+        super()._check(tare)
+        self._tracker = MotionTracker(tare)
+        self._tare_t, self._tare_r = _filtered_torque(arm, tare, gain)
+        super().__init__(arm, weighted=True)
+
+    def _check(self, recording: Recording) -> None:
+        """Whole recordings are checked first: the tare has to show their motion."""
+        super()._check(recording)
+        found = align(recording, self.tare)
+        if found.coverage < LEAST or found.deviation > TOLERANCE:
+            raise IdentificationError(
+                f"the tare {self.tare.source} does not show the motion of {recording.source}: {found.coverage:.0%} of "
+                f"its path is found there within {TOLERANCE:.0%} of the motion's amplitude, expected at least "
+                f"{LEAST:.0%}; run the same motion without the payload, or use the method map, which takes any tare"
+            )
+
+    @property
+    def seconds(self) -> float:
+        """How much of the run so far the tare has shown [s]."""
+        return self._blocks.duration
+
+    def _restart(self) -> None:
+        self._filter = _FilteredRows(self.arm, self.gain)
+        self._tracker.restart()
+
+    def _rows(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+        index, r, W = self._filter(t, q, dq, tau)
+        found: list[Aligned] = []
+        for k, *row in zip(index, r, W, strict=True):
+            found += self._tracker.feed(float(t[k]), q[k], row)
+        times = np.array([aligned.t for aligned in found])
+        y = np.array([aligned.row[0] for aligned in found]).reshape(-1, self.arm.n)
+        Y = np.array([aligned.row[1] for aligned in found]).reshape(-1, self.arm.n, 10)
+        if found:
+            y = y - self._tare_at(np.array([aligned.t + aligned.shift for aligned in found]))
+        keep = np.isfinite(y).all(axis=1)
+        return times[keep], y[keep], Y[keep]
+
+    def _tare_at(self, t: NDArray) -> NDArray[np.float64]:
+        """r of the tare (M, n) at times (M,) of its clock; NaN where it has not settled."""
+        return np.stack([np.interp(t, self._tare_t, column) for column in self._tare_r.T], axis=1)
+
+    def _add(self, t: NDArray, y: NDArray, Y: NDArray) -> None:
+        """Rows one stretch at a time: a row after a pause does not stand for the time of the pause."""
+        edges = np.flatnonzero(np.diff(t, prepend=self._last_row) > GAP)
+        for start, stop in zip([0, *edges], [*edges, len(t)], strict=True):
+            if start in edges:
+                self._last_row = t[start] - 1.0 / REGRESSOR_RATE
+            if stop > start:
+                super()._add(t[start:stop], y[start:stop], Y[start:stop])
+
+    def _residual_variance(self, phi: NDArray) -> NDArray[np.float64]:
+        """Long-run variance per row (n,): of few blocks, drawn towards the variance of the rows, scaled alike."""
+        rows = super()._residual_variance(phi) + (_RESOLUTION * rated_effort(self.arm)) ** 2
+        if not self._blocks.ready:
+            return rows
+        means, times = self._blocks.means()
+        square = (means[..., 10] - means[..., :10] @ phi) ** 2 * times[:, None] * self._blocks.rate
+        scale = np.exp(np.mean(np.log(np.maximum(square.mean(axis=0), 1e-12) / rows)))
+        return (_PRIOR_BLOCKS * scale * rows + square.sum(axis=0)) / (_PRIOR_BLOCKS + len(times))
+
+
+def _filtered_torque(arm: Arm, log: Recording, gain: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Times (M,) and r (M, n) of a whole log; NaN after every gap until the lags have settled."""
+    edges = np.flatnonzero(np.diff(log.t) > GAP) + 1
+    times, torques = [], []
+    for start, stop in zip([0, *edges], [*edges, len(log)], strict=True):
+        part = slice(start, stop)
+        index, r, _ = _FilteredRows(arm, gain)(log.t[part], log.q[part], log.dq[part], log.tau[part])
+        times.append(log.t[part][index])
+        torques.append(r)
+    return np.concatenate(times), np.concatenate(torques)

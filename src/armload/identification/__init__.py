@@ -1,0 +1,18 @@
+"""One log in, one answer out: plausibility, choice of method, answer."""
+
+from armload.identification.answer import Identification
+from armload.identification.identify_log import identify, plausible_tool
+from armload.identification.methods import DEFAULT, LEFT_OUT, METHODS, Method, default_for
+from armload.identification.plausibility import check_plausible
+
+__all__ = [
+    "DEFAULT",
+    "LEFT_OUT",
+    "METHODS",
+    "Identification",
+    "Method",
+    "check_plausible",
+    "default_for",
+    "identify",
+    "plausible_tool",
+]

@@ -1,0 +1,253 @@
+"""Is this log what it claims to be? Units, columns, limits and the arm, checked before anything is identified.
+
+Every test is meant to pass any sound log of the right arm, with noise, gaps, low rates, motor-side friction and
+payloads up to twice the rated one, and to refuse what would give a wrong answer without a sign of it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm
+from armload.errors import RecordingError
+from armload.identification.torque_scale import torque_scale
+from armload.recording import Recording
+from armload.recording.columns import check_joint_count
+from armload.recording.windows import integrals, windows
+
+_DEGREE = 180.0 / np.pi
+POSITION_TOLERANCE = 0.05  # [rad] beyond the limits
+_FULL_TURN = 2.0 * np.pi
+_JUMP = 0.1  # [rad] beyond what twice the velocity limit allows
+_UNLIMITED_SPEED = 10.0  # [rad/s] taken where the limit is not known
+_SPEED = 2.0  # times the velocity limit
+_MOVES = 0.005  # [rad] rms per window, below which a joint counts as standing still
+_NOT_DERIVATIVE = 0.5  # relative rms difference between ∫dq dt and the change of q
+# A payload of twice the rated mass, far off the flange, asks up to 2.4 times the rated torque of the wrist
+_EFFORT, _EFFORT_SHARE = 3.0, 0.01  # times the effort limit, in more than this share of the samples
+_NO_TORQUE = 1e-3  # [N·m]
+_FROZEN_TIME, _FROZEN_MOTION = 0.25, 0.1  # [s], [rad] without any change of torque: no sound sensor is so calm
+_SCALE_LOW, _SCALE_HIGH, _SURE = 0.6, 1.7, 2.0  # of the arm's own torque; standard deviations
+_MISFIT = 2.5  # plausible model errors
+
+
+def check_plausible(recording: Recording, arm: Arm) -> None:
+    """Refuse a log that is not a log of this arm in SI units; the rows in messages count from 0.
+
+    Raises:
+        RecordingError: another number or other names of joints; degrees; positions outside the limits; positions that
+            jump; dq that is not the derivative of q (unit, sign, swapped columns, time in milliseconds); too fast;
+            torque missing, frozen, too large, or not that of this arm (wrong arm, unit, sign, base orientation, or a
+            channel without gravity). One sentence that names the place.
+    """
+    _check_joints(recording, arm)
+    _check_radians(recording, arm)
+    _check_jumps(recording, arm)
+    _check_limits(recording, arm)
+    _check_velocity_is_derivative(recording)
+    _check_speed(recording, arm)
+    _check_effort(recording, arm)
+    if recording.channel == "measured":  # the others need not hold the arm's own weight
+        _check_torque_goes_on(recording)
+        _check_no_torque_is_dead(recording)
+        _check_torque_is_the_arms(recording, arm)
+
+
+def _check_joints(recording: Recording, arm: Arm) -> None:
+    check_joint_count(recording.n, recording.source, arm)
+    names = recording.joint_names
+    if names is not None and tuple(names) != arm.joint_names:
+        same = "in another order" if sorted(names) == sorted(arm.joint_names) else "of another arm"
+        raise RecordingError(
+            f"{recording.source} has joints {same} ({', '.join(names)}): expected {', '.join(arm.joint_names)}; read "
+            f"the log for {arm.name}, or name the robot that made it"
+        )
+
+
+def _check_radians(recording: Recording, arm: Arm) -> None:
+    """Most rows outside the limits, several angles beyond a full turn, and none outside once taken as degrees."""
+    q, beyond = recording.q, _beyond(recording.q, arm) > POSITION_TOLERANCE
+    mostly_outside = np.mean(np.any(beyond, axis=1)) > 0.5
+    turns = np.sum(np.abs(q).max(axis=0) > _FULL_TURN + 0.5)
+    if mostly_outside and turns >= min(2, arm.n) and np.all(_beyond(q / _DEGREE, arm) <= POSITION_TOLERANCE):
+        k, j = np.unravel_index(int(np.argmax(np.abs(q))), q.shape)
+        raise RecordingError(
+            f"{recording.source}: positions look like degrees (q{j + 1} = {q[k, j]:.4g} at {_row(recording, k)}): "
+            "expected radians; multiply q, and dq if it is in degrees too, by pi/180"
+        )
+
+
+def _check_limits(recording: Recording, arm: Arm) -> None:
+    bad = np.argwhere(_beyond(recording.q, arm) > POSITION_TOLERANCE)
+    if len(bad):
+        k, j = bad[0]
+        low, high = arm.limits.position_low[j], arm.limits.position_high[j]
+        raise RecordingError(
+            f"{recording.source}: q{j + 1} = {recording.q[k, j]:.4f} rad at {_row(recording, k)} is outside the limits "
+            f"of {arm.name}'s {arm.joint_names[j]} ({low:.4f} to {high:.4f} rad): expected the joint positions of this "
+            "robot; check the robot, the order of the joints and the unit"
+        )
+
+
+def _beyond(q: NDArray[np.float64], arm: Arm) -> NDArray[np.float64]:
+    """How far positions (N, n) lie outside the limits [rad]; −inf where there is no limit."""
+    return np.maximum(arm.limits.position_low - q, q - arm.limits.position_high)
+
+
+def _check_jumps(recording: Recording, arm: Arm) -> None:
+    step = np.diff(recording.t)[:, None]
+    speed = np.where(np.isfinite(arm.limits.velocity), arm.limits.velocity, _UNLIMITED_SPEED)
+    jump = np.abs(np.diff(recording.q, axis=0))
+    bad = np.argwhere(jump > 2.0 * speed * step + _JUMP)
+    if len(bad):
+        k, j = bad[0]
+        wrap = " (a full turn: unwrap the angle)" if abs(jump[k, j] - _FULL_TURN) < 0.3 else ""
+        raise RecordingError(
+            f"{recording.source}: q{j + 1} jumps by {jump[k, j]:.3f} rad in {step[k, 0]:.4g} s at "
+            f"{_row(recording, k + 1)}{wrap}: expected a continuous motion; remove the rows or split the log there"
+        )
+
+
+def _check_velocity_is_derivative(recording: Recording) -> None:
+    """Compare the change of q over short windows with the integral of dq, which noise hardly touches."""
+    parts = windows(recording)
+    if len(parts.first) < 3:
+        return
+    change = recording.q[parts.last] - recording.q[parts.first]
+    integral = integrals(recording, recording.dq, parts)
+    size_q, size_dq = _rms(change), _rms(integral)
+    moves = np.maximum(size_q, size_dq) > _MOVES
+    difference = _rms(change - integral) / np.maximum(np.maximum(size_q, size_dq), _MOVES)
+    wrong = np.flatnonzero(moves & (difference > _NOT_DERIVATIVE))
+    if len(wrong) == 0:
+        return
+    j = int(wrong[0])
+    what = f"dq{j + 1} is not the derivative of q{j + 1}"
+    if size_dq[j] < 1e-3 * size_q[j]:
+        what = f"dq{j + 1} is zero although q{j + 1} moves"
+    raise RecordingError(f"{recording.source}: {what}: {_why_not_derivative(change, integral, wrong)}")
+
+
+def _why_not_derivative(change: NDArray, integral: NDArray, wrong: NDArray) -> str:
+    """The likeliest cause, judged over all joints concerned."""
+    likeness = np.array([[_likeness(change[:, j], integral[:, i]) for i in range(change.shape[1])] for j in wrong])
+    own = likeness[np.arange(len(wrong)), wrong]
+    if np.all(np.abs(own) > 0.9):
+        factor = float(np.median([change[:, j] @ integral[:, j] / (integral[:, j] @ integral[:, j]) for j in wrong]))
+        for value, cause in (
+            (-1.0, "it has the opposite sign; turn it around"),
+            (1.0 / _DEGREE, "it looks like degrees per second; multiply dq by pi/180"),
+            (_DEGREE, "q looks like degrees; multiply q by pi/180"),
+            (1e-3, "t looks like milliseconds; divide it by 1000"),
+            (1e-6, "t looks like microseconds; divide it by 1e6"),
+            (1e-9, "t looks like nanoseconds; divide it by 1e9"),
+            (np.pi / 30.0, "it looks like revolutions per minute; multiply dq by pi/30"),
+        ):
+            if abs(factor / value - 1.0) < 0.25:
+                return f"expected rad, rad/s and s, but {cause}"
+        return f"the derivative is {factor:.3g} times dq; expected rad, rad/s and s"
+    for row, j in enumerate(wrong):
+        i = int(np.argmax(likeness[row]))
+        if i != j and likeness[row, i] > 0.9:
+            return (
+                f"it is that of another joint (dq{i + 1} fits q{j + 1}); expected the joints of q and dq in one order"
+            )
+    return "expected the measured joint velocity in rad/s; check the columns, their units and the time"
+
+
+def _check_speed(recording: Recording, arm: Arm) -> None:
+    limit = arm.limits.velocity
+    bad = np.argwhere(np.abs(recording.dq) > _SPEED * limit)
+    if len(bad):
+        k, j = bad[0]
+        degrees = np.all(np.percentile(np.abs(recording.dq), 99, axis=0) / _DEGREE < limit)
+        unit = "; q and dq look like degrees" if degrees and len(bad) > 0.05 * len(recording) else ""
+        raise RecordingError(
+            f"{recording.source}: dq{j + 1} = {recording.dq[k, j]:.4g} rad/s at {_row(recording, k)} is more than "
+            f"{_SPEED:g} times the limit of {arm.joint_names[j]} ({limit[j]:.4g} rad/s): expected rad/s of "
+            f"{arm.name}{unit}"
+        )
+
+
+def _check_effort(recording: Recording, arm: Arm) -> None:
+    size = np.abs(recording.tau)
+    if recording.channel == "measured" and size.max() < _NO_TORQUE:
+        rows = np.linspace(0, len(recording) - 1, 20).round().astype(int)
+        if np.abs(arm.torque(recording.q[rows])).max() > 1.0:
+            raise RecordingError(
+                f"{recording.source}: tau is zero in all joints and rows although {arm.name} has weight to hold: "
+                "expected the measured joint torque in N·m, gravity included"
+            )
+    beyond = size / arm.limits.effort > _EFFORT
+    share = beyond.mean(axis=0)
+    if np.any(share > _EFFORT_SHARE) or np.any(size > 10.0 * arm.limits.effort):
+        j = int(np.argmax((size / arm.limits.effort).max(axis=0)))
+        k = int(np.argmax(size[:, j]))
+        raise RecordingError(
+            f"{recording.source}: tau{j + 1} = {recording.tau[k, j]:.4g} at {_row(recording, k)} is "
+            f"{size[k, j] / arm.limits.effort[j]:.3g} times the limit of {arm.joint_names[j]} "
+            f"({arm.limits.effort[j]:g} N·m): expected joint torque in N·m of {arm.name}"
+        )
+
+
+def _check_torque_goes_on(recording: Recording) -> None:
+    """Refuse torque that repeats itself exactly in all joints while the arm moves: its sensor or logger stood still."""
+    same = np.r_[False, np.all(recording.tau[1:] == recording.tau[:-1], axis=1), False]
+    edges = np.diff(same.astype(int))
+    for first, last in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
+        time = recording.t[last] - recording.t[first]
+        if time > _FROZEN_TIME and np.any(np.ptp(recording.q[first : last + 1], axis=0) > _FROZEN_MOTION):
+            raise RecordingError(
+                f"{recording.source}: tau stays exactly the same in all joints from {_row(recording, first)} for "
+                f"{time:.2f} s although the arm moves: expected the torque of every moment; remove the rows"
+            )
+
+
+def _check_no_torque_is_dead(recording: Recording) -> None:
+    """Refuse a torque that is exactly the same in all rows although its joint moves, beside others that are alive."""
+    dead = np.ptp(recording.tau, axis=0) == 0.0
+    moves = np.ptp(recording.q, axis=0) > _FROZEN_MOTION
+    if np.any(dead & moves) and not np.all(dead):
+        j = int(np.flatnonzero(dead & moves)[0])
+        raise RecordingError(
+            f"{recording.source}: tau{j + 1} is {recording.tau[0, j]:.4g} in all rows although q{j + 1} moves: "
+            "expected the measured joint torque in N·m; the channel is dead, or another one was meant"
+        )
+
+
+def _check_torque_is_the_arms(recording: Recording, arm: Arm) -> None:
+    fit = torque_scale(recording, arm)
+    if fit is None:
+        return
+    scale, doubt = fit.scale, _SURE * fit.std
+    if scale + doubt < _SCALE_LOW or scale - doubt > _SCALE_HIGH:
+        if scale + doubt < 0:
+            what = "has the opposite sign of"
+        elif scale < 0.25:
+            what = f"holds only {max(scale, 0.0):.0%} of"
+        else:
+            what = f"is {scale:.2f} times"
+        raise RecordingError(
+            f"{recording.source}: tau {what} the torque {arm.name} needs to carry itself: expected the measured joint "
+            "torque in N·m, gravity included; check the robot, the unit, the torque channel and the base (--gravity)"
+        )
+    if fit.misfit > _MISFIT:
+        raise RecordingError(
+            f"{recording.source}: tau does not fit {arm.name} with any payload (misfit {fit.misfit:.1f} times a sound "
+            "robot's): expected a log of this robot; check the robot, the order of the joints and the base (--gravity)"
+        )
+
+
+def _likeness(a: NDArray, b: NDArray) -> float:
+    """Cosine between two signals."""
+    size = float(np.linalg.norm(a) * np.linalg.norm(b))
+    return float(a @ b) / size if size > 0 else 0.0
+
+
+def _rms(x: NDArray) -> NDArray[np.float64]:
+    return np.sqrt(np.mean(x**2, axis=0))
+
+
+def _row(recording: Recording, k: int | np.integer) -> str:
+    return f"row {int(k)} (t = {recording.t[int(k)]:.4f} s)"

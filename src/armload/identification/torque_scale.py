@@ -1,0 +1,115 @@
+"""How much of an arm's own torque is in a log: the test for a wrong arm, unit, sign or torque channel.
+
+Averaged over a window from t₁ to t₂, the joint torque of the bare arm is (p(t₂) − p(t₁))/(t₂ − t₁) + mean(g − Cᵀ·q̇),
+with p the momentum; the payload's is the same with its momentum regressor. So no acceleration is needed. With friction
+and an offset of each joint,
+
+    tau = s·tau_arm + W·phi + offset + level·tanh(q̇/0.05) + noise
+
+is linear in (s, phi, offset, level). All but s get a prior wide enough for any sound robot: a payload of three times
+the rated mass, motor-side friction, a model error of a few per cent of the rated torque, a tenth of it for a joint at
+rest, which friction holds in any way below stiction. If even then s is surely not
+about 1, or the noise far larger than a model error, the torque is not that of this arm.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm, momentum_regressor
+from armload.recording import Recording
+from armload.recording.windows import Windows, integrals, windows
+
+_MOST_WINDOWS = 120
+_POINTS = 9  # model evaluations per window
+_FRICTION_WIDTH = 0.05  # [rad/s]
+_MODEL_ERROR = 0.03  # of the rated torque, rms
+_OFFSET = 0.05  # of the rated torque
+_FRICTION = 0.2  # of the rated torque: gear friction as motor currents show it
+_STICTION = 0.1  # of the rated torque, of a joint at rest
+_WEAKEST = 0.4  # rating of an unrated wrist, as a share of the largest torque the model asks: 0.3 to 0.4 on real arms
+_UNRATED = 5.0  # [kg] payload assumed where the maker's rating is not known
+_LEVER = 0.15  # [m] of the payload's centre of mass and radius of gyration
+
+
+class TorqueScale(NamedTuple):
+    """scale: s; std: its standard deviation; misfit: rms of what s = 1 leaves, in units of a plausible model error."""
+
+    scale: float
+    std: float
+    misfit: float
+
+
+def torque_scale(recording: Recording, arm: Arm) -> TorqueScale | None:
+    """Fit the model above to a log; None if the log is too short to say anything."""
+    parts = _some(windows(recording))
+    if len(parts.first) < 2:
+        return None
+    own, payload, tau, friction, moving = _averages(recording, arm, parts)
+    W, n = own.shape
+    rated = _rated_torque(arm, own)
+
+    offset = np.broadcast_to(np.eye(n), (W, n, n))
+    level = friction[:, :, None] * np.eye(n)
+    A = np.concatenate([payload, offset, level], axis=2)  # (W, n, 10 + 2n)
+    mass = 3.0 * (arm.rated_payload or _UNRATED)
+    prior = np.concatenate(
+        [mass * np.r_[1.0, [_LEVER] * 3, [_LEVER**2] * 6], _OFFSET * rated, _FRICTION * rated]
+    )  # standard deviations
+    # a joint at rest is held by any friction below stiction: tanh knows nothing of it
+    noise = (rated * np.hypot(_MODEL_ERROR, _STICTION * (1.0 - np.minimum(moving, 1.0)))).ravel()
+    A = A.reshape(W * n, -1) * prior / noise[:, None]
+    b, y = own.ravel() / noise, tau.ravel() / noise
+
+    # Marginalise everything but s: with K = 1 + A·Aᵀ, s = bᵀK⁻¹y / bᵀK⁻¹b. Neighbouring windows err alike, so the
+    # standard deviation is that of one window in four.
+    inner = np.linalg.inv(np.eye(A.shape[1]) + A.T @ A)
+    Kb = b - A @ (inner @ (A.T @ b))
+    information = float(b @ Kb)
+    if information <= 0:
+        return None
+    scale = float(y @ Kb) / information
+    rest = (y - b) - A @ (inner @ (A.T @ (y - b)))  # what s = 1 leaves
+    misfit = float(np.sqrt(np.mean(rest**2)))
+    std = 2.0 * max(1.0, misfit) / np.sqrt(information)
+    return TorqueScale(scale, std, misfit)
+
+
+def _averages(recording: Recording, arm: Arm, parts: Windows) -> tuple[NDArray, ...]:
+    """Window means: bare arm's torque (W, n), payload regressor (W, n, 10), tau, tanh(dq/width) and its size (W, n)."""
+    q, dq = recording.q, recording.dq
+    T = (recording.t[parts.last] - recording.t[parts.first])[:, None]
+    rows = np.linspace(parts.first, parts.last, _POINTS, axis=1).round().astype(int)  # (W, P)
+    shape = rows.shape
+    p, drift = (x.reshape(*shape, -1) for x in arm.momentum(q[rows.ravel()], dq[rows.ravel()]))
+    Y = momentum_regressor(arm.frame_motion(q[rows.ravel()]), dq[rows.ravel()])
+    Yp, Yd = (x.reshape(*shape, arm.n, 10) for x in Y)
+    weight = np.r_[0.5, np.ones(_POINTS - 2), 0.5] / (_POINTS - 1)  # trapezoidal mean
+    own = (p[:, -1] - p[:, 0]) / T + np.einsum("wpi,p->wi", drift, weight)
+    payload = (Yp[:, -1] - Yp[:, 0]) / T[:, :, None] + np.einsum("wpij,p->wij", Yd, weight)
+    tau = integrals(recording, recording.tau, parts) / T
+    direction = np.tanh(dq / _FRICTION_WIDTH)
+    friction, moving = (integrals(recording, x, parts) / T for x in (direction, np.abs(direction)))
+    return own, payload, tau, friction, moving
+
+
+def _some(parts: Windows) -> Windows:
+    """At most `_MOST_WINDOWS`, spread over the log."""
+    if len(parts.first) <= _MOST_WINDOWS:
+        return parts
+    chosen = np.linspace(0, len(parts.first) - 1, _MOST_WINDOWS).round().astype(int)
+    return Windows(parts.first[chosen], parts.last[chosen])
+
+
+def _rated_torque(arm: Arm, own: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The torque each joint is made for (n,): its effort limit, or else a guess from what the log asks of the model.
+
+    A joint is at least as strong as those it carries, and the weakest of an arm about a fifth of the strongest.
+    """
+    most = np.abs(own).max(axis=0)
+    carried = np.maximum.accumulate(most[::-1])[::-1]
+    asked = np.maximum(2.0 * carried, _WEAKEST * most.max() + 1.0)
+    return np.where(np.isfinite(arm.limits.effort), arm.limits.effort, asked)

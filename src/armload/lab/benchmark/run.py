@@ -1,0 +1,273 @@
+"""Running the benchmark: a cell is one row on the episodes of one seed of a population, kept as soon as it is done."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm, arm
+from armload.errors import ArmloadError, IdentificationError
+from armload.estimators import Estimate
+from armload.identification import METHODS
+from armload.lab import load_cells, save_cell
+from armload.lab.benchmark.populations import (
+    ALL,
+    REPEAT,
+    Population,
+    population,
+    prior_of,
+)
+from armload.lab.benchmark.rows import (
+    BOUND,
+    Row,
+    bound_std,
+    default_names,
+    fingerprint,
+    rows_for,
+    trained_on,
+)
+from armload.lab.cells import finished_cell, key_of
+from armload.lab.episodes import Episode, EpisodeLogs, simulate_episodes
+
+FORMAT = 1  # of a cell; a change makes every cell unfinished
+TIMES = (0.02, 0.1, 0.5, 1.0, 3.0, 6.0)  # [s] since the run began
+FIRST_SEED = 900_001  # of the episodes: nothing is trained on it or on those that follow
+_REPEATED = 3  # arms and payloads whose repeatability is measured, at most
+
+
+@dataclass(frozen=True)
+class Size:
+    """How much is measured.
+
+    populations: names of `populations.ALL`. methods: names of rows (`rows.default_names`). episodes: of a population.
+    rate: of the logs [Hz]. robot: which arm. times: [s] since a run began. first_seed: of the episodes; each further
+    ten have the next one. per_seed: episodes of a seed; None: the population's own number.
+
+    Raises:
+        IdentificationError: nothing to measure.
+    """
+
+    populations: tuple[str, ...] = tuple(ALL)
+    methods: tuple[str, ...] = tuple(default_names())
+    episodes: int = 100
+    rate: float = 1000.0
+    robot: str = "panda"
+    times: tuple[float, ...] = TIMES
+    first_seed: int = FIRST_SEED
+    per_seed: int | None = None
+
+    def __post_init__(self) -> None:
+        if not self.populations or self.episodes < 1 or not self.rate > 0:
+            raise IdentificationError(
+                f"{self.episodes} episodes of {len(self.populations)} populations at {self.rate} Hz asked for: "
+                "expected at least one of each"
+            )
+        for name in self.populations:
+            rows_for(population(name), self.methods)
+
+    def seeds(self, of: Population) -> list[tuple[int, int]]:
+        """The seeds of a population, each with its number of episodes."""
+        each = of.per_seed if self.per_seed is None else self.per_seed
+        total = min(self.episodes, _REPEATED * each) if of.name == REPEAT else self.episodes
+        counts = [min(each, total - first) for first in range(0, total, each)]
+        return [(self.first_seed + k, count) for k, count in enumerate(counts)]
+
+
+QUICK = Size(
+    populations=("reference", "untared"),
+    methods=("hybrid", "map-gp", "map", "rls-filter+tare", "rls-filter"),
+    episodes=4,
+    rate=100.0,
+    per_seed=2,
+)
+
+
+@dataclass(frozen=True)
+class Task:
+    """What one process measures at a time: some rows on the episodes of one seed, each with the key of its cell."""
+
+    population: str
+    seed: int
+    count: int
+    rows: tuple[tuple[Row, str], ...]
+
+
+def cell_name(population: str, seed: int, row: str) -> str:
+    """Unique and readable; the file's stem."""
+    return f"{population}-{seed}-{row.replace(' ', '-')}"
+
+
+def keys(size: Size, robot: Arm, rows: dict[str, list[Row]]) -> dict[str, str]:
+    """The key of every cell by its name: what it measures, on which logs, and what its method answers on a probe.
+
+    Args:
+        size: how much is measured. robot: the arm. rows: by population.
+    """
+    out, answered = {}, {}
+    for name, members in rows.items():
+        of = population(name)
+        seeds = size.seeds(of)
+        looks, prior = of.fingerprint(robot, size.first_seed), prior_of(of.recipe, robot)
+        for row in members:
+            # what the baselines answer depends on the population's prior, what the others do does not
+            probe = (row, "" if row.method else key_of(prior.mean.tolist(), prior.covariance.tolist()))
+            if probe not in answered:
+                answered[probe] = fingerprint(row, robot, prior)
+            for seed, count in seeds:
+                parts = (FORMAT, looks, answered[probe], seed, count, size.rate, size.times)
+                out[cell_name(name, seed, row.name)] = key_of(*parts)
+    return out
+
+
+def run_benchmark(
+    size: Size,
+    folder: str | Path,
+    *,
+    jobs: int = 1,
+    until: float | None = None,
+    say: Callable[[str], None] = lambda _: None,
+) -> dict[str, dict[str, Any]]:
+    """Measure what is not finished yet and return all cells of the benchmark that hold, by name.
+
+    Args:
+        size: how much is measured.
+        folder: of the cells' files. Cells of other populations and methods of the same size are returned too: the
+            tables show all there is.
+        jobs: processes; the numbers do not depend on it.
+        until: begin nothing after so many seconds.
+        say: told what is next.
+    """
+    from joblib import Parallel, delayed
+
+    folder, started, robot = Path(folder), time.monotonic(), arm(size.robot)
+    cells = load_cells(folder)
+    say("checking what is finished")
+    wanted = {name: rows_for(population(name), size.methods) for name in size.populations}
+    valid = keys(size, robot, _with_finished(cells, wanted))
+    cells = {name: cell for name, cell in cells.items() if cell["key"] == valid.get(name)}
+
+    def unfinished() -> Iterator[Task]:
+        todo = _tasks(size, wanted, valid, cells)
+        for number, task in enumerate(todo, start=1):
+            if until is not None and time.monotonic() - started > until:
+                say(f"stopped before part {number} of {len(todo)}: run it again to go on")
+                return
+            rows = f"{len(task.rows)} row" + ("" if len(task.rows) == 1 else "s")
+            say(f"part {number} of {len(todo)}: {task.population}, seed {task.seed}, {rows}")
+            yield task
+
+    one_by_one: dict[str, Any] = {"pre_dispatch": jobs, "batch_size": 1, "return_as": "generator_unordered"}
+    finished: Any = Parallel(n_jobs=jobs, **one_by_one)(delayed(_measured)(t, size, folder) for t in unfinished())
+    for measured in finished:
+        cells |= {cell["name"]: cell for cell in measured}
+    return cells
+
+
+def _with_finished(cells: dict[str, dict[str, Any]], wanted: dict[str, list[Row]]) -> dict[str, list[Row]]:
+    """The rows wanted and those that there are cells of, by population."""
+    rows = {name: {row.name: row for row in members} for name, members in wanted.items()}
+    for cell in cells.values():
+        row = Row(**cell["row"])
+        if cell["population"] in ALL and row.method in ("", *METHODS):
+            rows.setdefault(cell["population"], {}).setdefault(row.name, row)
+    return {name: list(members.values()) for name, members in rows.items()}
+
+
+def _tasks(
+    size: Size, wanted: dict[str, list[Row]], valid: dict[str, str], cells: dict[str, dict[str, Any]]
+) -> list[Task]:
+    """What is left to do, the first seed of every population first."""
+    tasks = []
+    for name, rows in wanted.items():
+        for k, (seed, count) in enumerate(size.seeds(population(name))):
+            named = [(row, cell_name(name, seed, row.name)) for row in rows]
+            missing = tuple((row, valid[cell]) for row, cell in named if cell not in cells)
+            if missing:
+                tasks.append((k, Task(name, seed, count, missing)))
+    return [task for _, task in sorted(tasks, key=lambda numbered: numbered[0])]
+
+
+@lru_cache(maxsize=2)
+def _arm_of_process(robot: str) -> Arm:
+    return arm(robot)
+
+
+def _measured(task: Task, size: Size, folder: Path) -> list[dict[str, Any]]:
+    """Simulate the episodes once and put every missing row through them; each cell is written when it is done."""
+    robot, of, cells, missing = _arm_of_process(size.robot), population(task.population), [], []
+    for row, key in task.rows:  # another run may have finished it meanwhile
+        cell = finished_cell(folder, cell_name(task.population, task.seed, row.name), key)
+        cells += [] if cell is None else [cell]
+        missing += [(row, key)] if cell is None else []
+    if not missing:
+        return cells
+    episodes = of.episodes(robot, task.seed, task.count)
+    logs, prior = list(simulate_episodes(episodes, rate=size.rate)), prior_of(of.recipe, robot)
+    for row, key in missing:
+        cell = {
+            "name": cell_name(task.population, task.seed, row.name),
+            "key": key,
+            "population": task.population,
+            "seed": task.seed,
+            "row": {"name": row.name, "method": row.method, "tared": row.tared},
+            "times": list(size.times),
+            **measure(row, episodes, logs, prior, size.times),
+        }
+        save_cell(folder, cell, indent=None)
+        cells.append(cell)
+    return cells
+
+
+def measure(
+    row: Row, episodes: Sequence[Episode], logs: Sequence[EpisodeLogs], prior: Any, times: Sequence[float]
+) -> dict[str, Any]:
+    """What a row makes of episodes: `truth` (R, 10), `phi` and `std` (R, T, 10), `wall_s` (R,), `refused`, `trained`.
+
+    A method that is not given the tare answers with the tool that was mounted already in it: the tool is taken off.
+    One that refuses a log knows nothing: zeros, infinite standard deviations, and its words under `refused`. The bound
+    has no estimates.
+    """
+    phi, std, wall, refused, trained = [], [], [], [], ""
+    for episode, log in zip(episodes, logs, strict=True):
+        begun = time.perf_counter()
+        if row.name == BOUND:
+            phi.append(np.tile(log.truth.phi, (len(times), 1)))
+            std.append(bound_std(episode.arm, log, prior, times))
+        else:
+            try:
+                identifier = row.make(episode.arm, log.tare, prior)
+                found = identifier.at(log.run, times)
+                trained = trained_on(identifier)
+                known = episode.tool is not None and log.tare is not None and not row.tared
+                tool = episode.tool.parameters.phi if known and episode.tool is not None else np.zeros(10)
+            except ArmloadError as error:
+                refused.append(str(error))
+                found, tool = (
+                    [Estimate(t, np.zeros(10), np.diag(np.full(10, np.inf)), 0, "") for t in times],
+                    np.zeros(10),
+                )
+            phi.append(np.array([e.phi for e in found]) - tool)
+            std.append(np.array([e.std for e in found]))
+        wall.append(round(time.perf_counter() - begun, 4))
+    return {
+        "truth": [log.truth.phi.tolist() for log in logs],
+        "phi": _listed(np.array(phi)),
+        "std": _listed(np.array(std)),
+        "wall_s": wall,
+        "refused": refused,
+        "trained": trained,
+    }
+
+
+def _listed(values: NDArray[np.float64]) -> Any:
+    """For JSON: seven digits, None for what is not finite."""
+    if values.ndim > 1:
+        return [_listed(part) for part in values]
+    return [float(f"{x:.7g}") if np.isfinite(x) else None for x in values.tolist()]

@@ -1,0 +1,31 @@
+"""Evaluation: the same runs through every method, errors over time and at the end, honest baselines in every table."""
+
+from armload.lab.evaluation.baselines import PriorLeastSquares, TrainingMean
+from armload.lab.evaluation.compare import EvaluationRun, compare
+from armload.lab.evaluation.comparison import Comparison
+from armload.lab.evaluation.held_out import held_out_error
+from armload.lab.evaluation.metrics import (
+    absolute_error,
+    coverage,
+    half_width,
+    mean_absolute_error,
+    settling_time,
+    spread,
+)
+from armload.lab.evaluation.table import Table
+
+__all__ = [
+    "Comparison",
+    "EvaluationRun",
+    "PriorLeastSquares",
+    "Table",
+    "TrainingMean",
+    "absolute_error",
+    "compare",
+    "coverage",
+    "half_width",
+    "held_out_error",
+    "mean_absolute_error",
+    "settling_time",
+    "spread",
+]

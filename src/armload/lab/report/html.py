@@ -1,0 +1,103 @@
+"""One self-contained HTML file from a list of sections: no script, nothing to load, readable on a phone."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from armload.atomic import replacing
+from armload.errors import ReportError
+from armload.lab.evaluation import Table
+from armload.lab.report.style import look
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of a report: a heading, then text, tables and figures, each of them optional.
+
+    title: the heading.
+    text: paragraphs, an empty line between them; `code` and **bold** are understood, everything else is literal.
+    tables: drawn after the text. figures: (figure, caption) pairs, drawn after the tables.
+    """
+
+    title: str
+    text: str = ""
+    tables: tuple[Table, ...] = ()
+    figures: tuple[tuple[Figure, str], ...] = ()
+
+
+def write_report(path: str | Path, sections: Sequence[Section], title: str = "armload report") -> Path:
+    """Write the sections as one HTML file; an existing file is replaced whole, or left alone if something fails.
+
+    Args:
+        path: the file to write; its folder must exist.
+        sections: see `default_report`, whose list may be changed at will.
+        title: heading of the page.
+
+    Returns:
+        The path.
+
+    Raises:
+        ReportError: the file cannot be written.
+    """
+    text, path = render(sections, title), Path(path)
+    try:
+        with replacing(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ReportError(
+            f"the report cannot be written to {path}: {error.strerror}; name a file in a folder you can write to"
+        ) from None
+    return path
+
+
+def render(sections: Sequence[Section], title: str = "armload report") -> str:
+    """The HTML text of a report."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("armload.lab.report", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters.update(paragraphs=_paragraphs, picture=_picture, anchor=_anchor, head=_head)
+    return environment.get_template("report.html.j2").render(title=title, sections=sections)
+
+
+def _paragraphs(text: str) -> str:
+    """HTML of paragraphs with `code` and **bold**; anything else is escaped."""
+    out = []
+    for block in re.split(r"\n\s*\n", text.strip()):
+        escaped = html.escape(" ".join(block.split()), quote=False)
+        escaped = re.sub(r"`([^`]+)`", r"<code>\1</code>", escaped)
+        out.append("<p>" + re.sub(r"\*\*(.+?)\*\*", r"<strong>\1</strong>", escaped) + "</p>")
+    return "\n".join(out) if text.strip() else ""
+
+
+def _head(column: str) -> str:
+    """A column head with its unit on a line of its own."""
+    name, bracket, unit = html.escape(column, quote=False).partition(" [")
+    return f"{name}<br><span>[{unit}</span>" if bracket else name
+
+
+def _picture(figure: Figure) -> str:
+    """The figure as an SVG in a data URI: sharp at any size, and its ids do not meet those of another figure."""
+    buffer = io.BytesIO()
+    with look():
+        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
+
+
+def _anchor(title: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-") or "section"

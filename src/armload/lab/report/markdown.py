@@ -1,0 +1,43 @@
+"""The same sections as the HTML report, as a page of Markdown: text and tables, no figures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from armload.atomic import replacing
+from armload.errors import ReportError
+from armload.lab.evaluation import Table
+from armload.lab.report.html import Section
+
+
+def write_markdown(path: str | Path, sections: Sequence[Section], title: str, note: str = "") -> Path:
+    """Write sections as Markdown; an existing file is replaced whole, or left alone if something fails.
+
+    Args:
+        path: the file to write; its folder must exist.
+        sections: their figures are left out.
+        title: heading of the page. note: a paragraph below it.
+
+    Raises:
+        ReportError: the file cannot be written.
+    """
+    lines = [f"# {title}", "", *([note, ""] if note else [])]
+    for section in sections:
+        lines += [f"## {section.title}", "", section.text.strip(), ""]
+        lines += [markdown(table) for table in section.tables]
+    try:
+        with replacing(path) as temporary:
+            temporary.write_text("\n".join(lines).rstrip() + "\n", encoding="utf-8")
+    except OSError as error:
+        raise ReportError(f"the page cannot be written to {path}: {error.strerror}; name a file elsewhere") from None
+    return Path(path)
+
+
+def markdown(table: Table) -> str:
+    """A table as Markdown: title, rows, note."""
+    if not table.rows:
+        return f"**{table.title}**\n\n{table.note}\n"
+    rows = [table.columns, ["---"] * len(table.columns), *table.rows]
+    lines = ["| " + " | ".join(str(cell).replace("|", "\\|") for cell in row) + " |" for row in rows]
+    return f"**{table.title}**\n\n" + "\n".join(lines) + f"\n\n{table.note}\n"

@@ -1,0 +1,170 @@
+"""What the study rests on: the two data sets, and the runs on which every method is measured."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from armload.arms import Arm, arm, payload_regressor
+from armload.inertia import InertialParameters
+from armload.lab.dataset import Dataset, build_dataset
+from armload.lab.evaluation import EvaluationRun
+from armload.motion import Motion, random_motion, taie2024
+from armload.payloads import Payload, container_loadings, random_payloads, test_payload
+from armload.recording import Recording, read_recording
+from armload.simulation import (
+    Run,
+    Sensors,
+    World,
+    simulate_many,
+)
+
+# Seeds of what is drawn: kept apart, so that no run shares its noise with the training data.
+NOISE, WORLDS, FAMILY, MOTIONS, TARE = 5000, 100, 7000, 300, 900
+
+
+@dataclass(frozen=True)
+class Size:
+    """How much is measured: every n-th loading, rows per run, runs of each protocol; caps (None: the cell's own)."""
+
+    every: int
+    rows: int
+    worlds: int
+    payloads: int
+    motions: int
+    max_epochs: int | None
+    members: int | None
+    hidden: int | None
+
+
+FULL = Size(every=1, rows=3244, worlds=5, payloads=20, motions=5, max_epochs=None, members=None, hidden=None)
+QUICK = Size(every=7, rows=120, worlds=2, payloads=3, motions=2, max_epochs=3, members=2, hidden=32)
+
+
+@dataclass(frozen=True, eq=False)
+class Basis:
+    """Arm, motion, data sets and evaluation runs of the study.
+
+    Args:
+        folder: where the data sets are built.
+        size: `FULL` (the paper's 249 788 rows) or `QUICK`.
+        real_log: an unloaded log of a real Panda, for the semi-real runs; None: there are none.
+    """
+
+    folder: Path
+    size: Size = FULL
+    real_log: Path | None = None
+
+    @cached_property
+    def arm(self) -> Arm:
+        """The nominal Panda, bare to its flange."""
+        return arm("panda")
+
+    @cached_property
+    def motion(self) -> Motion:
+        """The excitation: a re-design, the paper's coefficients being unpublished."""
+        return taie2024()
+
+    @cached_property
+    def loadings(self) -> list[Payload]:
+        """The training payloads."""
+        return container_loadings()[:: self.size.every]
+
+    @cached_property
+    def truth(self) -> InertialParameters:
+        """The test payload, which is not among the loadings (the role of the paper's Table I)."""
+        return InertialParameters(test_payload().parameters.phi, self.arm.frame)
+
+    def dataset(self, sensors: str, progress: bool = False) -> Dataset:
+        """The data set with "ideal" sensors or those of a real "panda"; built where it is not there yet."""
+        return build_dataset(
+            self.folder / f"data-{sensors}",
+            self.arm,
+            [self.motion],
+            self.loadings,
+            sensors=None if sensors == "ideal" else Sensors.panda(self.arm),
+            rows_per_run=self.size.rows,
+            progress=progress,
+        )
+
+    @property
+    def fingerprint(self) -> str:
+        """SHA-256 of what the numbers depend on besides the method's own settings."""
+        parts = [
+            self.arm.fingerprint,
+            self.motion.name,
+            repr(self.size),
+            repr([p.parameters.phi for p in self.loadings]),
+        ]
+        parts += [repr(np.round(self.motion(np.linspace(0, 6, 25))[0], 9).tolist()), repr(self.truth.phi.tolist())]
+        return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+    @cached_property
+    def runs(self) -> dict[str, list[EvaluationRun]]:
+        """The runs by protocol, their tares on another motion; every method gets the same runs.
+
+        test_payload_nominal: the test payload on the nominal arm with real sensors, three noise seeds.
+        test_payload_real_like: on arms that differ from the model as real ones do; the stand-in for the real robot.
+        off_family: random payloads outside the container's family, nominal arm.
+        other_motion: the test payload on other motions, nominal arm.
+        test_payload_semi_real: the test payload's torque added to a real unloaded log, which shows another motion.
+        """
+        return self._simulated(same_motion=False) | self._on_real_log()
+
+    @cached_property
+    def runs_with_own_motion_tared(self) -> dict[str, list[EvaluationRun]]:
+        """The same runs, their tares on each run's own motion (Kurdas et al. 2022); a real log has none of those."""
+        return self._simulated(same_motion=True) | self._on_real_log()
+
+    def _simulated(self, same_motion: bool) -> dict[str, list[EvaluationRun]]:
+        robot, size, sensors = self.arm, self.size, Sensors.panda(self.arm)
+        nominal = World.nominal(robot)
+        worlds = [World.real_like(robot, WORLDS + k) for k in range(size.worlds)]
+        family = [
+            InertialParameters(p.parameters.phi, robot.frame) for p in random_payloads(size.payloads, seed=FAMILY)
+        ]
+        others = [random_motion(robot, MOTIONS + k) for k in range(size.motions)]
+        plan: dict[str, list[tuple[str, Motion, InertialParameters, World]]] = {
+            "test_payload_nominal": [(f"noise {k}", self.motion, self.truth, nominal) for k in range(3)],
+            "test_payload_real_like": [(w.name, self.motion, self.truth, w) for w in worlds],
+            "off_family": [(f"random payload {k}", self.motion, p, nominal) for k, p in enumerate(family)],
+            "other_motion": [(m.name, m, self.truth, nominal) for m in others],
+        }
+        out: dict[str, list[EvaluationRun]] = {}
+        for protocol, rows in plan.items():
+            first = NOISE + 1000 * len(out)
+            log_of = [Run(m, p, w, sensors, first + k) for k, (_, m, p, w) in enumerate(rows)]
+            # the tare is the empty arm in the same world
+            other = random_motion(robot, TARE, duration=20.0, harmonics=10)
+            tare_of = [
+                Run(m if same_motion else other, None, w, sensors, first + 500 + k)
+                for k, (_, m, _, w) in enumerate(rows)
+            ]
+            rate = size.rows / self.motion.duration
+            logs = simulate_many(robot, log_of, rate=rate)
+            tares = simulate_many(robot, tare_of, rate=rate if same_motion else 200.0)
+            out[protocol] = [
+                EvaluationRun(log, truth, label, tare, first + k)
+                for k, ((label, _, truth, _), log, tare) in enumerate(zip(rows, logs, tares, strict=True))
+            ]
+        return out
+
+    def _on_real_log(self) -> dict[str, list[EvaluationRun]]:
+        return {} if self.real_log is None else {"test_payload_semi_real": self._semi_real(self.real_log)}
+
+    def _semi_real(self, path: Path) -> list[EvaluationRun]:
+        """Three 6 s windows of the real log with the payload's torque added; its first 10 s are the tare."""
+        from scipy.signal import savgol_filter
+
+        log = read_recording(path, self.arm)
+        ddq = np.asarray(savgol_filter(log.dq, 101, 3, deriv=1, delta=1.0 / log.rate, axis=0))
+        added = payload_regressor(self.arm.frame_motion(log.q), log.dq, ddq) @ self.truth.phi
+        loaded = Recording(log.t, log.q, log.dq, log.tau + added, source="semi-real")
+        start = float(log.t[0])
+        tare = log.between(start, start + 10.0)
+        windows = [(w, loaded.between(start + w, start + w + 6.0)) for w in (10.0, 12.0, 14.0)]
+        return [EvaluationRun(window, self.truth, f"real log from {w:g} s", tare) for w, window in windows]

@@ -1,0 +1,284 @@
+"""The study in plain words, every number and every comparison computed from the cells."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.inertia import NAMES
+from armload.lab.evaluation.table import (
+    GROUPS,
+    SHOWN_SCALE,
+    SHOWN_UNITS,
+    short,
+)
+from armload.lab.study.ablations import compared
+from armload.lab.study.claims import (
+    CONFIRMED,
+    DEPENDS,
+    NOT_MEASURED,
+    VERDICTS,
+)
+from armload.lab.study.counterparts import RIVALS, SHOWN_ENSEMBLES
+from armload.lab.study.numbers import (
+    Answers,
+    Cells,
+    Ensemble,
+    Match,
+    at_end,
+    at_first,
+    benchmark,
+    both_stages,
+    cap,
+    held_out,
+    matched,
+    mean_ratio,
+)
+from armload.lab.study.tables import (
+    COMMAND,
+    LEARNERS,
+    LEAST_SQUARES,
+    NOMINAL,
+    PROTOCOLS,
+    REAL,
+    SPLITS,
+    TRAINING_MEAN,
+    capped,
+    ensemble_shown,
+    within_spread,
+)
+from armload.payloads import test_payload
+
+_NOT_YET = f"not measured yet; `{COMMAND}` measures it."
+_SIZE = 10.0  # percentage points within which a number agrees with the paper's, too
+_HIT = 0.02  # of the truth, within which the training mean is right by chance
+_KINDS = ("tree", "network")
+
+
+def paragraphs(cells: Cells, claims: Sequence[dict[str, Any]]) -> list[str]:
+    """What the study found; a paragraph without its cells says so."""
+    out = [_tally(claims)]
+    out += [f"**{_capital(LEARNERS[kind])} against least squares.** {_against(cells, kind)}" for kind in _KINDS]
+    out.append("**How much is memorising.** " + _memorising(cells))
+    out.append("**Accurate from the first time step.** " + _first_step(cells))
+    out.append("**Against the same-prior least squares.** " + _same_prior(cells))
+    out.append("**Without torque.** " + _without_torque(cells))
+    out.append("**One stage or two.** " + _stages(cells))
+    out.append("**SI units or standardised.** " + _scales(cells))
+    return out
+
+
+def _tally(claims: Sequence[dict[str, Any]]) -> str:
+    numbered = [claim for claim in claims if claim["paper"] is not None]
+    said = [claim for claim in claims if claim["paper"] is None]
+    close = [c for c in numbered if c["verdict"] == CONFIRMED and abs(c["ours"] - c["paper"]) <= _SIZE]
+    vague = [c for c in numbered if within_spread(c)]
+    return (
+        f"**The claims.** The paper gives {len(numbered)} comparisons as a percentage, repeats included: "
+        f"{_counts(numbered)}. Of those confirmed, {len(close)} agree with the paper's number within {_SIZE:g} points. "
+        f"Of all measured, {len(vague)} are smaller than their own spread over seeds or arms: others might "
+        f"turn them. It makes {len(said)} statements without a number: {_counts(said)}."
+    )
+
+
+def _counts(claims: Iterable[dict[str, Any]]) -> str:
+    count = Counter(claim["verdict"] for claim in claims)
+    words = {v: v for v in VERDICTS} | {NOT_MEASURED: "not measured yet"}
+    words[DEPENDS] = DEPENDS if count[DEPENDS] == 1 else DEPENDS.replace("depends", "depend")
+    return ", ".join(f"{count[v]} {words[v]}" for v in VERDICTS if count[v]) or "none"
+
+
+def _against(cells: Cells, kind: str) -> str:
+    own = both_stages(cells, kind, "row", REAL)
+    if own is None:
+        return _capital(_NOT_YET)
+    sentences = []
+    for method in RIVALS:
+        other = at_end(list(benchmark(cells, method).values()), REAL)
+        if other is not None:
+            sentences.append(f"than {LEAST_SQUARES[method]} on {_named(own.errors.mean(axis=0) < other.mean(axis=0))}")
+    if not sentences:
+        return _capital(_NOT_YET)
+    return (
+        "Test payload on real-like arms, rows split at random, at the end of the run. "
+        f"{_capital(_name(kind, own))} err less " + "; ".join(sentences) + "."
+    )
+
+
+def _named(which: NDArray[np.bool_]) -> str:
+    """The parameters that are true; where most are, those that are not."""
+    true, false = ([n for n, yes in zip(NAMES, which, strict=True) if yes == wanted] for wanted in (True, False))
+    if not true or not false:
+        return "all ten" if true else "none"
+    return f"all but {_listed(false)}" if len(false) < len(true) else f"{_listed(true)} only"
+
+
+def _memorising(cells: Cells) -> str:
+    sentences = []
+    for kind in _KINDS:
+        found = matched(cells, Ensemble(kind, 1, "row"), Ensemble(kind, 1, "payload"))
+        if not found:
+            sentences.append(f"{_capital(LEARNERS[kind])}: {_NOT_YET}")
+            continue
+        row, payload = (held_out(group) for group in found[0].cells)
+        ends = [at_end(found[0].cells[0], protocol) for protocol in (NOMINAL, "off_family", "other_motion")]
+        if row is None or payload is None:
+            continue
+        ratios = [short(payload[:, p].mean() / max(row[:, p].mean(), 1e-30), 2) for p in GROUPS.values()]
+        text = (
+            f"{_capital(_name(kind, found[0]))}, single-stage: error of single samples with whole payloads held out "
+            f"over that with rows held out: {_each(ratios)}"
+        )
+        if all(errors is not None for errors in ends):
+            mass = [_mass(errors) for errors in ends if errors is not None]
+            text += (
+                f"; the mass error at the end of a run is {mass[0]} for the test payload, {mass[1]} for payloads "
+                f"outside the container's family and {mass[2]} on motions they were not trained on"
+            )
+        sentences.append(text + ".")
+    blind = [at_end(list(benchmark(cells, "training-mean", "row").values()), p) for p in (NOMINAL, "off_family")]
+    mean = [_mass(errors) for errors in blind if errors is not None]
+    if len(mean) == 2:
+        sentences.append(f"The training mean errs by {mean[0]} on the test payload and by {mean[1]} on the others.")
+    return " ".join(sentences)
+
+
+def _first_step(cells: Cells) -> str:
+    blind = at_first(list(benchmark(cells, "training-mean", "row").values()), REAL)
+    first = {}
+    for kind, scale in SHOWN_ENSEMBLES:
+        own = both_stages(cells, kind, "row", REAL, scale, at_first)
+        if own is not None:
+            first[_name(kind, own, scale)] = own.errors
+    if blind is None or not first:
+        return _capital(_NOT_YET)
+    text = (
+        "Error of the first estimate on real-like arms over that of the training mean, which looks at no measurement: "
+        "geometric mean over the ten parameters, and by group. "
+        + _capital("; ".join(f"{name}: {_over(errors, blind)}" for name, errors in first.items()))
+        + "."
+    )
+    truth = test_payload().parameters.phi
+    hit = [n for n, e, x in zip(NAMES, blind.mean(axis=0), truth, strict=True) if e < _HIT * abs(x)]
+    if hit:
+        text += (
+            f" The training mean happens to be within {100 * _HIT:g} % of the truth on {_listed(hit)}, which in the "
+            "geometric mean counts against whoever looks at measurements, and hardly within a group."
+        )
+    prior = list(benchmark(cells, "same-prior").values())
+    begin, end = at_first(prior, REAL), at_end(prior, REAL)
+    if begin is not None and end is not None:
+        text += (
+            f" What being early is worth against {LEAST_SQUARES['same-prior']}, which are told the same payloads: "
+            f"their first estimate, the prior, is at {_over(begin, blind)}; their last one at {_over(end, blind)}."
+        )
+    filtered = at_first(list(benchmark(cells, "rls-filter").values()), REAL)
+    if filtered is not None:
+        masses = [f"{name} {_mass(errors)}" for name, errors in first.items()]
+        masses += [f"{LEAST_SQUARES['rls-filter']} {_mass(filtered)}", f"{TRAINING_MEAN} {_mass(blind)}"]
+        text += f" The mass alone, from one sample: {'; '.join(masses)}."
+    return text
+
+
+def _over(errors: NDArray, reference: NDArray) -> str:
+    """Errors (R, 10) over those of a reference: geometric mean over the parameters, and by group."""
+    a, b = errors.mean(axis=0), reference.mean(axis=0)
+    groups = _each([short(a[p].mean() / b[p].mean(), 2) for p in GROUPS.values()])
+    return f"{short(mean_ratio(a, b), 2)} ({groups})"
+
+
+def _each(ratios: Sequence[str]) -> str:
+    return ", ".join(f"{group} {ratio}" for group, ratio in zip(GROUPS, ratios, strict=True))
+
+
+def _same_prior(cells: Cells) -> str:
+    sentences = []
+    for kind, scale in SHOWN_ENSEMBLES:
+        ratios, name = [], ensemble_shown(kind, scale)
+        for protocol in (p for p in PROTOCOLS if p != "held_out"):
+            own = both_stages(cells, kind, "row", protocol, scale)
+            other = at_end(list(benchmark(cells, "same-prior").values()), protocol)
+            if own is not None and other is not None:
+                name = _name(kind, own, scale)
+                ratio = mean_ratio(own.errors.mean(axis=0), other.mean(axis=0))
+                ratios.append(f"{PROTOCOLS[protocol]} {short(ratio, 2)}")
+        sentences.append(f"{_capital(name)}: " + ("; ".join(ratios) + "." if ratios else _NOT_YET))
+    return (
+        "Error of an ensemble over that of the least squares that are told the training payloads as a Gaussian prior, "
+        "at the end of a run, geometric mean over the parameters (above 1: the ensemble is worse). "
+        + " ".join(sentences)
+    )
+
+
+def _without_torque(cells: Cells) -> str:
+    told = []
+    for reference, cell in compared(cells, "torque"):
+        a, b = held_out([reference]), held_out([cell])
+        if a is not None and b is not None:
+            ratios = [short(b[:, p].mean() / a[:, p].mean(), 2) for p in GROUPS.values()]
+            name = ensemble_shown(cell["spec"]["kind"], cell["spec"]["scale"], most=cap(cell))
+            told.append(f"{name}, {SPLITS[cell['spec']['split']]} held out: {_each(ratios)}, mass error {_mass(b)}")
+    if not told:
+        return _capital(_NOT_YET)
+    return (
+        "Error of single samples of single-stage ensembles that never saw the torque over that of those that did. "
+        + _capital("; ".join(told))
+        + ". The controller does not know the payload, so the joints sag under it by up to a few milliradians: in "
+        "noise-free simulation position and velocity alone tell of the payload, as much as the controller is soft."
+    )
+
+
+def _stages(cells: Cells) -> str:
+    sentences = []
+    for kind, scale in SHOWN_ENSEMBLES:
+        found = matched(cells, Ensemble(kind, 1, "row", scale), Ensemble(kind, 2, "row", scale))
+        sentences.append(_ratios(found, f"{LEARNERS[kind]}, {_UNITS[scale]}"))
+    return (
+        "Error of two-stage over single-stage training on held-out rows; if scaling the outputs brings the ratios to "
+        "1, it was the scale, not the stages. " + " ".join(sentences)
+    )
+
+
+_UNITS = {"raw": "in SI units", "standard": "standardised"}
+
+
+def _scales(cells: Cells) -> str:
+    sentences = []
+    for kind in _KINDS:
+        found = matched(cells, Ensemble(kind, 1, "row", "raw"), Ensemble(kind, 1, "row", "standard"))
+        sentences.append(_ratios(found, LEARNERS[kind]))
+    return (
+        "The paper does not say how it scaled inputs and outputs; our main rows are in SI units. Error of standardised "
+        "over SI training on held-out rows, single-stage, geometric mean within a group. " + " ".join(sentences)
+    )
+
+
+def _ratios(found: Sequence[Match], name: str) -> str:
+    """The second ensemble's error over the first's by group, at the largest cap on epochs both have."""
+    for match in found:
+        errors = [held_out(group) for group in match.cells]
+        a, b = (None if e is None else e.mean(axis=0) for e in errors)
+        if a is not None and b is not None:
+            ratios = [f"{mean_ratio(b[p], a[p]):.2f}" for p in GROUPS.values()]
+            return f"{_capital(name + capped(match.cap))}: {_each(ratios)}."
+    return f"{_capital(name)}: {_NOT_YET}"
+
+
+def _name(kind: str, found: Answers | Match, scale: str = "raw") -> str:
+    return ensemble_shown(kind, scale, most=found.cap)
+
+
+def _mass(errors: NDArray) -> str:
+    return f"{short(SHOWN_SCALE * float(errors[:, 0].mean()))} {SHOWN_UNITS[0]}"
+
+
+def _listed(parts: Sequence[str]) -> str:
+    return parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " and " + parts[-1]
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]

@@ -1,0 +1,233 @@
+"""Training a hybrid for any arm: draw episodes, put them through the physics, learn the payloads and the error bars."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, astuple, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm, kinship
+from armload.errors import ModelError
+from armload.inertia import Z95
+from armload.lab.cells import key_of
+from armload.lab.episodes import (
+    LIGHTEST,
+    POPULATIONS,
+    TOOL_SHARE,
+    Episode,
+    draw_episodes,
+)
+from armload.lab.training.calibrating import fit_calibration, nearest
+from armload.lab.training.records import TIMES, Records, measure_episodes
+from armload.payloads import draw_payload
+from armload.posterior import TRAITS, Calibration, HybridModel, MixturePrior
+from armload.posterior.evidence import KINDS
+from armload.posterior.model_file import POOLED
+from armload.regression import payload_prior_std
+from armload.simulation import rated_mass
+from armload.version import __version__
+
+EPISODES = 2400
+_CHUNK = 300  # episodes that are kept together: what an interruption can lose
+_MOTIONS = 120  # of a chunk
+_FIRST_SEED = 11  # of the first chunk; other seeds of a training begin far from it
+_DRAWS = 1500  # payloads of each family
+# how often a family is expected; nothing at all is one, and without `light` a screw or a phone is taken for it
+FAMILIES = {
+    "boxes": 0.2,
+    "shapes": 0.25,
+    "tools": 0.1,
+    "container": 0.2,
+    "nothing": 0.1,
+    "light": 0.05,
+    "tool and payload": 0.1,
+}
+FOLDS = 4
+# a payload unlike all families must not be pulled to one of them: a wide component, in units of the weak prior
+_ANYTHING, _ANYTHING_SHARE = 2.0, 0.03
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """How well the intervals held on episodes that training had not seen.
+
+    pooled: share of all parameters, times and episodes that lay inside.
+    cells: (3, B, 10) the same by what there was to compare with (`KINDS`), time and parameter; NaN where nothing was.
+    ratio: (3, B, 10) mean half-width over mean absolute error. episodes: how many.
+    counts: (3, B) how many of the episodes a cell rests on.
+    """
+
+    pooled: float
+    cells: NDArray[np.float64]
+    ratio: NDArray[np.float64]
+    episodes: int
+    counts: NDArray[np.int64]
+
+
+def train_hybrid(
+    arm: Arm,
+    *,
+    episodes: int = EPISODES,
+    seed: int = 0,
+    folder: str | Path | None = None,
+    jobs: int = 1,
+    population: str = "broad",
+    progress: Callable[[int, int], None] | None = None,
+) -> tuple[HybridModel, Coverage]:
+    """Train the learned parts for an arm on simulated episodes alone.
+
+    Args:
+        arm: the bare arm, nominal.
+        episodes: how many; a few hundred give a usable model, a thousand and more a calibrated one.
+        seed: the same seed gives the same model on the same kind of machine.
+        folder: where finished chunks of episodes are kept; the same call goes on from them. None: nowhere.
+        jobs: processes; the model does not depend on it.
+        population: that the episodes are drawn from.
+        progress: called as progress(done, total).
+
+    Returns:
+        the model, and the coverage of its kind on episodes held out (cross-validated).
+
+    Raises:
+        ModelError: too few episodes.
+    """
+    if episodes < 8 * FOLDS:
+        raise ModelError(f"{episodes} episodes asked for: expected at least {8 * FOLDS}")
+    records = episode_records(arm, population, episodes, seed, Path(folder) if folder else None, jobs, progress)
+    prior = payload_mixture(arm, seed)
+    checked = cross_validated(records, prior, seed)
+    model = HybridModel(
+        prior,
+        fit_calibration(records, prior, seed=seed),
+        arm.name,
+        kinship(arm),
+        str(arm.frame),
+        arm.n,
+        {
+            "population": population,
+            "episodes": episodes,
+            "seed": seed,
+            POOLED: round(checked.pooled, 4),
+        },
+    )
+    return model, checked
+
+
+def payload_mixture(arm: Arm, seed: int = 0) -> MixturePrior:
+    """The payload prior for an arm: draws of every family, up to what the arm is rated for."""
+    rng = np.random.default_rng([seed, 7])
+    rated = rated_mass(arm)
+
+    def drawn(family: str, count: int, most: float) -> NDArray[np.float64]:
+        smaller = np.exp(rng.uniform(np.log(LIGHTEST), 0.0, size=count))
+        sizes = most * np.where(rng.random(count) < POPULATIONS["broad"].lighter, smaller, 1.0)
+        seeds = rng.integers(1 << 30, size=count)
+        return np.array([draw_payload(family, int(s), m).parameters.phi for s, m in zip(seeds, sizes, strict=True)])
+
+    samples = {f: drawn(f, _DRAWS, rated) for f in ("boxes", "shapes", "tools", "container", "light")}
+    samples["nothing"] = np.zeros((20, 10))
+    tools = drawn("tools", _DRAWS, TOOL_SHARE * rated)
+    others = np.concatenate([samples["boxes"], samples["shapes"]])
+    samples["tool and payload"] = tools + (1.0 - TOOL_SHARE) * others[rng.permutation(len(others))[:_DRAWS]]
+    fitted = MixturePrior.fit(samples, FAMILIES, seed)
+    wide = np.diag((_ANYTHING * payload_prior_std(arm)) ** 2)
+    return fitted.joined(MixturePrior(np.ones(1), np.zeros((1, 10)), wide[None], ("anything",)), _ANYTHING_SHARE)
+
+
+def cross_validated(
+    records: Records, prior: MixturePrior, seed: int = 0, learned: tuple[str, ...] = ("tree", "network")
+) -> Coverage:
+    """Coverage of the intervals on held-out episodes: each fold is answered by a calibration fitted on the others.
+
+    The folds together lie near 95 % whatever the luck of the draw: where one holds more of the wild episodes, the
+    others' widths are the smaller. `coverage_on` new episodes tells how lucky the widths are.
+    """
+    episodes = np.random.default_rng([seed, 8]).permutation(np.unique(records.episode))
+    error, half = np.zeros((2, len(records), 10))
+    for k in range(FOLDS):
+        held = np.isin(records.episode, episodes[k::FOLDS])
+        calibration = fit_calibration(records.select(~held), prior, learned=learned, seed=seed + k)
+        error[held], half[held] = _answered(records.select(held), prior, calibration)
+    return _coverage(records, error, half)
+
+
+def coverage_on(records: Records, prior: MixturePrior, calibration: Calibration) -> Coverage:
+    """Coverage of a finished model's intervals on episodes that it was not trained on."""
+    return _coverage(records, *_answered(records, prior, calibration))
+
+
+def _answered(
+    records: Records, prior: MixturePrior, calibration: Calibration
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Absolute errors and half-widths (N, 10)."""
+    error, half = np.zeros((2, len(records), 10))
+    for k in range(len(records)):
+        found = calibration.answer(records.evidence(k), prior)
+        error[k] = np.abs(found.mean - records.truth[k])
+        half[k] = Z95 * np.sqrt(np.diag(found.covariance))
+    return error, half
+
+
+def _coverage(records: Records, error: NDArray[np.float64], half: NDArray[np.float64]) -> Coverage:
+    inside = error <= half
+    cells, ratio = np.full((len(KINDS), len(TIMES), 10), np.nan), np.full((len(KINDS), len(TIMES), 10), np.nan)
+    counts, which = np.zeros((len(KINDS), len(TIMES)), dtype=int), nearest(records.t, np.array(TIMES))
+    for kind in range(len(KINDS)):
+        for b in range(len(TIMES)):
+            rows = (records.kind == kind) & (which == b)
+            counts[kind, b] = rows.sum()
+            if rows.any():
+                cells[kind, b] = inside[rows].mean(axis=0)
+                ratio[kind, b] = half[rows].mean(axis=0) / error[rows].mean(axis=0)
+    return Coverage(float(inside.mean()), cells, ratio, len(np.unique(records.episode)), counts)
+
+
+def episode_records(
+    arm: Arm,
+    population: str = "broad",
+    episodes: int = EPISODES,
+    seed: int = 0,
+    folder: Path | None = None,
+    jobs: int = 1,
+    progress: Callable[[int, int], None] | None = None,
+) -> Records:
+    """What a training rests on: evidence and truth of its episodes. Arguments as of `train_hybrid`."""
+    parts: list[Records] = []
+    for first in range(0, episodes, _CHUNK):
+        count = min(_CHUNK, episodes - first)
+        path = None if folder is None else folder / f"episodes-{_key(arm, population, seed, first, count)[:12]}.npz"
+        if path is not None and path.is_file():
+            part = Records.load(path)
+        else:
+            drawn = _chunk(arm, population, seed, first, count)
+
+            def tell(done: int, _: int, first: int = first) -> None:
+                if progress is not None:
+                    progress(first + done, episodes)
+
+            part = measure_episodes(drawn, jobs=jobs, progress=tell)
+            if path is not None:
+                part.save(path)
+        parts.append(replace(part, episode=part.episode + first))
+    return Records.joined(parts)
+
+
+def drawn_episodes(arm: Arm, population: str = "broad", episodes: int = EPISODES, seed: int = 0) -> list[Episode]:
+    """The episodes behind `episode_records`, in its order, not simulated. Arguments as of `train_hybrid`."""
+    parts = [_chunk(arm, population, seed, k, min(_CHUNK, episodes - k)) for k in range(0, episodes, _CHUNK)]
+    return [episode for part in parts for episode in part]
+
+
+def _key(arm: Arm, population: str, seed: int, first: int, count: int) -> str:
+    """Of everything that a chunk's records depend on."""
+    facts = (arm.fingerprint, arm.known_as, arm.rated_payload, arm.link_spread, arm.motor_torque)
+    limits = [np.nan_to_num(column, posinf=1e9, neginf=-1e9).tolist() for column in astuple(arm.limits)]
+    recipe = asdict(POPULATIONS[population]) if population in POPULATIONS else population
+    return key_of(__version__, facts, limits, recipe, seed, first, count, TIMES, TRAITS)
+
+
+def _chunk(arm: Arm, population: str, seed: int, first: int, count: int) -> list[Episode]:
+    return draw_episodes(arm, population, count, 1000 * seed + _FIRST_SEED + first // _CHUNK, motions=_MOTIONS)

@@ -1,0 +1,142 @@
+"""Episodes turned into what the learned parts are fitted on: evidence at a few times, beside the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.atomic import replacing
+from armload.errors import ModelError
+from armload.lab.episodes import Episode, simulate_episodes
+from armload.posterior import Evidence, Physics
+from armload.recording import Recording
+
+TIMES = (0.02, 0.05, 0.1, 0.5, 1.0, 3.0, 6.0)  # [s] since the run began
+_BATCH = 4  # episodes per task
+
+
+@dataclass(frozen=True, eq=False)
+class Records:
+    """Evidence and truth of many episodes; row by row: an episode at one time, with or without its tare.
+
+    information (N, 10, 10), vector (N, 10), gain_std (N,), traits (N, T), t (N,), kind (N,): see `Evidence`.
+    truth: (N, 10) what identification was to find. episode: (N,) which episode. group: (N,) what it was drawn from.
+    """
+
+    information: NDArray[np.float64]
+    vector: NDArray[np.float64]
+    gain_std: NDArray[np.float64]
+    traits: NDArray[np.float64]
+    t: NDArray[np.float64]
+    kind: NDArray[np.int64]
+    truth: NDArray[np.float64]
+    episode: NDArray[np.int64]
+    group: NDArray[np.str_]
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def select(self, rows: Any) -> Records:
+        """The given rows."""
+        return Records(**{f.name: getattr(self, f.name)[rows] for f in fields(self)})
+
+    def evidence(self, k: int) -> Evidence:
+        """Row k as the identifier sees it."""
+        return Evidence(
+            self.information[k],
+            self.vector[k],
+            float(self.gain_std[k]),
+            self.traits[k],
+            float(self.t[k]),
+            int(self.kind[k]),
+        )
+
+    def save(self, path: str | Path) -> Path:
+        """Write an .npz file; it appears whole or not at all."""
+        path = Path(path)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(path) as temporary, temporary.open("wb") as file:
+            np.savez_compressed(file, **{f.name: getattr(self, f.name) for f in fields(self)})
+        return path
+
+    @classmethod
+    def load(cls, path: str | Path) -> Records:
+        """Read what `save` wrote.
+
+        Raises:
+            ModelError: not such a file.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as data:
+                return cls(**{f.name: data[f.name] for f in fields(cls)})
+        except (OSError, ValueError, KeyError) as error:
+            raise ModelError(f"{path} holds no records of episodes ({error}): delete it and make it again") from None
+
+    @classmethod
+    def joined(cls, parts: Sequence[Records]) -> Records:
+        """All rows of several, one after another."""
+        return cls(**{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(cls)})
+
+
+def measure_episodes(
+    episodes: Sequence[Episode],
+    *,
+    times: Sequence[float] = TIMES,
+    jobs: int = 1,
+    progress: Callable[[int, int], None] | None = None,
+) -> Records:
+    """Simulate episodes and put each through the physics, with its tare and, as if there were none, without.
+
+    Args:
+        times: [s] since a run began, at which evidence is taken.
+        jobs: processes; the records do not depend on it.
+        progress: called as progress(done, total).
+    """
+    from joblib import Parallel, delayed
+
+    batches = [(k, episodes[k : k + _BATCH]) for k in range(0, len(episodes), _BATCH)]
+    parallel: Any = Parallel  # its annotations are narrower than what it takes
+    run = parallel(n_jobs=jobs, batch_size=1, return_as="generator")
+    parts: list[Records] = []
+    done = 0
+    for part, count in run(delayed(_measured)(first, batch, tuple(times)) for first, batch in batches):
+        parts.append(part)
+        done += count
+        if progress is not None:
+            progress(done, len(episodes))
+    return Records.joined(parts)
+
+
+def _measured(first: int, batch: Sequence[Episode], times: tuple[float, ...]) -> tuple[Records, int]:
+    rows: list[tuple[Evidence, NDArray, int, str]] = []
+    for k, (episode, logs) in enumerate(zip(batch, simulate_episodes(batch), strict=True), start=first):
+        tool = 0.0 if episode.tool is None else episode.tool.parameters.phi
+        without = logs.truth.phi if logs.tare is None else logs.truth.phi + tool
+        group = f"{episode.population} {episode.world.name}"
+        pairs = [(None, without)] + ([] if logs.tare is None else [(logs.tare, logs.truth.phi)])
+        for tare, truth in pairs:
+            rows += [(e, truth, k, group) for e in evidence_over_time(episode.arm, logs.run, tare, times)]
+    evidence = [row[0] for row in rows]
+    columns = {f.name: np.array([getattr(e, f.name) for e in evidence]) for f in fields(Evidence)}
+    truth, number, group = (np.array([row[k] for row in rows]) for k in (1, 2, 3))
+    return Records(**columns, truth=truth, episode=number, group=group), len(batch)
+
+
+def evidence_over_time(arm: Any, run: Recording, tare: Recording | None, times: Sequence[float]) -> list[Evidence]:
+    """Evidence `times` [s] after a run began."""
+    physics = Physics(arm, tare)
+    stops = np.searchsorted(run.t, run.t[0] + np.asarray(times), side="right")
+    out, start = [], 0
+    for stop in np.maximum(stops, 2):
+        part = slice(start, stop)
+        if stop > start:
+            physics._take(run.t[part], run.q[part], run.dq[part], run.tau[part])
+        physics._estimate(float(run.t[stop - 1]))
+        out.append(physics.evidence(float(run.t[stop - 1])))
+        start = stop
+    return out

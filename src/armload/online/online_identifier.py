@@ -1,0 +1,314 @@
+"""The identifier that runs beside a robot for days: nothing it is fed makes it stop, every sample is answered.
+
+identifier = OnlineIdentifier(arm("panda"))
+for sample in source:
+    estimate = identifier.update(*sample)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm
+from armload.errors import IdentificationError
+from armload.estimators import Estimate, Identifier
+from armload.identification import METHODS
+from armload.inertia import determined, held
+from armload.online.engines import engine
+from armload.online.estimate import OnlineEstimate
+from armload.online.event import Event
+from armload.online.gate import Gate, Health, all_finite
+from armload.online.listening import Listening
+from armload.online.state import load_state, model_fingerprint, save_state
+from armload.online.step import MassStep
+from armload.online.watch import PayloadWatch
+from armload.posterior import StreamingIdentifier
+from armload.recording import Recording, Sample
+from armload.regression import payload_prior_std
+
+_MOVING = 0.01  # [rad/s] of any joint, within the last so many seconds
+_RECENT = 0.5  # [s]
+_PUBLISH = 0.01  # [s] intervals and judgements are made anew at most this often
+_STANDS = 0.25  # [s] of rows that count for nothing: with what one pose counts, half a second at rest
+_STANDING = "standing: a change of payload is noticed only when the arm moves"
+_DOUBT = "samples that do not fit are left out: something pulls at the arm, or the payload is changing"
+
+
+class OnlineIdentifier:
+    """Payload identification on a live stream, with any method.
+
+    >>> from armload.arms import arm
+    >>> identifier = OnlineIdentifier(arm("panda"))
+    >>> estimate = identifier.update(0.0, [0, 0, 0, -1.5, 0, 1.5, 0], [0] * 7, [0, -24.9, 0, 22.4, 0, 2.5, 0])
+    >>> estimate.held, estimate.moving, identifier.update(0.0, [0], None, "x").health.bad
+    (False, False, 1)
+
+    Args:
+        arm: the bare arm (or with a tool that is known), with the frame and gravity wanted.
+        tare: an earlier log of the same arm, on any motion, with whatever was mounted then: estimates are of what was
+            added since.
+        method: a name of the catalogue, or a trained model's file; None: the most trustworthy for the arm.
+
+    Raises:
+        ArmloadError: an unknown method, a model of another arm, or a tare that is none of this arm.
+    """
+
+    def __init__(self, arm: Arm, tare: Recording | None = None, method: str | Path | None = None) -> None:
+        self.arm, self.tare, self._tared = arm, tare, tare is not None
+        first = engine(arm, tare, method)
+        self._watch = PayloadWatch(first) if isinstance(first, StreamingIdentifier) else None
+        self._engine = first
+        self.method = self.engine.name
+        self._gate = Gate(arm)
+        self._stream = Listening()
+        self._weak = payload_prior_std(arm)
+        self._step = MassStep(float(self._weak[0]))
+        entry = METHODS.get(self.method)
+        known = self.engine.known
+        self._before: NDArray | None = None
+        if entry is None or entry.prior:
+            self._before = self._weak if known is None else known[1]
+        self.reset()
+
+    @property
+    def engine(self) -> Identifier:
+        """What identifies the current payload."""
+        return self._engine if self._watch is None else self._watch.run
+
+    @property
+    def relative_to(self) -> str:
+        """What the answer is relative to: the bare "arm", the "tool" it was given with, the "tare", or "before".
+
+        That is the empty arm before the last change, taken for a tare.
+        """
+        if self._tared:
+            return "tare"
+        if getattr(self._source or self.engine, "reference", None) is not None:
+            return "before"
+        return "arm" if self.arm.attached is None else "tool"
+
+    @property
+    def event(self) -> Event | None:
+        """The last change of payload that was noticed, on the stream's clock."""
+        return self._event
+
+    @property
+    def health(self) -> Health:
+        """Counts of the stream since `reset`."""
+        return self._gate.health
+
+    @property
+    def trouble(self) -> str | None:
+        """What keeps the stream's samples from being used at present; `notes` says it too."""
+        return self._stream.trouble
+
+    def reset(self) -> None:
+        """Forget the stream (not the tare); the next sample is the first."""
+        self._gate.reset()
+        if self._watch is None:
+            self._engine.reset()
+        else:
+            self._watch.reset()
+        self._stream.reset()
+        self._internal = 0.0
+        self._told = -np.inf  # time of the newest sample that counted in the answer, on our own clock
+        self._step.reset()
+        self._moved = -np.inf
+        self._since: float | None = None
+        self._published = -np.inf
+        self._event: Event | None = None
+        self._estimate = self._nothing()
+        self._source: Identifier | None = None  # the run it is of
+        self._determined, self._held = np.zeros(10, dtype=bool), False
+        self._notes: tuple[str, ...] = ()
+
+    def update(self, t: Any, q: Any, dq: Any, tau: Any) -> OnlineEstimate:
+        """Take one sample and say what is known; a sample that cannot be right is counted and left out.
+
+        Args:
+            t: [s], on any clock. q, dq, tau: (n,) [rad, rad/s, N·m]; tau = rigid body + friction, gravity in it.
+        """
+        sample = self._gate.take(t, q, dq, tau)
+        if sample is None:
+            self._stream.left_out(self._gate, t, q, dq, tau)
+            return self._said()
+        self._internal = sample.t
+        self._stream.used(self._gate, float(t))
+        if self._since is None:
+            self._since = self._stream.clock
+        if sample.t - self._moved > 0.1 * _RECENT and np.abs(sample.dq).max() > _MOVING:
+            self._moved = sample.t
+        self._identify(sample)
+        return self._said()
+
+    def close(self) -> None:
+        """Stop what runs beside; the identifier may go on."""
+        if self._watch is not None:
+            self._watch.close()
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write all there is to know to one .npz file; `restore` goes on from it exactly.
+
+        Raises:
+            IdentificationError: the method keeps something that cannot be written.
+        """
+        if self._watch is not None:
+            self._watch.hold()
+        state = {k: v for k, v in vars(self).items() if k not in ("arm", "tare")}
+        return save_state({"state": state, "tared": self._tared}, self._known(), path, self._origin())
+
+    @classmethod
+    def restore(cls, path: str | PathLike[str], arm: Arm, method: str | Path | None = None) -> Self:
+        """An identifier in the state that was saved.
+
+        Args:
+            path: what `save` wrote. arm, method: what the identifier was made with; a tare is in the state.
+
+        Raises:
+            IdentificationError: the file is none, or of another arm or trained model.
+        """
+        new = cls(arm, method=method)
+        own = new._origin()
+
+        def check(origin: Mapping[str, Any]) -> None:
+            if origin["arm"] != own["arm"]:
+                raise IdentificationError(
+                    f"{path} was saved for {origin['name']}: {arm.name} is another arm, or has another frame, gravity "
+                    "or tool"
+                )
+            if origin["model"] not in (None, own["model"]):  # its numbers and this model's would be mixed
+                there = "which has no trained model" if own["model"] is None else f"whose model is {own['model'][:12]}"
+                raise IdentificationError(
+                    f"{path} was saved with the method {origin['method']} and its trained model "
+                    f"{origin['model'][:12]} (SHA-256): found the method {own['method']}, {there}; give the method or "
+                    "the model's file that it was saved with, or begin anew"
+                )
+
+        try:
+            saved = load_state(path, new._known(), check)
+        finally:
+            new.close()
+        new.__dict__.update(saved["state"])
+        new._tared = saved["tared"]
+        return new
+
+    def _known(self) -> dict[str, Any]:
+        """What a new identifier for the same arm has already: the arm and the trained parts."""
+        parts = {name: value for name in ("model", "_payloads") if (value := getattr(self._engine, name, None))}
+        return {"arm": self.arm, **parts}
+
+    def _origin(self) -> dict[str, Any]:
+        """What a state holds for: it refers to the arm and the trained model, and has neither in it."""
+        model = self._known().get("model")
+        return {
+            "arm": self.arm.fingerprint,
+            "name": self.arm.name,
+            "method": self.method,
+            "model": None if model is None else model_fingerprint(model),
+        }
+
+    def _identify(self, sample: Sample) -> None:
+        run: Identifier = self._engine
+        if self._watch is None:
+            estimate, fresh = run.update(sample), not 0.0 <= sample.t - self._published < _PUBLISH
+        else:
+            known = self._watch.event
+            estimate = self._watch.update(sample, self._held)
+            if self._watch.event is not known:
+                self._noticed(sample.t)
+            if estimate is None or self._watch.settling:
+                if self._watch.doubting and sample.t - self._published > _PUBLISH and _DOUBT not in self._notes:
+                    self._notes = (*self._notes, _DOUBT)
+                return
+            run = self._watch.answered
+            fresh = run.fresh
+            if not fresh and run is not self._source and math.isfinite(run.data_t):
+                return  # a run just taken up again: until it answers anew, its answer is of long ago
+        if (fresh or self._watch is None) and not all_finite(estimate.phi):
+            return
+        stands = self._counted(sample, run)
+        if fresh:
+            self._published = sample.t
+            self._judge(estimate, run, stands)
+        self._estimate, self._source = estimate, run
+
+    def _counted(self, sample: Sample, run: Identifier) -> bool:
+        """Remember how old the answer is; whether what was seen lately told it nothing, as the arm stands."""
+        if not isinstance(run, StreamingIdentifier):
+            self._told = sample.t
+        elif run.fresh:
+            row = None if run.stream is None else run.stream.row
+            if row is not None and row.h <= 0.0 and run is self._source and self._told > -np.inf:
+                return run.data_t - self._told > _STANDS
+            self._told = run.data_t
+        elif run is self._source:
+            return False
+        else:
+            self._told = -np.inf
+        if self._stream.unseen:
+            self._stream.forget_pauses()
+        return False
+
+    def _noticed(self, now: float) -> None:
+        """A change: until its transient is over only what was known beforehand is."""
+        assert self._watch is not None
+        assert self._watch.event is not None
+        event, shift = self._watch.event, self._stream.clock - now
+        mass = self._step.of(event, self._source, self._watch.run)
+        self._event = replace(event, t=event.t + shift, began=event.began + shift, mass=mass)
+        if self._watch.settling:
+            self._since = self._stream.clock
+            self._estimate, self._source, self._told = self._nothing(), None, -np.inf
+            self._stream.forget_pauses()
+            self._determined, self._held, self._notes = np.zeros(10, dtype=bool), False, ("the payload has changed",)
+
+    def _nothing(self) -> Estimate:
+        """What is known beforehand."""
+        mean, std = (np.zeros(10), self._weak) if self.engine.known is None else self.engine.known
+        return Estimate(0.0, mean, np.diag(std**2), 0, str(self.arm.frame))
+
+    def _judge(self, estimate: Estimate, run: Identifier, stands: bool) -> None:
+        """What the data determine, and whether anything is there."""
+        std = estimate.std
+        self._determined = determined(std, self._before, run.alone, self._weak)
+        self._held = held(float(estimate.phi[0]), float(std[0]), bool(self._determined[0]))
+        notes = []
+        if not self._moving:
+            notes.append("not moving: inertia undetermined" if not self._determined[4:].all() else "not moving")
+        if stands and self._stream.trouble is None:
+            notes.append(_STANDING)
+        self._notes = tuple(notes)
+
+    @property
+    def _moving(self) -> bool:
+        return self._internal + self._stream.ahead - self._moved < _RECENT
+
+    def _said(self) -> OnlineEstimate:
+        engine, watch, stream = self.engine, self._watch, self._stream
+        age = stream.unseen + stream.ahead + (self._internal - self._told if self._told > -np.inf else 0.0)
+        return OnlineEstimate.of(
+            {
+                **vars(self._estimate),
+                "t": stream.clock,
+                "age": float(age),
+                "since": stream.clock if self._since is None else self._since,
+                "relative_to": self.relative_to,
+                "method": self.method,
+                "determined": self._determined,
+                "held": self._held,
+                "calibrated": engine.calibrated,
+                "moving": self._moving,
+                "settling": watch is not None and watch.settling,
+                "event": self._event,
+                "health": self._gate.health,
+                "notes": self._notes if stream.trouble is None else (*self._notes, stream.trouble),
+            }
+        )

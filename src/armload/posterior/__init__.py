@@ -1,0 +1,38 @@
+"""The default estimator: scales, sequential solution, payload prior, calibration, model file; and the bound."""
+
+from armload.posterior.advice import Advice, advise
+from armload.posterior.bound_worlds import scales_of
+from armload.posterior.calibration import Calibration
+from armload.posterior.cramer_rao import TIMES, Bound, bound, efficiency
+from armload.posterior.evidence import TRAITS, Evidence, Physics
+from armload.posterior.hybrid import HybridIdentifier, shipped_model
+from armload.posterior.hybrid_stream import StreamingHybrid
+from armload.posterior.live import StreamingIdentifier
+from armload.posterior.map import PosteriorLeastSquares, SmoothPosteriorLeastSquares
+from armload.posterior.model_file import HybridModel
+from armload.posterior.payload_prior import MixturePosterior, MixturePrior
+from armload.posterior.problem import Posterior
+
+__all__ = [
+    "TIMES",
+    "TRAITS",
+    "Advice",
+    "Bound",
+    "Calibration",
+    "Evidence",
+    "HybridIdentifier",
+    "HybridModel",
+    "MixturePosterior",
+    "MixturePrior",
+    "Physics",
+    "Posterior",
+    "PosteriorLeastSquares",
+    "SmoothPosteriorLeastSquares",
+    "StreamingHybrid",
+    "StreamingIdentifier",
+    "advise",
+    "bound",
+    "efficiency",
+    "scales_of",
+    "shipped_model",
+]

@@ -1,0 +1,279 @@
+"""One solution of the MAP problem: unknowns eliminated joint by joint, scales improved step by step.
+
+z = [payloads, eta] is what all joints share, g_j are the weights of joint j's own features. Given the scales, all is
+linear and Gaussian; `posterior` says what `posterior.solve` does with it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dpotrf, dpotri
+
+from armload.posterior.sequential import SequentialPosterior
+from armload.regression import GaussianPrior
+from armload.regression.information import RegressionData
+from armload.regression.noise import NoiseModel, share_of_noise, whole_noise
+
+# standard deviation of first moments and inertia per kilogram: bodies within about 20 cm of the frame's origin
+_REACH = np.array([0.2] * 3 + [0.2**2] * 6)  # [m, m²]
+_LIGHTEST = 0.02  # [kg]
+# Coulomb friction above this fraction of the effort limit: the torque is the motor's, not the link's
+_MOTOR_SIDE = 0.01
+_GAIN_STD = {"link": 0.005, "motor": 0.02}  # torque calibration, 1 sigma; motor constants are known to a few per cent
+# prior rms of a joint's smooth functions, as fractions of its effort limit, and the weight of these figures
+_POSE, _VELOCITY, _FEATURE_COUNT = 3e-3, 2e-3, 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class Scales:
+    """What expectation–maximisation finds.
+
+    noise: S of each run (K, n) [N²·m²·s]. eta: prior variance (p,). features: prior variance of the weights (n, R).
+    payloads: prior variance (10,) of the payload, or (20,) of the tares' and of what was added.
+    """
+
+    noise: NDArray[np.float64]
+    eta: NDArray[np.float64]
+    features: NDArray[np.float64]
+    payloads: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Mean and covariance of phi, and of what else was found along the way.
+
+    phi, covariance: (10,), (10, 10) of the payload (relative to the tare, if there was one).
+    information, vector: Λ (10, 10) and Λ·phi_ML (10,): what the logs alone say, all else integrated out.
+    eta: (p,) the arm's mismatch.
+    residual: √S (n,) of the run [N·m·√s].
+    torque: "link" or "motor", the side the torque seems to be measured on.
+    gain_std: relative standard deviation of the torque's calibration.
+    scales: what expectation–maximisation found; another solution may start there.
+    ratios: the scales (n,) of "noise", "pose", "velocity" and "friction", and the squared offsets ("offset"), over what
+        was expected of them, as variances.
+    """
+
+    phi: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    information: NDArray[np.float64]
+    vector: NDArray[np.float64]
+    eta: NDArray[np.float64]
+    residual: NDArray[np.float64]
+    torque: str
+    gain_std: float
+    scales: Scales
+    ratios: dict[str, NDArray[np.float64]]
+
+
+def _inverse(A: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A⁻¹ of a positive definite A, by its Cholesky factor: half the work of `numpy.linalg.inv`, and symmetric."""
+    factor, failed = dpotrf(A, lower=1)
+    if failed:
+        raise np.linalg.LinAlgError("not positive definite")
+    inverse, _ = dpotri(factor, lower=1)
+    return np.tril(inverse) + np.tril(inverse, -1).T
+
+
+@dataclass(frozen=True, eq=False)
+class _Gaussian:
+    """z ~ N(mean, covariance); g_j | z ~ N(own − slope·z, rest)."""
+
+    mean: NDArray
+    covariance: NDArray
+    own: NDArray  # (n, R)
+    slope: NDArray  # (n, R, z)
+    rest: NDArray  # (n, R, R)
+
+    @property
+    def weights(self) -> NDArray:
+        """Mean of g (n, R)."""
+        return self.own - self.slope @ self.mean
+
+    def spread(self, E: NDArray, j: int, X: NDArray) -> NDArray[np.float64]:
+        """Variance (B,) of X·[E·z, g_j], X (B, ·)."""
+        shared, own = X[:, : len(E)] @ E - X[:, len(E) :] @ self.slope[j], X[:, len(E) :]
+        return ((shared @ self.covariance) * shared).sum(axis=1) + ((own @ self.rest[j]) * own).sum(axis=1)
+
+
+class _Eliminated(NamedTuple):
+    """Information about z alone (A, b), and what it leaves of the joints' weights, as in `_Gaussian`."""
+
+    A: NDArray
+    b: NDArray
+    own: NDArray
+    slope: NDArray
+    rest: NDArray
+
+
+class Problem:
+    """One solution's fixed part: which unknowns a run sees, the stated priors."""
+
+    def __init__(
+        self, runs: list[RegressionData], prior_std: NDArray, prior: GaussianPrior | None, noise: NoiseModel
+    ) -> None:
+        self.runs, self.noise_model, self.correction = runs, noise, runs[0].correction
+        self.features = runs[0].features
+        count, p = min(len(runs), 2), self.correction.size
+        self.payloads, self.size = 10 * count, 10 * count + p
+        self.last = slice(10 * (count - 1), 10 * count)
+        self.payload_variance = np.tile(np.asarray(prior_std) ** 2, count)
+        self.mean, self.root = np.zeros(self.size), None
+        if prior is not None:
+            self.mean[self.last], self.root = prior.mean, prior.root
+        share = [share_of_noise(run.blocks.duration) for run in runs]
+        self.expected = np.outer(share, whole_noise(self.correction, noise))  # (K, n)
+        self.selections = []
+        for run in runs:
+            E = np.zeros((10 + p, self.size))
+            for i in range(count if run is runs[-1] else 1):
+                E[:10, 10 * i : 10 * i + 10] = np.eye(10)
+            E[10:, self.payloads :] = np.eye(p)
+            self.selections.append(E)
+        self.parts = [run.selected(E) for run, E in zip(runs, self.selections, strict=True)]
+        self.crossed = [run.A[:, 10 + p :, : 10 + p] @ E for run, E in zip(runs, self.selections, strict=True)]
+        group = np.repeat([_POSE, _VELOCITY], [self.features.pose, self.features.velocity])
+        self.feature_variance = (np.outer(self.correction.effort, group)) ** 2
+
+    def scales(self, start: Scales | None) -> Scales:
+        """Where expectation–maximisation begins."""
+        noise = self.expected.copy()
+        if start is None:
+            return Scales(noise, self.correction.prior_std**2, self.feature_variance, self.payload_variance)
+        noise[: len(start.noise)] = start.noise[: len(noise)]
+        return Scales(noise, start.eta, start.features, self.payload_variance)
+
+    def posterior(self, scales: Scales) -> _Gaussian:
+        """z and g given the scales."""
+        A, b, own, slope, rest = self._eliminated(scales)
+        root = np.diag(np.sqrt(np.concatenate([scales.payloads, scales.eta])))
+        if self.root is not None:
+            root[self.last, self.last] = self.root
+        P = root @ np.linalg.inv(root.T @ A @ root + np.eye(self.size)) @ root.T
+        P = 0.5 * (P + P.T)
+        return _Gaussian(self.mean + P @ (b - A @ self.mean), P, own, slope, rest)
+
+    def _eliminated(self, scales: Scales) -> _Eliminated:
+        """Each g_j is eliminated first: it occurs in the rows of joint j only."""
+        n, R, c = len(self.correction.effort), self.features.size, 10 + self.correction.size
+        S = scales.noise
+        A, b = np.zeros((self.size, self.size)), np.zeros(self.size)
+        for (squares, products), s in zip(self.parts, S, strict=True):
+            A += np.einsum("jab,j->ab", squares, 1.0 / s)
+            b += np.einsum("ja,j->a", products, 1.0 / s)
+        own, slope, rest = np.zeros((n, R)), np.zeros((n, R, self.size)), np.zeros((n, R, R))
+        for j in range(n if R else 0):
+            Agg = sum(run.A[j, c:, c:] / s[j] for run, s in zip(self.runs, S, strict=True))
+            Agz = sum(crossed[j] / s[j] for crossed, s in zip(self.crossed, S, strict=True))
+            bg = sum(run.b[j, c:] / s[j] for run, s in zip(self.runs, S, strict=True))
+            root = np.sqrt(scales.features[j])
+            rest[j] = root[:, None] * _inverse(root[:, None] * Agg * root + np.eye(R)) * root
+            own[j], slope[j] = rest[j] @ bg, rest[j] @ Agz
+            A, b = A - Agz.T @ slope[j], b - Agz.T @ own[j]
+        return _Eliminated(0.5 * (A + A.T), b, own, slope, rest)
+
+    def sequential(self, scales: Scales) -> SequentialPosterior:
+        """The same posterior as a state that takes further rows of the last run: phi last to be integrated out."""
+        found = self._eliminated(scales)
+        first, last = self.last.start, self.last
+        shared = np.r_[0:first, last.stop : self.size]
+        order = np.r_[last.start : last.stop, shared]
+        prior = np.concatenate([scales.payloads, scales.eta])[shared]
+        A, b = found.A, found.b
+        root = np.sqrt(prior)
+        C = np.linalg.inv(root[:, None] * A[np.ix_(shared, shared)] * root + np.eye(len(root)))
+        C = root[:, None] * (0.5 * (C + C.T)) * root
+        slope, own = C @ A[shared][:, last], C @ b[shared]
+        Λ, h = A[last, last] - A[last][:, shared] @ slope, b[last] - A[last][:, shared] @ own
+        return SequentialPosterior(
+            C=np.ascontiguousarray(found.rest),
+            own=found.own,
+            slope=np.ascontiguousarray(found.slope[:, :, order]),
+            shared_C=C,
+            shared_own=own,
+            shared_slope=np.ascontiguousarray(slope),
+            information=0.5 * (Λ + Λ.T),
+            vector=h,
+            noise=scales.noise[-1].copy(),
+            tares=first // 10,
+        )
+
+    def improved(self, scales: Scales, found: _Gaussian) -> Scales:
+        """One step of expectation–maximisation, each scale held to its stated value by pseudo-observations."""
+        z, P = found.mean, found.covariance
+        variance = np.diag(P)
+        eta, stated = scales.eta.copy(), self.correction.prior_std**2
+        adaptive = self.correction.adaptive
+        seen = z[self.payloads :] ** 2 + variance[self.payloads :]
+        eta[adaptive] = 0.5 * (stated + seen)[adaptive]
+        features = scales.features.copy()
+        weights = found.weights
+        if self.features.size:
+            spread = np.einsum("jrr->jr", found.rest) + ((found.slope @ P) * found.slope).sum(axis=2)
+            for part in (slice(0, self.features.pose), slice(self.features.pose, None)):
+                size = weights[:, part].shape[1]
+                total = (weights[:, part] ** 2 + spread[:, part]).sum(axis=1, keepdims=True)
+                known = _FEATURE_COUNT * self.feature_variance[:, part]
+                features[:, part] = (known + total) / (_FEATURE_COUNT + size)
+        return Scales(self._noise(found), eta, features, self._payloads(z, variance))
+
+    def _noise(self, found: _Gaussian) -> NDArray[np.float64]:
+        """S of each run."""
+        model, out = self.noise_model, []
+        for run, E, expected in zip(self.runs, self.selections, self.expected, strict=True):
+            spread = partial(found.spread, E) if self.features.size else None
+            S = run.residual_variance(E @ found.mean, expected, np.inf, found.weights, spread)
+            S = np.maximum(S, expected) if model.floor else S
+            out.append(S * max(1.0, run.blocks.duration / model.novelty))
+        return np.array(out)
+
+    def _payloads(self, z: NDArray, variance: NDArray) -> NDArray:
+        """A light body has small moments: what was mounted at a tare seldom weighs much, and its moments follow."""
+        now = self.payload_variance.copy()
+        if self.last.start > 0:
+            heaviest = max(abs(z[0]) + 2.0 * np.sqrt(max(variance[0], 0.0)), _LIGHTEST)
+            now[1:10] = np.minimum(now[1:10], (heaviest * _REACH) ** 2)
+        return now
+
+    def answer(self, scales: Scales, found: _Gaussian) -> Posterior:
+        """The payload of the last run."""
+        phi, covariance = found.mean[self.last], found.covariance[self.last, self.last]
+        eta = found.mean[self.payloads :]
+        friction = float(np.median(np.abs(self.correction.coulomb(eta)) / self.correction.effort))
+        torque = "motor" if self.correction.arm.motor_torque or friction > _MOTOR_SIDE else "link"
+        precision = np.linalg.inv(covariance)
+        if self.root is None:
+            before, pull = np.diag(1.0 / self.payload_variance[self.last]), np.zeros(10)
+        else:
+            before = np.linalg.inv(self.root @ self.root.T)
+            pull = before @ self.mean[self.last]
+        gain = _GAIN_STD[torque]
+        return Posterior(
+            phi=phi,
+            covariance=self.noise_model.overrated * covariance + gain**2 * np.outer(phi, phi),
+            information=precision - before,
+            vector=precision @ phi - pull,
+            eta=eta,
+            residual=np.sqrt(scales.noise[-1]),
+            torque=torque,
+            gain_std=gain,
+            scales=scales,
+            ratios=self._ratios(scales, eta),
+        )
+
+    def _ratios(self, scales: Scales, eta: NDArray) -> dict[str, NDArray[np.float64]]:
+        stated = self.correction.prior_std**2
+        repeated = max(1.0, self.runs[-1].blocks.duration / self.noise_model.novelty)
+        out = {
+            "noise": scales.noise[-1] / (repeated * self.expected[-1]),
+            "friction": self.correction.coulomb(scales.eta) / self.correction.coulomb(stated),
+            "offset": self.correction.offset(eta**2) / self.correction.offset(stated),
+        }
+        for name, k in (("pose", 0), ("velocity", self.features.pose)):
+            if self.features.size > k:
+                out[name] = scales.features[:, k] / self.feature_variance[:, k]
+        return out

@@ -1,0 +1,76 @@
+"""MAP least squares: payload and arm mismatch together, with an uncertainty that knows the residual is correlated.
+
+    r = W·phi + Z·eta + G·g + e,   phi ~ N(0, P_phi), eta ~ N(0, P_eta), g_j ~ N(0, P_g), e_j of long-run variance S_j
+
+r, W, Z, G come from the acceleration-free filtered regression (`regression.py`); eta is what the arm's rigid-body model
+gets wrong (`correction.py`), g_j are the weights of joint j's smooth functions of pose and velocity (`features.py`).
+The information A = Σ_j ∫ X_jᵀ·X_j dt / S_j with X = [W Z G] accumulates in constant memory; the posterior is
+x = (A + P⁻¹)⁻¹·b, joint by joint with g_j eliminated first. S_j (batch means of the residual) and the scales of the
+priors of offsets, friction and features (expectation–maximisation) are found from the data in a few iterations.
+
+Tares enter the same model: they see phi_0 (whatever was mounted then) with the same eta and g, the later run sees
+phi_0 + phi. Virtual calibration [Kurdas 2022] is the special case without eta and g.
+
+Sources: information form and EM: Bishop 2006, ch. 3 and 9; arm and load together: Khalil, Gautier, Lemoine, ICRA 2007.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import ThreadpoolController
+
+from armload.posterior.problem import Posterior, Problem, Scales
+from armload.posterior.sequential import SequentialPosterior
+from armload.regression import GaussianPrior
+from armload.regression.information import RegressionData
+from armload.regression.noise import RIGID, SMOOTH, NoiseModel
+
+
+@cache
+def threads() -> ThreadpoolController:
+    """Limits BLAS to one thread: for matrices of a hundred rows more cost up to 100 × on a busy machine."""
+    return ThreadpoolController()
+
+
+def solve(
+    runs: list[RegressionData],
+    prior_std: NDArray[np.float64],
+    prior: GaussianPrior | None = None,
+    noise: NoiseModel = RIGID,
+    iterations: int = 12,
+    start: Scales | None = None,
+) -> Posterior:
+    """Posterior of the payload of the last run; runs before it are tares, all with the same mounted.
+
+    Unknowns z = [phi_0, phi, eta], and g_j: tares carry phi_0, the last run phi_0 + phi. Each payload is
+    near zero within `prior_std` (10,), a tare's moments also within `_REACH` of its mass; the last one follows `prior`
+    where that is given. `start` holds scales found before, of the same runs or of all but the last.
+    """
+    with threads().limit(limits=1):
+        problem = Problem(runs, prior_std, prior, noise)
+        scales = problem.scales(start)
+        for _ in range(iterations - 1):
+            scales = problem.improved(scales, problem.posterior(scales))
+        return problem.answer(scales, problem.posterior(scales))
+
+
+def advance(
+    runs: list[RegressionData],
+    prior_std: NDArray[np.float64],
+    noise: NoiseModel = SMOOTH,
+    start: Scales | None = None,
+    steps: int = 1,
+) -> tuple[Posterior, SequentialPosterior]:
+    """The posterior after some steps of expectation–maximisation from `start`, and the same ready to take further rows.
+
+    Arguments as of `solve`.
+    """
+    with threads().limit(limits=1):
+        problem = Problem(runs, prior_std, None, noise)
+        scales = problem.scales(start)
+        for _ in range(steps):
+            scales = problem.improved(scales, problem.posterior(scales))
+        return problem.answer(scales, problem.posterior(scales)), problem.sequential(scales)

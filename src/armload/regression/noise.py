@@ -1,0 +1,53 @@
+"""What is expected of the residual e, before anything is seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.regression.information import NOVELTY, REGRESSOR_RATE
+from armload.regression.mismatch import Correction
+
+# [s] a run shorter than this sees one value of a residual that changes slowly: its mean does not grow with 1/T
+_MOMENT = 0.1
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """What is expected of the residual e.
+
+    Args:
+        residual: prior standard deviation of the unexplained torque over a block, as a fraction of the effort limit.
+        block: length of the residual's batch means [s].
+        floor: whether the residual is never taken to be smaller than `residual`: what is left of skew between the
+            channels and of the sensors' quirks follows the motion, and does not average out.
+        novelty: [s] beyond which more time on similar motions counts no more, as for a mismatch that is a function of
+            the configuration and has no unknown of its own.
+        overrated: by which factor the posterior's covariance is too small on arms unlike those the model was made for:
+            squared error over variance, mean over simulated episodes (`hybrid.calibration.overrating`, 2 % trimmed).
+    """
+
+    residual: float
+    block: float
+    floor: bool
+    novelty: float
+    overrated: float = 1.0
+
+
+# without features, the smooth mismatch is in the residual: it is large and repeats
+RIGID = NoiseModel(residual=4e-3, block=1.0, floor=False, novelty=NOVELTY)
+# what is left repeats all the same: errors hardly fall after half a minute (`benchmarks/long_logs.py`), nor may the
+# information grow for days, until its digits are gone
+SMOOTH = NoiseModel(residual=1e-3, block=0.25, floor=True, novelty=60.0, overrated=2.25)
+
+
+def whole_noise(correction: Correction, noise: NoiseModel) -> NDArray[np.float64]:
+    """S (n,) that is expected of a run of `_MOMENT` or more, before anything is seen [N²·m²·s]."""
+    return (noise.residual * correction.effort) ** 2 * noise.block
+
+
+def share_of_noise(seconds: float) -> float:
+    """The fraction of `whole_noise` that a run of so many seconds shows."""
+    return min(1.0, max(seconds, 1.0 / REGRESSOR_RATE) / _MOMENT)

@@ -1,0 +1,39 @@
+"""Simulation: the arm under a joint controller that does not know the payload, in a world, seen through sensors."""
+
+from armload.simulation.continued import ContinuedRun
+from armload.simulation.controller import Command, Gains
+from armload.simulation.friction import Friction
+from armload.simulation.plant import build_model, settled_start
+from armload.simulation.ratings import is_panda, rated_mass
+from armload.simulation.residual import SmoothTorque
+from armload.simulation.resolution import Resolution
+from armload.simulation.runs import Run, simulate, simulate_many
+from armload.simulation.sensors import Sensors
+from armload.simulation.torque_control import TorqueRun, torque_controlled
+from armload.simulation.torque_laws import GravityCompensation, JointImpedance, Law, moderate_stiffness
+from armload.simulation.worlds import Drift, World
+
+__all__ = [
+    "Command",
+    "ContinuedRun",
+    "Drift",
+    "Friction",
+    "Gains",
+    "GravityCompensation",
+    "JointImpedance",
+    "Law",
+    "Resolution",
+    "Run",
+    "Sensors",
+    "SmoothTorque",
+    "TorqueRun",
+    "World",
+    "build_model",
+    "is_panda",
+    "moderate_stiffness",
+    "rated_mass",
+    "settled_start",
+    "simulate",
+    "simulate_many",
+    "torque_controlled",
+]

@@ -1,0 +1,89 @@
+"""How far a simulated arm is off its model, part by part: the figures, and draws of links and friction.
+
+The figures for the Panda are measured ones: two robots, published model, below 10 Hz. After links, offsets and friction
+have been fitted, (.20 .29 .19 .20 .08 .05 .05) N·m rms remain, smooth in q and repeatable: a torque outside the
+rigid-body span. The link figures (2 % of mass, 2 mm, 5 % of inertia, times `Arm.link_spread`: a model identified on a
+robot is better than a maker's drawing) are our choice. Other arms scale with rated torque. What is beyond the measured
+ones is our choice altogether.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import LINK_SPREAD, Arm, rated_effort
+from armload.inertia import com_to_phi, nearest_consistent, phi_to_com
+from armload.simulation.friction import Friction
+from armload.simulation.ratings import is_panda
+
+_LINK_MOST = 10.0  # a spread of links beyond this many of `LINK_SPREAD` would leave no arm
+_LIGHTEST_LINK = 0.2  # of the model's mass
+_PANDA_OFFSET = (0.2, 0.3, 0.12, 0.25, 0.05, 0.08, 0.02)  # [N·m], 1 sigma
+_PANDA_FRICTION = (0.25, 0.25, 0.2, 0.35, 0.35, 0.2, 0.26)  # [N·m]
+_PANDA_RESIDUAL = (0.20, 0.28, 0.19, 0.20, 0.08, 0.05, 0.045)  # [N·m], rms
+_OTHER_OFFSET, _OTHER_FRICTION, _OTHER_RESIDUAL = 0.003, 0.01, 0.0035  # of the rated torque
+_FRICTION_WIDTH = 0.06  # [rad/s]
+_FRICTION_SPREAD = 0.3
+
+# beyond the measured ones
+_WIDTHS = (0.02, 0.2)  # [rad/s]
+LENGTHS = (0.3, 3.0)  # [rad] of the residual
+_STRIBECK, _VISCOUS, LOAD = 0.6, 0.5, 0.015  # at most: of the level, of the level per rad/s, of the torque
+GAIN, MOTOR_GAIN = 0.01, 0.03  # torque scale, at most
+_MOTOR_FRICTION = (0.05, 0.15)  # of the rated torque
+MOTOR_LOAD = 0.08  # at most of the torque: gears lose a share of what they transmit
+_ROTOR = (0.002, 0.02)  # [s²] rotor inertia over rated torque
+
+
+def sizes(arm: Arm) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Offset, friction and residual (n,) of an arm like the measured ones [N·m]."""
+    if is_panda(arm):
+        return np.array(_PANDA_OFFSET), np.array(_PANDA_FRICTION), np.array(_PANDA_RESIDUAL)
+    rated = rated_effort(arm)
+    return rated * _OTHER_OFFSET, rated * _OTHER_FRICTION, rated * _OTHER_RESIDUAL
+
+
+def on_motor(arm: Arm, rng: np.random.Generator) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Friction level (n,) [N·m] and rotor inertia (n,) [kg·m²] where torque is measured on the motor's side."""
+    rated = rated_effort(arm)
+    level = rated * np.exp(rng.uniform(*np.log(_MOTOR_FRICTION), size=arm.n))
+    return level, rated * np.exp(rng.uniform(*np.log(_ROTOR), size=arm.n))
+
+
+def _spread(level: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+    return level * np.clip(1.0 + _FRICTION_SPREAD * rng.normal(size=len(level)), 0.1, None)
+
+
+def plain_friction(level: NDArray[np.float64], rng: np.random.Generator) -> Friction:
+    """tanh friction of the measured width, its level scattered about the given one."""
+    return Friction(_spread(level, rng), np.full(len(level), _FRICTION_WIDTH))
+
+
+def any_friction(level: NDArray[np.float64], rng: np.random.Generator, load: float) -> Friction:
+    """Friction of any width, with each other shape in half of the worlds; load: the most that grows with the torque."""
+    n = len(level)
+    level = _spread(level, rng)
+    width = np.exp(rng.uniform(*np.log(_WIDTHS), size=n))
+    has = rng.random(4) < 0.5
+    return Friction(
+        level,
+        width,
+        has[0] * np.clip(0.2 * rng.normal(size=n), -0.5, 0.5),
+        has[1] * level * rng.uniform(0.0, _STRIBECK, size=n),
+        width + rng.uniform(0.03, 0.2, size=n),
+        has[2] * level * rng.uniform(0.0, _VISCOUS, size=n),
+        has[3] * rng.uniform(0.0, load, size=n),
+    )
+
+
+def perturbed(phi: NDArray[np.float64], rng: np.random.Generator, spread: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A link somewhat off its model, still a body that can exist; spread: of mass, centre and inertia."""
+    mass, com, inertia = phi_to_com(phi)
+    off_mass, off_com, off_inertia = np.minimum(spread, _LINK_MOST) * LINK_SPREAD
+    root = np.sqrt(np.abs(np.diag(inertia)))
+    noise = rng.normal(size=(3, 3))
+    inertia = inertia + off_inertia * np.outer(root, root) * (np.triu(noise) + np.triu(noise, 1).T)
+    off = mass * max(1 + off_mass * rng.normal(), _LIGHTEST_LINK)
+    changed = com_to_phi(off, com + off_com * rng.normal(size=3), inertia)
+    return nearest_consistent(changed)

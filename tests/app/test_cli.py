@@ -1,0 +1,215 @@
+"""The command line's manners: help, usage errors in one sentence, exit codes, quick start, signals."""
+
+import json
+import os
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import armload
+from armload.app.cli import main
+from armload.app.cli.entry import COMMANDS
+
+ROOT = Path(__file__).resolve().parents[2]
+HEAVY = {"jax", "sklearn", "matplotlib", "mujoco", "rosbags", "trimesh"}
+
+
+def refused(capsys, argv, code=2):
+    """The one line on stderr of a call that must be refused with nothing on stdout."""
+    assert main(argv) == code
+    out, err = capsys.readouterr()
+    assert out == ""
+    lines = err.splitlines()
+    assert len(lines) == 1, err
+    assert "Traceback" not in err
+    assert not set(err) & set("│╭╮╰╯─┌┐└┘|")
+    assert lines[0].startswith("armload: ")
+    return lines[0]
+
+
+def test_help_lists_every_command_with_a_line_of_its_own(capsys):
+    assert main(["--help"]) == 0
+    out = capsys.readouterr().out
+    for name, text in COMMANDS.items():
+        assert sum(line.split()[:1] == [name] and text in line for line in out.splitlines()) == 1
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_of_each_command_ends_with_examples_of_it(capsys, command):
+    assert main([command, "--help"]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert f"armload {command}" in out.split("examples:")[1]
+
+
+def test_version_is_the_packages(capsys):
+    assert main(["--version"]) == 0
+    stated = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    assert capsys.readouterr().out == f"armload {stated}\n"
+    assert armload.__version__ == stated
+
+
+@pytest.mark.parametrize(
+    ("argv", "named"),
+    [
+        ([], "identify"),
+        (["identfy"], "did you mean 'identify'"),
+        (["--robot", "panda"], "--robot"),
+        (["identify"], "LOG, --robot"),
+        (["identify", "log.csv"], "--robot"),
+        (["identify", "--robot", "panda"], "LOG"),
+        (["identify", "log.csv", "--robot", "panda", "--colour", "red"], "--colour"),
+        (["identify", "log.csv", "more.csv", "--robot", "panda"], "more.csv"),
+        (["identify", "log.csv", "--robot"], "--robot"),
+        (["identify", "log.csv", "--robot", "panda", "--gravity"], "--gravity"),
+        (["identify", "log.csv", "--robot", "panda", "--gravity", "--json"], "--gravity"),
+        (["identify", "log.csv", "--robot", "panda", "--gravity", "1,2"], "'1,2'"),
+        (["identify", "log.csv", "--robot", "panda", "--gravity", "-1,2"], "'-1,2'"),
+        (["identify", "log.csv", "--robot", "panda", "--gravity", "a,b,c"], "'a,b,c'"),
+        (["identify", "log.csv", "--robot", "panda", "--gravity", "0,0,nan"], "gravity"),
+        (["identify", "log.csv", "--robot", "panda", "--gravity", "0,0,-9810"], "9.81e+03"),
+        (["identify", "log.csv", "--robot", "panda", "--gravity="], "--gravity"),
+        (["identify", "log.csv", "--robot", "panda", "--json=yes"], "--json"),
+        (["motion"], "ACTION"),
+        (["motion", "dance"], "dance"),
+        (["motion", "show", "random:x"], "random:x"),
+        (["motion", "check", "no_such.json", "--robot", "panda"], "no_such.json"),
+        (["motion", "export", "taie2024", "--format", "gif", "--out", "x"], "gif"),
+        (["motion", "random", "--robot", "panda", "--seed", "-1", "--out", "x"], "-1"),
+        (["motion", "random", "--robot", "panda", "--duration", "1e9", "--out", "x"], "from 0.1 to 3600"),
+        (["motion", "export", "taie2024", "--format", "csv", "--rate", "1e9", "--out", "x"], "from 0.001 to 10000"),
+        (["motion", "export", "taie2024", "--format", "csv", "--out", ""], "--out: the name is empty"),
+        (["motion", "show", "taie2024", "--robot", "nobody"], "nobody"),
+    ],
+)
+def test_a_usage_error_is_one_sentence_that_names_the_place(capsys, argv, named):
+    assert named in refused(capsys, argv)
+
+
+def test_interruption_is_one_line_and_130(capsys, monkeypatch):
+    def interrupt(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("armload.arms.arm", interrupt)
+    assert refused(capsys, ["identify", "log.csv", "--robot", "panda"], code=130) == "armload: interrupted"
+
+
+def test_a_bug_is_one_line_with_a_hint_and_the_traceback_on_request(capsys, monkeypatch):
+    def broken(*_, **__):
+        raise ZeroDivisionError("by zero,\nsomewhere")
+
+    monkeypatch.setattr("armload.arms.arm", broken)
+    argv = ["identify", "log.csv", "--robot", "panda"]
+    line = refused(capsys, argv, code=1)
+    assert "ZeroDivisionError: by zero, somewhere" in line
+    assert "ARMLOAD_TRACEBACK=1" in line
+    assert main([*argv, "--traceback"]) == 1
+    assert "Traceback" in capsys.readouterr().err
+    monkeypatch.setenv("ARMLOAD_TRACEBACK", "1")
+    assert main(argv) == 1
+    assert "Traceback" in capsys.readouterr().err
+
+
+def run(*argv, **settings):
+    return subprocess.run([sys.executable, "-m", "armload", *argv], capture_output=True, text=True, **settings)
+
+
+def test_the_process_refuses_as_main_does():
+    done = run("identify", "no_such_log.csv", "--robot", "panda", "--json")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.count("\n") == 1
+    assert "no_such_log.csv" in done.stderr
+
+
+def test_a_reader_that_left_is_not_complained_about():
+    read, write = os.pipe()
+    os.close(read)
+    try:
+        done = subprocess.run([sys.executable, "-m", "armload", "--help"], stdout=write, stderr=subprocess.PIPE)
+    finally:
+        os.close(write)
+    assert (done.returncode, done.stderr) == (141, b"")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full to write to")
+def test_a_full_disk_is_one_sentence():
+    with open("/dev/full", "w") as full:
+        done = subprocess.run([sys.executable, "-m", "armload", "--help"], stdout=full, stderr=subprocess.PIPE)
+    assert done.returncode == 2
+    assert done.stderr.count(b"\n") == 1
+
+
+def test_a_terminal_without_greek_still_gets_the_answer():
+    done = run("motion", "show", "taie2024", env=os.environ | {"PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"})
+    assert done.returncode == 0
+    assert "-0.852" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("code", "allowed"),
+    [
+        ("import armload", set()),
+        ("import armload.app.cli; armload.app.cli.main(['--help'])", set()),
+        ("import armload.app.cli; armload.app.cli.main(['identify', '--help'])", set()),
+        (
+            "import armload.app.cli; armload.app.cli.main(['identify', 'none.csv', '--robot', 'panda'])",
+            {"numpy", "pinocchio"},
+        ),
+    ],
+)
+def test_nothing_heavy_is_imported_before_it_is_needed(code, allowed):
+    listing = "import sys, json; print('\\n' + json.dumps([m for m in sys.modules if '.' not in m]))"
+    done = subprocess.run([sys.executable, "-c", f"{code}\n{listing}"], capture_output=True, text=True, check=True)
+    loaded = set(json.loads(done.stdout.splitlines()[-1]))
+    assert not loaded & ((HEAVY | {"numpy", "pinocchio", "scipy", "rich", "numba"}) - allowed - {"scipy", "numba"})
+    assert allowed or not loaded & {"scipy", "numba"}
+
+
+def test_every_public_name_is_there():
+    for name in armload.__all__:
+        assert getattr(armload, name) is not None
+        assert name in dir(armload)
+    with pytest.raises(AttributeError, match="no_such_name"):
+        _ = armload.no_such_name
+
+
+def test_numba_keeps_what_it_compiles_in_a_folder_of_the_user_s_own_where_nothing_else_can_be_written(tmp_path):
+    code = "import os; os.access = lambda *_: False; import armload; print(os.environ['NUMBA_CACHE_DIR'])"
+    env = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"} | {"TMPDIR": str(tmp_path)}
+
+    def folder():
+        return Path(
+            subprocess.run([sys.executable, "-c", code], env=env, check=True, capture_output=True, text=True).stdout[
+                :-1
+            ]
+        )
+
+    kept = folder()
+    assert kept == folder() == tmp_path / f"armload-{os.getuid()}"
+    assert kept.stat().st_mode & 0o777 == 0o700
+    kept.chmod(0o777)  # anybody could put code there
+    other = folder()
+    assert other != kept
+    assert other.stat().st_mode & 0o777 == 0o700
+
+
+@pytest.mark.parametrize("closed", ["2>&-", ">&-"])
+def test_a_stream_that_is_closed_is_no_crash(closed):
+    """A shell can start a program without standard output or error; Python then has None for them."""
+    done = subprocess.run(
+        ["sh", "-c", f'"{sys.executable}" -m armload methods {closed}'], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0
+    assert "Traceback" not in done.stdout + done.stderr
+    assert ("hybrid" in done.stdout) == (closed == "2>&-")
+    done = subprocess.run(
+        ["sh", "-c", f'"{sys.executable}" -m armload identify no.csv --robot panda {closed}'],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert done.stdout == ""

@@ -1,0 +1,25 @@
+"""The examples run, and say what they promise."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = sorted((Path(__file__).resolve().parents[2] / "examples").glob("*.py"))
+PROMISED = {
+    "identify_a_log": "rls-filter: 1.4",
+    "design_and_export_a_motion": "excitation.script",
+    "learn_and_refuse": "does not follow a motion",
+}
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_runs_and_keeps_its_promise(path, tmp_path):
+    done = subprocess.run([sys.executable, "-W", "error", str(path)], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert PROMISED[path.stem] in done.stdout
+
+
+def test_every_example_has_a_promise():
+    assert {path.stem for path in EXAMPLES} == set(PROMISED)

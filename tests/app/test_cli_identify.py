@@ -1,0 +1,255 @@
+"""What `armload identify` answers: the contract's JSON, and answers that are right on simulated and on real logs."""
+
+import json
+from importlib import resources
+
+import numpy as np
+import pytest
+
+from armload.app.cli import main
+from armload.arms import arm
+from armload.inertia import InertialParameters, com_to_phi
+from armload.motion import taie2024
+from armload.payloads import Payload, franka_hand, write_payload
+from armload.recording import Recording, write_recording
+from armload.simulation import simulate
+
+KEYS = [
+    "method",
+    "robot",
+    "frame",
+    "relative_to",
+    "n_samples",
+    "duration",
+    "phi",
+    "phi_low",
+    "phi_high",
+    "interval",
+    "determined",
+    "mass",
+    "com",
+    "inertia_com",
+    "consistent",
+    "held",
+]
+BODY = InertialParameters(com_to_phi(1.2, [0.02, -0.03, 0.09], np.diag([4e-3, 5e-3, 3e-3])), "panda_link8")
+TILTED = (-4.905, 0.0, -9.81 * np.sqrt(0.75))  # base tilted by 30° about y
+
+
+@pytest.fixture(scope="module")
+def logs(panda, tmp_path_factory):
+    """Simulated logs (MuJoCo, no noise) of a Panda: bare, with a body, with the hand, with both; and on a slope."""
+    folder, motion = tmp_path_factory.mktemp("logs"), taie2024()
+    hand = franka_hand().parameters
+    carried = {"bare": None, "body": BODY, "hand": hand, "both": BODY + hand}
+    for name, payload in carried.items():
+        write_recording(folder / f"{name}.csv", simulate(panda, motion, payload, rate=200.0))
+    write_recording(folder / "tilted.npz", simulate(arm("panda", gravity=TILTED), motion, BODY, rate=200.0))
+    return folder
+
+
+@pytest.fixture
+def answer(capsys):
+    """Call identify --json and return its object."""
+
+    def call(log, *argv):
+        code = main(["identify", str(log), *map(str, argv), "--json"])
+        out, err = capsys.readouterr()
+        assert code == 0, err
+        assert out.count("\n") == 1
+
+        def reject(constant):
+            raise AssertionError(f"{constant} in the JSON")
+
+        return json.loads(out, parse_constant=reject)
+
+    return call
+
+
+def test_json_has_the_contracts_keys_in_order_and_finite_numbers(answer, logs):
+    found = answer(logs / "body.csv", "--robot", "panda")
+    assert list(found) == KEYS
+    assert [len(found[key]) for key in ("phi", "phi_low", "phi_high", "determined")] == [10] * 4
+    assert np.shape(found["com"]) == (3,)
+    assert np.shape(found["inertia_com"]) == (3, 3)
+    for key in ("phi", "phi_low", "phi_high", "com", "inertia_com", "mass", "duration"):
+        assert np.all(np.isfinite(found[key]))
+    assert np.all(np.array(found["phi_low"]) <= found["phi"])
+    assert np.all(np.array(found["phi"]) <= found["phi_high"])
+    assert found["method"] == "hybrid"
+    assert found["robot"] == "panda"
+    assert found["frame"] == "panda_link8"
+    assert found["interval"] == "calibrated"
+    assert found["n_samples"] == 1200
+    assert found["duration"] == pytest.approx(5.995)
+    assert found["held"] is True
+    assert found["consistent"] is True
+    assert com_to_phi(found["mass"], found["com"], found["inertia_com"]) == pytest.approx(found["phi"], abs=1e-9)
+
+
+@pytest.mark.parametrize("method", ["hybrid", "map-gp", "map", "rls", "rls-filter"])
+def test_every_method_finds_the_simulated_body(answer, logs, method):
+    found = answer(logs / "body.csv", "--robot", "panda", "--method", method)
+    assert found["method"] == method
+    assert found["mass"] == pytest.approx(BODY.mass, rel=0.03)
+    assert found["com"] == pytest.approx(BODY.com, abs=0.01)
+
+
+def test_the_answer_is_relative_to_the_arm_the_tool_or_the_tare(answer, logs, tmp_path):
+    whole = answer(logs / "both.csv", "--robot", "panda")
+    assert whole["relative_to"] == "arm"
+    assert whole["mass"] == pytest.approx(BODY.mass + 0.73, rel=0.01)
+
+    named = answer(logs / "both.csv", "--robot", "panda", "--tool", "franka-hand")
+    write_payload(tmp_path / "hand.json", franka_hand())
+    filed = answer(logs / "both.csv", "--robot", "panda", "--tool", tmp_path / "hand.json")
+    assert named == filed
+    assert named["relative_to"] == "tool"
+    tared = answer(logs / "both.csv", "--robot", "panda", "--tare", logs / "hand.csv")
+    assert tared["relative_to"] == "tare"
+    for found in (named, tared):
+        assert found["mass"] == pytest.approx(BODY.mass, rel=0.01)
+        assert found["com"] == pytest.approx(BODY.com, abs=0.002)
+
+
+def test_a_saved_answer_is_a_tool_for_the_next_one(answer, logs, tmp_path):
+    hand = answer(logs / "hand.csv", "--robot", "panda")
+    (tmp_path / "hand.json").write_text(json.dumps(hand))
+    found = answer(logs / "both.csv", "--robot", "panda", "--tool", tmp_path / "hand.json")
+    assert found["mass"] == pytest.approx(BODY.mass, rel=0.01)
+
+
+def test_an_empty_arm_holds_nothing(answer, logs):
+    found = answer(logs / "bare.csv", "--robot", "panda")
+    assert found["held"] is False
+    assert found["mass"] == pytest.approx(0.0, abs=0.01)
+
+
+@pytest.mark.parametrize("spelling", [["--gravity={}"], ["--gravity", "{}"]], ids=["equals", "space"])
+def test_a_tilted_base_is_told_by_gravity(answer, logs, spelling):
+    gravity = [part.format(",".join(map(str, TILTED))) for part in spelling]
+    found = answer(logs / "tilted.npz", "--robot", "panda", *gravity)
+    assert found["mass"] == pytest.approx(BODY.mass, rel=0.01)
+    assert found["com"] == pytest.approx(BODY.com, abs=0.002)
+
+
+def test_standard_gravity_may_be_said(answer, logs):
+    assert answer(logs / "body.csv", "--robot", "panda", "--gravity", "0,0,-9.81") == answer(
+        logs / "body.csv", "--robot", "panda"
+    )
+
+
+@pytest.mark.parametrize(("method", "tolerance"), [("rls-filter", 1e-4), ("map", 1e-3), ("hybrid", 2e-3)])
+def test_another_frame_moves_the_answer_rigidly(answer, logs, method, tolerance):
+    here = answer(logs / "body.csv", "--robot", "panda", "--method", method)
+    there = answer(logs / "body.csv", "--robot", "panda", "--frame", "panda_link7", "--method", method)
+    assert there["frame"] == "panda_link7"
+    moved = arm("panda", "panda_link7").in_frame(InertialParameters(here["phi"], "panda_link8"))
+    # the frames are 0.107 m apart; map's weak prior is drawn about each: equal up to its pull
+    assert there["mass"] == pytest.approx(moved.mass, abs=tolerance)
+    assert there["com"] == pytest.approx(moved.com, abs=tolerance)
+    assert np.array(there["inertia_com"]) == pytest.approx(moved.inertia_com, abs=3 * tolerance)
+
+
+def test_the_built_in_arm_and_its_urdf_file_give_the_same(answer, logs, tmp_path):
+    path = tmp_path / "panda.urdf"
+    path.write_text(resources.files("armload.arms").joinpath("descriptions/panda.urdf").read_text())
+    built_in = answer(logs / "body.csv", "--robot", "panda", "--method", "rls-filter")
+    filed = answer(logs / "body.csv", "--robot", path, "--frame", "panda_link8", "--method", "rls-filter")
+    assert filed == built_in
+    # a file with the links of a built-in arm is that arm: what is known of it holds, too
+    mine = path.rename(tmp_path / "my_cell.urdf")
+    default = answer(logs / "body.csv", "--robot", mine, "--frame", "panda_link8")
+    assert default == answer(logs / "body.csv", "--robot", "panda") | {"robot": "my_cell"}
+
+
+def test_an_arm_that_never_moves_tells_what_gravity_tells(answer, panda, tmp_path):
+    loaded, pose = panda.with_payload(BODY), np.array([0.2, -0.6, 0.3, -1.8, 0.2, 1.6, 0.4])
+    t = np.arange(600) / 200.0
+    q = np.tile(pose, (len(t), 1))
+    tau = np.tile(loaded.torque(pose), (len(t), 1))
+    write_recording(tmp_path / "still.parquet", Recording(t, q, 0 * q, tau))
+    found = answer(tmp_path / "still.parquet", "--robot", "panda")
+    assert found["determined"][4:] == [False] * 6
+    assert found["phi_low"][0] <= BODY.mass <= found["phi_high"][0]
+    # what gravity tells in this pose: the torque about the joints, which the answer must explain
+    explained = panda.with_payload(InertialParameters(found["phi"])).torque(pose) - panda.torque(pose)
+    assert explained == pytest.approx(loaded.torque(pose) - panda.torque(pose), abs=0.5)
+
+
+def test_the_table_has_units_intervals_and_the_reason(capsys, logs):
+    assert main(["identify", str(logs / "body.csv"), "--robot", "panda"]) == 0
+    out, err = capsys.readouterr()
+    for word in ("kg·m²", "m·rx", "95 %", "method hybrid:", "relative to the arm", "mm"):
+        assert word in out
+    assert "hybrid" not in err
+
+
+def test_notes_of_the_reader_go_to_stderr(capsys, logs, tmp_path):
+    lines = (logs / "body.csv").read_text().splitlines()
+    (tmp_path / "twice.csv").write_text("\n".join([*lines[:50], lines[49], *lines[50:]]) + "\n")
+    assert main(["identify", str(tmp_path / "twice.csv"), "--robot", "panda", "--json"]) == 0
+    out, err = capsys.readouterr()
+    json.loads(out)
+    assert "line 51" in err
+
+
+def test_a_minute_at_one_kilohertz_is_answered(answer, analytic_log, panda, tmp_path):
+    write_recording(tmp_path / "long.npz", analytic_log(panda, BODY, duration=60.0, rate=1000.0))
+    found = answer(tmp_path / "long.npz", "--robot", "panda")
+    assert found["n_samples"] == 60000
+    assert found["mass"] == pytest.approx(BODY.mass, rel=0.01)
+
+
+def test_a_tool_must_be_about_a_frame_of_the_arm(capsys, analytic_log, tmp_path):
+    write_recording(tmp_path / "ur.csv", analytic_log(arm("ur10e"), rate=50.0))
+    assert main(["identify", str(tmp_path / "ur.csv"), "--robot", "ur10e", "--tool", "franka-hand"]) == 2
+    assert "ur10e has no flange of a Franka" in capsys.readouterr().err
+
+
+def test_a_tool_file_without_a_frame_is_about_the_payload_frame(answer, logs, tmp_path):
+    tool = Payload("hand", InertialParameters(franka_hand().parameters.phi))
+    write_payload(tmp_path / "tool.json", tool)
+    found = answer(logs / "both.csv", "--robot", "panda", "--tool", tmp_path / "tool.json")
+    assert found["mass"] == pytest.approx(BODY.mass, rel=0.01)
+
+
+# ---------------------------------------------------------------------- real logs
+
+
+def test_real_ur10e_pair_gives_the_weighed_mass(answer, real_data):
+    found = answer(
+        real_data / "ur10e_loaded_2805g.csv",
+        *("--robot", real_data / "ur10e.urdf", "--frame", "tool0", "--tare", real_data / "ur10e_unloaded.csv"),
+    )
+    assert (found["relative_to"], found["method"], found["interval"]) == ("tare", "hybrid", "calibrated")
+    assert found["mass"] == pytest.approx(2.805, rel=0.03)
+    assert found["phi_low"][0] <= 2.805 <= found["phi_high"][0]
+    assert found["phi_high"][0] - found["phi_low"][0] < 2 * 0.06 * 2.805
+    assert found["held"] is True
+
+
+def test_real_empty_ur10e_without_a_tare_holds_nothing(answer, real_data):
+    found = answer(real_data / "ur10e_unloaded.csv", "--robot", "ur10e")
+    assert found["phi_low"][0] <= 0.0 <= found["phi_high"][0]
+    assert found["held"] is False
+
+
+@pytest.mark.xfail(strict=True, reason="this arm is 0.9 kg off its description: 3.69 ± 0.82 kg, a twelfth too narrow")
+def test_real_loaded_ur10e_without_a_tare_is_within_its_interval(answer, real_data):
+    found = answer(real_data / "ur10e_loaded_2805g.csv", "--robot", "ur10e")
+    assert found["held"] is True
+    assert found["phi_low"][0] <= 2.805 <= found["phi_high"][0]
+
+
+def test_real_unloaded_panda_holds_nothing(answer, real_data):
+    found = answer(real_data / "panda_unloaded_1khz.csv", "--robot", "panda")
+    assert abs(found["mass"]) < 0.12
+    assert found["held"] is False
+
+
+def test_real_ros2_bag_is_answered(answer, real_data):
+    # its payload is not known: only that the answer is a body, with intervals
+    found = answer(real_data / "ur10_ros2_bag.db3", "--robot", "ur10e")
+    assert found["n_samples"] > 3000
+    assert found["consistent"] is True

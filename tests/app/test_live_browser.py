@@ -1,0 +1,253 @@
+"""The page in a real browser: it loads, the numbers move, its orders are obeyed, its files read back.
+
+Needs viser, playwright and a Chromium (on Debian: apt-get install chromium-headless-shell). ARMLOAD_PICTURES=FOLDER
+keeps the picture of the page there.
+"""
+
+import contextlib
+import io
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+import urllib.request
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armload.app.page import Session
+from armload.app.page.page import Page
+from armload.arms import arm as arm_named
+from armload.devices import Simulator, read_load
+from armload.payloads import test_payload
+from armload.recording import read_recording
+
+pytestmark = pytest.mark.full
+
+HELD = test_payload().parameters
+BROWSERS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
+FLAGS = (
+    "--no-sandbox",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--ignore-gpu-blocklist",
+    "--disable-background-networking",
+)
+PATIENCE = 120_000  # [ms] drawing without a GPU is slow
+LARGE, SMALL = (1360, 860), (960, 600)  # [px] of the picture to keep, and where nothing but text is looked at
+
+
+@pytest.fixture(scope="module")
+def open_browser():
+    """Open the page in a browser of its own, which closes with the `with`: two that draw without a GPU in one process
+    have been seen to stop each other."""
+    sync_api = pytest.importorskip("playwright.sync_api", reason="driving a browser needs playwright")
+    program = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if program is None:
+        pytest.skip(f"no browser found: expected one of {', '.join(BROWSERS)}")
+    with sync_api.sync_playwright() as playwright:
+
+        @contextlib.contextmanager
+        def opened(url, complaints, strangers, size=SMALL):
+            with playwright.chromium.launch(executable_path=program, args=list(FLAGS)) as browser:
+                tab = browser.new_page(viewport=dict(zip(("width", "height"), size, strict=True)))
+                tab.set_default_timeout(PATIENCE)
+                tab.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
+                tab.on("pageerror", lambda error: complaints.append(str(error)))
+                tab.on(
+                    "request", lambda r: None if r.url.startswith((url, "data:", "blob:")) else strangers.append(r.url)
+                )
+                tab.goto(url)
+                tab.wait_for_selector("[data-armload=state]")
+                yield tab
+
+        yield opened
+
+
+class Hesitant(Simulator):
+    """A simulator that stops before the payload is taken up until it is told to go on: browsers may be slow."""
+
+    def __init__(self, *arguments, **settings):
+        super().__init__(*arguments, **settings)
+        self.go_on = threading.Event()
+
+    def __iter__(self):
+        for sample in super().__iter__():
+            if sample.t > 5.0:
+                self.go_on.wait()
+            yield sample
+
+
+@pytest.fixture(scope="module")
+def served(panda):
+    """The page of a simulated Panda that takes up a payload; what browsers complain of, whom else they ask."""
+    pytest.importorskip("viser", reason="the page needs viser")
+    simulator = Hesitant(panda, payloads=[(6.0, HELD)], rate=250.0)
+    session = Session(simulator, panda)
+    page = Page(session, port=0, period=0.3)
+    server = threading.Thread(target=page.serve)
+    server.start()
+    session.start()
+    yield session, page, [], []
+    simulator.go_on.set()
+    page.close()
+    server.join()
+    session.close()
+
+
+@pytest.fixture
+def tab(request, served, open_browser):
+    """The page open in a browser."""
+    _, page, complaints, strangers = served
+    with open_browser(page.url, complaints, strangers, getattr(request, "param", SMALL)) as tab:
+        yield tab
+
+
+@pytest.fixture
+def holding(served, tab):
+    """The page open in a browser while the payload is held and known."""
+    session, *_ = served
+    session.source.go_on.set()
+    until(lambda: session.estimate.determined.all())
+    return tab
+
+
+def text(tab, name):
+    return tab.locator(f"[data-armload={name}]").inner_text()
+
+
+def mass(tab):
+    """Value and half-width of the mass on the page [kg]; None while it is undetermined."""
+    found = re.fullmatch(r"(\S+) ± (\S+) kg", text(tab, "mass"))
+    return None if found is None else tuple(map(float, found.groups()))
+
+
+def until(condition, seconds=90.0):
+    end = time.monotonic() + seconds
+    while not (found := condition()):
+        assert time.monotonic() < end, "it did not happen"
+        time.sleep(0.2)
+    return found
+
+
+def choose(tab, label, option):
+    tab.get_by_label(label, exact=True).or_(tab.locator(f"label:has-text('{label}') ~ * input")).first.click()
+    tab.get_by_role("option", name=option, exact=True).click()
+
+
+def test_numbers_move_and_approach_the_truth(served, tab):
+    session, *_ = served
+    first = until(lambda: tab.locator("[data-armload=mass]").count() and mass(tab))
+    assert first[0] < 0.2  # nothing is held yet
+    assert "nothing is held" in text(tab, "state")
+    session.source.go_on.set()
+    until(lambda: (now := mass(tab)) is not None and now[0] > 1.0)
+    later = until(lambda: (now := mass(tab)) is not None and now[1] < 0.03 and now)
+    assert len({first, later}) == 2
+    assert later[0] == pytest.approx(HELD.mass, abs=0.05)
+    assert "truth: 1.480 kg" in text(tab, "truth")
+    assert "grasp" in until(lambda: "grasp" in text(tab, "log") and text(tab, "log"))
+    assert "samples" in text(tab, "health")
+    assert float(tab.locator("[data-armload=phi0] td").nth(1).inner_text()) == pytest.approx(later[0], abs=0.05)
+    assert session.error is None
+
+
+@pytest.mark.parametrize("tab", [LARGE], indirect=True, ids=["large"])
+def test_the_picture_shows_the_arm_and_what_it_holds(holding, tmp_path):
+    from PIL import Image
+
+    tab = holding
+    until(lambda: mass(tab))
+    tab.evaluate("document.querySelectorAll('.mantine-Notification-root button').forEach(b => b.click())")
+    time.sleep(2.0)
+    image = Image.open(io.BytesIO(tab.screenshot())).convert("RGB")
+    middle = np.asarray(image)[:, 420:940].reshape(-1, 3).astype(int)
+    red, green, blue = middle.T
+    assert np.count_nonzero((red > 150) & (green > red - 110) & (blue < green - 40)) > 300  # the payload, orange
+    assert np.count_nonzero((np.ptp(middle, axis=1) < 45) & (middle.max(axis=1) < 170)) > 500  # joints, dark grey
+    assert np.count_nonzero((green > red + 60) & (green > blue + 10)) > 50  # the truth's edges, green
+    folder = Path(os.environ.get("ARMLOAD_PICTURES") or tmp_path)
+    image.save(folder / "live.jpg", quality=80, optimize=True)
+    assert (folder / "live.jpg").stat().st_size < 150_000
+
+
+def test_downloads_read_back(holding, tmp_path):
+    tab = holding
+    with tab.expect_download() as started:
+        tab.get_by_role("button", name="Download").click()
+    assert started.value.suggested_filename == "payload-urdf.urdf"
+    started.value.save_as(tmp_path / "payload.urdf")
+    root = ET.parse(tmp_path / "payload.urdf").getroot()
+    assert float(root.find(".//mass").get("value")) == pytest.approx(HELD.mass, abs=0.05)
+
+    choose(tab, "Form", "json")
+    with tab.expect_download() as started:
+        tab.get_by_role("button", name="Download").click()
+    started.value.save_as(tmp_path / "payload.json")
+    load = read_load(tmp_path / "payload.json")
+    assert load.parameters.mass == pytest.approx(HELD.mass, abs=0.05)
+    assert np.allclose(load.parameters.com, HELD.com, atol=0.005)
+
+
+def test_whoever_comes_later_sees_the_present_state(served, holding, open_browser):
+    _, page, complaints, strangers = served
+    with open_browser(page.url, complaints, strangers) as late:
+        late.wait_for_selector("[data-armload=phi9]")
+        assert until(lambda: mass(late))[0] == pytest.approx(until(lambda: mass(holding))[0], abs=0.05)
+        assert "grasp" in text(late, "log")
+
+
+def test_the_method_can_be_switched_and_the_stream_tared(served, holding):
+    session, *_ = served
+    choose(holding, "Method", "map")
+    until(lambda: session.method == "map")
+    until(lambda: "method map" in text(holding, "log"))
+    until(lambda: (now := mass(holding)) is not None and abs(now[0] - HELD.mass) < 0.1)
+    began = session.estimate.t
+    until(lambda: session.estimate.t > began + 5.0)
+    holding.get_by_role("button", name="Tare").or_(holding.get_by_text("Tare", exact=True)).first.click()
+    until(lambda: session.estimate.relative_to == "tare")
+    until(lambda: (now := mass(holding)) is not None and abs(now[0]) < 0.1)
+
+
+@pytest.mark.usefixtures("tab")
+def test_the_browser_had_nothing_to_complain_of_and_asked_nobody_else(served):
+    *_, complaints, strangers = served
+    assert complaints == []
+    assert strangers == []
+
+
+def test_killing_the_page_loses_nothing_of_the_record(tmp_path):
+    pytest.importorskip("viser", reason="the page needs viser")
+    record = tmp_path / "record.csv"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "armload", "live", "--port", "0", "--record", str(record), "--method", "map"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    said = process.stderr.readline()
+    url = re.search(r"http://127\.0\.0\.1:\d+", said).group()
+    with urllib.request.urlopen(url, timeout=30) as answer:
+        assert b"<html" in answer.read(2000).lower()
+    until(lambda: record.stat().st_size > 100_000)
+    before = record.read_text(encoding="utf-8").count("\n")
+    process.send_signal(signal.SIGKILL)
+    out, _ = process.communicate(timeout=30)
+    assert out == ""
+    assert len(read_recording(record, arm_named("panda"))) >= before - 1
+    size = record.stat().st_size
+    time.sleep(1.5)
+    assert record.stat().st_size == size or until(lambda: not _grows(record))  # the reader has ended too
+
+
+def _grows(path):
+    size = path.stat().st_size
+    time.sleep(0.5)
+    return path.stat().st_size > size

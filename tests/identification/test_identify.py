@@ -1,0 +1,257 @@
+"""One log in, one answer out: intervals, what is determined, tare, tool, frames, and bodies that can exist."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from armload.arms import arm
+from armload.errors import IdentificationError
+from armload.identification import METHODS, identify
+from armload.identification.identify_log import Z95
+from armload.inertia import InertialParameters, is_consistent
+from armload.lab.episodes import Recipe, draw_episodes, simulate_episodes
+from armload.motion import random_motion, taie2024
+from armload.posterior import PosteriorLeastSquares, shipped_model
+from armload.recording import Recording
+from armload.regression import payload_prior_std
+from armload.simulation import Sensors, World, simulate
+
+BOX = InertialParameters.from_com(1.2, (0.02, -0.03, 0.07), np.diag([4e-3, 3e-3, 2e-3]))
+TOOL = InertialParameters.from_com(0.8, (0.0, 0.01, 0.04), np.diag([1e-3, 1e-3, 5e-4]))
+
+
+@pytest.fixture(scope="module")
+def real_like():
+    """A Panda that differs from its model, and its sensors."""
+    panda = arm("panda")
+    return panda, {"world": World.real_like(panda, 5), "sensors": Sensors.panda(panda), "rate": 500.0}
+
+
+@pytest.fixture(scope="module")
+def loaded(real_like):
+    panda, how = real_like
+    return simulate(panda, taie2024(), BOX, seed=1, **how)
+
+
+def test_the_answer_is_the_method_s_estimate_moved_to_the_nearest_body(loaded, real_like):
+    panda, _ = real_like
+    answer, estimate = identify(loaded, panda, method="map"), PosteriorLeastSquares(panda).run(loaded)
+    assert not is_consistent(estimate.phi)
+    assert answer.consistent
+    assert is_consistent(answer.phi)
+    metric = np.linalg.inv(estimate.covariance)
+    away = np.array(answer.phi) - estimate.phi
+    # no body on the way from the answer to the truth, nor a mix of it and another body, is nearer
+    for body in (BOX.phi, TOOL.phi, 2.0 * BOX.phi, (BOX + TOOL).phi):
+        nearer = np.array(answer.phi) + 1e-3 * (body - np.array(answer.phi)) - estimate.phi
+        assert away @ metric @ away <= nearer @ metric @ nearer * (1 + 1e-6)
+    assert answer.parameters.mass == answer.mass
+    again = InertialParameters.from_com(answer.mass, answer.com, answer.inertia_com)
+    assert again.phi == pytest.approx(np.array(answer.phi), abs=1e-12)
+
+
+@pytest.mark.parametrize("method", [None, *(name for name, entry in METHODS.items() if not entry.needs)])
+def test_every_interval_is_finite_and_holds_the_point(loaded, real_like, method):
+    panda, _ = real_like
+    answer = identify(loaded, panda, method=method)
+    phi, low, high = (np.array(x) for x in (answer.phi, answer.phi_low, answer.phi_high))
+    assert np.isfinite([phi, low, high]).all()
+    assert np.all(low <= phi)
+    assert np.all(phi <= high)
+    assert answer.interval == ("calibrated" if answer.method == "hybrid" else "approximate")
+
+
+@pytest.fixture(scope="module")
+def still():
+    """A Panda that holds the box and does not move: gravity in one pose."""
+    panda, pose = arm("panda"), np.tile([0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8], (400, 1))
+    return Recording(np.arange(400) * 0.01, pose, 0 * pose, panda.with_payload(BOX).torque(pose))
+
+
+@pytest.mark.parametrize("method", [None, "map-gp", "map"])
+def test_an_arm_that_does_not_move_determines_the_mass_and_not_the_inertia(panda, still, method):
+    answer = identify(still, panda, method=method)
+    assert answer.determined[0]
+    assert answer.phi[0] == pytest.approx(BOX.mass, abs=0.1)
+    assert not any(answer.determined[4:])
+    assert np.all(np.array(answer.phi_low)[4:] <= BOX.phi[4:])
+    assert np.all(BOX.phi[4:] <= np.array(answer.phi_high)[4:])
+    assert "Izz" in answer.notes[0]
+
+
+def test_undetermined_parameters_carry_the_interval_of_what_was_known_before(panda, still):
+    before = Z95 * payload_prior_std(panda)
+    assert np.array(identify(still, panda, method="map-gp").phi_high)[4:] == pytest.approx(before[4:])
+    prior, answer = shipped_model(panda).prior, identify(still, panda)
+    assert answer.method == "hybrid"
+    expected = [prior.mean[4:] - Z95 * prior.std[4:], prior.mean[4:] + Z95 * prior.std[4:]]
+    assert [answer.phi_low[4:], answer.phi_high[4:]] == [pytest.approx(x) for x in expected]
+
+
+def test_a_tare_with_a_tool_leaves_what_was_added_and_a_known_tool_what_it_carries(real_like):
+    panda, how = real_like
+    both = simulate(panda, taie2024(), TOOL + BOX, seed=3, **how)
+    tare = simulate(panda, random_motion(panda, 8, duration=15.0, harmonics=8), TOOL, seed=4, **how)
+    by_tare, by_tool = identify(both, panda, tare=tare), identify(both, panda, tool=TOOL)
+    assert (by_tare.relative_to, by_tool.relative_to) == ("tare", "tool")
+    for answer in (by_tare, by_tool):
+        assert answer.phi_low[0] < BOX.mass < answer.phi_high[0]
+        assert answer.com == pytest.approx(BOX.com, abs=0.025)
+    assert identify(both, panda).mass > BOX.mass + 0.6 * TOOL.mass
+
+
+def test_what_was_taken_off_since_the_tare_is_negative_and_said_so(real_like):
+    panda, how = real_like
+    tare = simulate(panda, taie2024(), TOOL + BOX, seed=3, **how)
+    now = simulate(panda, taie2024(), TOOL, seed=4, **how)
+    answer = identify(now, panda, tare=tare)
+    assert answer.mass == pytest.approx(-BOX.mass, abs=0.05)
+    assert (answer.held, answer.consistent) == (False, False)
+    assert "taken off" in answer.notes[0]
+    assert "below zero" in str(answer)
+    assert "within three standard deviations" not in str(answer)
+
+
+@pytest.mark.parametrize(("sigmas", "says"), [(2.5, False), (3.5, True)])
+def test_taken_off_asks_for_as_much_evidence_as_held(real_like, sigmas, says):
+    panda, how = real_like
+    tare = simulate(panda, taie2024(), None, seed=3, **how)
+    now = simulate(panda, taie2024(), TOOL, seed=4, **how)
+    added = identify(now, panda, tare=tare)
+    sigma = (added.phi_high[0] - added.phi_low[0]) / 2 / Z95
+    heavier = InertialParameters.from_com(added.mass + sigmas * sigma, TOOL.com, TOOL.inertia_com)
+    answer = identify(now, panda, tare=tare, tool=heavier)
+    assert any("taken off" in note or "is negative" in note for note in answer.notes) == says
+
+
+def test_gear_friction_in_the_torques_of_an_arm_that_nobody_knows_is_found_from_the_log(tmp_path):
+    known = arm("ur5e")
+    text = re.sub(r'mass value="([\d.e+-]+)"', lambda m: f'mass value="{1.01 * float(m[1])}"', known.urdf)
+    (tmp_path / "like_a_ur.urdf").write_text(text)
+    stranger = arm(tmp_path / "like_a_ur.urdf", "tool0")
+    told = replace(stranger, motor_torque=True)
+    motion = random_motion(told, 4, duration=8.0, harmonics=4)
+    log = simulate(stranger, motion, BOX, seed=1, world=World.real_like(told, 3), rate=250.0)
+    assert (stranger.known_as, stranger.motor_torque) == (None, False)
+    assert identify(log, stranger).phi == pytest.approx(identify(log, told).phi)
+
+
+def test_an_empty_arm_holds_nothing_and_a_light_payload_is_held_with_a_tare(real_like):
+    panda, how = real_like
+    light = InertialParameters.from_com(0.25, (0, 0, 0.05), np.diag([2e-4] * 3))
+    empty = simulate(panda, taie2024(), None, seed=5, **how)
+    tare = simulate(panda, random_motion(panda, 9, duration=15.0, harmonics=8), None, seed=6, **how)
+    assert not identify(empty, panda).held
+    assert not identify(empty, panda, tare=tare).held
+    assert identify(simulate(panda, taie2024(), light, seed=7, **how), panda, tare=tare).held
+
+
+@pytest.mark.parametrize("method", [None, "difference"])
+def test_a_log_that_is_its_own_tare_holds_nothing_and_the_intervals_hold_zero(loaded, real_like, method):
+    panda, _ = real_like
+    answer = identify(loaded, panda, tare=loaded, method=method)
+    assert not answer.held
+    assert np.all(np.array(answer.phi_low) < 0)
+    assert np.all(np.array(answer.phi_high) > 0)
+    assert np.all(np.isfinite(answer.com))
+    assert "nothing seems to be held" in str(answer)
+
+
+def test_another_frame_moves_the_same_body(loaded):
+    flange, wrist = arm("panda"), arm("panda", "panda_link7")
+    here, there = identify(loaded, flange), identify(loaded, wrist)
+    assert there.mass == pytest.approx(here.mass, abs=0.01)
+    # panda_link8 sits 0.107 m along z of panda_link7, axes parallel
+    assert np.array(there.com) - here.com == pytest.approx([0, 0, 0.107], abs=0.01)
+
+
+def test_only_measured_torque_at_a_useful_rate_is_taken(panda, analytic_log):
+    log = analytic_log(panda, BOX)
+    with pytest.raises(IdentificationError, match="external torque"):
+        identify(Recording(log.t, log.q, log.dq, log.tau, channel="external"), panda)
+    with pytest.raises(IdentificationError, match="10 Hz"):
+        identify(log.select(slice(None, None, 20)), panda)
+    with pytest.raises(IdentificationError, match="unknown method 'magic'"):
+        identify(log, panda, method="magic")
+    with pytest.raises(IdentificationError, match="did you mean 'hybrid'"):
+        identify(log, panda, method="hybird")
+
+
+def test_a_tool_mounted_after_the_tare_is_taken_off_the_answer(real_like):
+    panda, how = real_like
+    both = simulate(panda, taie2024(), TOOL + BOX, seed=3, **how)
+    for mounted, seed, relative_to, said in ((None, 4, "tool", "after the tare"), (TOOL, 5, "tare", "already")):
+        tare = simulate(panda, random_motion(panda, 8, duration=15.0, harmonics=8), mounted, seed=seed, **how)
+        answer = identify(both, panda, tare=tare, tool=TOOL)
+        assert answer.relative_to == relative_to
+        assert answer.phi_low[0] < BOX.mass < answer.phi_high[0]
+        assert any(said in note for note in answer.notes)
+
+
+def test_a_tool_in_grams_is_refused(panda, analytic_log):
+    with pytest.raises(IdentificationError, match="730 kg"):
+        identify(analytic_log(panda, BOX), panda, tool=InertialParameters(1e3 * np.array([0.73] + [0.0] * 9)))
+
+
+def test_a_known_tool_that_is_not_mounted_is_missed_and_said_to_be(real_like):
+    panda, how = real_like
+    answer = identify(simulate(panda, taie2024(), None, seed=5, **how), panda, tool=TOOL)
+    assert answer.phi_low[0] < -TOOL.mass < answer.phi_high[0] < 0.0
+    assert (answer.held, answer.consistent) == (False, False)
+    assert "less is mounted" in answer.notes[0]
+
+
+def test_where_the_tare_does_not_tell_of_the_tool_the_intervals_hold_both_cases():
+    ur, light = arm("ur10e"), 0.25 * TOOL.phi
+    tool = InertialParameters(light, "tool0")
+    how = {"world": World.real_like(ur, 3), "sensors": Sensors.generic(ur), "rate": 100.0}
+    tare = simulate(ur, random_motion(ur, 53, duration=15.0), None, seed=4, **how)
+    log = simulate(ur, random_motion(ur, 54, duration=8.0), InertialParameters(2.5 * BOX.phi + light), seed=5, **how)
+    answer = identify(log, ur, tare=tare, tool=tool)
+    assert any("does not tell for sure" in note for note in answer.notes)
+    assert answer.interval == "approximate"
+    plain = identify(log, ur, tare=tare)
+    assert answer.phi_high[0] - answer.phi_low[0] > plain.phi_high[0] - plain.phi_low[0] + 0.9 * tool.mass
+    assert answer.phi_low[0] < 2.5 * BOX.mass < answer.phi_high[0]
+
+
+@pytest.mark.parametrize("gravity", [(5.0, 0.0, -8.44), (0.0, -4.0, -8.96)])
+def test_a_base_that_stands_otherwise_than_was_said_is_noticed(real_like, gravity):
+    panda, how = real_like
+    true = arm("panda", gravity=gravity)
+    log = simulate(true, taie2024(), BOX, seed=3, **how)
+    right, wrong = identify(log, true), identify(log, panda)
+    assert not any("--gravity" in note for note in right.notes)
+    assert any("--gravity" in note for note in wrong.notes)
+    assert (right.interval, wrong.interval) == ("calibrated", "approximate")
+
+
+def test_arms_as_they_are_are_not_called_strange(panda):
+    """Half a minute of slow motion, on arms further from their description than most."""
+    recipe = Recipe(worlds=("beyond",), motions=("slow",), untared=1.0, duration=30.0)
+    for logs in simulate_episodes(draw_episodes(panda, recipe, 4, seed=5)):
+        assert not any("check the robot" in note for note in identify(logs.run, panda).notes)
+
+
+def test_error_bars_that_lean_on_the_prior_are_named_and_those_that_a_log_tells_are_not(real_like, loaded):
+    panda, how = real_like
+    tare = simulate(panda, taie2024(), None, seed=9, **how)
+    told, leaning = identify(loaded, panda, tare=tare), identify(loaded, panda)
+    assert all(told.determined)
+    assert not any("rest on what payloads are usually like" in note for note in told.notes)
+    (said,) = (note for note in leaning.notes if "rest on what payloads are usually like" in note)
+    assert "map-gp" in said
+    assert "mass" not in said
+    assert not any("usually like" in note for note in identify(loaded, panda, method="map-gp").notes)
+
+
+def test_an_undetermined_interval_of_a_method_without_a_prior_holds_its_own(real_like):
+    panda, how = real_like
+    heavy = InertialParameters.from_com(5.0, (0.0, 0.0, 0.06), np.diag([1e-2, 1e-2, 1e-2]))
+    log = simulate(panda, taie2024(), heavy, seed=3, **how).between(0.0, 1.0)
+    answer = identify(log, panda, method="rls")
+    assert not answer.determined[0]
+    assert "does not tell whether anything is held" in str(answer)
+    assert answer.phi_high[0] >= answer.phi[0] > Z95 * payload_prior_std(panda)[0]

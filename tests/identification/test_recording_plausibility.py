@@ -1,0 +1,319 @@
+"""Sound logs pass, whatever they carry; logs in wrong units, of wrong columns or of wrong arms do not."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from armload.arms import arm, rated_effort
+from armload.errors import RecordingError
+from armload.identification import check_plausible
+from armload.identification.torque_scale import torque_scale
+from armload.inertia import InertialParameters
+from armload.motion import random_motion, taie2024
+from armload.recording import Recording, read_recording
+from armload.recording.windows import integrals, windows
+from armload.simulation import (
+    Run,
+    Sensors,
+    World,
+    simulate_many,
+)
+
+DEGREE = 180.0 / np.pi
+
+
+def heavy(mass, seed):
+    """A payload with its centre of mass up to 0.2 m off the flange."""
+    com = np.random.default_rng(seed).normal(size=3)
+    com *= 0.15 / np.linalg.norm(com)
+    com[2] = abs(com[2]) + 0.05
+    return InertialParameters.from_com(mass, com, np.eye(3) * mass * 0.05**2)
+
+
+@pytest.fixture(scope="module")
+def sound():
+    """By arm: logs in real-like worlds, without payload, at the rated payload and at twice the rated payload."""
+    out = {}
+    for name in ("panda", "ur10e"):
+        robot = arm(name)
+        sensors = Sensors.panda(robot) if name == "panda" else Sensors.generic(robot)
+        runs = []
+        for seed in range(3):
+            motion = taie2024() if name == "panda" and seed == 0 else random_motion(robot, seed)
+            for share in (0, 1, 2):
+                payload = heavy(share * robot.rated_payload, seed) if share else None
+                runs.append(Run(motion, payload, World.real_like(robot, seed), sensors, seed))
+        out[name] = robot, simulate_many(robot, runs, rate=250.0)
+    return out
+
+
+@pytest.fixture(scope="module")
+def real(real_data):
+    """The real logs with the arm they are of."""
+    ur = arm(real_data / "ur10e.urdf", "tool0")
+    return {
+        "panda": (arm("panda"), read_recording(real_data / "panda_unloaded_1khz.csv")),
+        "ur10e": (ur, read_recording(real_data / "ur10e_unloaded.csv")),
+        "ur10e loaded": (ur, read_recording(real_data / "ur10e_loaded_2805g.csv")),
+        "ur10": (arm("ur10e"), read_recording(real_data / "ur10_ros2_bag.db3", arm("ur10e"))),
+    }
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e"])
+def test_simulated_logs_up_to_twice_the_rated_payload_pass(sound, name):
+    robot, logs = sound[name]
+    for log in logs:
+        check_plausible(log, robot)
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e", "ur10e loaded", "ur10"])
+def test_real_logs_pass(real, name):
+    robot, log = real[name]
+    check_plausible(log, robot)
+
+
+def degraded(log, kind):
+    rng = np.random.default_rng(0)
+    match kind:
+        case "noise":
+            return replace(
+                log,
+                q=log.q + 1e-3 * rng.normal(size=log.q.shape),
+                dq=log.dq + 0.03 * rng.normal(size=log.q.shape),
+                tau=log.tau + rng.normal(size=log.q.shape),
+            )
+        case "half the samples lost":
+            return log.select(rng.random(len(log)) > 0.5)
+        case "gaps":
+            return log.select((log.t % 2.0) > 0.7)
+        case "20 Hz":
+            return log.select(slice(None, None, round(log.rate / 20)))
+        case "two samples":
+            return log.select(slice(0, 2))
+        case "one second":
+            return log.between(log.t[0] + 2.0, log.t[0] + 3.0)
+    raise AssertionError(kind)
+
+
+@pytest.mark.parametrize("kind", ["noise", "half the samples lost", "gaps", "20 Hz", "two samples", "one second"])
+@pytest.mark.parametrize("name", ["panda", "ur10e"])
+def test_poor_but_sound_logs_pass(sound, name, kind):
+    robot, logs = sound[name]
+    check_plausible(degraded(logs[1], kind), robot)
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e", "ur10e loaded"])
+@pytest.mark.parametrize("kind", ["noise", "half the samples lost", "gaps", "20 Hz", "one second"])
+def test_poor_real_logs_pass(real, name, kind):
+    robot, log = real[name]
+    check_plausible(degraded(log, kind), robot)
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e"])
+def test_an_arm_that_never_moves_passes(name):
+    robot = arm(name)
+    q = random_motion(robot, 3)(1.0)[0]
+    tau = robot.torque(q) * 1.1
+    t = np.arange(500) * 0.01
+    check_plausible(Recording(t, np.tile(q, (500, 1)), np.zeros((500, robot.n)), np.tile(tau, (500, 1))), robot)
+
+
+def unrated(robot):
+    """The arm from a description without effort limits, as many exporters write it."""
+    return replace(robot, urdf=re.sub('effort="[^"]*"', 'effort="0"', robot.urdf))
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e", "ur10e loaded", "ur10"])
+def test_real_logs_pass_where_the_description_has_no_effort_limits(real, name):
+    robot, log = real[name]
+    assert np.all(np.isinf(unrated(robot).limits.effort))
+    check_plausible(log, unrated(robot))
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e"])
+def test_simulated_logs_pass_where_the_description_has_no_effort_limits(sound, name):
+    robot, logs = sound[name]
+    for log in logs:
+        check_plausible(log, unrated(robot))
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e"])
+def test_the_wrong_arm_is_refused_where_the_description_has_no_effort_limits(real, name):
+    robot, log = real[name]
+    for wrong in (replace(robot, gravity=(9.81, 0.0, 0.0)), robot.with_links(2.5 * robot.link_parameters)):
+        with pytest.raises(RecordingError, match=r"check the robot, .*--gravity"):
+            check_plausible(log, unrated(wrong))
+
+
+def swapped(x):
+    return x[:, [1, 0, *range(2, x.shape[1])]]
+
+
+WRONG = {
+    "degrees": (
+        lambda r: {"q": r.q * DEGREE, "dq": r.dq * DEGREE},
+        r"positions look like degrees \(q\d = .* at row \d+",
+    ),
+    "q in degrees": (lambda r: {"q": r.q * DEGREE}, r"positions look like degrees"),
+    "dq in degrees": (lambda r: {"dq": r.dq * DEGREE}, r"dq1 is not the derivative of q1: .* degrees per second"),
+    "dq in rpm": (lambda r: {"dq": r.dq * 30 / np.pi}, r"dq1 is not .* revolutions per minute"),
+    "dq backwards": (lambda r: {"dq": -r.dq}, r"dq1 is not the derivative of q1: .* opposite sign"),
+    "dq of motor": (lambda r: {"dq": r.dq * 101}, r"the derivative is 0\.0099 times dq"),
+    "no dq": (lambda r: {"dq": 0 * r.dq}, r"dq1 is zero although q1 moves"),
+    "dq swapped": (lambda r: {"dq": swapped(r.dq)}, r"dq1 is not .* another joint \(dq2 fits q1\)"),
+    "milliseconds": (lambda r: {"t": r.t * 1e3}, r"t looks like milliseconds"),
+    "microseconds": (lambda r: {"t": r.t * 1e6}, r"t looks like microseconds"),
+    "nanoseconds": (lambda r: {"t": r.t * 1e9}, r"t looks like nanoseconds"),
+    "no tau": (lambda r: {"tau": 0 * r.tau}, r"tau is zero in all joints and rows"),
+    "tau in N·mm": (lambda r: {"tau": 1e3 * r.tau}, r"tau\d = .* at row \d+ .* times the limit"),
+    "wrap": (
+        lambda r: {"q": r.q + 2 * np.pi * (np.arange(len(r)) > 99)[:, None] * (np.arange(r.n) == 2)},
+        r"q3 jumps by 6\.2\d+ rad in .* at row 100 \(t = .* s\) \(a full turn: unwrap the angle\)",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", WRONG)
+@pytest.mark.parametrize("source", ["sound", "real"])
+@pytest.mark.parametrize("name", ["panda", "ur10e"])
+def test_wrong_units_and_columns_are_refused_by_name(request, source, name, fault):
+    robot, log = request.getfixturevalue(source)[name]
+    log = log if isinstance(log, Recording) else log[1]
+    change, says = WRONG[fault]
+    with pytest.raises(RecordingError, match=says) as refusal:
+        check_plausible(replace(log, **change(log)), robot)
+    assert "\n" not in str(refusal.value)
+
+
+WRONG_TORQUE = {
+    "backwards": (lambda r, _: -r.tau, r"tau has the opposite sign of the torque"),
+    "amperes": (lambda r, _: r.tau / 11.0, r"tau holds only \d+% of the torque"),
+    "third": (lambda r, _: r.tau / 3.0, r"tau is 0\.[23]\d times the torque"),
+    "without gravity": (lambda r, a: r.tau - a.torque(r.q), r"tau holds only \d+% of the torque"),
+    "reversed": (lambda r, _: r.tau[:, ::-1], r"tau"),
+}
+
+
+@pytest.mark.parametrize("fault", WRONG_TORQUE)
+@pytest.mark.parametrize("name", ["panda", "ur10e"])
+def test_torque_in_wrong_units_or_of_a_wrong_channel_is_refused(real, name, fault):
+    robot, log = real[name]
+    change, says = WRONG_TORQUE[fault]
+    with pytest.raises(RecordingError, match=says):
+        check_plausible(replace(log, tau=change(log, robot)), robot)
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e"])
+def test_the_wrong_arm_or_base_is_refused(real, name):
+    robot, log = real[name]
+    for wrong in (
+        robot.with_links(0.4 * robot.link_parameters),
+        robot.with_links(2.5 * robot.link_parameters),
+        replace(robot, gravity=(9.81, 0.0, 0.0)),
+        replace(robot, gravity=(0.0, 0.0, 9.81)),
+    ):
+        with pytest.raises(RecordingError, match=r"check the robot, .*--gravity"):
+            check_plausible(log, wrong)
+
+
+def test_the_external_channel_need_not_hold_the_arms_weight(real):
+    robot, log = real["panda"]
+    check_plausible(replace(log, tau=log.tau - robot.torque(log.q), channel="external"), robot)
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e"])
+@pytest.mark.parametrize("at", ["its last value", "zero"])
+def test_torque_that_stands_still_while_the_arm_moves_is_refused_by_row(real, name, at):
+    robot, log = real[name]
+    middle = int(np.argmax(np.abs(log.dq).sum(axis=1)))
+    stop = middle + int(2.0 * log.rate)
+    tau = log.tau.copy()
+    tau[middle:stop] = tau[middle] if at == "its last value" else 0.0
+    with pytest.raises(RecordingError, match=rf"tau stays exactly the same in all joints from row {middle} "):
+        check_plausible(replace(log, tau=tau), robot)
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e"])
+def test_a_torque_that_never_changes_while_its_joint_moves_is_refused_by_joint(real, name):
+    robot, log = real[name]
+    joint = int(np.argmax(np.ptp(log.q, axis=0)))
+    tau = log.tau.copy()
+    tau[:, joint] = 0.0
+    with pytest.raises(RecordingError, match=rf"tau{joint + 1} is 0 in all rows although q{joint + 1} moves"):
+        check_plausible(replace(log, tau=tau), robot)
+
+
+def test_positions_outside_the_limits_are_refused_by_joint_and_row(sound, panda):
+    log = sound["panda"][1][0]
+    q = log.q.copy()
+    shift = panda.limits.position_high[3] + 0.04 - q[:, 3].max()
+    q[:, 3] += shift
+    check_plausible(replace(log, q=q, tau=panda.torque(q)), panda)  # calibration may be off by so much
+    q[:, 3] += 0.02
+    k = int(np.flatnonzero(q[:, 3] > panda.limits.position_high[3] + 0.05)[0])
+    says = rf"q4 = -0\.0\d+ rad at row {k} \(t = .*outside the limits of panda's panda_joint4"
+    with pytest.raises(RecordingError, match=says):
+        check_plausible(replace(log, q=q), panda)
+
+
+def test_joint_names_of_another_arm_or_order_are_refused(sound, panda):
+    log = sound["panda"][1][0]
+    with pytest.raises(RecordingError, match=r"joints in another order"):
+        check_plausible(replace(log, joint_names=panda.joint_names[::-1]), panda)
+    with pytest.raises(RecordingError, match=r"joints of another arm"):
+        check_plausible(replace(log, joint_names=tuple("abcdefg")), panda)
+    with pytest.raises(RecordingError, match=r"log has 7 joints \(q1\.\.q7\), ur10e has 6"):
+        check_plausible(log, arm("ur10e"))
+
+
+def test_too_fast_is_refused_by_joint_and_row(sound, panda):
+    log = sound["panda"][1][0]
+    dq = log.dq.copy()
+    dq[77, 4] = -7.0
+    with pytest.raises(RecordingError, match=r"dq5 = -7 rad/s at row 77 .* 2 times the limit of panda_joint5"):
+        check_plausible(replace(log, dq=dq), panda)
+
+
+def test_the_torque_scale_is_one_for_the_arm_itself_and_the_factor_for_another():
+    robot = arm("panda")
+    (log,) = simulate_many(robot, [Run(taie2024(), heavy(3.0, 0))], rate=500.0)
+    fit = torque_scale(log, robot)
+    assert fit.scale == pytest.approx(1.0, abs=0.01)
+    assert fit.misfit < 0.05
+    for factor in (0.5, 2.0):
+        other = robot.with_links(robot.link_parameters / factor)
+        fit = torque_scale(replace(log, tau=robot.torque(*taie2024()(log.t))), other)
+        assert fit.scale == pytest.approx(factor, rel=0.05)
+
+
+def test_windows_never_span_a_gap_and_integrate_exactly():
+    t = np.delete(np.arange(0, 10, 0.01), np.s_[300:340])
+    log = Recording(t, *(np.c_[f(t)] for f in (np.sin, np.cos, np.sin)))
+    parts = windows(log)
+    assert not np.any((t[parts.first] < 3.0) & (t[parts.last] > 3.39))
+    assert np.all(parts.first[1:] >= parts.last[:-1])
+    assert np.sum(t[parts.last] - t[parts.first]) > 9.0
+    change = log.q[parts.last] - log.q[parts.first]
+    np.testing.assert_allclose(integrals(log, log.dq, parts), change, atol=1e-5)  # trapezoids: h²/12
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_friction_that_keeps_hold_of_resting_joints_is_no_wrong_robot(seed):
+    """A pick-and-place log of motor currents: at rest each joint is held by the friction of its last move."""
+    robot, rng, t = arm("ur5e"), np.random.default_rng(seed), np.arange(0.0, 6.0, 0.008)
+    poses = rng.uniform([-1.0, -2.0, -1.0, -1.0, -1.0, -1.0], [1.0, -0.9, 1.0, 1.0, 1.0, 1.0], size=(4, 6))
+    q, dq, ddq = np.zeros((3, len(t), 6))
+    q += poses[0]
+    held = np.tile(np.sign(rng.normal(size=6)), (len(t), 1))
+    for k, move in enumerate(np.diff(poses, axis=0)):
+        s = np.clip(t - 0.5 - 2.0 * k, 0.0, 1.0)
+        q += np.outer(10 * s**3 - 15 * s**4 + 6 * s**5, move)
+        dq += np.outer(30 * s**2 - 60 * s**3 + 30 * s**4, move)
+        ddq += np.outer(60 * s - 180 * s**2 + 120 * s**3, move)
+        held[t >= 0.5 + 2.0 * k] = np.sign(move)
+    tau = robot.torque(q, dq, ddq) + 0.12 * rated_effort(robot) * held
+    check_plausible(Recording(t, q, dq, tau), robot)
+    with pytest.raises(RecordingError, match=r"opposite sign|does not fit|holds only"):
+        check_plausible(Recording(t, q, dq, -tau), robot)

@@ -1,0 +1,210 @@
+"""The study's machinery: cells that are measured once, protocols with known errors, a quick run that resumes."""
+
+import json
+
+import numpy as np
+import pytest
+
+from armload.app.cli import main
+from armload.errors import DatasetError
+from armload.estimators import Estimate, Identifier
+from armload.inertia import InertialParameters
+from armload.lab import load_cells, save_cell
+from armload.lab.evaluation import EvaluationRun
+from armload.lab.study import (
+    FULL,
+    QUICK,
+    Basis,
+    Spec,
+    plan,
+    run_study,
+    write_results,
+)
+from armload.lab.study.protocols import measure_learned, measure_stream
+from armload.recording import Recording
+
+TRUTH = InertialParameters(np.arange(1.0, 11.0))
+
+
+class Constant(Identifier):
+    """Says the same at every sample."""
+
+    name = "constant"
+
+    def __init__(self, arm, phi):
+        self.arm, self.phi, self.count = arm, phi, 0
+
+    def reset(self):
+        self.count = 0
+
+    def update(self, sample):
+        self.count += 1
+        return Estimate(sample.t, self.phi, np.eye(10), self.count, str(self.arm.frame))
+
+
+@pytest.fixture
+def runs(analytic_log, panda):
+    log = analytic_log(panda, duration=1.0, rate=100.0)
+    late = Recording(log.t + 50.0, log.q, log.dq, log.tau)
+    return {"test_payload_nominal": [EvaluationRun(log, TRUTH, "a"), EvaluationRun(late, TRUTH, "b")]}
+
+
+# ---------------------------------------------------------------------------- cells
+
+
+@pytest.mark.parametrize("size", [FULL, QUICK])
+def test_no_two_cells_of_the_plan_share_a_name_or_a_key(size):
+    cells = plan(size)
+    assert len({cell.name for cell in cells}) == len({cell.key("basis") for cell in cells}) == len(cells)
+
+
+def test_the_key_knows_every_setting_and_the_basis_but_not_the_table():
+    spec = Spec("network", split="row")
+    others = [
+        Spec("network", split="payload"),
+        Spec("network", split="row", seed=1),
+        Spec("network", split="row", max_epochs=60),
+        Spec("network", split="row", drop=("t",)),
+    ]
+    assert len({spec.key("a"), spec.key("b"), *(other.key("a") for other in others)}) == 6
+    assert Spec("network", split="row", ablation="scale").key("a") == spec.key("a")
+
+
+def test_the_plan_holds_what_the_paper_trains_on_both_splits_without_a_cap():
+    cells = plan(FULL)
+    for kind in ("tree", "network"):
+        for stages in (1, 2):
+            for split in ("row", "payload"):
+                assert Spec(kind, stages=stages, split=split) in cells
+
+
+def test_a_cell_reads_back_as_it_was_written_and_a_stranger_is_named(tmp_path):
+    cell = {"name": "tree-x", "key": "k", "protocols": {"held_out": {"single": [0.1] * 10}}}
+    save_cell(tmp_path, cell)
+    assert load_cells(tmp_path) == {"tree-x": cell}
+    (tmp_path / "other.json").write_text("[1, 2")
+    with pytest.raises(DatasetError, match=r"other\.json is not a cell"):
+        load_cells(tmp_path)
+
+
+# ---------------------------------------------------------------------------- protocols
+
+
+def test_errors_that_cancel_over_a_run_count_for_single_samples_only(runs):
+    def predict(X):
+        sign = np.where(np.arange(len(X)) % 2, 1.0, -1.0)
+        return TRUTH.phi + 0.5 * sign[:, None]
+
+    measured = measure_learned(predict, runs)["protocols"]["test_payload_nominal"]
+    assert measured["single"] == pytest.approx([0.5] * 10)
+    assert np.array(measured["running"]) == pytest.approx(np.zeros((2, 10)), abs=1e-6)
+    assert np.array(measured["first"]) == pytest.approx(np.full((2, 10), 0.5))
+
+
+def test_a_learned_method_sees_time_from_the_start_of_each_run(runs):
+    starts = []
+
+    def predict(X):
+        starts.append(X[0, 0])
+        return np.tile(TRUTH.phi, (len(X), 1))
+
+    measure_learned(predict, runs)
+    assert starts == [0.0, 0.0]
+
+
+def test_a_stream_s_error_is_that_of_its_last_estimate(runs, panda):
+    measured = measure_stream(lambda _: Constant(panda, TRUTH.phi + 0.25), runs)
+    protocol = measured["protocols"]["test_payload_nominal"]
+    for kind in ("running", "second_half", "first"):
+        assert np.array(protocol[kind]) == pytest.approx(np.full((2, 10), 0.25))
+    assert measured["izz"]["test_payload_nominal"]["truth"] == TRUTH.phi[9]
+
+
+# ---------------------------------------------------------------------------- the run
+
+
+@pytest.fixture(scope="module")
+def quick(tmp_path_factory):
+    """A quick study, stopped after its first cell and then run to the end."""
+    folder = tmp_path_factory.mktemp("study")
+    basis = Basis(folder, QUICK)
+    said = []
+    first = run_study(basis, folder / "cells", until=0.0, say=said.append)
+    cells = run_study(basis, folder / "cells", say=said.append)
+    return folder, first, cells, said
+
+
+def test_a_study_that_was_stopped_goes_on_and_measures_nothing_twice(quick):
+    folder, first, cells, said = quick
+    assert len(first) < len(cells) == len(plan(QUICK))
+    assert len([line for line in said if line.startswith("cell")]) == len(cells)
+    again = []
+    assert run_study(Basis(folder, QUICK), folder / "cells", say=again.append) == cells
+    assert again == []
+
+
+def test_the_same_seed_gives_the_same_numbers(quick):
+    folder, _, cells, _ = quick
+    name = next(name for name in cells if name.startswith("tree-2stage"))
+    (folder / "cells" / f"{name}.json").unlink()
+    assert run_study(Basis(folder, QUICK), folder / "cells")[name]["protocols"] == cells[name]["protocols"]
+
+
+def test_the_numbers_do_not_depend_on_how_many_cells_are_measured_at_once(quick):
+    folder, _, cells, _ = quick
+    left = ("benchmark-rls-s0", "network-1stage-raw-row-ideal-s0", "tree-2stage-raw-payload-ideal-s1")
+    names = [name for name in cells if name.startswith(left)][:4]
+    for name in names:
+        (folder / "cells" / f"{name}.json").unlink()
+    said = []
+    again = run_study(Basis(folder, QUICK), folder / "cells", jobs=2, say=said.append)
+    assert len(said) == len(names) >= 3
+    for name in names:
+        for field in ("key", "spec", "epochs", "file_bytes", "protocols", "izz"):
+            assert again[name].get(field) == cells[name].get(field)
+    assert load_cells(folder / "cells") == again
+
+
+def test_a_cell_of_another_size_is_measured_again(quick):
+    folder, _, cells, _ = quick
+    name = "benchmark-training-mean-row-s0"
+    path = folder / "cells" / f"{name}.json"
+    path.write_text(json.dumps({**cells[name], "key": "of another basis", "protocols": {}}))
+    assert run_study(Basis(folder, QUICK), folder / "cells")[name] == cells[name] | {
+        "wall_s": json.loads(path.read_text())["wall_s"]
+    }
+
+
+def test_every_learned_cell_has_all_protocols_and_finite_errors(quick):
+    _, _, cells, _ = quick
+    for name, cell in cells.items():
+        if name.startswith(("tree", "network", "mixed")):
+            assert {"held_out", "test_payload_nominal", "test_payload_real_like", "off_family", "other_motion"} <= set(
+                cell["protocols"]
+            )
+            assert all(np.isfinite(p["single"]).all() for p in cell["protocols"].values())
+
+
+def test_page_summary_and_report_are_written_from_the_cells(quick, tmp_path):
+    _, _, cells, _ = quick
+    written = write_results(cells, tmp_path / "a" / "s.json", tmp_path / "p.md", tmp_path / "r.html")
+    summary = json.loads(written["summary"].read_text(encoding="utf-8"))
+    assert {"rows", "payloads", "seeds", "command", "versions", "wall_s", "methods", "claims"} <= set(summary)
+    assert summary["payloads"] == len(range(0, 77, QUICK.every))
+    verdicts = {claim["verdict"] for claim in summary["claims"]}
+    assert verdicts <= {"confirmed", "not confirmed", "depends on the split", "not measured"}
+    page = written["page"].read_text(encoding="utf-8")
+    assert all(claim["id"] in page or claim["text"] in page for claim in summary["claims"])
+    assert "training mean" in page
+    assert "same-prior least squares" in page
+
+
+def test_the_command_stops_in_time_names_what_is_missing_and_writes_the_page(tmp_path, capsys):
+    command = ["reproduce", "taie2024", "--quick", "--hours", "0", "--out", str(tmp_path)]
+    assert main(command) == 0
+    out, err = capsys.readouterr()
+    assert "stopped before cell 1" in err
+    assert str(tmp_path / "paper.md") in out
+    assert "not measured yet" in (tmp_path / "paper.md").read_text(encoding="utf-8")
+    assert main([*command, "--real-log", str(tmp_path / "none.csv")]) == 2
+    assert "no real log at" in capsys.readouterr().err

@@ -1,0 +1,235 @@
+"""Changes of payload on a live stream: noticed soon, told apart from pushes, and nothing seen where nothing is."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from armload import Recording, arm, read_recording
+from armload.devices import Simulator
+from armload.inertia import InertialParameters
+from armload.motion import random_motion, taie2024
+from armload.online import OnlineIdentifier
+from armload.simulation import Sensors, World, simulate
+
+
+def box(mass):
+    """A box of 8 by 6 by 12 cm, held off its middle."""
+    sides = np.array([0.08, 0.06, 0.12]) ** 2
+    inertia = np.diag(mass / 12.0 * (sides.sum() - sides))
+    return InertialParameters.from_com(mass, (0.01, -0.02, 0.07), inertia)
+
+
+HALF_KILO = box(0.5)
+
+
+def stream(seed, payloads, seconds, rate=200.0, motion=None):
+    """The log of a real-like Panda that holds a payload, or nothing, from each time on."""
+    panda = arm("panda")
+    source = Simulator(
+        panda,
+        motion or random_motion(panda, seed),
+        payloads,
+        world=World.real_like(panda, seed),
+        sensors=Sensors.panda(panda),
+        rate=rate,
+        speed=None,
+        duration=seconds,
+        seed=seed,
+    )
+    return Recording(*map(np.array, zip(*source, strict=True)))  # type: ignore[arg-type]
+
+
+def said(log, method=None, pause=None):
+    """All estimates of a new identifier, and its events in order, each as it was called in the end."""
+    identifier = OnlineIdentifier(arm("panda"), method=method)
+    estimates, events = [], {}
+    for k, sample in enumerate(log):
+        if pause is not None and k % 97 == 0:
+            time.sleep(pause)
+        estimate = identifier.update(*sample)
+        estimates.append(estimate)
+        if estimate.event is not None:
+            events[estimate.event.t] = estimate.event
+    identifier.close()
+    return estimates, list(events.values())
+
+
+def at(estimates, t):
+    """The last estimate by t."""
+    return next(estimate for estimate in reversed(estimates) if estimate.t <= t)
+
+
+def covers(estimate, phi):
+    return np.abs(estimate.phi - phi) <= 1.96 * estimate.std
+
+
+@pytest.mark.parametrize("rate", [200.0, 1000.0])
+def test_half_a_kilo_is_noticed_in_a_third_of_a_second_and_its_mass_known_in_one(rate):
+    estimates, events = said(stream(1, [(5.0, HALF_KILO)], 7.0, rate))
+    assert [event.kind for event in events] == ["grasp"]
+    assert 5.0 < events[0].t < 5.3
+    before, after = at(estimates, 4.99), at(estimates, 6.0)
+    assert not before.held
+    assert covers(before, 0.0)[0]
+    assert after.held
+    assert abs(after.phi[0] - 0.5) <= 1.96 * after.std[0] < 0.15
+    assert after.since > 5.0
+
+
+def test_while_a_change_settles_nothing_is_said_but_what_was_known_beforehand():
+    estimates, events = said(stream(1, [(5.0, HALF_KILO)], 6.0), "map-gp")
+    settling = [estimate for estimate in estimates if estimate.settling]
+    assert settling
+    assert all(0.0 <= estimate.t - events[0].t <= 0.25 for estimate in settling)
+    assert all(not estimate.held and covers(estimate, HALF_KILO.phi).all() for estimate in settling)
+
+
+def test_what_is_put_down_is_gone_and_what_is_taken_up_again_is_recognised():
+    payload, truth = HALF_KILO, HALF_KILO.phi
+    log = stream(2, [(5.0, payload), (10.0, None), (15.0, payload)], 20.0)
+    estimates, events = said(log, "map-gp")
+    assert [event.kind for event in events] == ["grasp", "return", "return"]
+    for event, t in zip(events, (5.0, 10.0, 15.0), strict=True):
+        assert t < event.t < t + 0.3
+    first, empty, again = (at(estimates, t) for t in (9.99, 14.99, 19.99))
+    assert (first.held, empty.held, again.held) == (True, False, True)
+    for estimate, phi in ((first, truth), (empty, 0.0 * truth), (again, truth)):
+        assert covers(estimate, phi)[:4].all()
+    assert again.n_samples > 1.5 * first.n_samples  # the earlier run went on
+    assert (
+        max(estimate.age for estimate in estimates) < 0.05
+    )  # samples get lost; an answer of seconds ago never returns
+    assert np.all(again.std[:4] < first.std[:4])
+
+
+def test_a_cycle_in_step_with_the_motion_stays_as_good_in_its_second_minute_as_in_its_first():
+    payload, motion = box(0.3), taie2024()  # always taken up in one pose and put down in another
+    changes = np.arange(4.0, 118.0, 0.5 * motion.duration)
+    schedule = [(t, None if k % 2 else payload) for k, t in enumerate(changes)]
+    log = stream(22, schedule, 120.0, 100.0, motion)
+    estimates, events = said(log, "map-gp")
+    assert len(events) == len(changes)
+    for event, t in zip(events, changes, strict=True):
+        assert t < event.t < t + 0.3
+    times = np.array([estimate.t for estimate in estimates])
+    after = [estimates[np.searchsorted(times, t + 1.0) - 1] for t in changes]
+    truth = np.array([0.0 if held is None else payload.mass for _, held in schedule])
+    error = np.array([estimate.phi[0] for estimate in after]) - truth
+    half_width = 1.96 * np.array([estimate.std[0] for estimate in after])
+    assert np.all(np.abs(error) <= half_width)
+    late = changes > 60.0
+    for loaded in (truth == 0.0, truth > 0.0):
+        first, second = (np.sqrt(np.mean(error[loaded & part] ** 2)) for part in (~late, late))
+        assert second < 1.5 * first + 0.005
+    assert np.all(half_width[late] < 0.1)
+
+
+def test_another_payload_of_another_mass_is_no_return():
+    other = box(0.9)
+    estimates, events = said(stream(3, [(5.0, HALF_KILO), (9.0, other)], 13.0), "map-gp")
+    assert [event.kind for event in events] == ["grasp", "swap"]
+    assert covers(estimates[-1], other.phi)[:4].all()
+
+
+@pytest.mark.parametrize("payload", [None, HALF_KILO], ids=["empty", "loaded"])
+def test_nothing_is_noticed_where_nothing_changes(payload):
+    _, events = said(stream(4, [(-1.0, payload)], 20.0, motion=taie2024()), "map-gp")
+    assert events == []
+
+
+def test_a_slow_drift_of_the_torque_is_no_change():
+    log = stream(5, [], 20.0)
+    drift = np.outer(log.t / log.t[-1], 5e-3 * arm("panda").limits.effort)  # 0.4 N·m on the large joints
+    _, events = said(Recording(log.t, log.q, log.dq, log.tau + drift), "map-gp")
+    assert events == []
+
+
+@pytest.mark.parametrize("force", [(0.0, 40.0, 0.0), (0.0, 0.0, -40.0)], ids=["sideways", "down"])
+def test_a_push_that_ends_gives_the_estimate_back(force):
+    log = stream(6, [(3.0, HALF_KILO)], 14.0)
+    start, end = 8.0, 9.0
+    panda = arm("panda")
+    size = np.sin(np.pi * np.clip((log.t - start) / (end - start), 0.0, 1.0)) ** 2
+    J, R = panda.frame_motion(log.q).jacobian[:, 3:], panda.frame_pose(log.q)[0]
+    pushed = size[:, None] * np.einsum("nij,ni->nj", J, np.einsum("nji,j->ni", R, np.array(force)))
+    estimates, _ = said(Recording(log.t, log.q, log.dq, log.tau - pushed), "map-gp")
+    old = [estimate for estimate in estimates if estimate.age > 0.02]
+    assert old
+    assert all(any("do not fit" in note for note in estimate.notes) for estimate in old)
+    assert not estimates[-1].notes
+    before, after = at(estimates, start), estimates[-1]
+    assert covers(before, HALF_KILO.phi)[0]
+    assert after.held
+    assert covers(after, HALF_KILO.phi)[0]
+    assert after.std[0] < 0.1
+
+
+def test_a_replay_says_the_same_bit_for_bit_however_the_second_thread_fares():
+    log = stream(7, [(4.0, HALF_KILO), (7.0, None)], 10.0)
+    (ours, events), (theirs, other) = said(log), said(log, pause=0.004)
+    assert len(events) == 2
+    assert events == other
+    for a, b in zip(ours, theirs, strict=True):
+        assert (a.settling, a.held, a.n_samples, a.age) == (b.settling, b.held, b.n_samples, b.age)
+        np.testing.assert_array_equal(a.phi, b.phi)
+        np.testing.assert_array_equal(a.covariance, b.covariance)
+
+
+def test_threads_do_not_pile_up_with_the_changes():
+    def running():
+        return sum(thread.name == "armload-scales" for thread in threading.enumerate())
+
+    schedule = [(3.0 + 2.0 * k, None if k % 2 else HALF_KILO) for k in range(8)]
+    identifier, before, most = OnlineIdentifier(arm("panda"), method="map-gp"), running(), 0
+    seen = set()
+    for sample in stream(8, schedule, 19.0):
+        estimate = identifier.update(*sample)
+        seen.add(estimate.event and estimate.event.t)
+        most = max(most, running() - before)
+    identifier.close()
+    assert len(seen) > 8
+    assert most <= 6  # the runs kept, and the watch's own
+
+
+def test_a_pose_first_seen_shortly_after_a_change_is_not_another_change():
+    log = stream(5001, [(-1.0, None), (5.217, box(1.0))], 14.0, motion=taie2024())
+    _, events = said(log, "map-gp")  # the empty arm was not seen in all poses of the round before it took hold
+    assert [event.kind for event in events] == ["grasp"]
+
+
+def test_a_real_arm_that_breaks_away_from_rest_is_no_change_of_payload(real_data):
+    ur = arm("ur10e")
+    loaded, tare = (read_recording(real_data / f"ur10e_{name}.csv", ur) for name in ("loaded_2805g", "unloaded"))
+    identifier, estimates = OnlineIdentifier(ur, tare), []
+    for sample in zip(loaded.t, loaded.q, loaded.dq, loaded.tau, strict=True):
+        estimates.append(identifier.update(*sample))
+    identifier.close()
+    assert estimates[-1].event is None
+    assert not any(at(estimates, loaded.t[0] + t).determined[0] for t in (1.0, 2.0, 3.0, 4.0))  # it moves from 2.5 s on
+    assert all(covers(at(estimates, loaded.t[0] + t), 2.805)[0] for t in np.arange(10.0, 64.0, 2.0))
+    assert 1.96 * estimates[-1].std[0] < 0.06 * 2.805
+
+
+@pytest.mark.parametrize("rate", [50.0, 200.0])
+def test_a_change_is_said_to_have_begun_as_far_back_as_the_rows_go_that_show_it(rate):
+    _, events = said(stream(1, [(5.0, HALF_KILO)], 6.5, rate), "map-gp")
+    assert [event.kind for event in events] == ["grasp"]
+    back = rate * (events[0].t - events[0].began)  # rows, and a few that were lost
+    assert 15.5 < back < 20.0
+    assert events[0].began < 5.0
+
+
+def test_the_run_of_the_empty_arm_counts_beside_a_tare_that_was_given():
+    panda, log, found = arm("panda"), stream(1, [(6.0, HALF_KILO)], 8.0), {}
+    elsewhere = random_motion(panda, 98, duration=20.0, harmonics=10)
+    given = simulate(panda, elsewhere, world=World.real_like(panda, 1), sensors=Sensors.panda(panda), rate=200.0)
+    for name, tare in (("without", None), ("with", given)):
+        identifier = OnlineIdentifier(panda, tare, "map-gp")
+        for sample in log:
+            found[name] = identifier.update(*sample)
+        identifier.close()
+        assert identifier.relative_to == ("before" if tare is None else "tare")
+        assert covers(found[name], HALF_KILO.phi)[:4].all()
+    assert np.all(found["with"].std[:4] < 1.1 * found["without"].std[:4])
