@@ -13,7 +13,7 @@ from armload.posterior.solve import advance
 from armload.regression import Correction, JointFeatures, payload_prior_std
 from armload.regression.information import RegressionData
 from armload.regression.noise import SMOOTH
-from armload.regression.row_stream import RowStream
+from armload.regression.rows import FilteredRegression
 from armload.simulation import World, simulate
 
 GAIN = 20.0

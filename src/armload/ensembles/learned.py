@@ -53,7 +53,21 @@ class LearnedIdentifier(Identifier):
 
     def update(self, sample: Sample) -> Estimate:
         """Take one sample and return the average, or with `single` its own prediction."""
-        t, q, dq, tau = sample
+        self._follow(*sample)
+        return self._last
+
+    def conclude(self) -> Estimate:
+        """The last estimate: nothing is left to solve."""
+        return self._last
+
+    def _take(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
+        for sample in zip(t.tolist(), q, dq, tau, strict=True):
+            self._follow(*sample)
+
+    def _estimate(self, t: float) -> Estimate:  # noqa: ARG002
+        return self._last
+
+    def _follow(self, t: float, q: NDArray, dq: NDArray, tau: NDArray) -> None:
         if self._start is None:
             self._start = t
         row = np.empty(1 + 3 * self.arm.n)
@@ -63,17 +77,12 @@ class LearnedIdentifier(Identifier):
             said, count = self.model.compiled.row(row), 1 if self.single else self._count
             _average(self._averages, said, count, self._own, phi, covariance)
             self._last = Estimate(t, phi, covariance, self._count, self.model.frame)
-        return self._last
 
-    def trace(self, recording: Recording, every: int = 1) -> list[Estimate]:
-        """The estimates along a recording of a motion the model knows.
-
-        Raises:
-            ModelError: the recording follows no motion of the model (unless `any_motion`), or is of another arm.
-        """
+    def _check(self, recording: Recording) -> None:
+        """Whole recordings must follow a motion of the model (unless `any_motion`), and be of its arm."""
         if not self.any_motion:
             self.model.check(self.arm, recording)
-        return super().trace(recording, every)
+        super()._check(recording)
 
 
 @njit(cache=True, nogil=True)

@@ -25,7 +25,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from armload.posterior.sequential import SequentialPosterior
-from armload.regression.row_stream import Row
+from armload.regression.rows import Row
 
 _WINDOWS = (16, 48)  # rows: 0.08 and 0.24 s
 LONGEST = max(_WINDOWS)

@@ -29,7 +29,7 @@ from armload.posterior.live import FAST
 from armload.posterior.stream import Worker
 from armload.recording import Sample
 from armload.regression import payload_prior_std
-from armload.regression.information import REGRESSOR_RATE
+from armload.regression.rows import REGRESSOR_RATE
 
 _FIRST = (0.5, 2.0)  # [s] of a run before which nothing is suspected, with a tare and without
 _TRANSIENT = 0.2  # [s] left out after a change: four times the lag of the regression

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.regression.information import NOVELTY, REGRESSOR_RATE
+from armload.regression.information import NOVELTY
+from armload.regression.rows import REGRESSOR_RATE
 from armload.regression.mismatch import Correction
 
 # [s] a run shorter than this sees one value of a residual that changes slowly: its mean does not grow with 1/T
