@@ -18,7 +18,8 @@ from armload import __version__, arm
 from armload.inertia import Z95
 from armload.lab.training import payload_mixture
 from armload.lab.training.calibrating import fit_calibration, nearest
-from armload.lab.training.hybrid import EPISODES, FOLDS, episode_records
+from armload.lab.training.coverage import FOLDS
+from armload.lab.training.hybrid import EPISODES, episode_records
 from armload.lab.training.records import TIMES
 from armload.posterior import MixturePrior
 

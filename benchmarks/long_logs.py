@@ -21,7 +21,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -37,7 +37,6 @@ from armload.lab.episodes import (
     simulate_episodes,
 )
 from armload.posterior import HybridIdentifier, HybridModel, shipped_model
-from armload.posterior.model_file import POOLED
 
 HERE = Path(__file__).resolve().parent
 TIMES = (1.0, 3.0, 6.0, 15.0, 30.0, 60.0)  # [s] since the run began
@@ -98,7 +97,7 @@ def main() -> None:
         f"--worlds {asked.worlds}",
         "robot": robot.name,
         "version": __version__,
-        "model": {key: model.provenance.get(key) for key in ("population", "episodes", "seed", POOLED)},
+        "model": None if model.training is None else asdict(model.training),
         "first_seed": FIRST_SEED,
         "episodes": asked.episodes,
         "times_s": list(TIMES),

@@ -25,12 +25,12 @@ from fresh_episodes import RESULTS, SEED
 from numpy.typing import NDArray
 
 from armload import Arm, arm
-from armload.app.cli.train_hybrid import episodes_shown, versions
+from armload.app.cli.train_hybrid import episodes_shown
 from armload.atomic import replacing
 from armload.inertia import Z95, determined
 from armload.lab.training import Records
 from armload.lab.training.calibrating import nearest
-from armload.lab.training.hybrid import episode_records
+from armload.lab.training.hybrid import episode_records, versions
 from armload.lab.training.records import TIMES
 from armload.payloads import solids
 from armload.posterior import HybridModel, shipped_model

@@ -472,6 +472,20 @@ def test_a_detached_source_hands_on_every_sample_and_records_it(tmp_path, panda,
     np.testing.assert_array_equal(numbers(read_recording(tmp_path / "run.csv")), numbers(log))
 
 
+def test_ctrl_c_is_not_for_the_reader_not_even_before_its_first_line(panda, path, log, monkeypatch, capfd):
+    class Hit(subprocess.Popen):
+        def __init__(self, *arguments, **settings):
+            super().__init__(*arguments, **settings)
+            self.send_signal(signal.SIGINT)
+
+    monkeypatch.setattr(subprocess, "Popen", Hit)
+    with Detached(str(path), panda) as source:
+        source.process.send_signal(signal.SIGINT)
+        np.testing.assert_array_equal(table(source), numbers(log))
+    assert capfd.readouterr().err == ""
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])  # whoever started it still hears of it
+
+
 def test_kill_9_of_the_reader_is_an_error_and_its_record_can_be_read(tmp_path, panda, path):
     with Detached(str(path), panda, loop=True, record=tmp_path / "run.csv") as source:
         samples = iter(source)

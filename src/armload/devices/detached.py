@@ -13,6 +13,7 @@ import contextlib
 import json
 import os
 import select
+import signal
 import subprocess
 import sys
 import threading
@@ -91,6 +92,9 @@ class Detached(Source):
         self._calls = 0
         command = [sys.executable, "-P", "-m", "armload.devices.reader_process"]
         theirs = (self._ring.descriptor, wake, status)
+        # Ctrl-C goes to the whole group, and the one who started the reader decides: it never hears of it, not even
+        # before its first line. A signal that comes meanwhile is ours when the mask is taken off
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             self.process = subprocess.Popen(
                 [*command, *map(str, theirs)],
@@ -99,6 +103,7 @@ class Detached(Source):
                 pass_fds=theirs,
             )
         finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
             os.close(wake)
             os.close(status)
         told = {**options, "payloads": payloads_to_json(options["payloads"])} if options.get("payloads") else options

@@ -150,6 +150,5 @@ def _lines(descriptor: int) -> Iterator[bytes]:
 
 
 if __name__ == "__main__":
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to the whole group: the one who started us decides
     _silence_clients()
     _Reader(*map(int, sys.argv[1:4])).run()

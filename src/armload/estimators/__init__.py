@@ -2,7 +2,7 @@
 
 from armload.estimators.acceleration import CommandedLeastSquares, PolynomialLeastSquares
 from armload.estimators.consistent import ConsistentLeastSquares, LogCholeskyLeastSquares
-from armload.estimators.contract import Estimate, Identifier, Tared, samples_until
+from armload.estimators.contract import ArmMismatch, Estimate, Identifier, Tared, samples_until
 from armload.estimators.difference import DifferenceLeastSquares
 from armload.estimators.joint import JointLeastSquares
 from armload.estimators.kalman import ExtendedKalmanFilter
@@ -12,6 +12,7 @@ from armload.estimators.recursive import FilteredRecursiveLeastSquares, Recursiv
 from armload.estimators.total import RecursiveTotalLeastSquares
 
 __all__ = [
+    "ArmMismatch",
     "CommandedLeastSquares",
     "ConsistentLeastSquares",
     "DifferenceLeastSquares",

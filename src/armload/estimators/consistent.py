@@ -58,6 +58,12 @@ class _ConsistentLeastSquares(Identifier):
     def reset(self) -> None:
         """Forget the run (not the tare); the next sample is the first."""
         self._free.reset()
+        self._unprojected: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+
+    @property
+    def unprojected(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """The unconstrained estimate less the tare's, and its covariance; None before the first sample."""
+        return self._unprojected
 
     def _take(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
         self._free._take(t, q, dq, tau)
@@ -70,6 +76,7 @@ class _ConsistentLeastSquares(Identifier):
         if self.before is not None:
             phi, spread = phi - self.before.phi, spread + self.before.covariance
             covariance = covariance + self.before.covariance
+        self._unprojected = phi, covariance
         body, covariance = self._body(phi, _inverse(spread), covariance)
         return replace(free, phi=body, covariance=covariance)
 

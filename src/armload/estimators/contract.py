@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -55,6 +56,17 @@ class Estimate:
         return f"payload about {self.frame} after {self.n_samples} samples:\n" + "\n".join(rows)
 
 
+class ArmMismatch(NamedTuple):
+    """What a method found of the arm beside the payload.
+
+    torque: "link" or "motor", the side the torque seems to be measured on.
+    offset_ratios: squared torque offsets (n,) over their expected variance.
+    """
+
+    torque: str
+    offset_ratios: NDArray[np.float64]
+
+
 class Identifier(ABC):
     """A payload identifier: samples one at a time or many, constant memory, no acceleration needed from the caller.
 
@@ -78,6 +90,19 @@ class Identifier(ABC):
     @property
     def weak_std(self) -> NDArray[np.float64] | None:
         """Standard deviation (10,) of the last estimate under a weak payload prior instead; None: it is that one."""
+        return None
+
+    @property
+    def unprojected(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Mean (10,) and covariance (10, 10) of what the data say, of a method whose phi was made a body since.
+
+        None: phi and its covariance are that themselves.
+        """
+        return None
+
+    @property
+    def mismatch(self) -> ArmMismatch | None:
+        """What was found of the arm with the last solution; None: the method asks nothing of it."""
         return None
 
     @abstractmethod

@@ -5,9 +5,10 @@ torque at the same place of both runs, and goes with their difference:
 
     r_run(t) − r_tare(t + shift) = W_run(t)·phi + e,      r = F[tau − tau_bare]
 
-each r from the acceleration-free filtered regression of its own log (`regression.rows`). The nominal arm is taken off both, because under a
-payload that the controller does not know the two motions differ by milliradians. `recording.alignment` finds the
-shift from the joint positions. Joints are weighed by the long-run variance of their residual (`regression.block_means`).
+each r from the acceleration-free filtered regression of its own log (`regression.rows`). The nominal arm is taken off
+both, because under a payload that the controller does not know the two motions differ by milliradians.
+`recording.alignment` finds the shift from the joint positions. Joints are weighed by the long-run variance of their
+residual (`regression.block_means`).
 
 Sources: Atkeson, An & Hollerbach, IJRR 1986 (difference of torques with and without load); filtered momentum form: see
 `regression.rows`.
@@ -120,7 +121,7 @@ class DifferenceLeastSquares(NormalLeastSquares):
             self._began = float(rows.t[0])
         found: list[Aligned] = []
         for now, pose, *row in zip(rows.t.tolist(), rows.q, rows.r, rows.X[:, :, :10], strict=True):
-            if now < self._began + _SETTLED / self.gain:
+            if self._began is not None and now < self._began + _SETTLED / self.gain:
                 row[0] = np.full_like(row[0], np.nan)
             found += self._tracker.feed(now, pose, row)
         times = np.array([aligned.t for aligned in found])

@@ -23,8 +23,8 @@ from armload.estimators.contract import Estimate, Identifier
 from armload.inertia import is_consistent, nearest_consistent
 from armload.recording import GAP, Sample
 from armload.regression import solution_prior_std
-from armload.regression.rows import REGRESSOR_RATE
 from armload.regression.mismatch import FRICTION_WIDTH
+from armload.regression.rows import REGRESSOR_RATE
 
 # as fractions of the effort limit: √S of the unmodelled torque per √Hz; first spread of offset and Coulomb friction
 _TORQUE, _OFFSET, _COULOMB = 4e-3, 4e-3, 1e-2

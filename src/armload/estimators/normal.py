@@ -52,7 +52,7 @@ class NormalLeastSquares(Identifier):
         self._restart()
 
     def weighted_solution(self, phi: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-        """phi (10,) and G (10, 10) with the weights that go with the residual of an estimate (10,), and rows per second."""
+        """phi (10,) and G (10, 10) with the weights that an estimate (10,) asks for, and the rows per second."""
         w = 1.0 / self._residual_variance(phi) if self._rows_seen else np.ones(self.arm.n)
         return *self._solve(w), self._blocks.rate
 

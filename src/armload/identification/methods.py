@@ -7,8 +7,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
 
 from armload.arms import Arm
 from armload.errors import IdentificationError, ModelError
@@ -312,17 +314,43 @@ _ELSEWHERE = "map-gp"
 
 
 def default_for(arm: Arm) -> str:
-    """The name of the most trustworthy method for an arm: the hybrid where one is shipped, map-gp elsewhere."""
-    from armload.posterior import HybridModel
+    """The name of the most trustworthy method for an arm: the hybrid where one is shipped, map-gp elsewhere.
 
-    shipped = HybridModel.shipped(arm)
-    if shipped is None:
+    Raises:
+        ModelError: a hybrid is shipped for the arm, and its file is missing or cannot be read.
+    """
+    from armload.posterior import HybridModel, shipped_model
+
+    if HybridModel.shipped(arm) is None:
         return _ELSEWHERE
+    model = shipped_model(arm)
     try:
-        HybridModel.load(shipped).prior_for(arm)
+        model.prior_for(arm)
     except ModelError:  # an arm of that name with other links
         return _ELSEWHERE
     return DEFAULT
+
+
+def model_file(name: str | Path, names: Sequence[str]) -> Path:
+    """The file of a trained model that was given in place of a method's name.
+
+    Raises:
+        IdentificationError: there is no such file; the message says what was meant, a file or one of `names`.
+    """
+    path, text = Path(name), str(name)
+    if path.is_file():
+        return path
+    if path.suffix or len(path.parts) > 1:  # no method is called so
+        state = "is not a file" if path.exists() else "does not exist"
+        raise IdentificationError(
+            f"the model {text} {state}: expected the .safetensors file that `armload train` wrote, or a method that "
+            "`armload methods` lists"
+        )
+    near = get_close_matches(text, names, 1)
+    raise IdentificationError(
+        f"unknown method {text!r}: expected one of {', '.join(names)}, or the path of a trained model"
+        + (f"; did you mean {near[0]!r}?" if near else "")
+    )
 
 
 # What the paper's related work names (its reference numbers) and armload does not build, with the reason.

@@ -24,7 +24,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-
 _WINDOWS = (16, 48)  # rows: 0.08 and 0.24 s
 LONGEST = max(_WINDOWS)
 _ALARM = 12.0  # ln of a payload's likelihood ratio over nothing, in either window

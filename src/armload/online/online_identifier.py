@@ -20,9 +20,8 @@ from numpy.typing import NDArray
 from armload.arms import Arm
 from armload.errors import IdentificationError
 from armload.estimators import Estimate, Identifier
-from armload.identification import METHODS
+from armload.identification.choice import choose
 from armload.inertia import determined, held
-from armload.online.engines import engine
 from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
 from armload.online.gate import Gate, Health, all_finite
@@ -63,7 +62,8 @@ class OnlineIdentifier:
 
     def __init__(self, arm: Arm, tare: Recording | None = None, method: str | Path | None = None) -> None:
         self.arm, self.tare, self._tared = arm, tare, tare is not None
-        first = engine(arm, tare, method)
+        choice = choose(arm, tare, method, live=True)
+        first = choice.identifier
         self._watch = PayloadWatch(first) if isinstance(first, PosteriorLeastSquares) else None
         self._engine = first
         self.method = self.engine.name
@@ -71,10 +71,9 @@ class OnlineIdentifier:
         self._stream = Listening()
         self._weak = payload_prior_std(arm)
         self._step = MassStep(float(self._weak[0]))
-        entry = METHODS.get(self.method)
-        known = self.engine.payload_prior
+        known = first.payload_prior
         self._before: NDArray | None = None
-        if entry is None or entry.prior:
+        if choice.prior:
             self._before = self._weak if known is None else known[1]
         self.reset()
 

@@ -87,5 +87,3 @@ class Runs:
             return False
         phi, covariance = (estimate.phi - then[0])[:4], (estimate.covariance + then[1])[:4, :4]
         return bool(phi @ np.linalg.solve(covariance, phi) < _SAME)
-
-

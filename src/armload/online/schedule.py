@@ -11,10 +11,10 @@ _LATER = 2  # samples after a row: the row, the answer and the look at the innov
 class Deferred:
     """One task for each row: done at once on a slow stream, some samples later on a fast one, before the next row.
 
-        if deferred.due(t):  # at each sample, before the row it may complete
-            …
-        if deferred.row(t):  # at a sample that completed a row: True if the task is due at once
-            …
+    if deferred.due(t):  # at each sample, before the row it may complete
+        …
+    if deferred.row(t):  # at a sample that completed a row: True if the task is due at once
+        …
     """
 
     def __init__(self) -> None:

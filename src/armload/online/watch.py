@@ -4,11 +4,12 @@
 
 The watch is in one of three phases:
 
-| phase     | what becomes of a sample                        | how it ends                                              |
-|-----------|-------------------------------------------------|----------------------------------------------------------|
-| FOLLOWING | the run takes it; its innovations are looked at | they fit no more → DOUBTING; a payload beats all → SETTLING |
-| DOUBTING  | looked at only: the run is not told             | they fit again, or for too long → FOLLOWING; a payload → SETTLING |
-| SETTLING  | left out, while the next run is made            | the transient is over → FOLLOWING, with the next run      |
+    FOLLOWING   the run takes the sample, and its innovations are looked at;
+                they fit no more → DOUBTING, a change of payload explains them best → SETTLING
+    DOUBTING    the sample is looked at, and the run is not told;
+                samples fit again, or have not for too long → FOLLOWING, a change of payload → SETTLING
+    SETTLING    the sample is left out, while the next run is made beside;
+                the transient is over → FOLLOWING, with the next run
 
 After a change the new run is *judged* while it is followed: it says what the change was, once its mass is known, and
 gives way to the earlier run if it holds what that one held (a push that has ended). The run of the empty arm is a tare
@@ -292,4 +293,3 @@ class PayloadWatch:
         """The run after a change, where it is ready."""
         made = None if self._change is None else self._change.following
         return [made] if isinstance(made, PosteriorLeastSquares) else []
-

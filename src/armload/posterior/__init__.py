@@ -7,7 +7,7 @@ from armload.posterior.cramer_rao import TIMES, Bound, bound, efficiency
 from armload.posterior.evidence import TRAITS, Evidence
 from armload.posterior.hybrid import HybridIdentifier, shipped_model
 from armload.posterior.map import PosteriorLeastSquares, SmoothPosteriorLeastSquares
-from armload.posterior.model_file import HybridModel
+from armload.posterior.model_file import HybridModel, Training
 from armload.posterior.payload_prior import MixturePosterior, MixturePrior
 from armload.posterior.problem import Posterior
 
@@ -25,6 +25,7 @@ __all__ = [
     "Posterior",
     "PosteriorLeastSquares",
     "SmoothPosteriorLeastSquares",
+    "Training",
     "advise",
     "bound",
     "efficiency",

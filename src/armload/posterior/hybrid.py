@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import cache
+from pathlib import Path
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -17,7 +20,7 @@ from armload.posterior.model_file import HybridModel
 from armload.posterior.payload_prior import MixturePrior
 from armload.posterior.same_motion import SameMotion
 from armload.recording import Recording
-from armload.regression import JointFeatures, payload_prior_std
+from armload.regression import JointFeatures, payload_prior_std, solution_prior_std
 from armload.regression.noise import SMOOTH
 
 _REMOVED = 0.1  # how likely it is, beforehand, that something was taken off
@@ -82,6 +85,11 @@ class HybridIdentifier(PosteriorLeastSquares):
         """Standard deviation (10,) of the last estimate under the weak prior of `payload_prior_std` instead."""
         return self._weak if self._trusted is None else _weak_std(self._trusted.information, self._weak)
 
+    @property
+    def unprojected(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """What the log says without the learned prior, as far as it can be trusted; None before the first sample."""
+        return None if self._trusted is None else without_learned_prior(self._trusted, solution_prior_std(self.arm))
+
     def _before(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         return self._payloads.mean, np.diag(self._payloads.std**2)
 
@@ -111,6 +119,19 @@ def answer(
     return sign * nearest_body(found.mean, covariance), covariance
 
 
+def without_learned_prior(
+    trusted: Evidence, wide: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mean (10,) and covariance (10, 10) under a prior N(0, diag(wide²)), what `map-gp` makes of the same evidence.
+
+    P = (Λ + diag(wide)⁻²)⁻¹, m = P·h, covariance P + gain²·m·mᵀ. A learned prior draws the mean to the bodies it knows,
+    so that its mean cannot tell that no body explains the log.
+    """
+    P = wide[:, None] * np.linalg.inv(np.eye(10) + wide[:, None] * trusted.information * wide) * wide
+    mean = P @ trusted.vector
+    return mean, 0.5 * (P + P.T) + trusted.gain_std**2 * np.outer(mean, mean)
+
+
 @njit(cache=True, nogil=True)
 def _weak_std(information, weak):  # pragma: no cover - compiled
     """Standard deviation (10,) under a weak prior of standard deviations `weak`, evidence trusted as far as it is."""
@@ -124,13 +145,26 @@ def _weak_std(information, weak):  # pragma: no cover - compiled
     return out
 
 
+@cache
+def _loaded(path: Path, _: int) -> HybridModel:
+    """A model that is read once, until its file changes."""
+    return HybridModel.load(path)
+
+
 def shipped_model(arm: Arm) -> HybridModel:
     """The learned parts that come with armload for an arm.
 
     Raises:
-        ModelError: there are none.
+        ModelError: there are none, or their file is missing or cannot be read.
     """
     path = HybridModel.shipped(arm)
     if path is None:
         raise ModelError(f"no hybrid is shipped for {arm.name}: train one with `armload train --method hybrid`")
-    return HybridModel.load(path)
+    try:
+        return _loaded(path, path.stat().st_mtime_ns)
+    except (ModelError, OSError):
+        state = "cannot be read" if path.exists() else "is missing"
+        raise ModelError(
+            f"the hybrid model of {arm.known_as} is part of armload, and its file {path} {state}: install armload "
+            "again, or name another method (--method map-gp)"
+        ) from None

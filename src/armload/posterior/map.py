@@ -1,8 +1,8 @@
-"""MAP least squares as identifiers, for logs and for live robots: with the arm's rigid mismatch, and with its smooth one.
+"""MAP least squares as identifiers, for logs and live robots: with the arm's rigid mismatch, and with its smooth one.
 
-A log is a stream that ends: both go through the same rows and the same posterior (`stream.StreamingPosterior`). `update`
-answers from the sequential posterior, in bounded time; `conclude` makes a last solution from all rows, and `run` takes
-the samples of a log many at a time and concludes.
+A log is a stream that ends: both go through the same rows and the same posterior (`stream.StreamingPosterior`).
+`update` answers from the sequential posterior, in bounded time; `conclude` makes a last solution from all rows, and
+`run` takes the samples of a log many at a time and concludes.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm, rated_effort
-from armload.estimators import Estimate, Identifier
+from armload.estimators import ArmMismatch, Estimate, Identifier
 from armload.posterior.evidence import Evidence
 from armload.posterior.problem import Posterior, Scales
 from armload.posterior.same_motion import SameMotion
@@ -190,8 +190,13 @@ class PosteriorLeastSquares(Identifier):
             raise RuntimeError("no sample has been seen: call update or run first")
         return self.stream.posterior
 
+    @property
+    def mismatch(self) -> ArmMismatch | None:
+        """The side the torque seems to be measured on, and the arm's offsets, by the last solution."""
+        return ArmMismatch(self.posterior.torque, self.posterior.ratios["offset"]) if self._count else None
+
     def evidence(self, elapsed: float | None = None) -> Evidence:
-        """What the logs say as the stream stands, without a prior on the payload; `elapsed` [s]: since the run began."""
+        """What the logs say as the stream stands, without a prior on the payload, `elapsed` [s] after the run began."""
         stream, now = self.stream, self._elapsed if elapsed is None else elapsed
         said = stream if stream.difference is None else stream.difference
         earlier = 0.0 if self.reference is None else self.reference.stream.seconds

@@ -1,7 +1,7 @@
-"""A tare along the run's own motion: what the arm does wrong it does wrong in both logs, and their difference is free of it.
+"""A tare along the run's own motion: what the arm does wrong in both logs, their difference is free of.
 
-Fed with the rows of the run, beside the posterior (`estimators.DifferenceLeastSquares`): it costs nothing to ask whether
-the tare shows the motion, and where it does its evidence takes the posterior's place.
+Fed with the rows of the run, beside the posterior (`estimators.DifferenceLeastSquares`): it costs little to ask whether
+the tare shows the motion, and where it does, its evidence takes the posterior's place.
 """
 
 from __future__ import annotations
@@ -69,5 +69,5 @@ class SameMotion:
         found = self._difference._estimate(self._last)
         if np.any(np.diag(found.covariance) > np.diag(covariance)):
             return None  # too few rows yet
-        information = np.linalg.inv(found.covariance)
+        information = np.asarray(np.linalg.inv(found.covariance), dtype=float)
         return Difference(information, information @ found.phi, self._last)

@@ -219,7 +219,7 @@ class StreamingPosterior:
     # ------------------------------------------------------------------ full solutions
 
     def conclude(self) -> None:
-        """A last solution from all rows so far, as no more will come: expectation–maximisation from the tare's scales."""
+        """A last solution from all rows so far, as no more will come; it begins with the scales found from the tare."""
         self._abandon()
         self._accumulate_waiting()
         self._adopt(self._solved([*self.tares, self._run], self.start, self.iterations - 1))
@@ -249,6 +249,7 @@ class StreamingPosterior:
     def _beside(self, row: Row) -> None:
         """Hand rows over, begin a solution, adopt one: each at fixed numbers of rows."""
         if self._future is not None:
+            assert self._catching_up is not None
             self._catching_up.put(row)
             if self.rows >= self._adopt_at:
                 self.hold()
@@ -272,8 +273,8 @@ class StreamingPosterior:
                 self._worker = Worker()
             self._adopt_at = self.rows + _ADOPTED
             if due:
-                self._catching_up = SimpleQueue()
-                late, following = self._waiting.copy(), self._catching_up
+                late, following = self._waiting.copy(), SimpleQueue()
+                self._catching_up = following
                 self._future = self._worker.submit(self._refit, rows, late, following, covariance)
             else:
                 self._last = self._worker.submit(self._accumulate, rows, covariance)
@@ -307,8 +308,9 @@ class StreamingPosterior:
     def hold(self) -> None:
         """Wait for what is done beside; nothing is from then on, until the next rows. What is adopted when stays."""
         if self._future is not None:
+            assert self._catching_up is not None
             self._catching_up.put(None)
-            self._ready, self._future = self._future.result(), None
+            self._ready, self._future, self._catching_up = self._future.result(), None, None
         if self._last is not None:
             self._found, self._last = (self._last.result(),), None
 
@@ -332,9 +334,11 @@ class StreamingPosterior:
         """Let a solution under way go nowhere."""
         future: Future | None = getattr(self, "_future", None)
         if future is not None:
+            assert self._catching_up is not None
             self._catching_up.put(None)
             future.exception()  # waited for, whatever became of it: its tare may have gone on meanwhile
         self._future: Future[tuple[Solution, Difference | None]] | None = None
+        self._catching_up: SimpleQueue[Row | None] | None = None  # rows since it was begun
         self._ready: tuple[Solution, Difference | None] | None = None  # a solution that waits to be adopted
         last: Future | None = getattr(self, "_last", None)
         if last is not None:

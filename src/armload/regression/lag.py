@@ -1,4 +1,4 @@
-"""The first-order lag F = λ/(s + λ), discretised by the bilinear rule: the filter of the acceleration-free regression."""
+"""The first-order lag F = λ/(s + λ), discretised by the bilinear rule."""
 
 from __future__ import annotations
 

@@ -92,9 +92,9 @@ class FilteredRegression:
         self.arm, self.gain = arm, gain
         self._momentum = MomentumRow(arm)
         self._links = np.ascontiguousarray(arm.link_parameters.ravel())
-        few = features is None or not features.size
-        self._waves = np.zeros((0, arm.n)) if few else features.waves
-        self._velocity_waves = np.zeros(0) if few else features.velocity_waves
+        self._waves, self._velocity_waves = np.zeros((0, arm.n)), np.zeros(0)
+        if features is not None and features.size:
+            self._waves, self._velocity_waves = features.waves, features.velocity_waves
         self._wide = 10 + (0 if mismatch is None else mismatch.size)
         apart = -1.0 if rate is None else SPACING * REGRESSOR_RATE / rate
         self._settings = np.array([gain, apart, settling, 0.0 if mismatch is None else mismatch.presliding])
@@ -110,10 +110,10 @@ class FilteredRegression:
 
     def rows(self, t: ArrayLike, q: ArrayLike, dq: ArrayLike, tau: ArrayLike) -> Rows:
         """The rows that the next N samples complete: t (N,) rising [s]; q, dq, tau (N, n) [rad, rad/s, N·m]."""
-        t = np.require(np.atleast_1d(t), float, "CW")
-        q, dq, tau = (np.require(np.atleast_2d(x), float, "CW") for x in (q, dq, tau))
-        index, *rows = self._advance(t, q, dq, tau)
-        return Rows(t[index], q[index], *rows)
+        times = np.require(np.atleast_1d(t), float, ["C", "W"])
+        poses, dq, tau = (np.require(np.atleast_2d(x), float, ["C", "W"]) for x in (q, dq, tau))
+        index, *rows = self._advance(times, poses, dq, tau)
+        return Rows(times[index], poses[index], *rows)
 
     def row(self, t: float, q: NDArray, dq: NDArray, tau: NDArray) -> Row | None:
         """The row that a sample completes, if it does; q, dq, tau (n,)."""

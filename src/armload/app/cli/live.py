@@ -98,11 +98,13 @@ def run(options: argparse.Namespace) -> int | None:
     """Identify until the source ends (--headless) or somebody interrupts; 2 if an error was told meanwhile."""
     from armload.app.page.session import Session
     from armload.devices import open_source
-    from armload.recording import read_recording
+    from armload.recording import check_own_measurements, read_recording
 
     options.robot = options.robot or _robot_of(options.source)
     arm = _arm_of(options)
     tare = None if options.tare is None else read_recording(options.tare, arm, topic=options.topic)
+    if tare is not None and options.source != "sim" and "://" not in options.source:  # a log
+        check_own_measurements(read_recording(options.source, arm, topic=options.topic), tare)
     # the page takes time from its own process: what runs on the clock is read in another one
     beside = True if not options.headless and options.speed is not None and options.speed <= 1.0 else None
     source = open_source(

@@ -24,7 +24,8 @@ from armload.app.page.curves import (
 from armload.app.page.download import ENDINGS, file_of
 from armload.app.page.scene import Scene
 from armload.app.page.session import Session
-from armload.errors import ArmloadError, UsageError
+from armload.arms import Arm
+from armload.errors import ArmloadError, ModelError, UsageError
 from armload.identification import METHODS, default_for
 
 _NUMBERS, _CURVES = 3, 8  # pictures from which on numbers and curves follow
@@ -175,9 +176,16 @@ def methods_for(session: Session) -> tuple[str, ...]:
         name
         for name, method in METHODS.items()
         if (method.needs == "" or (method.needs == "tare" and session.tare is not None))
-        and (name != "hybrid" or default_for(session.arm) == "hybrid")
+        and (name != "hybrid" or _has_hybrid(session.arm))
     ]
     return tuple(names) if session.method in names else (session.method, *names)
+
+
+def _has_hybrid(arm: Arm) -> bool:
+    try:
+        return default_for(arm) == "hybrid"
+    except ModelError:  # its file is missing: who asks for it is told so
+        return True
 
 
 def _told(client: Any, title: str, action: Any) -> bool:
