@@ -697,6 +697,27 @@ def test_what_a_client_prints_is_kept_apart_unless_asked_for(client, monkeypatch
     assert err == ("from the client, outfrom the client, err" if asked else "")
 
 
+def test_a_robot_s_sample_gets_old_while_nobody_takes_the_next(client, tmp_path):
+    client("""
+        from types import SimpleNamespace
+        class Robot:
+            n = 0
+            def __init__(self, *_):
+                pass
+            def read_once(self):
+                time.sleep(0.001)
+                self.n += 1
+                now = SimpleNamespace(to_sec=lambda: 0.001 * self.n)
+                return SimpleNamespace(time=now, q=[0.0] * 7, dq=[0.0] * 7, tau_J=[0.0] * 7)
+        """)
+    record = tmp_path / "run.csv"
+    with open_source("fr3://192.0.2.9", arm("fr3"), record=record) as source:
+        first = next(iter(source))
+        while record.read_bytes().count(b"\n") < 300:
+            threading.Event().wait(0.02)
+        assert source.lag() >= read_recording(record).t[-1] - first.t  # each state took a millisecond at least
+
+
 def test_a_bug_in_the_reader_still_says_where_it_is(client, capfd):
     client("""
         def Robot(*_):

@@ -33,6 +33,7 @@ _STICTION = 0.1  # of the rated torque, of a joint at rest
 _WEAKEST = 0.4  # rating of an unrated wrist, as a share of the largest torque the model asks: 0.3 to 0.4 on real arms
 _UNRATED = 5.0  # [kg] payload assumed where the maker's rating is not known
 _LEVER = 0.15  # [m] of the payload's centre of mass and radius of gyration
+_LOW, _HIGH, _SURE = 0.6, 1.7, 2.0  # of the arm's own torque; standard deviations
 
 
 class TorqueScale(NamedTuple):
@@ -41,6 +42,22 @@ class TorqueScale(NamedTuple):
     scale: float
     std: float
     misfit: float
+
+    @property
+    def is_wrong(self) -> bool:
+        """Whether s is surely beyond what a sound log of the arm shows."""
+        return self.scale + _SURE * self.std < _LOW or self.scale - _SURE * self.std > _HIGH
+
+    @property
+    def is_negative(self) -> bool:
+        """Whether s is surely below 0."""
+        return self.scale + _SURE * self.std < 0
+
+    def contradicts(self, wrong: TorqueScale) -> bool:
+        """Whether s is that of a sound log, and surely another than a wrong one that was seen before."""
+        return _LOW <= self.scale <= _HIGH and abs(self.scale - wrong.scale) > _SURE * float(
+            np.hypot(self.std, wrong.std)
+        )
 
 
 def torque_scale(recording: Recording, arm: Arm) -> TorqueScale | None:

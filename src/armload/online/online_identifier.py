@@ -298,6 +298,7 @@ class OnlineIdentifier:
                 **vars(self._estimate),
                 "t": stream.clock,
                 "age": float(age),
+                "lag": 0.0,
                 "since": stream.clock if self._since is None else self._since,
                 "relative_to": self.relative_to,
                 "method": self.method,

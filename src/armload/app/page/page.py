@@ -15,7 +15,10 @@ from typing import Any
 
 from armload.app.page import tables
 from armload.app.page.curves import (
+    AXES,
     GROUPS,
+    HEIGHT,
+    PADDING,
     bands_of,
     data_of,
     legend_of,
@@ -122,10 +125,10 @@ class Page:
                     series_of(group),
                     bands=bands_of(group),
                     scales={"x": {"time": False}, "y": {"auto": True}},
-                    axes=({"size": 24, "gap": 2, "ticks": {"size": 4}}, {"size": 58, "gap": 3, "ticks": {"size": 4}}),
+                    axes=AXES,
                     legend={"show": False},
-                    padding=(8, 14, 0, 0),
-                    height=122,
+                    padding=PADDING,
+                    height=HEIGHT,
                 )
                 self._plots.append(plot)
             gui.add_html(_KEY)

@@ -84,6 +84,7 @@ class Simulator(Source):
         self._world, self._sensors, self._seed = world, sensors, seed
         self._end = None if duration is None else round(duration * rate)
         self._pace = Pace(speed)
+        self.speed = speed or 1.0
 
     def __iter__(self) -> Iterator[Sample]:
         for t, q, dq, tau in self._pieces():
@@ -95,6 +96,10 @@ class Simulator(Source):
     def close(self) -> None:
         """End the simulation; an iteration that waits ends at once."""
         self._pace.stop()
+
+    def arrived(self) -> float | None:
+        """When the sample handed on last was due; None without a clock."""
+        return self._pace.due
 
     def truth(self, t: float) -> InertialParameters:
         """What the arm holds at time t; ten zeros where it holds nothing."""

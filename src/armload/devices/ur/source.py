@@ -60,6 +60,7 @@ class URSource(Source):
         self._constants = np.array(torque_constants, dtype=float)
         if self._constants.shape != (6,) or not np.all(np.isfinite(self._constants)):
             raise SourceError(f"torque constants are {list(torque_constants)}: expected six finite numbers in N·m/A")
+        self._arrived: float | None = None
         self._stop = threading.Event()
         self._client = _connect(address)
         self.rate = 500.0
@@ -79,8 +80,12 @@ class URSource(Source):
             q, dq, current = client.getActualQ(), client.getActualQd(), client.getActualCurrent()
             if client.getTimestamp() != t:
                 continue  # the next packet came in between: the values may be of either
-            last = t
+            last, self._arrived = t, heard
             yield Sample(float(t), np.array(q), np.array(dq), self._constants * current)
+
+    def arrived(self) -> float | None:
+        """When the client had the values handed on last."""
+        return self._arrived
 
     def close(self) -> None:
         """Let go of the robot."""
