@@ -147,7 +147,7 @@ def test_the_models_that_are_part_of_armload_are_those_stated():
 @pytest.mark.parametrize(("name", "state"), [("mine.safetensors", "does not exist"), (".", "is not a file")])
 def test_a_model_named_by_a_file_that_is_none_is_refused_by_that_name(call, small, tmp_path, command, name, state):
     path = tmp_path / "models" / name
-    path.parent.mkdir(exist_ok=True)
+    (tmp_path / "models").mkdir()
     headless = ("--headless",) if command == "live" else ()
     argv = (command, small / "run.csv", "--robot", small / "two.urdf", "--method", path, *headless)
     refused = call(*argv, code=2)

@@ -3,7 +3,7 @@
 from armload.recording.alignment import Alignment, same_motion
 from armload.recording.files import has_topics, read_recording, write_recording
 from armload.recording.recording import CHANNELS, GAP, Recording, Sample
-from armload.recording.shared import check_own_measurements, shared_samples
+from armload.recording.copies import check_own_measurements, shared_samples
 
 __all__ = [
     "CHANNELS",
