@@ -472,7 +472,6 @@ def test_methods_offered_are_those_that_work_here(held, panda):
     for name in names:
         OnlineIdentifier(panda, None, name).close()
     assert "difference" not in names  # needs a tare
-    assert "svr" not in names
 
 
 # ---------------------------------------------------------------------- shapes
