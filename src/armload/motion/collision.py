@@ -2,7 +2,8 @@
 
 Capsules are coarse on purpose: a motion must stay clear of them by a margin, not graze the true surface.
 
-- `panda`: one or two capsules per link from the outer size of Franka's links (our figures below, rounded up to 1 cm).
+- an arm whose sheet gives its outer size (the Panda), and any arm whose joints sit as that one's do (an FR3, a Panda
+  with other inertias): the sheet's capsules.
 - any other arm: one capsule from each joint origin to the next, with a radius of half its length, but between 2 % and
   4 % of the sum of these lengths (UR10e: 0.08 m for the upper arm, 0.06 m for the wrist).
 - what the arm holds: a ball of a given radius, centred 0.1 m beyond the payload frame along its z axis.
@@ -15,41 +16,19 @@ little between them that they touch whenever the arm folds.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armload.arms import Arm
+from armload.arms import ARMS, PAYLOAD_REACH, Arm, Capsule, arm
 
-PAYLOAD_REACH = 0.10  # [m] centre of the payload's ball beyond the payload frame, along its z axis
 PAYLOAD_RADIUS = 0.15  # [m]
 _THIN, _THICK = 0.02, 0.04  # radius of an unknown arm's links over the sum of its link lengths
+_SAME_PLACE = 1e-3  # [m] between joints' origins of arms with the same links
 _ROOM_TO_FOLD = 1.2  # links nearer than this multiple of their radii cannot be kept apart by the joints between them
-
-# Panda: origins of joints 1 to 7 in the link before, by which the arm is recognised under any name [m]
-_PANDA_JOINTS = (
-    (0, 0, 0.333),
-    (0, 0, 0),
-    (0, -0.316, 0),
-    (0.0825, 0, 0),
-    (-0.0825, 0.384, 0),
-    (0, 0, 0),
-    (0.088, 0, 0),
-)
-# Panda: link (0 = base), start and end [m] in the link's joint frame, radius [m]. Outer size of the castings.
-_PANDA = (
-    (0, (-0.09, 0, 0.06), (0.0, 0, 0.06), 0.09),
-    (1, (0, 0, -0.333), (0, 0, -0.05), 0.07),
-    (2, (0, 0, -0.06), (0, 0, 0.06), 0.07),
-    (3, (0, 0, -0.22), (0, 0, -0.07), 0.07),
-    (4, (0, 0, -0.06), (0, 0, 0.06), 0.07),
-    (5, (0, 0, -0.31), (0, 0, -0.21), 0.07),
-    (5, (0, 0.08, -0.20), (0, 0.08, -0.06), 0.06),
-    (6, (0, 0, -0.07), (0, 0, 0.01), 0.06),
-    (7, (0, 0, -0.06), (0, 0, 0.08), 0.05),
-)
 
 
 class Clearance(NamedTuple):
@@ -113,14 +92,14 @@ def capsule_arm(arm: Arm, payload_radius: float = PAYLOAD_RADIUS) -> CapsuleArm:
     """The capsules of an arm and of what it holds.
 
     Args:
-        arm: any arm; a Panda by its own measures, others by the distances between their joints.
+        arm: any arm; one whose outer size is known by that, others by the distances between their joints.
         payload_radius: radius of the ball around the payload [m]; 0: nothing is held.
     """
     origins = _joint_origins(arm)  # (n + 1, 3): of joint i + 1 in link i; the last is the payload frame in link n
     length = np.linalg.norm(origins, axis=1)
-    is_panda = arm.n == 7 and np.allclose(origins[:7], _PANDA_JOINTS, atol=1e-3)
-    if is_panda:
-        parts = [(link, np.array(a, float), np.array(b, float), r) for link, a, b, r in _PANDA]
+    measured = _measured(origins)
+    if measured is not None:
+        parts = [(link, np.array(a, float), np.array(b, float), r) for link, a, b, r in measured]
     else:
         radius = np.clip(length / 2, _THIN * length.sum(), _THICK * length.sum())
         parts = [(link, np.zeros(3), origin, radius[link]) for link, origin in enumerate(origins)]
@@ -140,7 +119,7 @@ def capsule_arm(arm: Arm, payload_radius: float = PAYLOAD_RADIUS) -> CapsuleArm:
         between = float(length[link_i + 1 : link_j].sum())  # how far the links between can keep the two apart
         if j == payload:
             between += float(length[-1]) + PAYLOAD_REACH
-        elif is_panda and link_j - link_i == 2:
+        elif measured is not None and link_j - link_i == 2:
             return True  # the joint limits between them keep these apart; their capsules overlap
         return between <= _ROOM_TO_FOLD * (r_i + r_j)
 
@@ -154,6 +133,21 @@ def capsule_arm(arm: Arm, payload_radius: float = PAYLOAD_RADIUS) -> CapsuleArm:
         np.array(pairs, dtype=int).reshape(-1, 2),
         tuple(names),
     )
+
+
+def _measured(origins: NDArray[np.float64]) -> tuple[Capsule, ...] | None:
+    """The capsules of the built-in arm whose joints sit like these (n + 1, 3); None: no such arm was measured."""
+    for facts in ARMS.values():
+        if facts.capsules is not None and facts.joints == len(origins) - 1:
+            theirs = _origins_of(facts.name)
+            if np.allclose(origins[:-1], theirs[:-1], atol=_SAME_PLACE):
+                return facts.capsules
+    return None
+
+
+@cache
+def _origins_of(name: str) -> NDArray[np.float64]:
+    return _joint_origins(arm(name))
 
 
 def segment_distance(a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> NDArray[np.float64]:

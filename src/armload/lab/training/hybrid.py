@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm, kinship
+from armload.arms import Arm, kinship, rated_mass
 from armload.errors import ModelError
 from armload.inertia import Z95
 from armload.lab.cells import key_of
@@ -27,7 +27,6 @@ from armload.posterior import TRAITS, Calibration, HybridModel, MixturePrior
 from armload.posterior.evidence import KINDS
 from armload.posterior.model_file import POOLED
 from armload.regression import payload_prior_std
-from armload.simulation import rated_mass
 from armload.version import __version__
 
 EPISODES = 2400
