@@ -1,5 +1,6 @@
 """Robot arms: their rigid-body model, and the regressors through which a payload shows in the joint torques."""
 
+from armload.arms.capsules import NearestCapsules
 from armload.arms.catalogue import arm, facts_of
 from armload.arms.facts import ARMS, ArmFacts, Capsule
 from armload.arms.forward import ForwardDerivatives, ForwardDynamics
@@ -21,6 +22,7 @@ __all__ = [
     "ForwardDynamics",
     "Limits",
     "MomentumRegressor",
+    "NearestCapsules",
     "arm",
     "facts_of",
     "full_arm_regressor",

@@ -12,6 +12,9 @@ Two fifths of the moving links' mass, another rule for the rated mass, is off by
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -43,8 +46,12 @@ def rated_effort(arm: Arm) -> NDArray[np.float64]:
 
 def rated_mass(arm: Arm) -> float:
     """What the arm may carry [kg]: the maker's figure, or 0.7 of what its joints hold in 95 % of all poses."""
-    if arm.rated_payload is not None:
-        return arm.rated_payload
+    return arm.rated_payload if arm.rated_payload is not None else _assumed_mass(arm)
+
+
+@lru_cache(maxsize=16)  # a stream asks at every answer
+def _assumed_mass(arm: Arm) -> float:
+    arm = replace(arm)  # another thread may be computing with this one
     q = poses(arm)
     bare = arm.torque(q)
     kilogram = InertialParameters.from_com(1.0, (0.0, 0.0, PAYLOAD_REACH), 1e-3 * np.eye(3))

@@ -16,14 +16,14 @@ little between them that they touch whenever the arm folds.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armload.arms import ARMS, PAYLOAD_REACH, Arm, Capsule, arm
+from armload.arms import ARMS, PAYLOAD_REACH, Arm, Capsule, NearestCapsules, arm
 
 PAYLOAD_RADIUS = 0.15  # [m]
 _THIN, _THICK = 0.02, 0.04  # radius of an unknown arm's links over the sum of its link lengths
@@ -59,14 +59,6 @@ class CapsuleArm:
     pairs: NDArray[np.int64]
     names: tuple[str, ...]
 
-    def axes(self, q: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Both ends (N, C, 3) of the capsules' axes in the base [m] at poses q (N, n)."""
-        R, p = self.arm.link_poses(np.atleast_2d(q))
-        N = len(p)
-        R = np.concatenate([np.broadcast_to(np.eye(3), (N, 1, 3, 3)), R], axis=1)[:, self.link]  # (N, C, 3, 3)
-        p = np.concatenate([np.zeros((N, 1, 3)), p], axis=1)[:, self.link]
-        return p + np.einsum("tcij,cj->tci", R, self.start), p + np.einsum("tcij,cj->tci", R, self.end)
-
     def clearance(self, q: ArrayLike, floor: float | None = 0.0) -> Clearance:
         """Distance to the floor and of the arm to itself at poses q (N, n).
 
@@ -74,18 +66,30 @@ class CapsuleArm:
             q: (N, n) [rad].
             floor: height of the floor in the base's frame [m]; None: there is none.
         """
-        a, b = self.axes(q)
-        N, rows = len(a), np.arange(len(a))
-        height = np.minimum(a[..., 2], b[..., 2]) - self.radius - (0.0 if floor is None else floor)
-        height[:, (self.link < 2) | (floor is None)] = np.inf  # the base, and what only turns on it, stand on the floor
-        lowest = np.argmin(height, axis=1)
-        if len(self.pairs) == 0:
-            none = np.full(N, np.inf)
-            return Clearance(height[rows, lowest], lowest, none, np.zeros(N, dtype=int))
-        i, j = self.pairs.T
-        apart = segment_distance(a[:, i], b[:, i], a[:, j], b[:, j]) - self.radius[i] - self.radius[j]
-        closest = np.argmin(apart, axis=1)
-        return Clearance(height[rows, lowest], lowest, apart[rows, closest], closest)
+        poses = np.atleast_2d(np.asarray(q, dtype=float))
+        apart, pair = self._itself(poses)
+        if floor is None:
+            return Clearance(np.full(len(poses), np.inf), np.zeros(len(poses), dtype=int), apart, pair)
+        height, lowest = self._ground(poses)
+        return Clearance(height - floor, self._above[lowest] if len(self._above) else lowest, apart, pair)
+
+    @cached_property
+    def _capsules(self) -> list[Capsule]:
+        parts = zip(self.link.tolist(), self.start.tolist(), self.end.tolist(), self.radius.tolist(), strict=True)
+        return [Capsule(link, tuple(start), tuple(end), radius) for link, start, end, radius in parts]
+
+    @cached_property
+    def _itself(self) -> NearestCapsules:
+        return NearestCapsules(self.arm, self._capsules, [(int(i), int(j)) for i, j in self.pairs])
+
+    @cached_property
+    def _above(self) -> NDArray[np.int64]:
+        """Which capsules may hit the floor: the base, and what only turns on it, stand on it."""
+        return np.flatnonzero(self.link >= 2)
+
+    @cached_property
+    def _ground(self) -> NearestCapsules:
+        return NearestCapsules(self.arm, self._capsules, [(int(part), -1) for part in self._above])
 
 
 def capsule_arm(arm: Arm, payload_radius: float = PAYLOAD_RADIUS) -> CapsuleArm:
@@ -148,36 +152,6 @@ def _measured(origins: NDArray[np.float64]) -> tuple[Capsule, ...] | None:
 @cache
 def _origins_of(name: str) -> NDArray[np.float64]:
     return _joint_origins(arm(name))
-
-
-def segment_distance(a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> NDArray[np.float64]:
-    """Distance between the segments ab and cd; points (..., 3) [m], result (...).
-
-    The nearest points are either inside both segments, where the connecting line is perpendicular to both, or one of
-    them is an end point: the smallest of these five candidates.
-
-    >>> float(segment_distance([0, 0, 0], [1, 0, 0], [0.5, -1, 2], [0.5, 1, 2]))
-    2.0
-    """
-    a, b, c, d = (np.asarray(x, dtype=float) for x in (a, b, c, d))
-    u, v, w = b - a, d - c, a - c
-    uu, uv, vv, uw, vw = (np.sum(x * y, axis=-1) for x, y in ((u, u), (u, v), (v, v), (u, w), (v, w)))
-    determinant = uu * vv - uv**2
-    crossing = determinant > 1e-12 * np.maximum(uu * vv, 1e-300)  # not parallel, neither of them a point
-    safe = np.where(crossing, determinant, 1.0)
-    s, t = (uv * vw - vv * uw) / safe, (uu * vw - uv * uw) / safe
-    inside = crossing & (s >= 0) & (s <= 1) & (t >= 0) & (t <= 1)
-    between = np.linalg.norm(w + s[..., None] * u - t[..., None] * v, axis=-1)
-    ends = [_point_distance(a, c, d), _point_distance(b, c, d), _point_distance(c, a, b), _point_distance(d, a, b)]
-    return np.minimum.reduce([np.where(inside, between, np.inf), *ends])
-
-
-def _point_distance(p: NDArray, a: NDArray, b: NDArray) -> NDArray[np.float64]:
-    """Distance of the point p to the segment ab."""
-    u, w = b - a, p - a
-    uu = np.sum(u * u, axis=-1)
-    s = np.clip(np.sum(u * w, axis=-1) / np.where(uu > 0, uu, 1.0), 0.0, 1.0)
-    return np.linalg.norm(w - s[..., None] * u, axis=-1)
 
 
 def _joint_origins(arm: Arm) -> NDArray[np.float64]:
