@@ -22,15 +22,15 @@ from armload.app.page import (
 )
 from armload.app.page.curves import GROUPS, data_of, series_of
 from armload.app.page.download import ENDINGS, file_of
-from armload.app.page.page import Page, methods_for
-from armload.app.page.recent import Recent
-from armload.app.page.shapes import (
+from armload.app.page.drawing import (
     arm_parts,
     capsule,
     drum,
     edges,
     frame_poses,
 )
+from armload.app.page.page import Page, methods_for
+from armload.app.page.recent import Recent
 from armload.app.page.tables import (
     com_std,
     events,

@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from armload.ensembles.bag import Learner, draw_bag
 from armload.ensembles.network import NetworkLearner
 from armload.ensembles.progress import Report, reporter
 from armload.ensembles.tree import TreeLearner
+from armload.ensembles.weak_learner import Learner, draw_bag
 from armload.errors import ModelError
 
 KINDS: dict[str, type[Learner]] = {"tree": TreeLearner, "network": NetworkLearner}

@@ -9,8 +9,8 @@ from armload.arms import Arm, Limits, facts_of
 from armload.errors import MotionError
 from armload.motion.check import check_motion, rated_load
 from armload.motion.collision import CapsuleArm, capsule_arm
-from armload.motion.files import shipped_motion
 from armload.motion.fourier import FourierMotion
+from armload.motion.motion_file import shipped_motion
 
 _SPEED = 1.5  # [rad/s] velocity limit of an arm whose maker gives none
 _TO_SPEED = 0.25  # [s] in which it reaches its velocity limit, where no acceleration limit is given
