@@ -11,6 +11,7 @@ from time import sleep
 
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 from armload.app.cli import lines, main
 from armload.app.page import (
@@ -29,15 +30,15 @@ from armload.app.page.curves import (
     series_of,
 )
 from armload.app.page.download import ENDINGS, file_of
-from armload.app.page.page import Page, methods_for
-from armload.app.page.recent import Recent
-from armload.app.page.shapes import (
+from armload.app.page.drawing import (
     arm_parts,
     capsule,
     drum,
     edges,
     frame_poses,
 )
+from armload.app.page.page import Page, methods_for
+from armload.app.page.recent import Recent
 from armload.app.page.tables import (
     com_std,
     events,
@@ -626,7 +627,6 @@ def test_methods_offered_are_those_that_work_here(held, panda):
     for name in names:
         OnlineIdentifier(panda, None, name).close()
     assert "difference" not in names  # needs a tare
-    assert "svr" not in names
 
 
 # ---------------------------------------------------------------------- shapes
@@ -663,18 +663,18 @@ def test_links_reach_from_joint_to_joint_and_drums_stay_where_their_joint_turns(
     parts = arm_parts(any_arm)
     assert {part.frame for part in parts if part.kind == "joint"} == set(range(any_arm.n + 1))
     for part in parts:
-        first, last = p[part.frame] + part.mesh.vertices[-2:] @ R[part.frame].T  # the two poles
+        corners = p[part.frame] + part.mesh.vertices @ R[part.frame].T
         if part.kind == "link":
-            along = (last - first) / np.linalg.norm(last - first)
-            beyond = np.linalg.norm(last - first) - np.linalg.norm(p[part.frame + 1] - p[part.frame])
-            assert np.allclose(first + 0.5 * beyond * along, p[part.frame])
-            assert np.allclose(last - 0.5 * beyond * along, p[part.frame + 1])
+            along = p[part.frame + 1] - p[part.frame]
+            share = np.clip((corners - p[part.frame]) @ along / (along @ along), 0.0, 1.0)
+            away = np.linalg.norm(corners - p[part.frame] - share[:, None] * along, axis=1)
+            assert np.allclose(away, away[0])  # a capsule about the line from this joint to the next
         elif part.frame:
             turned = q.copy()
-            turned[part.frame - 1] += 0.7
+            turned[part.frame - 1] += 2 * np.pi * 5 / 32  # by five of its 32 sides it turns into itself
             R_after, p_after = frame_poses(any_arm, turned)
-            after = p_after[part.frame] + part.mesh.vertices[-2:] @ R_after[part.frame].T
-            assert np.allclose(after, [first, last])
+            after = p_after[part.frame] + part.mesh.vertices @ R_after[part.frame].T
+            assert np.allclose(KDTree(corners).query(after)[0], 0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -15,10 +15,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from armload.arms import arm
+from armload.arms import ARMS, arm
 from armload.devices import FrankaSource, Load, open_source
 from armload.devices.franka import writer as franka_robot
-from armload.devices.ur.source import TORQUE_CONSTANTS
 from armload.errors import SourceError
 from armload.inertia import InertialParameters, to_order
 from armload.motion import random_motion, taie2024
@@ -305,7 +304,7 @@ def test_a_ur_arm_gives_positions_velocities_and_currents_as_torque(address, tmp
     pytest.importorskip("rtde_receive", reason="ur-rtde has no wheel for this Python")
     robot = arm("ur10e")
     run = simulate(robot, random_motion(robot, 1), heavy_payload(), rate=500.0, duration=2.2)
-    constants = np.array(TORQUE_CONSTANTS["ur10e"])
+    constants = np.array(ARMS["ur10e"].torque_constants)
     t = 100.0 + run.t
     log = {"timestamp": t, "actual_q": run.q, "actual_qd": run.dq, "actual_current": run.tau / constants}
     with serving("ur_server", log, address, tmp_path) as (_, events):

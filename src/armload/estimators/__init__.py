@@ -1,7 +1,7 @@
 """The contract of every identifier, and the classic methods, one file each."""
 
 from armload.estimators.acceleration import CommandedLeastSquares, PolynomialLeastSquares
-from armload.estimators.consistent import ConsistentLeastSquares, LogCholeskyLeastSquares
+from armload.estimators.constrained import ConsistentLeastSquares, LogCholeskyLeastSquares
 from armload.estimators.contract import ArmMismatch, Estimate, Identifier, Tared, samples_until
 from armload.estimators.difference import DifferenceLeastSquares
 from armload.estimators.joint import JointLeastSquares

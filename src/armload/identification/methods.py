@@ -297,16 +297,6 @@ _CATALOGUE = (
         build=_trained("mixed"),
         needs="training",
     ),
-    Method(
-        "svr",
-        "bagged support-vector machines with a Gaussian kernel",
-        "as network, with a few thousand rows and minutes of training",
-        "Vapnik 1995; Smola & Schölkopf, Statistics and Computing 2004",
-        tare="none",
-        prior=True,
-        build=_trained("svr"),
-        needs="training",
-    ),
 )
 METHODS: dict[str, Method] = {method.name: method for method in _CATALOGUE}
 DEFAULT = "hybrid"

@@ -1,9 +1,9 @@
 """Recordings: what a robot's joints did, the files they come in, and whether they can be believed."""
 
 from armload.recording.alignment import Alignment, same_motion
+from armload.recording.copies import check_own_measurements, shared_samples
 from armload.recording.files import has_topics, read_recording, write_recording
 from armload.recording.recording import CHANNELS, GAP, Recording, Sample
-from armload.recording.copies import check_own_measurements, shared_samples
 
 __all__ = [
     "CHANNELS",

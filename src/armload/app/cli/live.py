@@ -34,7 +34,7 @@ examples:
 The page is for this machine only (http://127.0.0.1:8080) unless --host says otherwise: whoever can open it can read
 everything on it, switch the method and tare. Nothing is written to the robot.
 """
-_ROBOTS = {"sim": "panda", "fr3": "fr3", "panda": "panda"}  # whose arm is plain from the source
+_SIMULATED = "panda"
 
 
 def _speed(text: str) -> float | None:
@@ -168,7 +168,12 @@ def _serve(session, options: argparse.Namespace) -> int | None:
 
 def _robot_of(source: str) -> str:
     """The robot where --robot does not name one."""
-    kind = urlsplit(source).scheme if "://" in source else source
-    if kind not in _ROBOTS:
-        raise UsageError(f"{source}: name the robot with --robot, such as --robot panda")
-    return _ROBOTS[kind]
+    from armload.arms import ARMS
+
+    if source == "sim":
+        return _SIMULATED
+    scheme = urlsplit(source).scheme if "://" in source else None
+    speaking = [name for name, facts in ARMS.items() if scheme is not None and facts.scheme == scheme]
+    if len(speaking) != 1:
+        raise UsageError(f"{source}: name the robot with --robot, such as --robot {_SIMULATED}")
+    return speaking[0]

@@ -7,8 +7,8 @@ from html import escape
 
 import numpy as np
 
+from armload.app.page.drawing import CHI2_95, com_region
 from armload.app.page.session import Entry
-from armload.app.page.shapes import CHI2_95, com_region
 from armload.inertia import NAMES, UNITS, Z95, InertialParameters
 from armload.online import OnlineEstimate
 from armload.online.listening import UNUSED

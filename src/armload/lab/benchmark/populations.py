@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from armload.arms import Arm
+from armload.arms import Arm, rated_mass
 from armload.errors import ArmError
 from armload.inertia import InertialParameters
 from armload.lab.cells import key_of
@@ -21,7 +21,6 @@ from armload.lab.episodes import (
 )
 from armload.payloads import draw_payload
 from armload.regression import GaussianPrior
-from armload.simulation import rated_mass
 
 REPEAT = "repeat"
 _PAYLOADS = 400  # that the baselines are told of

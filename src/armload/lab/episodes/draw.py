@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm
+from armload.arms import Arm, rated_mass
 from armload.errors import ArmError
 from armload.lab.episodes.episode import Episode
 from armload.lab.episodes.motions import MotionSource
@@ -23,7 +23,6 @@ from armload.simulation import (
     Gains,
     Sensors,
     World,
-    rated_mass,
 )
 
 POOL = 200  # motions drawn for one seed; beyond, they are used again

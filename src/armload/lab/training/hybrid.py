@@ -11,7 +11,7 @@ from platform import python_version
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm, kinship
+from armload.arms import Arm, kinship, rated_mass
 from armload.errors import ModelError
 from armload.lab.cells import key_of
 from armload.lab.episodes import (
@@ -27,7 +27,6 @@ from armload.lab.training.records import TIMES, Records, measure_episodes
 from armload.payloads import draw_payload
 from armload.posterior import TRAITS, HybridModel, MixturePrior, Training
 from armload.regression import payload_prior_std
-from armload.simulation import rated_mass
 from armload.version import __version__
 
 EPISODES = 2400
