@@ -227,7 +227,7 @@ def test_python_and_the_command_line_write_the_same_model(call, small, coverage,
     monkeypatch.setattr(training, "episode_records", lambda *_: None)
     monkeypatch.setattr(training, "payload_mixture", lambda *_: learned.prior)
     monkeypatch.setattr(training, "cross_validated", lambda *_: coverage)
-    monkeypatch.setattr(training.Calibration, "fit", lambda *_, **__: learned.calibration)
+    monkeypatch.setattr(training, "fit_calibration", lambda *_, **__: learned.calibration)
     asked = tmp_path / "asked.safetensors"
     argv = ("--robot", small / "two.urdf", "--episodes", "40", "--seed", "3", "--work", tmp_path / "work")
     call("train", *argv, "--out", asked, "--report", tmp_path / "report.json")

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from armload.app.cli import lines, main
+from armload.app.cli import main
+from armload.app.cli.headless import lines
 from armload.app.page import (
     History,
     Session,

@@ -13,7 +13,6 @@ from armload.inertia import InertialParameters, is_consistent
 from armload.motion import FourierMotion, taie2024
 from armload.posterior import PosteriorLeastSquares
 from armload.regression import FilteredRegression, first_order_lag
-from armload.regression.filtered import Lag, filtered_regressor
 from armload.simulation import (
     Command,
     Friction,
@@ -289,7 +288,8 @@ def test_residual_lies_outside_the_span_of_links_and_offsets(panda):
     q = hold(panda).offset + 0.7 * np.sin(t[:, None] * (1.0 + 0.17 * joints) + joints)
     dq = 0.7 * (1.0 + 0.17 * joints) * np.cos(t[:, None] * (1.0 + 0.17 * joints) + joints)
     Y = full_arm_regressor(panda, q, dq)
-    W = filtered_regressor(t, Y.momentum, Y.drift, Lag(20.0))
+    momentum = 20.0 * Y.momentum
+    W = momentum + first_order_lag(t, Y.drift - momentum, 20.0, initial=-momentum[0])
     A = np.concatenate([W, np.tile(np.eye(7), (len(t), 1, 1))], axis=2).reshape(-1, 77)
     for seed in range(3):
         residual = World.real_like(panda, seed).residual(q)

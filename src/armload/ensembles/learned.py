@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -44,8 +42,7 @@ class LearnedIdentifier(Identifier):
         self.model, self.arm, self.single, self.any_motion = model, arm, single, any_motion
         self.name = f"{model.kind} ensemble" + (", single sample" if single else "")
         # what did not vary in training is not known exactly for that
-        self._family_std = np.maximum(model.phi_std, SMALL / Z95)
-        self.payload_prior = (model.phi_mean, self._family_std)
+        self.payload_prior = (model.phi_mean, np.maximum(model.phi_std, SMALL / Z95))
         self._own = np.zeros(10) if model.error_std is None else model.error_std**2  # variance beside the members'
         if model.error_std is None and model.compiled.n_members == 1:
             self._own = np.full(10, np.inf)
@@ -63,21 +60,12 @@ class LearnedIdentifier(Identifier):
         self._follow(*sample)
         return self._last
 
-    def conclude(self) -> Estimate:
-        """The last estimate; with the spread of the training's payloads where the error on held-out ones is unknown.
-
-        How far the members disagree is no error bar.
-        """
-        if self.model.error_std is not None:
-            return self._last
-        return replace(self._last, covariance=np.diag(self._family_std**2))
-
     def _take(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
         for sample in zip(t.tolist(), q, dq, tau, strict=True):
             self._follow(*sample)
 
     def _estimate(self, t: float) -> Estimate:  # noqa: ARG002
-        return self.conclude()
+        return self._last
 
     def _follow(self, t: float, q: NDArray, dq: NDArray, tau: NDArray) -> None:
         if self._start is None:

@@ -19,13 +19,16 @@ LIVE = tuple(name for name, method in METHODS.items() if method.needs not in ("t
 class Choice:
     """A method made ready for an arm.
 
-    identifier: it has seen nothing of the run yet. prior: whether it starts from a prior on the payload.
-    why: why this one, in a sentence.
+    name: of the method. identifier: it has seen nothing of the run yet.
+    prior: whether it starts from a prior on the payload. why: why this one, in a sentence.
+    error_known: whether its covariance says how large its errors are: how far an ensemble's members disagree does not.
     """
 
+    name: str
     identifier: Identifier
     prior: bool
     why: str
+    error_known: bool = True
 
 
 def choose(arm: Arm, tare: Recording | None = None, method: str | Path | None = None, *, live: bool = False) -> Choice:
@@ -50,7 +53,7 @@ def choose(arm: Arm, tare: Recording | None = None, method: str | Path | None = 
         why = f"{name} holds for any motion and payload" if method is None else "asked for"
         if method is None and tare is None:
             why += "; without a tare the error bars allow for the model's errors"
-        return Choice(entry.make(arm, tare), entry.prior, why)
+        return Choice(name, entry.make(arm, tare), entry.prior, why)
     return _trained(arm, tare, model_file(name, LIVE if live else tuple(METHODS)))
 
 
@@ -59,7 +62,7 @@ def _trained(arm: Arm, tare: Recording | None, file: Path) -> Choice:
 
     if HybridModel.wrote(file):
         made = HybridIdentifier(arm, tare, HybridModel.load(file))
-        return Choice(made, True, f"asked for; {file} was trained for this arm")
+        return Choice(made.name, made, True, f"asked for; {file} was trained for this arm")
     from armload.ensembles import LearnedIdentifier, load_model
 
     model = load_model(file)
@@ -68,4 +71,5 @@ def _trained(arm: Arm, tare: Recording | None, file: Path) -> Choice:
             f"the trained model {file} cannot use a tare (an empty arm lies outside its training): leave the tare "
             "out, or use the method map"
         )
-    return Choice(LearnedIdentifier(model, arm), True, f"asked for; {file} was trained on this arm and motion")
+    why = f"asked for; {file} was trained on this arm and motion"
+    return Choice(model.kind, LearnedIdentifier(model, arm), True, why, error_known=model.error_std is not None)

@@ -174,6 +174,8 @@ def _found(choice: Choice, arm: Arm, recording: Recording) -> _Found:
     identifier = choice.identifier
     estimate = identifier.run(recording)
     mean, std = identifier.payload_prior or (np.zeros(10), payload_prior_std(arm))
+    if not choice.error_known:
+        estimate = replace(estimate, covariance=np.diag(std**2))
     mismatch = identifier.mismatch
     # where the payload prior is learned, so are error bars that allow for friction
     unknown = identifier.payload_prior is None and not arm.motor_torque
@@ -182,7 +184,7 @@ def _found(choice: Choice, arm: Arm, recording: Recording) -> _Found:
         before=mean,
         before_std=std,
         prior=choice.prior,
-        method=identifier.name,
+        method=choice.name,
         why=choice.why,
         calibrated=identifier.calibrated,
         weak_std=identifier.weak_std,

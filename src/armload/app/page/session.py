@@ -127,7 +127,7 @@ class Session:
         if self._plausibility.look_at_last(self._recent):
             self._doubted()
         if self.estimate is not None:
-            self.estimate = self._plausibility.qualified(self._identifier.conclude())
+            self.estimate = self._plausibility.qualified(self._identifier.conclude()).behind(self.source.lag())
         self._say("the source has ended")
         self.ended = True
 
