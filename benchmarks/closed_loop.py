@@ -26,12 +26,7 @@ from armload.motion import Motion, random_motion
 from armload.posterior import HybridIdentifier
 from armload.recording import Recording
 from armload.regression import FilteredRegression
-from armload.simulation import (
-    JointImpedance,
-    Sensors,
-    World,
-    torque_controlled,
-)
+from armload.simulation import JointImpedance, Sensors, World, torque_controlled
 
 RESULT = ROOT / "benchmarks" / "results" / "closed_loop.json"
 FIGURE = ROOT / "docs" / "pictures" / "closed_loop.png"

@@ -25,12 +25,7 @@ from study_of_arms import ROOT, write_table
 
 from armload import Arm, arm
 from armload.app.cli.printing import console
-from armload.app.cli.train_hybrid import (
-    cells_table,
-    episodes_shown,
-    summary,
-    versions,
-)
+from armload.app.cli.train_hybrid import cells_table, episodes_shown, summary, versions
 from armload.atomic import replacing
 from armload.lab.training import Records
 from armload.lab.training.calibrating import nearest

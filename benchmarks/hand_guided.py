@@ -34,13 +34,7 @@ from armload.inertia import InertialParameters
 from armload.lab.report.style import COLOURS, look, new_figure
 from armload.motion import FourierMotion, Motion, random_motion
 from armload.recording import Recording
-from armload.simulation import (
-    GravityCompensation,
-    JointImpedance,
-    Sensors,
-    World,
-    torque_controlled,
-)
+from armload.simulation import GravityCompensation, JointImpedance, Sensors, World, torque_controlled
 
 RESULT = ROOT / "benchmarks" / "results" / "hand_guided.json"
 FIGURE = ROOT / "docs" / "pictures" / "hand_guided.png"

@@ -30,12 +30,7 @@ from threadpoolctl import threadpool_limits
 
 from armload import Arm, Recording, __version__, arm
 from armload.inertia import Z95
-from armload.lab.episodes import (
-    Episode,
-    Recipe,
-    draw_episodes,
-    simulate_episodes,
-)
+from armload.lab.episodes import Episode, Recipe, draw_episodes, simulate_episodes
 from armload.posterior import HybridIdentifier, HybridModel, shipped_model
 from armload.posterior.model_file import POOLED
 

@@ -42,12 +42,7 @@ from threadpoolctl import threadpool_limits
 from armload import Recording, __version__, arm
 from armload.arms import Arm
 from armload.devices import Replay, Simulator
-from armload.ensembles import (
-    BaggingEnsemble,
-    LearnedIdentifier,
-    NetworkLearner,
-    save_model,
-)
+from armload.ensembles import BaggingEnsemble, LearnedIdentifier, NetworkLearner, save_model
 from armload.inertia import InertialParameters
 from armload.motion import random_motion
 from armload.online import OnlineIdentifier

@@ -17,22 +17,12 @@ import numpy as np
 
 from armload import FilteredRecursiveLeastSquares, PosteriorLeastSquares, RecursiveLeastSquares, __version__, arm
 from armload.inertia import NAMES, InertialParameters
-from armload.lab.evaluation import (
-    Comparison,
-    EvaluationRun,
-    Table,
-    compare,
-)
+from armload.lab.evaluation import Comparison, EvaluationRun, Table, compare
 from armload.motion import random_motion
 from armload.payloads import random_payloads
 from armload.posterior import HybridIdentifier, SmoothPosteriorLeastSquares
 from armload.regression import GaussianPrior
-from armload.simulation import (
-    Run,
-    Sensors,
-    World,
-    simulate_many,
-)
+from armload.simulation import Run, Sensors, World, simulate_many
 
 HERE = Path(__file__).resolve().parent
 TIMES = (0.5, 1.0, 3.0, 6.0)  # [s]

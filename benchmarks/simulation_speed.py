@@ -18,12 +18,7 @@ import mujoco
 from armload.arms import arm
 from armload.motion import taie2024
 from armload.payloads import container_loadings
-from armload.simulation import (
-    Run,
-    Sensors,
-    World,
-    simulate_many,
-)
+from armload.simulation import Run, Sensors, World, simulate_many
 
 RATE = 3244 / 6  # [Hz] the paper's rows per run over its period
 

@@ -10,35 +10,15 @@ from armload.errors import ArmloadError, IdentificationError
 from armload.estimators import Estimate, Identifier
 from armload.identification import METHODS
 from armload.lab import load_cells
-from armload.lab.benchmark import (
-    ALL,
-    QUICK,
-    Size,
-    default_names,
-    gather,
-    left_out,
-    run_benchmark,
-    write_results,
-)
+from armload.lab.benchmark import ALL, QUICK, Size, default_names, gather, left_out, run_benchmark, write_results
+from armload.lab.benchmark.benchmark_run import cell_name, measure
+from armload.lab.benchmark.benchmark_tables import AHEAD, group_table, losses_table, repeatability_table
 from armload.lab.benchmark.populations import population, prior_of
-from armload.lab.benchmark.rows import (
-    BASELINES,
-    BOUND,
-    Row,
-    fingerprint,
-    rows_for,
-)
-from armload.lab.benchmark.run import cell_name, measure
-from armload.lab.benchmark.tables import (
-    AHEAD,
-    group_table,
-    losses_table,
-    repeatability_table,
-)
+from armload.lab.benchmark.rows import BASELINES, BOUND, Row, fingerprint, rows_for
 from armload.lab.benchmark.targets import verdicts
 from armload.lab.cells import finished_cell
 from armload.lab.episodes import EpisodeLogs, Recipe, draw_episodes
-from armload.lab.evaluation.table import GROUPS
+from armload.lab.report.shown import GROUPS
 from armload.regression import GaussianPrior
 
 # ---------------------------------------------------------------------------- populations

@@ -11,15 +11,7 @@ from armload.estimators import Estimate, Identifier
 from armload.inertia import InertialParameters
 from armload.lab import load_cells, save_cell
 from armload.lab.evaluation import EvaluationRun
-from armload.lab.study import (
-    FULL,
-    QUICK,
-    Basis,
-    Spec,
-    plan,
-    run_study,
-    write_results,
-)
+from armload.lab.study import FULL, QUICK, Basis, Spec, plan, run_study, write_results
 from armload.lab.study.protocols import measure_learned, measure_stream
 from armload.recording import Recording
 

@@ -27,18 +27,8 @@ from armload.errors import DatasetError
 from armload.estimators import FilteredRecursiveLeastSquares, Identifier, RecursiveLeastSquares
 from armload.identification import METHODS, Identification, default_for, identify
 from armload.inertia import InertialParameters
-from armload.lab.dataset import (
-    Dataset,
-    Split,
-    build_dataset,
-    split_payloads,
-)
-from armload.lab.evaluation import (
-    Comparison,
-    EvaluationRun,
-    Table,
-    compare,
-)
+from armload.lab.dataset import Dataset, Split, build_dataset, split_payloads
+from armload.lab.evaluation import Comparison, EvaluationRun, Table, compare
 from armload.motion import Motion, random_motion, taie2024
 from armload.payloads import container_loadings, test_payload
 from armload.posterior import PosteriorLeastSquares
@@ -47,7 +37,7 @@ from armload.simulation import Sensors, World, simulate
 
 if TYPE_CHECKING:
     from armload.ensembles import BaggingEnsemble, LearnedModel, TwoStage
-    from armload.lab.evaluation.compare import Method
+    from armload.lab.evaluation.contest import Method
 
 HELD_OUT = 0.15  # of the loadings, for validation
 TARE_DURATION, TARE_HARMONICS = 20.0, 10  # [s]
@@ -209,12 +199,7 @@ def _train(
     clock: _Clock,
 ) -> dict[str, Method]:
     """One ensemble of each kind, single-stage and two-stage, saved and read back as a stream identifier."""
-    from armload.ensembles import (
-        BaggingEnsemble,
-        NetworkLearner,
-        TwoStage,
-        save_model,
-    )
+    from armload.ensembles import BaggingEnsemble, NetworkLearner, TwoStage, save_model
     from armload.lab.evaluation import held_out_error
 
     network = NetworkLearner(hidden=size.hidden, max_epochs=size.epochs)

@@ -8,15 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armload.app.cli.arguments import (
-    Parser,
-    add_arm_arguments,
-    arm_of,
-    arm_of_dataset,
-    at_least,
-    file_name,
-    payload_of,
-)
+from armload.app.cli.arguments import Parser, add_arm_arguments, arm_of, arm_of_dataset, at_least, file_name, payload_of
 from armload.app.cli.printing import print_note, print_table, working
 from armload.errors import UsageError
 

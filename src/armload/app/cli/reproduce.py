@@ -54,13 +54,7 @@ def parser() -> Parser:
 
 def run(options: argparse.Namespace) -> None:
     """Measure what is missing, then write the page, the summary and the report."""
-    from armload.lab.study import (
-        FULL,
-        QUICK,
-        Basis,
-        run_study,
-        write_results,
-    )
+    from armload.lab.study import FULL, QUICK, Basis, run_study, write_results
 
     if options.hours is not None and not options.hours >= 0:
         raise UsageError(f"--hours is {options.hours}: expected a number of hours, 0 or more")

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from armload.atomic import replacing
 from armload.errors import ReportError
-from armload.lab.evaluation import Table
+from armload.lab.report.shown import Table
 from armload.lab.report.style import look
 
 if TYPE_CHECKING:

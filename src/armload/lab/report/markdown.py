@@ -7,8 +7,8 @@ from pathlib import Path
 
 from armload.atomic import replacing
 from armload.errors import ReportError
-from armload.lab.evaluation import Table
 from armload.lab.report.html import Section
+from armload.lab.report.shown import Table
 
 
 def write_markdown(path: str | Path, sections: Sequence[Section], title: str, note: str = "") -> Path:

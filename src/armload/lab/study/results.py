@@ -8,7 +8,7 @@ from typing import Any
 
 from armload.atomic import replacing
 from armload.lab.study.claims import evaluate
-from armload.lab.study.page import html_report, summary_json, write_page
+from armload.lab.study.study_page import html_report, summary_json, write_page
 
 
 def write_results(

@@ -6,26 +6,14 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from armload.lab.benchmark import tables
+from armload.lab.benchmark import benchmark_tables as tables
+from armload.lab.benchmark.benchmark_run import Size
+from armload.lab.benchmark.benchmark_tables import Results, subject
 from armload.lab.benchmark.populations import PRIOR, REPEAT
 from armload.lab.benchmark.rows import BOUND, left_out
-from armload.lab.benchmark.run import Size
-from armload.lab.benchmark.tables import Results, subject
-from armload.lab.benchmark.targets import (
-    MISSED,
-    NOT_CLEAR,
-    REACHED,
-    targets_table,
-    verdicts,
-)
-from armload.lab.evaluation import Table
-from armload.lab.evaluation.table import (
-    GROUPS,
-    SHOWN_SCALE,
-    SHOWN_UNITS,
-    short,
-)
+from armload.lab.benchmark.targets import MISSED, NOT_CLEAR, REACHED, targets_table, verdicts
 from armload.lab.report import Section
+from armload.lab.report.shown import GROUPS, SHOWN_SCALE, SHOWN_UNITS, Table, short
 
 if TYPE_CHECKING:
     from armload.lab.report.style import Figure

@@ -17,22 +17,8 @@ from armload.errors import ArmloadError, IdentificationError
 from armload.estimators import Estimate
 from armload.identification import METHODS
 from armload.lab import load_cells, save_cell
-from armload.lab.benchmark.populations import (
-    ALL,
-    REPEAT,
-    Population,
-    population,
-    prior_of,
-)
-from armload.lab.benchmark.rows import (
-    BOUND,
-    Row,
-    bound_std,
-    default_names,
-    fingerprint,
-    rows_for,
-    trained_on,
-)
+from armload.lab.benchmark.populations import ALL, REPEAT, Population, population, prior_of
+from armload.lab.benchmark.rows import BOUND, Row, bound_std, default_names, fingerprint, rows_for, trained_on
 from armload.lab.cells import finished_cell, key_of
 from armload.lab.episodes import Episode, EpisodeLogs, simulate_episodes
 

@@ -17,9 +17,9 @@ from armload.lab import load_cells, save_cell
 from armload.lab.dataset import Split, split_payloads, split_rows
 from armload.lab.evaluation import EvaluationRun, PriorLeastSquares, mean_absolute_error
 from armload.lab.study.basis import Basis, Size
-from armload.lab.study.cells import Spec
 from armload.lab.study.plan import plan
 from armload.lab.study.protocols import measure_learned, measure_stream
+from armload.lab.study.spec import Spec
 from armload.posterior import PosteriorLeastSquares
 from armload.regression import GaussianPrior
 
@@ -134,13 +134,7 @@ def _learned(spec: Spec, basis: Basis, progress: bool) -> dict[str, Any]:
 
 
 def _untrained(spec: Spec) -> BaggingEnsemble | TwoStage | MixedEnsemble:
-    from armload.ensembles import (
-        BaggingEnsemble,
-        MixedEnsemble,
-        NetworkLearner,
-        TreeLearner,
-        TwoStage,
-    )
+    from armload.ensembles import BaggingEnsemble, MixedEnsemble, NetworkLearner, TreeLearner, TwoStage
 
     network = NetworkLearner(
         hidden=spec.hidden, batch=spec.batch, max_epochs=spec.max_epochs, learning_rate=spec.learning_rate

@@ -8,28 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armload.inertia import NAMES
-from armload.lab.evaluation.table import GROUPS, SHOWN_SCALE, SHOWN_UNITS
-from armload.lab.report.style import (
-    COLOURS,
-    TRUTH,
-    look,
-    new_figure,
-)
-from armload.lab.study.counterparts import (
-    benchmark_rows,
-    curves,
-    real_rows,
-    training_rows,
-)
+from armload.lab.report.shown import GROUPS, SHOWN_SCALE, SHOWN_UNITS
+from armload.lab.report.style import COLOURS, TRUTH, look, new_figure
+from armload.lab.study.counterparts import benchmark_rows, curves, real_rows, training_rows
 from armload.lab.study.numbers import Cells
-from armload.lab.study.tables import (
-    BASELINES,
-    LEARNERS,
-    LEAST_SQUARES,
-    TRAINING_MEAN,
-    Row,
-    ensemble_shown,
-)
+from armload.lab.study.study_tables import BASELINES, LEARNERS, LEAST_SQUARES, TRAINING_MEAN, Row, ensemble_shown
 
 if TYPE_CHECKING:
     from armload.lab.report.style import Figure

@@ -7,19 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from armload.inertia import NAMES
-from armload.lab.evaluation import Comparison, half_width
-from armload.lab.evaluation.table import GROUPS, SHOWN_SCALE, SHOWN_UNITS
-from armload.lab.report.style import (
-    TRUTH,
-    look,
-    method_styles,
-    new_figure,
-)
+from armload.inertia import NAMES, Z95
+from armload.lab.report.shown import GROUPS, SHOWN_SCALE, SHOWN_UNITS
+from armload.lab.report.style import TRUTH, look, method_styles, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from armload.lab.evaluation import Comparison
 
 _TITLES = ("mass", "first moment", "inertia about the frame's origin")
 _LOG_FROM = 30.0  # ratio of largest to smallest error from which an axis becomes logarithmic
@@ -65,8 +61,8 @@ def error_bars(comparison: Comparison, at: int = -1) -> Figure:
     return figure
 
 
-def estimates(comparison: Comparison, run: int = 0, level: float = 0.95) -> Figure:
-    """Estimates of one run at the end, with the methods' own intervals, beside the truth."""
+def estimates(comparison: Comparison, run: int = 0) -> Figure:
+    """Estimates of one run at the end, with the methods' own 95 % intervals, beside the truth."""
     styles = method_styles(comparison)
     with look():
         figure, axes = _three_axes()
@@ -77,7 +73,7 @@ def estimates(comparison: Comparison, run: int = 0, level: float = 0.95) -> Figu
             ax.hlines(truth, places - 0.45, places + 0.45, color=TRUTH, linewidth=1.6, label="truth", zorder=3)
             for m, name in enumerate(comparison.methods):
                 phi = SHOWN_SCALE * comparison.phi[m, run, -1, part]
-                half = SHOWN_SCALE * half_width(comparison.std[m, run, -1, part], level)
+                half = SHOWN_SCALE * Z95 * comparison.std[m, run, -1, part]
                 ax.errorbar(
                     places + (m - 0.5 * (count - 1)) * 0.8 / count,
                     phi,

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from armload.lab.benchmark.benchmark_tables import Results, row_names
 from armload.lab.benchmark.measured import Measured
-from armload.lab.benchmark.tables import Results, row_names
-from armload.lab.evaluation.table import GROUPS, SHOWN_SCALE, SHOWN_UNITS
+from armload.lab.report.shown import GROUPS, SHOWN_SCALE, SHOWN_UNITS
 from armload.lab.report.style import look, new_figure, styles_of
 
 if TYPE_CHECKING:

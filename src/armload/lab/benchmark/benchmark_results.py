@@ -13,20 +13,15 @@ from numpy.typing import NDArray
 from armload.atomic import replacing
 from armload.errors import ReportError
 from armload.inertia import NAMES, UNITS
-from armload.lab.benchmark.figures import figures
+from armload.lab.benchmark.benchmark_page import COMMAND, PAIRS, TITLE, sections
+from armload.lab.benchmark.benchmark_run import Size
+from armload.lab.benchmark.benchmark_tables import Results
 from armload.lab.benchmark.measured import Measured, gather
-from armload.lab.benchmark.page import (
-    COMMAND,
-    PAIRS,
-    TITLE,
-    sections,
-)
+from armload.lab.benchmark.population_figures import figures
 from armload.lab.benchmark.populations import REPEAT
-from armload.lab.benchmark.run import Size
-from armload.lab.benchmark.tables import Results
 from armload.lab.benchmark.targets import verdicts
-from armload.lab.evaluation.table import GROUPS
 from armload.lab.report import write_markdown, write_report
+from armload.lab.report.shown import GROUPS
 
 _DIGITS = 4
 
