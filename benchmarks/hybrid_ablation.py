@@ -8,13 +8,13 @@ episodes; se is the standard error over the folds. Writes benchmarks/results/hyb
 
 from __future__ import annotations
 
-import argparse
 import json
 from pathlib import Path
 
 import numpy as np
+from script import options, say, write
 
-from armload import __version__, arm
+from armload import arm
 from armload.inertia import Z95
 from armload.lab.training import payload_mixture
 from armload.lab.training.calibrating import fit_calibration, nearest
@@ -22,7 +22,6 @@ from armload.lab.training.hybrid import EPISODES, FOLDS, episode_records
 from armload.lab.training.records import TIMES
 from armload.posterior import MixturePrior
 
-RESULTS = Path(__file__).parent / "results" / "hybrid_ablation.json"
 SHOWN = (0.1, 1.0, 6.0)  # [s]
 GROUPS = {"mass_g": slice(0, 1), "first_moment_g_m": slice(1, 4), "inertia_g_m2": slice(4, 10)}
 
@@ -37,13 +36,9 @@ def gaussian(prior: MixturePrior) -> MixturePrior:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--work", type=Path, default=Path("out/hybrid-panda"))
-    parser.add_argument("--episodes", type=int, default=EPISODES)
-    parser.add_argument("--jobs", type=int, default=1)
-    options = parser.parse_args()
+    asked = options(__doc__, work=Path("out/hybrid-panda"), episodes=EPISODES, jobs=1)
     panda = arm("panda")
-    records = episode_records(panda, episodes=options.episodes, folder=options.work, jobs=options.jobs)
+    records = episode_records(panda, episodes=asked.episodes, folder=asked.work, jobs=asked.jobs)
     prior = payload_mixture(panda)
     rows = {
         "predict the training mean": None,
@@ -88,10 +83,8 @@ def main() -> None:
                     line[f"{group}_half_width"] = round(1e3 * float(h.mean()), 3)
                     line[f"{group}_inside"] = round(float(np.mean(e <= h)), 4)
                 out.append(line)
-                print(json.dumps(line), flush=True)
-    command = f"python benchmarks/hybrid_ablation.py --episodes {options.episodes}"
-    report = {"command": command, "version": __version__, "seed": 0, "folds": FOLDS, "rows": out}
-    RESULTS.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+                say(json.dumps(line))
+    write("hybrid_ablation", {"seed": 0, "folds": FOLDS, "rows": out})
 
 
 if __name__ == "__main__":

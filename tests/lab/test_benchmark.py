@@ -1,6 +1,7 @@
 """The benchmark: what takes part where, cells that are measured once, numbers with known answers, what is written."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -311,14 +312,15 @@ def test_the_files_say_the_same_as_the_cells(finished):
 
 
 def test_nothing_finished_is_nothing_written(tmp_path):
-    cells = run_benchmark(QUICK, tmp_path / "cells", until=-1.0)
+    size = replace(QUICK, populations=("untared",), methods=("rls-filter",))
+    cells = run_benchmark(size, tmp_path / "cells", until=-1.0)
     assert cells == {}
     with pytest.raises(ArmloadError, match="nothing is measured"):
-        write_results(cells, QUICK, tmp_path / "a.json", tmp_path / "a.md", tmp_path / "a.html")
+        write_results(cells, size, tmp_path / "a.json", tmp_path / "a.md", tmp_path / "a.html")
     assert not (tmp_path / "a.json").exists()
 
 
 def test_the_prior_is_the_same_every_time(panda):
-    first, second = (prior_of(ALL["shapes"].recipe, panda) for _ in range(2))
+    first, second = (prior_of.__wrapped__(ALL["shapes"].recipe, panda) for _ in range(2))
     assert isinstance(first, GaussianPrior)
     np.testing.assert_array_equal(first.covariance, second.covariance)

@@ -151,7 +151,7 @@ def test_training_sees_nothing_of_the_odd_payloads():
 
 
 def test_broad_holds_every_kind_of_episode(panda):
-    drawn = draw_episodes(panda, "broad", 150, seed=0, motions=20)
+    drawn = draw_episodes(panda, "broad", 150, seed=0, motions=6)
     assert {e.world.name for e in drawn} == {"real-like", "beyond", "beyond, motor side"}
     assert {e.payload.name.split()[0] for e in drawn} >= {"random", "shapes", "tools", "container", "nothing"}
     assert {e.rate for e in drawn} == {100.0, 200.0, 500.0, 1000.0}

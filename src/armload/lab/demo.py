@@ -10,7 +10,6 @@ This shows the way, not the paper's figures: ten times fewer rows, fewer epochs,
 
 from __future__ import annotations
 
-import json
 import shutil
 import time
 from collections.abc import Callable
@@ -22,13 +21,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from armload.arms import Arm, arm
-from armload.atomic import replacing
 from armload.errors import DatasetError
 from armload.estimators import FilteredRecursiveLeastSquares, Identifier, RecursiveLeastSquares
 from armload.identification import METHODS, Identification, default_for, identify
 from armload.inertia import InertialParameters
 from armload.lab.dataset import Dataset, Split, build_dataset, split_payloads
 from armload.lab.evaluation import Comparison, EvaluationRun, Table, compare
+from armload.lab.experiment import write_json
 from armload.motion import Motion, random_motion, taie2024
 from armload.payloads import container_loadings, test_payload
 from armload.posterior import PosteriorLeastSquares
@@ -44,7 +43,10 @@ TARE_DURATION, TARE_HARMONICS = 20.0, 10  # [s]
 
 
 class Size(NamedTuple):
-    """How much is done: every n-th loading, rows per run, members, hidden units, epochs, rate of the logs [Hz]."""
+    """How much is done.
+
+    Every n-th loading, rows per run, members, hidden units, epochs, rate of the logs [Hz], times compared at.
+    """
 
     every: int
     rows: int
@@ -52,10 +54,11 @@ class Size(NamedTuple):
     hidden: int
     epochs: int
     rate: float
+    points: int
 
 
-FULL = Size(every=1, rows=300, members=5, hidden=500, epochs=60, rate=1000.0)
-QUICK = Size(every=7, rows=100, members=2, hidden=64, epochs=8, rate=200.0)
+FULL = Size(every=1, rows=300, members=5, hidden=500, epochs=60, rate=1000.0, points=49)
+QUICK = Size(every=7, rows=100, members=2, hidden=64, epochs=8, rate=200.0, points=9)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,13 +99,39 @@ def run_demo(
     Raises:
         ArmloadError: a file cannot be written.
     """
-    size = QUICK if quick else FULL
-    folder = Path(out)
-    folder.mkdir(parents=True, exist_ok=True)
-    robot, motion = arm("panda"), taie2024()
-    nominal, real, sensors = World.nominal(robot), World.real_like(robot, seed), Sensors.panda(robot)
-    clock = _Clock(say)
+    size, folder, robot, clock = QUICK if quick else FULL, Path(out), arm("panda"), _Clock(say)
+    dataset, split, run, tare, learned = _made(folder, robot, size, seed, progress, clock)
+    clock.start("identifying", f"{test_payload().name} ({test_payload().parameters.mass:.3f} kg), outside the loadings")
+    answer = identify(run, robot, tare=tare)
+    write_json(folder / "identified.json", answer.to_dict())
+    truth = InertialParameters(test_payload().parameters.phi, robot.frame)
+    runs = [EvaluationRun(run, truth, test_payload().name, tare, seed + 1)]
+    training = [dataset.truth(k) for k in np.unique(dataset.run[split.train])]
+    validation = len(np.unique(dataset.run[split.validation]))
+    comparison = compare(
+        _physical(robot) | learned,
+        runs,
+        np.linspace(0.0, run.duration, size.points),
+        training=training,
+        split=f"by payload: {len(training)} loadings for training, {validation} for validation, the test payload is in "
+        f"neither; trained on the nominal arm, tested on a real-like one (seed {seed}); tare on another motion",
+    )
 
+    clock.start("reporting", "tables and figures")
+    table = _table(comparison)
+    report = _report(folder / "report.html", comparison, runs, robot, table)
+    write_json(folder / "comparison.json", comparison.to_dict())
+    clock.stop()
+    return DemoResult(table, comparison, answer, folder, report, clock.seconds)
+
+
+def _made(
+    folder: Path, robot: Arm, size: Size, seed: int, progress: bool, clock: _Clock
+) -> tuple[Dataset, Split, Recording, Recording, dict[str, Method]]:
+    """What is compared: the data set and its split, the run, the tare, the trained ensembles; all in the folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    motion = taie2024()
+    nominal, real, sensors = World.nominal(robot), World.real_like(robot, seed), Sensors.panda(robot)
     loadings = container_loadings()[:: size.every]
     clock.start("simulating", f"{len(loadings)} loadings on {motion.name} and a nominal {robot.name}")
     dataset = _dataset(folder / "dataset", robot, motion, loadings, nominal, sensors, size.rows, seed, progress)
@@ -113,28 +142,7 @@ def run_demo(
 
     split = split_payloads(dataset, seed, (1.0 - HELD_OUT, HELD_OUT, 0.0))
     learned = _train(folder / "models", dataset, split, robot, motion, size, seed, progress, clock)
-
-    clock.start("identifying", f"{test_payload().name} ({test_payload().parameters.mass:.3f} kg), outside the loadings")
-    answer = identify(run, robot, tare=tare)
-    _write_json(folder / "identified.json", answer.to_dict())
-    truth = InertialParameters(test_payload().parameters.phi, robot.frame)
-    runs = [EvaluationRun(run, truth, test_payload().name, tare, seed + 1)]
-    training = [dataset.truth(k) for k in np.unique(dataset.run[split.train])]
-    validation = len(np.unique(dataset.run[split.validation]))
-    comparison = compare(
-        _physical(robot) | learned,
-        runs,
-        training=training,
-        split=f"by payload: {len(training)} loadings for training, {validation} for validation, the test payload is in "
-        f"neither; trained on the nominal arm, tested on a real-like one (seed {seed}); tare on another motion",
-    )
-
-    clock.start("reporting", "tables and figures")
-    table = _table(comparison)
-    report = _report(folder / "report.html", comparison, runs, robot, table)
-    _write_json(folder / "comparison.json", comparison.to_dict())
-    clock.stop()
-    return DemoResult(table, comparison, answer, folder, report, clock.seconds)
+    return dataset, split, run, tare, learned
 
 
 def _dataset(
@@ -273,11 +281,6 @@ def _table(c: Comparison) -> Table:
     note = f"Inertia error: mean of six, about the origin of {c.frame}. {c.conditions}"
     baselines = tuple(1 + c.methods.index(name) for name in c.baselines)
     return Table("An unseen payload, identified after one motion", columns, tuple(rows), note, baselines)
-
-
-def _write_json(path: Path, content: dict) -> None:
-    with replacing(path) as temporary:
-        temporary.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def _millimetres(vector: np.ndarray) -> str:

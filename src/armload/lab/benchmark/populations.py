@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -98,6 +99,7 @@ def population(name: str) -> Population:
     return ALL[name]
 
 
+@cache
 def prior_of(recipe: Recipe, arm: Arm) -> GaussianPrior:
     """What the baselines know: mean and covariance of 400 payloads of a recipe, none of which is in an episode."""
     rng, rated, drawn = np.random.default_rng(_PRIOR_SEED), rated_mass(arm), []
