@@ -106,12 +106,9 @@ def semi_real(folder: Path) -> dict:
 
 def main() -> None:
     folder = data()
-    parts = {
-        "ur10e_pair": ur10e(folder),
-        "panda_unloaded_phantom": phantom(folder),
-        "panda_semi_real": semi_real(folder),
-    }
-    write("real_logs", {"command": "ARMLOAD_REAL_DATA=FOLDER python benchmarks/real_logs.py"} | parts)
+    command = "ARMLOAD_REAL_DATA=FOLDER python benchmarks/real_logs.py"
+    first = {"command": command, "ur10e_pair": ur10e(folder), "panda_unloaded_phantom": phantom(folder)}
+    write("real_logs", first | {"panda_semi_real": semi_real(folder)})
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """The study's machinery: cells that are measured once, protocols with known errors, a quick run that resumes."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,9 +13,12 @@ from armload.inertia import InertialParameters
 from armload.lab import load_cells, save_cell
 from armload.lab.evaluation import EvaluationRun
 from armload.lab.study import FULL, QUICK, Basis, Size, Spec, plan, run_study, write_results
+from armload.lab.study.claims import evaluate
 from armload.lab.study.protocols import measure_learned, measure_stream
+from armload.lab.study.study_page import summary_json, write_page
 from armload.recording import Recording
 
+ROOT = Path(__file__).resolve().parents[2]
 # every cell of the plan, each as cheap as can be
 SMALL = Size(every=26, rows=12, worlds=2, payloads=1, motions=1, max_epochs=2, members=2, hidden=8)
 TRUTH = InertialParameters(np.arange(1.0, 11.0))
@@ -191,6 +195,16 @@ def test_page_summary_and_report_are_written_from_the_cells(small, tmp_path):
     assert all(claim["id"] in page or claim["text"] in page for claim in summary["claims"])
     assert "training mean" in page
     assert "same-prior least squares" in page
+
+
+def test_the_committed_page_and_summary_are_what_the_committed_cells_say(tmp_path):
+    results, said = ROOT / "benchmarks" / "results", []
+    cells = run_study(Basis(tmp_path, FULL), results / "taie2024", until=-1.0, say=said.append)
+    assert said == []  # no cell is left to measure
+    claims = evaluate(cells)
+    assert json.loads((results / "taie2024.json").read_text(encoding="utf-8")) == summary_json(cells, claims)
+    page = write_page(cells, claims, tmp_path / "paper.md")
+    assert page.read_text(encoding="utf-8") == (ROOT / "docs" / "paper.md").read_text(encoding="utf-8")
 
 
 def test_the_command_stops_in_time_names_what_is_missing_and_writes_the_page(tmp_path, capsys):

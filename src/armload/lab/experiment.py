@@ -16,6 +16,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from armload.atomic import replacing
 from armload.lab.cells import finished_cell, key_of, load_cells, save_cell
 from armload.version import __version__
@@ -139,6 +141,17 @@ def provenance(command: str) -> dict[str, Any]:
         "machine": f"{platform.machine()}, {os.cpu_count()} cores",
         "load": [round(x, 2) for x in os.getloadavg()],
     }
+
+
+def listed(values: Any, digits: int = 7) -> Any:
+    """Numbers of any shape as lists for JSON, to so many digits; None for what is not finite.
+
+    >>> listed([[1.23456789, float("inf")]], 3)
+    [[1.23, None]]
+    """
+    if np.ndim(values) > 0:
+        return [listed(part, digits) for part in values]
+    return float(f"{values:.{digits}g}") if np.isfinite(values) else None
 
 
 def write_json(path: str | Path, content: Any, indent: int | None = 1) -> Path:

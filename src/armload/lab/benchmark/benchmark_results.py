@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armload.atomic import replacing
 from armload.errors import ReportError
 from armload.inertia import NAMES, UNITS
 from armload.lab.benchmark.benchmark_page import COMMAND, PAIRS, TITLE, sections
@@ -20,10 +18,11 @@ from armload.lab.benchmark.measured import Measured, gather
 from armload.lab.benchmark.population_figures import figures
 from armload.lab.benchmark.populations import REPEAT
 from armload.lab.benchmark.targets import verdicts
+from armload.lab.experiment import listed, write_json
 from armload.lab.report import write_markdown, write_report
 from armload.lab.report.shown import GROUPS
 
-_DIGITS = 4
+_rounded = partial(listed, digits=4)
 
 
 def write_results(
@@ -51,9 +50,7 @@ def write_results(
     written = {"summary": Path(summary), "page": Path(page), "report": Path(report)}
     for path in written.values():
         path.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(written["summary"]) as temporary:
-        text = json.dumps(summary_json(results, size), allow_nan=False, separators=(",", ":"))
-        temporary.write_text(text + "\n", encoding="utf-8")
+    write_json(written["summary"], summary_json(results, size), indent=None)
     note = f"Written by `{COMMAND}`; every number on this page comes from its cells."
     write_markdown(written["page"], sections(results, size), TITLE, note)
     write_report(written["report"], sections(results, size, figures(results)), f"armload {TITLE.lower()}")
@@ -73,9 +70,9 @@ def summary_json(results: Results, size: Size) -> dict[str, Any]:
             "a": a,
             "b": b,
             "population": name,
-            "ratio": _listed(m.ratio(a, b)),
-            "difference": _listed(m.paired(a, b)[0]),
-            "standard_error": _listed(m.paired(a, b)[1]),
+            "ratio": _rounded(m.ratio(a, b)),
+            "difference": _rounded(m.paired(a, b)[0]),
+            "standard_error": _rounded(m.paired(a, b)[1]),
         }
         for a, b in PAIRS
         for name, m in results.items()
@@ -91,7 +88,7 @@ def summary_json(results: Results, size: Size) -> dict[str, Any]:
         "groups": list(GROUPS),
         "populations": {name: _population(m) for name, m in results.items()},
         "paired": paired,
-        "targets": [{k: _number(v) if isinstance(v, float) else v for k, v in t.items()} for t in verdicts(results)],
+        "targets": [{k: _rounded(v) if isinstance(v, float) else v for k, v in t.items()} for t in verdicts(results)],
     }
 
 
@@ -109,16 +106,8 @@ def _population(m: Measured) -> dict[str, Any]:
         numbers["repeatability"] = m.repeatability
     methods = {}
     for i, row in enumerate(m.rows):
-        methods[row] = {name: _listed(values[i]) for name, values in numbers.items()}
-        methods[row]["wall_s"] = _number(float(np.median(m.comparison.wall[i])))
+        methods[row] = {name: _rounded(values[i]) for name, values in numbers.items()}
+        methods[row]["wall_s"] = _rounded(float(np.median(m.comparison.wall[i])))
         methods[row] |= {"refused": m.refused[row]} if row in m.refused else {}
         methods[row] |= {"trained": m.trained[row]} if row in m.trained else {}
     return {"episodes": m.runs, "seeds": list(m.comparison.seeds), "prior": m.comparison.prior, "methods": methods}
-
-
-def _listed(values: NDArray[np.float64]) -> Any:
-    return [_listed(part) for part in values] if values.ndim > 1 else [_number(x) for x in values.tolist()]
-
-
-def _number(value: float) -> float | None:
-    return float(f"{value:.{_DIGITS}g}") if np.isfinite(value) else None

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armload.arms import Arm, arm
 from armload.errors import ArmloadError, IdentificationError
@@ -20,7 +19,7 @@ from armload.lab.benchmark.populations import ALL, REPEAT, Population, populatio
 from armload.lab.benchmark.rows import BOUND, Row, bound_std, default_names, fingerprint, rows_for, trained_on
 from armload.lab.cells import key_of, load_cells
 from armload.lab.episodes import Episode, EpisodeLogs, simulate_episodes
-from armload.lab.experiment import Cells, Task, run_tasks
+from armload.lab.experiment import Cells, Task, listed, run_tasks
 
 FORMAT = 1  # of a cell; a change makes every cell unfinished
 TIMES = (0.02, 0.1, 0.5, 1.0, 3.0, 6.0)  # [s] since the run began
@@ -203,16 +202,9 @@ def measure(
         wall.append(round(time.perf_counter() - begun, 4))
     return {
         "truth": [log.truth.phi.tolist() for log in logs],
-        "phi": _listed(np.array(phi)),
-        "std": _listed(np.array(std)),
+        "phi": listed(np.array(phi)),
+        "std": listed(np.array(std)),
         "wall_s": wall,
         "refused": refused,
         "trained": trained,
     }
-
-
-def _listed(values: NDArray[np.float64]) -> Any:
-    """For JSON: seven digits, None for what is not finite."""
-    if values.ndim > 1:
-        return [_listed(part) for part in values]
-    return [float(f"{x:.7g}") if np.isfinite(x) else None for x in values.tolist()]

@@ -2,8 +2,8 @@
 
 from armload.lab.study.basis import FULL, QUICK, Basis, Size
 from armload.lab.study.plan import plan
-from armload.lab.study.results import write_results
 from armload.lab.study.spec import Spec
+from armload.lab.study.study_results import write_results
 from armload.lab.study.study_run import run_study
 
 __all__ = [
