@@ -19,13 +19,19 @@ RESULTS = ROOT / "benchmarks" / "results"
 
 
 def options(about: str | None, **defaults: Any) -> argparse.Namespace:
-    """The options of a script, --name for each default, whose type it takes; False is a flag that is not set."""
+    """The options of a script, --name for each default, whose type it takes.
+
+    False is a flag that is not set; a tuple stands for as many values as it has.
+    """
     parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
     for name, default in defaults.items():
+        flag = f"--{name.replace('_', '-')}"
         if default is False:
-            parser.add_argument(f"--{name}", action="store_true")
+            parser.add_argument(flag, action="store_true")
+        elif isinstance(default, tuple):
+            parser.add_argument(flag, type=type(default[0]), nargs=len(default), default=default)
         else:
-            parser.add_argument(f"--{name}", type=type(default), default=default, help=f"(default: {default})")
+            parser.add_argument(flag, type=type(default), default=default, help=f"(default: {default})")
     return parser.parse_args()
 
 
