@@ -18,7 +18,7 @@ from argparse import Namespace
 from pathlib import Path
 
 import numpy as np
-from hybrid_ablation import GROUPS, gaussian
+from hybrid_ablation import GROUPS, by_tare_and_time, gaussian
 from numpy.typing import NDArray
 from script import ROOT, markdown_table, options, write, write_table
 
@@ -26,9 +26,7 @@ from armload import Arm, arm
 from armload.app.cli.printing import console
 from armload.app.cli.train_hybrid import cells_table, episodes_shown, summary
 from armload.lab.training import Records
-from armload.lab.training.calibrating import nearest
 from armload.lab.training.hybrid import coverage_on, drawn_episodes, episode_records
-from armload.lab.training.records import TIMES
 from armload.posterior import HybridModel, shipped_model
 from armload.regression import solution_prior_std
 
@@ -61,7 +59,7 @@ def errors(robot: Arm, model: HybridModel, records: Records) -> dict[str, NDArra
 
 def compared(error: dict[str, NDArray[np.float64]], records: Records, families: NDArray[np.str_]) -> list[dict]:
     """Mean errors of every row, and how far the others are above the hybrid, subset by subset and time by time."""
-    which, family, mass = nearest(records.t, np.array(TIMES)), families[records.episode], records.truth[:, 0]
+    family, mass = families[records.episode], records.truth[:, 0]
     everything = np.ones(len(records), dtype=bool)
     subsets = {"all": everything}
     subsets |= {f"world: {g.removeprefix('broad ')}": records.group == g for g in np.unique(records.group)}
@@ -69,19 +67,18 @@ def compared(error: dict[str, NDArray[np.float64]], records: Records, families: 
     subsets |= {f"below {LIGHT} kg": mass < LIGHT, f"{LIGHT} kg and above": mass >= LIGHT}
     out = []
     for subset, rows in subsets.items():
-        for kind, what in ((0, "no tare"), (1, "tare")):
-            for b, t in enumerate(TIMES):
-                cell = rows & (records.kind == kind) & (which == b)
-                line: dict = {"subset": subset, "what": what, "t": t, "episodes": int(cell.sum())}
-                for group, part in GROUPS.items():
-                    own = 1e3 * error["hybrid"][cell][:, part].mean(axis=1)
-                    line[group] = {"hybrid": round(float(own.mean()), 3)}
-                    for name in COMPARED:
-                        more = 1e3 * error[name][cell][:, part].mean(axis=1) - own
-                        line[group][name] = round(float((own + more).mean()), 3)
-                        line[group][f"{name}, more"] = round(float(more.mean()), 3)
-                        line[group][f"{name}, more, se"] = round(float(more.std(ddof=1) / np.sqrt(len(more))), 3)
-                out.append(line)
+        for named, cell in by_tare_and_time(records):
+            cell = cell & rows
+            line: dict = {"subset": subset, **named, "episodes": int(cell.sum())}
+            for group, part in GROUPS.items():
+                own = 1e3 * error["hybrid"][cell][:, part].mean(axis=1)
+                line[group] = {"hybrid": round(float(own.mean()), 3)}
+                for name in COMPARED:
+                    more = 1e3 * error[name][cell][:, part].mean(axis=1) - own
+                    line[group][name] = round(float((own + more).mean()), 3)
+                    line[group][f"{name}, more"] = round(float(more.mean()), 3)
+                    line[group][f"{name}, more, se"] = round(float(more.std(ddof=1) / np.sqrt(len(more))), 3)
+            out.append(line)
     return out
 
 

@@ -9,14 +9,16 @@ episodes; se is the standard error over the folds. Writes benchmarks/results/hyb
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from script import options, say, write
 
 from armload import arm
 from armload.inertia import Z95
-from armload.lab.training import payload_mixture
+from armload.lab.training import Records, payload_mixture
 from armload.lab.training.calibrating import fit_calibration, nearest
 from armload.lab.training.hybrid import EPISODES, FOLDS, episode_records
 from armload.lab.training.records import TIMES
@@ -35,6 +37,14 @@ def gaussian(prior: MixturePrior) -> MixturePrior:
     return MixturePrior(np.ones(1), prior.mean[None], second[None], ("all",))
 
 
+def by_tare_and_time(records: Records, times: Sequence[float] = TIMES) -> Iterator[tuple[dict, NDArray[np.bool_]]]:
+    """Without and with a tare, time by time: what it is called and which of the records (N,) it is."""
+    which = nearest(records.t, np.array(TIMES))
+    for kind, what in ((0, "no tare"), (1, "tare")):
+        for t in times:
+            yield {"what": what, "t": t}, (records.kind == kind) & (which == TIMES.index(t))
+
+
 def main() -> None:
     asked = options(__doc__, work=Path("out/hybrid-panda"), episodes=EPISODES, jobs=1)
     panda = arm("panda")
@@ -50,7 +60,6 @@ def main() -> None:
         "hybrid: both": (prior, ("tree", "network")),
     }
     episodes = np.random.default_rng([0, 8]).permutation(np.unique(records.episode))
-    which = nearest(records.t, np.array(TIMES))
     out = []
     for name, how in rows.items():
         error, half = np.zeros((len(records), 10)), np.zeros((len(records), 10))
@@ -71,19 +80,17 @@ def main() -> None:
                 found = calibration.answer(records.evidence(int(row)), used)
                 error[row] = np.abs(found.mean - records.truth[row])
                 half[row] = Z95 * np.sqrt(np.diag(found.covariance))
-        for kind, what in ((0, "no tare"), (1, "tare")):
-            for t in SHOWN:
-                cell = (records.kind == kind) & (which == TIMES.index(t))
-                line = {"row": name, "what": what, "t": t, "episodes": int(cell.sum())}
-                for group, part in GROUPS.items():
-                    e, h = error[cell][:, part], half[cell][:, part]
-                    folds = [1e3 * error[cell & (fold == k)][:, part].mean() for k in range(FOLDS)]
-                    line[group] = round(1e3 * float(e.mean()), 3)
-                    line[f"{group}_se"] = round(float(np.std(folds, ddof=1) / np.sqrt(FOLDS)), 3)
-                    line[f"{group}_half_width"] = round(1e3 * float(h.mean()), 3)
-                    line[f"{group}_inside"] = round(float(np.mean(e <= h)), 4)
-                out.append(line)
-                say(json.dumps(line))
+        for named, cell in by_tare_and_time(records, SHOWN):
+            line = {"row": name, **named, "episodes": int(cell.sum())}
+            for group, part in GROUPS.items():
+                e, h = error[cell][:, part], half[cell][:, part]
+                folds = [1e3 * error[cell & (fold == k)][:, part].mean() for k in range(FOLDS)]
+                line[group] = round(1e3 * float(e.mean()), 3)
+                line[f"{group}_se"] = round(float(np.std(folds, ddof=1) / np.sqrt(FOLDS)), 3)
+                line[f"{group}_half_width"] = round(1e3 * float(h.mean()), 3)
+                line[f"{group}_inside"] = round(float(np.mean(e <= h)), 4)
+            out.append(line)
+            say(json.dumps(line))
     write("hybrid_ablation", {"seed": 0, "folds": FOLDS, "rows": out})
 
 

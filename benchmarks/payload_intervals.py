@@ -19,14 +19,13 @@ from itertools import pairwise
 
 import numpy as np
 from fresh_episodes import SEED, new_records
+from hybrid_ablation import by_tare_and_time
 from numpy.typing import NDArray
 from script import options, write
 
 from armload import Arm, arm
 from armload.inertia import Z95, determined
 from armload.lab.training import Records
-from armload.lab.training.calibrating import nearest
-from armload.lab.training.records import TIMES
 from armload.payloads import solids
 from armload.posterior import HybridModel, shipped_model
 from armload.posterior.hybrid import std_alone
@@ -90,18 +89,16 @@ def main() -> None:
     robot = arm("panda")
     model, records = shipped_model(robot), new_records(robot, asked)
     bodies = np.array([wide(k) for k in range(len(np.unique(records.episode)))])
-    which, cells, weights = nearest(records.t, np.array(TIMES)), [], []
+    cells, weights = [], []
     for name, some in (("wide", exchanged(records, bodies)), ("as drawn", records)):
         inside = held(robot, model, some)
-        for kind, what in ((0, "no tare"), (1, "tare")):
-            for b, t in enumerate(TIMES):
-                rows = (records.kind == kind) & (which == b)
-                for method, found in inside.items():
-                    shares = {group: round(float(found[rows][:, part].mean()), 4) for group, part in GROUPS.items()}
-                    line = {"payloads": name, "what": what, "t": t, "method": method, "episodes": int(rows.sum())}
-                    cells.append(line | shares)
-                    if t in (0.1, 1.0, 6.0):
-                        print(*line.values(), *(f"{group} {100 * x:.1f} %" for group, x in shares.items()), sep="  ")
+        for named, rows in by_tare_and_time(records):
+            for method, found in inside.items():
+                shares = {group: round(float(found[rows][:, part].mean()), 4) for group, part in GROUPS.items()}
+                line = {"payloads": name, **named, "method": method, "episodes": int(rows.sum())}
+                cells.append(line | shares)
+                if named["t"] in (0.1, 1.0, 6.0):
+                    print(*line.values(), *(f"{group} {100 * x:.1f} %" for group, x in shares.items()), sep="  ")
         if name == "as drawn":
             for low, high in pairwise(WEIGHTS):
                 rows = (low <= some.truth[:, 0]) & (some.truth[:, 0] < high) & (records.kind < 2) & (records.t > 0.8)
