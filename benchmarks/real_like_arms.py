@@ -13,16 +13,17 @@ import time
 import numpy as np
 from script import ROOT, options, write
 
-from armload import FilteredRecursiveLeastSquares, PosteriorLeastSquares, RecursiveLeastSquares, __version__, arm
+from armload import __version__, arm
 from armload.inertia import NAMES, InertialParameters
-from armload.lab.evaluation import Comparison, EvaluationRun, compare
+from armload.lab.evaluation import Comparison, EvaluationRun, catalogued, compare
 from armload.lab.report import markdown
 from armload.motion import random_motion
 from armload.payloads import random_payloads
-from armload.posterior import HybridIdentifier, SmoothPosteriorLeastSquares
 from armload.regression import GaussianPrior
 from armload.simulation import Run, Sensors, World, simulate_many
 
+METHODS = ("rls", "rls-filter", "rls-filter, with tare", "map", "map, with tare", "map-gp, with tare")
+METHODS += ("hybrid", "hybrid, with tare")
 TIMES = (0.5, 1.0, 3.0, 6.0)  # [s]
 COMMAND = "python benchmarks/real_like_arms.py"
 
@@ -53,16 +54,7 @@ def run(count: int) -> Comparison:
         [p.parameters for p in random_payloads(400, seed=10_000)], "400 payloads of the population"
     )
     return compare(
-        {
-            "rls": lambda _: RecursiveLeastSquares(robot),
-            "rls-filter": lambda _: FilteredRecursiveLeastSquares(robot),
-            "rls-filter, with tare": FilteredRecursiveLeastSquares(robot),
-            "map": lambda _: PosteriorLeastSquares(robot),
-            "map, with tare": lambda tare: PosteriorLeastSquares(robot, tare),
-            "map-gp, with tare": lambda tare: SmoothPosteriorLeastSquares(robot, tare),
-            "hybrid": lambda _: HybridIdentifier(robot),
-            "hybrid, with tare": lambda tare: HybridIdentifier(robot, tare),
-        },
+        catalogued(robot, *METHODS),
         cases(count),
         TIMES,
         training=prior,

@@ -2,7 +2,7 @@
 
 from armload.lab.evaluation.baselines import PriorLeastSquares, TrainingMean
 from armload.lab.evaluation.comparison import Comparison
-from armload.lab.evaluation.contest import EvaluationRun, compare
+from armload.lab.evaluation.contest import EvaluationRun, catalogued, compare
 from armload.lab.evaluation.held_out import held_out_error
 from armload.lab.evaluation.metrics import (
     absolute_error,
@@ -21,6 +21,7 @@ __all__ = [
     "Table",
     "TrainingMean",
     "absolute_error",
+    "catalogued",
     "compare",
     "coverage",
     "half_width",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable
 from dataclasses import asdict
@@ -11,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from armload.estimators import FilteredRecursiveLeastSquares, Identifier, RecursiveLeastSquares, Tared
+from armload.estimators import Identifier
+from armload.identification import METHODS
 from armload.lab.dataset import Split, split_payloads, split_rows
 from armload.lab.evaluation import EvaluationRun, PriorLeastSquares, mean_absolute_error
 from armload.lab.experiment import Cells, Task, run_tasks, versions
@@ -19,7 +21,6 @@ from armload.lab.study.basis import Basis, Size
 from armload.lab.study.plan import plan
 from armload.lab.study.protocols import measure_learned, measure_stream
 from armload.lab.study.spec import Spec
-from armload.posterior import PosteriorLeastSquares
 from armload.regression import GaussianPrior
 
 if TYPE_CHECKING:
@@ -136,16 +137,10 @@ def _benchmark(spec: Spec, basis: Basis) -> dict[str, Any]:
     prior = GaussianPrior.of([p.parameters for p in basis.loadings], "the training payloads")
 
     def make(run: EvaluationRun) -> Identifier:
-        if spec.method == "rls":
-            return RecursiveLeastSquares(robot)
-        if spec.method == "rls-filter":
-            return FilteredRecursiveLeastSquares(robot)
-        if spec.method.startswith("rls-filter-calibrated"):
-            assert run.tare is not None
-            return Tared(FilteredRecursiveLeastSquares(robot), run.tare)
         if spec.method == "same-prior":
             return PriorLeastSquares(robot, prior.mean, prior.covariance)
-        return PosteriorLeastSquares(robot, run.tare if spec.method == "map-tare" else None)
+        name = re.sub("-(tare|calibrated.*)$", "", spec.method)
+        return METHODS[name].make(robot, None if name == spec.method else run.tare)
 
     runs = basis.runs_with_own_motion_tared if spec.method == "rls-filter-calibrated" else basis.runs
     return {"epochs": None, "file_bytes": None, **measure_stream(make, runs)}
