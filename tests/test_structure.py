@@ -10,7 +10,7 @@ FILES = {
     "__init__.py": "",
     "low/__init__.py": "from armload.low.first import One\n",
     "low/first.py": "LIMIT, _SPAN = 3, (0.5, 2 * -1.5)  # two numbers\nNAMES = ('a', 'b')\nclass One: ...\n",
-    "low/second.py": "from armload.low.first import One\nclass Two(One): ...\nSTEP: float = 1e-3\nstep, FLAG = 4, True\n",
+    "low/second.py": "from armload.low.first import One\nclass Two(One): ...\nSTEP: float = 1e-3\nstep, ON = 4, True\n",
     "high/__init__.py": "",
     "high/left.py": "import armload.high.right\nfrom armload.low import second\n\nclass Three(second.Two): ...\n",
     "high/right.py": "from armload.high import left\n",
@@ -62,5 +62,5 @@ def test_inheritance_is_counted_over_modules(package):
 
 def test_named_numbers_are_those_of_all_modules_an_entry_point_may_come_to_load(package):
     found = package.measured()
-    assert found["constants, identify"] == 3  # LIMIT, _SPAN and STEP, neither NAMES nor FLAG
+    assert found["constants, identify"] == 3  # LIMIT, _SPAN and STEP, neither NAMES nor ON
     assert found["constants, stream"] == 3  # by way of identification
