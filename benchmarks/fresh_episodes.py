@@ -26,7 +26,8 @@ from armload import Arm, arm
 from armload.app.cli.printing import console
 from armload.app.cli.train_hybrid import cells_table, episodes_shown, summary
 from armload.lab.training import Records
-from armload.lab.training.hybrid import coverage_on, drawn_episodes, episode_records
+from armload.lab.training.coverage import coverage_on
+from armload.lab.training.hybrid import drawn_episodes, episode_records
 from armload.posterior import HybridModel, shipped_model
 from armload.regression import solution_prior_std
 
@@ -143,7 +144,7 @@ def main() -> None:
     result = {
         "population": "broad",
         "seed": SEED,
-        "trained": {key: model.provenance[key] for key in ("population", "episodes", "seed")},
+        "trained": {key: getattr(model.training, key) for key in ("population", "episodes", "seed")},
         **summary(robot, found),
         "errors": lines,
         "verdicts": verdict,

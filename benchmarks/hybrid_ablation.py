@@ -20,7 +20,8 @@ from armload import arm
 from armload.inertia import Z95
 from armload.lab.training import Records, payload_mixture
 from armload.lab.training.calibrating import fit_calibration, nearest
-from armload.lab.training.hybrid import EPISODES, FOLDS, episode_records
+from armload.lab.training.coverage import FOLDS
+from armload.lab.training.hybrid import EPISODES, episode_records
 from armload.lab.training.records import TIMES
 from armload.posterior import MixturePrior
 

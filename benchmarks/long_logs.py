@@ -18,7 +18,7 @@ slope: d ln(error) / d ln(t) between two times; −0.5 where errors average out,
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import cache
 from typing import Any
 
@@ -32,7 +32,6 @@ from armload.lab.cells import key_of
 from armload.lab.episodes import Episode, Recipe, draw_episodes, simulate_episodes
 from armload.lab.experiment import Task, run_tasks, source_key
 from armload.posterior import HybridIdentifier, HybridModel, shipped_model
-from armload.posterior.model_file import POOLED
 
 TIMES = (1.0, 3.0, 6.0, 15.0, 30.0, 60.0)  # [s] since the run began
 FIRST_SEED = 910_001  # nothing is trained on it
@@ -109,10 +108,10 @@ def main() -> None:
             inside = (error <= half).mean(axis=2)
             by_motion = {kind: inside[kinds == kind].mean(axis=0).round(3).tolist() for kind in sorted(set(kinds))}
             tables[what] = table(error, half) | {"coverage_by_motion": by_motion}
-    trained = shipped_model(arm(name)).provenance
+    trained = shipped_model(arm(name)).training
     result = {
         "robot": name,
-        "model": {key: trained.get(key) for key in ("population", "episodes", "seed", POOLED)},
+        "model": None if trained is None else asdict(trained),
         "first_seed": FIRST_SEED,
         "episodes": count,
         "times_s": list(TIMES),

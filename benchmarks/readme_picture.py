@@ -1,8 +1,9 @@
-"""The README's picture: a Panda along the excitation, and what armload knows of its payload while it moves.
+"""The README's picture: a Panda on the excitation motion, and the default method's estimate while it moves.
 
     python benchmarks/readme_picture.py
 
-Writes docs/pictures/identify.png. Simulated: a real-like arm, a tare of the empty arm on another motion.
+Writes docs/pictures/identify.png. The logs are those of examples/simulate_two_logs.py: a simulated Panda that differs
+from its model as real ones do, and a tare of the empty arm on another motion.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from armload import PosteriorLeastSquares, arm
+from armload import HybridIdentifier, arm
 from armload.motion import random_motion, taie2024
 from armload.payloads import test_payload
 from armload.simulation import Sensors, World, simulate
@@ -29,7 +30,7 @@ def main() -> None:
     log = simulate(robot, motion, truth, world=world, sensors=sensors, seed=SEED)
     other = random_motion(robot, SEED, duration=20.0, harmonics=10)
     tare = simulate(robot, other, None, world=world, sensors=sensors, seed=SEED + 1)
-    trace = PosteriorLeastSquares(robot, tare).trace(log, every=40)
+    trace = HybridIdentifier(robot, tare).trace(log, every=40)
     t = np.array([e.t for e in trace]) - log.t[0]
     phi, half = np.array([e.phi for e in trace]), 1.96 * np.array([e.std for e in trace])
 
@@ -53,15 +54,15 @@ def main() -> None:
     for panel, (index, label, scale) in enumerate(shown):
         axes = figure.add_subplot(grid[panel % 2, 1 + panel // 2])
         value, width, true = scale * phi[:, index], scale * half[:, index], scale * truth.phi[index]
-        axes.fill_between(t, value - width, value + width, color=BLUE, alpha=0.2, lw=0, label="95 %, approximate")
-        axes.plot(t, value, color=BLUE, label="map, with tare")
+        axes.fill_between(t, value - width, value + width, color=BLUE, alpha=0.2, lw=0, label="95 %, calibrated")
+        axes.plot(t, value, color=BLUE, label="hybrid, with a tare")
         axes.axhline(true, color="black", lw=0.8, ls="--", label="truth")
         reach = 4.0 * width[len(width) // 2]
         axes.set(ylabel=label, ylim=(true - reach, true + reach), xlim=(0, t[-1]))
         axes.tick_params(labelsize=7)
         if panel % 2:
             axes.set_xlabel("time [s]")
-        if panel == 0:
+        if panel == 1:
             axes.legend(fontsize=7, frameon=False, loc="upper right")
     TARGET.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(TARGET, metadata={"Software": None})

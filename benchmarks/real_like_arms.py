@@ -75,7 +75,7 @@ def page(c: Comparison) -> str:
             "Every case is another Panda that differs from its model as real ones do, another payload of one to four",
             "boxes (0.2–2.8 kg), another motion, and a tare of the empty arm on yet another motion.",
             "",
-            "Read each column against the row `training mean`: a method above it has told nothing of that parameter.",
+            "Read each column against the row `training mean`: a method with a larger error has no information on it.",
             "`same-prior least squares` is `map, with tare` with the payload population as its prior: what a method",
             "trained on this population has to beat.",
             "",

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 import tomllib
 from pathlib import Path
 
@@ -95,6 +96,53 @@ def test_interruption_is_one_line_and_130(capsys, monkeypatch):
 
     monkeypatch.setattr("armload.arms.arm", interrupt)
     assert refused(capsys, ["identify", "log.csv", "--robot", "panda"], code=130) == "armload: interrupted"
+
+
+def cause():
+    """As the interpreter says that compiled code came back with an error it did not tell of."""
+    try:
+        raise KeyboardInterrupt
+    except KeyboardInterrupt as stop:
+        raise SystemError("returned a result with an exception set") from stop
+
+
+def context():
+    """As a compiler that cleans up fails over what it left unfinished."""
+    unfinished = {}
+    try:
+        raise KeyboardInterrupt
+    finally:
+        unfinished["half compiled"]
+
+
+def destructor():
+    """Where Python prints the exception and goes on."""
+
+    class Stopped:
+        def __del__(self):
+            raise KeyboardInterrupt
+
+    Stopped()
+    for _ in range(500):
+        time.sleep(0.01)
+    raise AssertionError("the interruption was lost")
+
+
+@pytest.mark.parametrize("how", [cause, context, destructor])
+def test_an_interruption_that_others_made_something_else_of_is_one_all_the_same(capfd, monkeypatch, how):
+    monkeypatch.setattr("armload.arms.arm", lambda *_, **__: how())
+    assert refused(capfd, ["identify", "log.csv", "--robot", "panda"], code=130) == "armload: interrupted"
+
+
+def test_a_bug_told_after_an_interruption_is_a_bug(capsys, monkeypatch):
+    def told_late(*_, **__):
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt:
+            raise ZeroDivisionError("of the thread that identifies") from None
+
+    monkeypatch.setattr("armload.arms.arm", told_late)
+    assert "ZeroDivisionError" in refused(capsys, ["identify", "log.csv", "--robot", "panda"], code=1)
 
 
 def test_a_bug_is_one_line_with_a_hint_and_the_traceback_on_request(capsys, monkeypatch):

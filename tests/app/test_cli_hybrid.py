@@ -3,6 +3,7 @@
 import io
 import json
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,15 +11,24 @@ from rich.console import Console
 
 from armload.app.cli import main
 from armload.app.cli.train_hybrid import cells_table, said, summary
-from armload.arms import arm, kinship
+from armload.arms import ARMS, arm, kinship
 from armload.inertia import InertialParameters
-from armload.lab.training import Coverage
+from armload.lab.training import Coverage, train_hybrid
+from armload.lab.training import hybrid as training
 from armload.lab.training.hybrid import EPISODES
 from armload.lab.training.records import TIMES
 from armload.motion import random_motion
-from armload.posterior import Calibration, HybridModel, MixturePrior
+from armload.posterior import (
+    Calibration,
+    HybridModel,
+    MixturePrior,
+    Training,
+)
+from armload.posterior import (
+    model_file as model,
+)
 from armload.posterior.evidence import KINDS
-from armload.posterior.model_file import POOLED
+from armload.posterior.model_file import SHIPPED
 from armload.recording import write_recording
 from armload.regression import payload_prior_std
 from armload.simulation import Sensors, World, simulate
@@ -61,9 +71,9 @@ def small(tmp_path_factory):
     prior = MixturePrior(np.ones(1), np.zeros((1, 10)), np.diag(std**2)[None], ("anything",))
     calibration = Calibration(None, 1.0, np.array([0.1, 6.0]), np.full((3, 2, 10), 1.96))
     for name, pooled, episodes in (("checked", 0.95, 2400), ("trial", 0.80, 2400), ("small", 0.95, 300)):
-        known = {POOLED: pooled, "episodes": episodes}
-        model = HybridModel(prior, calibration, two.name, kinship(two), str(two.frame), two.n, known)
-        model.save(folder / f"{name}.safetensors")
+        checked = Training("broad", episodes, 0, pooled)
+        made = HybridModel(prior, calibration, two.name, kinship(two), str(two.frame), two.n, {}, checked)
+        made.save(folder / f"{name}.safetensors")
     return folder
 
 
@@ -106,6 +116,44 @@ def test_a_hybrid_of_another_arm_is_refused_in_a_sentence(call, small, analytic_
     assert refused.out == ""
     assert "trained for two: panda is another arm" in refused.err
     assert refused.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("state", ["is missing", "cannot be read"])
+@pytest.mark.parametrize("name", SHIPPED)
+def test_a_model_that_is_part_of_armload_and_not_there_is_an_error_and_no_other_method(
+    call, analytic_log, tmp_path, monkeypatch, name, state
+):
+    write_recording(tmp_path / "run.csv", analytic_log(arm(name), duration=1.0, rate=50.0))
+    monkeypatch.setattr("armload.posterior.model_file.__file__", str(tmp_path / "model.py"))
+    if state == "cannot be read":
+        (tmp_path / "models").mkdir()
+        (tmp_path / "models" / f"{name}.safetensors").write_bytes(b"half of it")
+    log = (tmp_path / "run.csv", "--robot", name)
+    for argv in (("identify", *log), ("identify", *log, "--method", "hybrid"), ("live", *log, "--headless")):
+        refused = call(*argv, code=2)
+        assert (refused.out, refused.err.count("\n")) == ("", 1)
+        assert f"the hybrid model of {name} is part of armload" in refused.err
+        assert f"{state}: install armload again" in refused.err
+    assert json.loads(call("identify", *log, "--method", "map", "--json").out)["method"] == "map"
+
+
+def test_the_models_that_are_part_of_armload_are_those_stated():
+    folder = Path(model.__file__).parent / "models"
+    assert sorted(SHIPPED) == sorted(path.stem for path in folder.glob("*.safetensors"))
+    assert set(SHIPPED) <= set(ARMS)
+
+
+@pytest.mark.parametrize("command", ["identify", "live"])
+@pytest.mark.parametrize(("name", "state"), [("mine.safetensors", "does not exist"), (".", "is not a file")])
+def test_a_model_named_by_a_file_that_is_none_is_refused_by_that_name(call, small, tmp_path, command, name, state):
+    path = tmp_path / "models" / name
+    (tmp_path / "models").mkdir()
+    headless = ("--headless",) if command == "live" else ()
+    argv = (command, small / "run.csv", "--robot", small / "two.urdf", "--method", path, *headless)
+    refused = call(*argv, code=2)
+    assert (refused.out, refused.err.count("\n")) == ("", 1)
+    assert f"the model {path} {state}: expected the .safetensors file" in refused.err
+    assert "map-gp" not in refused.err  # a path is no method's name spelt wrong
 
 
 def test_the_name_of_the_method_without_a_model_says_how_to_get_one(call, small):
@@ -173,6 +221,25 @@ def test_options_that_do_not_go_together_are_refused_before_anything_is_simulate
     assert named in refused.err
 
 
+def test_python_and_the_command_line_write_the_same_model(call, small, coverage, monkeypatch, tmp_path):
+    """What is learned is given here: what the file says of it must not depend on who asked for it."""
+    learned = HybridModel.load(small / "checked.safetensors")
+    monkeypatch.setattr(training, "episode_records", lambda *_: None)
+    monkeypatch.setattr(training, "payload_mixture", lambda *_: learned.prior)
+    monkeypatch.setattr(training, "cross_validated", lambda *_: coverage)
+    monkeypatch.setattr(training.Calibration, "fit", lambda *_, **__: learned.calibration)
+    asked = tmp_path / "asked.safetensors"
+    argv = ("--robot", small / "two.urdf", "--episodes", "40", "--seed", "3", "--work", tmp_path / "work")
+    call("train", *argv, "--out", asked, "--report", tmp_path / "report.json")
+    made, checked = train_hybrid(arm(small / "two.urdf"), episodes=40, seed=3)
+    assert made.save(tmp_path / "made.safetensors").read_bytes() == asked.read_bytes()
+    assert checked is coverage
+    assert made.training == Training("broad", 40, 3, 0.9512)
+    report, said = json.loads((tmp_path / "report.json").read_text()), HybridModel.load(asked).provenance
+    assert {"cells", "ratio", "counts", "times", "parameters", "compared_with", "versions"} <= set(said)
+    assert {key: report[key] for key in said} == said
+
+
 @pytest.mark.full
 def test_a_hybrid_is_trained_for_a_urdf_resumed_and_used(call, small):
     """Over a minute on one core: 32 episodes, enough to go all the way and too few to be calibrated."""
@@ -189,7 +256,10 @@ def test_a_hybrid_is_trained_for_a_urdf_resumed_and_used(call, small):
 
     again = call(*train, "--out", small / "again.safetensors", "--json")
     assert json.loads(again.out)["resumed"] is True
-    assert (small / "again.safetensors").read_bytes() == (small / "first.safetensors").read_bytes()
+    trained, _ = train_hybrid(arm(small / "two.urdf"), episodes=32, folder=small / "work")
+    made = trained.save(small / "made.safetensors")
+    for path in (small / "again.safetensors", made):
+        assert path.read_bytes() == (small / "first.safetensors").read_bytes()
 
     argv = ("identify", small / "run.csv", "--robot", small / "two.urdf", "--method", small / "first.safetensors")
     found = json.loads(call(*argv, "--tare", small / "tare.csv", "--json").out)

@@ -169,6 +169,19 @@ def test_what_is_not_there_or_not_a_log_is_refused(refused, tmp_path, log_text):
     assert ".xlsx" in refused(odd, *ROBOT)
 
 
+@pytest.mark.parametrize("command", ["identify", "live"])
+def test_a_log_under_another_name_is_no_tare_for_itself(capsys, panda, analytic_log, tmp_path, command):
+    log = analytic_log(panda, duration=1.0, rate=100.0)
+    write_recording(tmp_path / "run.csv", log)
+    write_recording(tmp_path / "before.npz", log.select(slice(40)))
+    argv = [command, str(tmp_path / "run.csv"), "--robot", "panda", "--tare", str(tmp_path / "before.npz")]
+    assert main([*argv, *(["--headless"] if command == "live" else [])]) == 2
+    said = capsys.readouterr()
+    assert (said.out, said.err.count("\n")) == ("", 1)
+    assert "before.npz and the log" in said.err
+    assert "share 40 measured samples" in said.err
+
+
 def test_a_bag_cut_off_in_the_middle_is_refused(refused, real_data, tmp_path):
     whole = (real_data / "ur10_ros2_bag.db3").read_bytes()
     path = tmp_path / "cut.db3"

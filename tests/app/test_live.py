@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import math
 import re
 import signal
 import subprocess
@@ -10,6 +11,7 @@ from time import sleep
 
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 from armload.app.cli import lines, main
 from armload.app.page import (
@@ -19,30 +21,53 @@ from armload.app.page import (
     equivalent_box,
     equivalent_ellipsoid,
 )
-from armload.app.page.curves import GROUPS, data_of, series_of
+from armload.app.page.curves import (
+    AXES,
+    GROUPS,
+    HEIGHT,
+    PADDING,
+    data_of,
+    series_of,
+)
 from armload.app.page.download import ENDINGS, file_of
-from armload.app.page.page import Page, methods_for
-from armload.app.page.recent import Recent
-from armload.app.page.shapes import (
+from armload.app.page.drawing import (
     arm_parts,
     capsule,
     drum,
     edges,
     frame_poses,
 )
+from armload.app.page.page import Page, methods_for
+from armload.app.page.recent import Recent
 from armload.app.page.tables import (
     com_std,
     events,
     headline,
     parameters,
+    stream,
 )
 from armload.arms import arm as arm_named
-from armload.devices import FORMS, Replay, Simulator, Source, read_load
+from armload.devices import (
+    FORMS,
+    Detached,
+    Recorded,
+    Replay,
+    Simulator,
+    Source,
+    open_source,
+    read_load,
+)
 from armload.errors import ArmloadError, SinkError, SourceError, UsageError
+from armload.identification import check_plausible
 from armload.inertia import InertialParameters
 from armload.online import OnlineIdentifier
 from armload.payloads import random_payload, solids, test_payload
-from armload.recording import Sample, read_recording, write_recording
+from armload.recording import (
+    Recording,
+    Sample,
+    read_recording,
+    write_recording,
+)
 
 HELD = test_payload().parameters
 # what was started in the background of a shell is deaf to Ctrl-C, and so are its children
@@ -229,6 +254,48 @@ def test_curves_hold_the_estimates_within_their_intervals(held, group):
     assert np.all(np.isfinite(np.array(data)))
 
 
+def ticks(low, high, axis):
+    """How many ticks uPlot puts on a y axis: at the least of its increments that leaves `space` px (its own: 30)."""
+    pixels = HEIGHT - PADDING[0] - PADDING[2] - AXES[0]["size"]
+    increments = [m * 10.0**e for e in range(-12, 12) for m in (1.0, 2.0, 2.5, 5.0)]
+    step = next(i for i in increments if pixels * i / (high - low) >= axis.get("space", 30))
+    return math.floor(high / step) - math.ceil(low / step) + 1
+
+
+def test_a_source_that_knows_no_truth_is_drawn_like_any_other(panda, log):
+    """uPlot takes the least of all numbers of a scale: one that is none would leave the plot empty."""
+    session = Session(Replay(log, panda, speed=None), panda, method="map-gp")
+    session.run()
+    session.close()
+    t, rows = session.history.last()
+    assert np.isnan(rows[:, 20:]).all()
+    for group in GROUPS:
+        data = data_of(group, t, rows)
+        assert len(data) == len(series_of(group))
+        assert np.isfinite(np.array(data)).all()
+        low, high = min(x.min() for x in data[1:]), max(x.max() for x in data[1:])
+        for k, place in enumerate(group.places):
+            assert data[3 + 4 * k][-1] == rows[-1, place]
+            assert np.array_equal(data[4 + 4 * k], data[3 + 4 * k])  # under the line of the value, in its colour
+        ends = rows[-1, :10] + np.array([[-1.0], [1.0]]) * rows[-1, 10:20]
+        assert low <= ends[0, list(group.places)].min()
+        assert high >= ends[1, list(group.places)].max()
+        assert high - low < 10.0 * np.ptp(ends[:, list(group.places)])
+        pad = 0.1 * (high - low)  # uPlot's own
+        assert ticks(low - pad, high + pad, AXES[1]) >= 3
+
+
+def test_a_truth_that_is_known_late_is_drawn_from_then_on(held):
+    t, rows = held.history.last()
+    rows = rows.copy()
+    rows[: len(t) // 2, 20:] = np.nan
+    for group in GROUPS:
+        data = np.array(data_of(group, t, rows))
+        assert np.isfinite(data).all()
+        for k, place in enumerate(group.places):
+            assert np.all(data[4 + 4 * k, len(t) // 2 :] == HELD.phi[place])
+
+
 def test_nothing_yet_and_no_interval_yet_can_be_drawn():
     for rows in (
         np.empty((0, 30)),
@@ -238,6 +305,7 @@ def test_nothing_yet_and_no_interval_yet_can_be_drawn():
         data = data_of(GROUPS[1], np.arange(float(len(rows))), rows)
         assert len({len(column) for column in data}) == 1
         assert len(data[0]) >= 2
+        assert np.isfinite(np.array(data)).all()
 
 
 # ---------------------------------------------------------------------- session
@@ -301,6 +369,55 @@ def test_lines_go_on_and_say_why_while_no_sample_can_be_used(panda, analytic_log
     assert len(warned) == 1
     assert [entry.text for entry in session.log if entry.warning] == warned
     assert session.sample.t < 2.0  # what the page draws
+
+
+class Clock:
+    """A machine's monotonic clock that goes on when it is told to, in place of the module `time`."""
+
+    def __init__(self, monkeypatch):
+        self.now = 100.0
+        for user in ("pace", "source"):
+            monkeypatch.setattr(f"armload.devices.{user}.time", self)
+
+    def monotonic(self):
+        return self.now
+
+
+@pytest.mark.parametrize("speed", [1.0, 4.0, None])
+@pytest.mark.parametrize("recorded", [False, True])
+def test_an_answer_is_as_old_as_its_samples_have_waited(panda, analytic_log, monkeypatch, tmp_path, speed, recorded):
+    log, clock = analytic_log(panda, HELD, duration=2.0), Clock(monkeypatch)
+    source = Replay(log, panda, speed=speed)
+    source = Recorded(source, tmp_path / "record.csv") if recorded else source
+    session = Session(source, panda, method="map")
+    estimates = session.estimates()
+    assert next(estimates).lag == 0.0
+    clock.now += 5.0  # the consumer is held up, and all the rest of the log comes due
+    late = 0.0 if speed is None else 5.0 * speed
+    for estimate in estimates:
+        waited = 0.0 if speed is None else late - (estimate.t - log.t[0])  # the first was due at once
+        assert estimate.lag == pytest.approx(waited, abs=1e-9)
+        assert -1e-9 <= estimate.age - waited <= 0.0101  # rows are 5 ms apart
+    session.close()
+    assert ("this machine is too busy" in stream("log", session.estimate)) == (speed is not None)
+
+
+def test_lines_tell_what_was_lost_and_how_late_they_are(panda, log, tmp_path):
+    """The reader has its own process and does not wait: what it has written to its record was due before."""
+    kept = tmp_path / "record.csv"
+    with Detached(str(log), panda, record=kept, capacity=100) as source:
+        session = Session(source, panda, method="map")
+        told = lines(session, every=0.0)
+        next(told)  # and at most 99 more are on their way
+        while kept.read_bytes().count(b"\n") < 500:
+            sleep(0.02)
+        newest = read_recording(kept).t[-1]
+        held_up = [finite_json(line) for line in told]
+        session.close()
+    assert held_up[-1]["lost"] >= 300
+    for line in held_up[:-1]:  # the last is told when the log has ended
+        assert line["lag"] >= newest - line["t"] - 1e-9
+        assert line["age"] >= line["lag"]
 
 
 @pytest.mark.parametrize("time", [np.nan, 3.0], ids=["no time", "one time"])
@@ -375,6 +492,44 @@ def test_an_interruption_is_no_jump_of_the_joints(panda, moved):
     session.run()
     session.close()
     assert warned == []
+
+
+def test_a_doubt_stays_though_too_little_is_seen_of_the_next_payload_to_say_it_again():
+    """Another method forgets what was seen, as a change of payload does; two seconds of this arm then pass as sound."""
+    robot, anew = arm_named("ur10e"), [4.25, 8.25]
+    with open_source("sim", robot, payloads=[], speed=None, duration=11.0, rate=200.0, seed=4) as simulator:
+        stream = [s._replace(tau=-s.tau) for s in simulator]
+    for begins in anew:
+        two = [s for s in stream if begins <= s.t <= begins + 2.1]
+        check_plausible(Recording(*map(np.array, zip(*two, strict=True))), robot)
+    session, doubted = Session(Given(stream), robot, method="map"), []
+    for estimate in session.estimates():
+        if anew and estimate.t >= anew[0]:
+            session.use("map")
+            anew.pop(0)
+        doubted += [any("not plausible" in note for note in estimate.notes)] if estimate.t > 4.0 else []
+    session.close()
+    assert all(doubted)
+    assert not any("plausible now" in entry.text for entry in session.log)
+
+
+@pytest.mark.parametrize("method", ["map", "rls"])  # one takes the turns for changes of payload
+def test_a_doubt_is_taken_back_by_evidence_and_the_checks_go_on(panda, analytic_log, method):
+    """The sign of the torque is turned, set right after 4 s, and turned again after 40 s."""
+    log = analytic_log(panda, HELD, duration=65.0, rate=50.0)
+    stream = [s._replace(tau=s.tau if 4.0 < s.t < 40.0 else -s.tau) for s in log]
+    session = Session(Given(stream), panda, method=method)
+    session.run()
+    session.close()
+    first, back, again = [entry for entry in session.log if "plausible" in entry.text]
+    assert "opposite sign" in first.text
+    assert first.t < 4.0
+    assert "plausible now" in back.text
+    assert 2.0 * first.t - 0.3 < back.t < 40.0  # after as much motion as the doubt rested on
+    assert "not plausible" in again.text
+    assert again.t > 40.0
+    assert "not plausible" in session.estimate.notes[-1]
+    assert not session.estimate.calibrated
 
 
 def test_a_lost_source_is_told_in_the_terminal_at_once(monkeypatch, capsys):
@@ -472,7 +627,6 @@ def test_methods_offered_are_those_that_work_here(held, panda):
     for name in names:
         OnlineIdentifier(panda, None, name).close()
     assert "difference" not in names  # needs a tare
-    assert "svr" not in names
 
 
 # ---------------------------------------------------------------------- shapes
@@ -509,18 +663,18 @@ def test_links_reach_from_joint_to_joint_and_drums_stay_where_their_joint_turns(
     parts = arm_parts(any_arm)
     assert {part.frame for part in parts if part.kind == "joint"} == set(range(any_arm.n + 1))
     for part in parts:
-        first, last = p[part.frame] + part.mesh.vertices[-2:] @ R[part.frame].T  # the two poles
+        corners = p[part.frame] + part.mesh.vertices @ R[part.frame].T
         if part.kind == "link":
-            along = (last - first) / np.linalg.norm(last - first)
-            beyond = np.linalg.norm(last - first) - np.linalg.norm(p[part.frame + 1] - p[part.frame])
-            assert np.allclose(first + 0.5 * beyond * along, p[part.frame])
-            assert np.allclose(last - 0.5 * beyond * along, p[part.frame + 1])
+            along = p[part.frame + 1] - p[part.frame]
+            share = np.clip((corners - p[part.frame]) @ along / (along @ along), 0.0, 1.0)
+            away = np.linalg.norm(corners - p[part.frame] - share[:, None] * along, axis=1)
+            assert np.allclose(away, away[0])  # a capsule about the line from this joint to the next
         elif part.frame:
             turned = q.copy()
-            turned[part.frame - 1] += 0.7
+            turned[part.frame - 1] += 2 * np.pi * 5 / 32  # by five of its 32 sides it turns into itself
             R_after, p_after = frame_poses(any_arm, turned)
-            after = p_after[part.frame] + part.mesh.vertices[-2:] @ R_after[part.frame].T
-            assert np.allclose(after, [first, last])
+            after = p_after[part.frame] + part.mesh.vertices @ R_after[part.frame].T
+            assert np.allclose(KDTree(corners).query(after)[0], 0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(5))

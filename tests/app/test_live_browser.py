@@ -24,7 +24,7 @@ import pytest
 from armload.app.page import Session
 from armload.app.page.page import Page
 from armload.arms import arm as arm_named
-from armload.devices import Simulator, read_load
+from armload.devices import Replay, Simulator, read_load
 from armload.payloads import test_payload
 from armload.recording import read_recording
 
@@ -214,6 +214,30 @@ def test_the_method_can_be_switched_and_the_stream_tared(served, holding):
     holding.get_by_role("button", name="Tare").or_(holding.get_by_text("Tare", exact=True)).first.click()
     until(lambda: session.estimate.relative_to == "tare")
     until(lambda: (now := mass(holding)) is not None and abs(now[0]) < 0.1)
+
+
+def test_curves_are_drawn_of_a_source_that_knows_no_truth(panda, analytic_log, open_browser):
+    pytest.importorskip("viser", reason="the page needs viser")
+    session = Session(Replay(analytic_log(panda, HELD, duration=4.0), panda, speed=None), panda, method="map")
+    session.run()
+    page, complaints, strangers = Page(session, port=0, period=0.3), [], []
+    server = threading.Thread(target=page.serve)
+    server.start()
+    try:
+        with open_browser(page.url, complaints, strangers) as tab:
+            # where viser keeps its charts for tests
+            charts = "Object.values((window.__viserTestpoints || {}).uplots || {}).map(p => p.chart.scales.y)"
+            scales = f"{charts}.map(y => [y.min, y.max])"
+            seen = until(
+                lambda: len(now := tab.evaluate(scales)) == 4 and all(None not in ends for ends in now) and now
+            )
+            assert np.isfinite(seen).all()
+            assert min(low for low, _ in seen) < HELD.mass < max(high for _, high in seen)
+    finally:
+        page.close()
+        server.join()
+        session.close()
+    assert complaints == []
 
 
 @pytest.mark.usefixtures("tab")

@@ -757,7 +757,7 @@ ONE_LINK = robot(link("base"), joint("j", "revolute", "base", "a"), link("a", 1.
 @pytest.mark.parametrize(
     ("attempt", "says"),
     [
-        (lambda: arm("pandas"), r"unknown robot 'pandas': expected one of panda, fr3, ur5e, ur10e"),
+        (lambda: arm("pandas"), r"unknown robot 'pandas': expected one of fr3, panda, ur10e, ur5e"),
         (lambda: arm("panda", frame="tool0"), r"unknown frame 'tool0' in panda: expected one of .*panda_link8$"),
         (lambda: arm("ur10e", frame="wrist_3"), r"unknown frame 'wrist_3'.*; did you mean 'wrist_3_link'\?"),
         (lambda: arm("panda", gravity=(0, 0)), r"gravity is \(0, 0\): expected 3 finite numbers"),

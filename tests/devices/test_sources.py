@@ -472,6 +472,20 @@ def test_a_detached_source_hands_on_every_sample_and_records_it(tmp_path, panda,
     np.testing.assert_array_equal(numbers(read_recording(tmp_path / "run.csv")), numbers(log))
 
 
+def test_ctrl_c_is_not_for_the_reader_not_even_before_its_first_line(panda, path, log, monkeypatch, capfd):
+    class Hit(subprocess.Popen):
+        def __init__(self, *arguments, **settings):
+            super().__init__(*arguments, **settings)
+            self.send_signal(signal.SIGINT)
+
+    monkeypatch.setattr(subprocess, "Popen", Hit)
+    with Detached(str(path), panda) as source:
+        source.process.send_signal(signal.SIGINT)
+        np.testing.assert_array_equal(table(source), numbers(log))
+    assert capfd.readouterr().err == ""
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])  # whoever started it still hears of it
+
+
 def test_kill_9_of_the_reader_is_an_error_and_its_record_can_be_read(tmp_path, panda, path):
     with Detached(str(path), panda, loop=True, record=tmp_path / "run.csv") as source:
         samples = iter(source)
@@ -681,6 +695,27 @@ def test_what_a_client_prints_is_kept_apart_unless_asked_for(client, monkeypatch
     out, err = capfd.readouterr()
     assert out == ""
     assert err == ("from the client, outfrom the client, err" if asked else "")
+
+
+def test_a_robot_s_sample_gets_old_while_nobody_takes_the_next(client, tmp_path):
+    client("""
+        from types import SimpleNamespace
+        class Robot:
+            n = 0
+            def __init__(self, *_):
+                pass
+            def read_once(self):
+                time.sleep(0.001)
+                self.n += 1
+                now = SimpleNamespace(to_sec=lambda: 0.001 * self.n)
+                return SimpleNamespace(time=now, q=[0.0] * 7, dq=[0.0] * 7, tau_J=[0.0] * 7)
+        """)
+    record = tmp_path / "run.csv"
+    with open_source("fr3://192.0.2.9", arm("fr3"), record=record) as source:
+        first = next(iter(source))
+        while record.read_bytes().count(b"\n") < 300:
+            threading.Event().wait(0.02)
+        assert source.lag() >= read_recording(record).t[-1] - first.t  # each state took a millisecond at least
 
 
 def test_a_bug_in_the_reader_still_says_where_it_is(client, capfd):

@@ -4,7 +4,9 @@ import contextlib
 import json
 import os
 import re
+import runpy
 import socket
+import struct
 import subprocess
 import sys
 from dataclasses import replace
@@ -13,10 +15,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from armload.arms import arm
+from armload.arms import ARMS, arm
 from armload.devices import FrankaSource, Load, open_source
 from armload.devices.franka import writer as franka_robot
-from armload.devices.ur.source import TORQUE_CONSTANTS
 from armload.errors import SourceError
 from armload.inertia import InertialParameters, to_order
 from armload.motion import random_motion, taie2024
@@ -29,6 +30,7 @@ pytestmark = pytest.mark.full
 SERVERS = Path(__file__).resolve().parent / "servers"
 FRANKAS = [("panda", "panda_py", 5), ("fr3", "pylibfranka", 10)]
 LOST = [700, 701, 1500]
+ENOUGH = 2500  # samples to identify a payload from, of 20000 of which a busy client drops some
 LOAD = InertialParameters.from_com(
     1.5, (0.02, -0.03, 0.06), [[4e-3, 3e-4, -2e-4], [3e-4, 5e-3, 1e-4], [-2e-4, 1e-4, 6e-3]]
 )
@@ -47,7 +49,7 @@ def serving(program, log, address, tmp_path, *arguments):
     path = tmp_path / "served.npz"
     np.savez(path, **log)
     command = [sys.executable, SERVERS / f"{program}.py", path, "--address", address, *map(str, arguments)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         events = map(json.loads, process.stdout)
         try:
@@ -55,6 +57,12 @@ def serving(program, log, address, tmp_path, *arguments):
             yield process, events
         finally:
             process.kill()
+
+
+def tell(process, order):
+    """Tell an arm that stands to go, or to stand still again."""
+    process.stdin.write(order + "\n")
+    process.stdin.flush()
 
 
 def franka_urdf(robot):
@@ -68,8 +76,11 @@ def franka_urdf(robot):
 
 
 @contextlib.contextmanager
-def franka(robot, version, address, tmp_path, *, seconds=2.5, motion=None, lose=(), rest=60.0):
-    """A simulated robot with a payload behind the Franka Control Interface; also its log, at whole milliseconds."""
+def franka(robot, version, address, tmp_path, *, seconds=2.5, motion=None, lose=(), rest=60.0, stand=False):
+    """A simulated robot with a payload behind the Franka Control Interface; also its log, at whole milliseconds.
+
+    stand: it moves while it is told to, so that nothing of the motion is over before a client is there.
+    """
     motion = motion or (taie2024() if robot.name == "panda" else random_motion(robot, 3))
     world = World.real_like(replace(robot, link_spread=1.0), 2)  # one whose links are as well known as a Panda's
     run = simulate(robot, motion, heavy_payload(), world=world, duration=seconds)
@@ -82,15 +93,23 @@ def franka(robot, version, address, tmp_path, *, seconds=2.5, motion=None, lose=
     urdf = tmp_path / "robot.urdf"
     urdf.write_text(franka_urdf(robot))
     arguments = ["--version", version, "--urdf", urdf, *(["--lose", *lose] if len(lose) else [])]
+    arguments += ["--stand"] if stand else []
     with serving("franka_server", log, address, tmp_path, *arguments) as (process, events):
         yield log, process, events
 
 
-def collect(source):
-    """All samples until the source is lost, (N, 1 + 3n), and what was said then."""
+def collect(source, begin=lambda: None):
+    """All samples until the source is lost, (N, 1 + 3n), and what was said then; `begin` is called at the first."""
     rows = []
+
+    def states():
+        for s in source:
+            if not rows:
+                begin()
+            yield np.concatenate([[s.t], s.q, s.dq, s.tau])
+
     with pytest.raises(SourceError) as lost:
-        rows.extend(np.concatenate([[s.t], s.q, s.dq, s.tau]) for s in source)
+        rows.extend(states())
     return np.array(rows), str(lost.value)
 
 
@@ -104,22 +123,25 @@ def system(request):
 def test_every_state_arrives_as_the_robot_sent_it(system, address, tmp_path):
     name, version = system
     robot = arm(name)
-    with franka(robot, version, address, tmp_path, lose=LOST, rest=0.0) as (log, _, _):
+    with franka(robot, version, address, tmp_path, lose=LOST, rest=0.0, stand=True) as (log, process, events):
         record = tmp_path / "run.csv"
         with open_source(f"{name}://{address}", robot, record=record) as source:
             assert (source.n, source.rate, source.name) == (7, 1000.0, f"{name}://{address}")
-            rows, said = collect(source)
+            rows, said = collect(source, lambda: tell(process, "go"))
             assert source.lost == 0
+        stood = next(event for event in events if event["event"] == "moves")["tick"]
     assert f"{name}://{address} was lost" in said  # the log was over: the server fell silent
     t = rows[:, 0]
     assert np.all(np.diff(t) > 0)
-    place = np.round(1000 * (t - log["t"][0])).astype(int)
-    np.testing.assert_allclose(t, log["t"][place], atol=1e-9)
+    place = np.round(1000 * (t - log["t"][0])).astype(int) - stood
+    moving, place = place >= 0, place[place >= 0]
+    assert not np.any(rows[~moving, 8:15])
+    np.testing.assert_allclose(t[moving], log["t"][place] + 1e-3 * stood, atol=1e-9)
     sent = np.hstack([log["q"], log["dq"], log["tau"]])[place]
     if version == 5:
-        np.testing.assert_array_equal(rows[:, 1:], sent)
+        np.testing.assert_array_equal(rows[moving, 1:], sent)
     else:
-        np.testing.assert_array_equal(rows[:, 1:], sent.astype(np.float32))
+        np.testing.assert_array_equal(rows[moving, 1:], sent.astype(np.float32))
     # lost packets are gaps in time; a busy machine adds some of its own, as the client keeps only the newest
     assert not set(LOST) & set(place)
     assert len(place) > 500
@@ -150,15 +172,20 @@ def test_a_payload_goes_from_the_vendor_s_stream_into_the_robot_s_own_load(syste
     """The whole way: the maker's client streams a simulated robot, armload identifies, the robot is told at rest."""
     name, version = system
     robot = arm(name)
-    with franka(robot, version, address, tmp_path, seconds=4.0) as (_, _, events):
+    with franka(robot, version, address, tmp_path, seconds=20.0, rest=0.0, stand=True) as (_, process, events):
         online = OnlineIdentifier(robot)
         with open_source(f"{name}://{address}", robot) as source:
-            for sample in source:
-                estimate = online.update(*sample)
-                if not np.any(sample.dq):
+            samples = iter(source)
+            next(samples)
+            tell(process, "go")
+            for sample in samples:
+                if np.any(sample.dq):
+                    estimate = online.update(*sample)
+                    if online.health.used == ENOUGH:
+                        tell(process, "stop")
+                elif online.health.used >= ENOUGH:
                     break
             online.close()
-            assert online.health.used > 500
             assert estimate.held
             load = Load.of(estimate, robot)
             told = franka_robot.set_load(source, load, robot, write=True, allow_undetermined_inertia=name == "fr3")
@@ -169,6 +196,43 @@ def test_a_payload_goes_from_the_vendor_s_stream_into_the_robot_s_own_load(syste
     assert received[1:4] == pytest.approx(truth.com, abs=0.02)
     matrix = estimate.parameters.inertia_com
     assert received[4:] == pytest.approx([*matrix[:, 0], *matrix[:, 1], *matrix[:, 2]], rel=1e-9)
+
+
+def test_a_served_arm_moves_from_when_it_is_told_to_until_it_is_told_to_stop(address, tmp_path):
+    """Through plain sockets: a late client misses nothing of the motion, which is not over before it has enough."""
+    place = runpy.run_path(str(SERVERS / "franka_server.py"))["State"](5).at
+    with (
+        franka(arm("panda"), 5, address, tmp_path, seconds=10.0, rest=0.0, stand=True) as (log, process, events),
+        socket.create_connection((address, 1337)) as commands,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as states,
+    ):
+        states.bind((commands.getsockname()[0], 0))
+        states.settimeout(60.0)
+        commands.sendall(struct.pack("<3I2H", 0, 1, 16, 5, states.getsockname()[1]))
+
+        def state():
+            message = states.recv(1 << 16)
+            numbers = np.frombuffer(message, "<f8", place["dtheta"].stop, 8)
+            return struct.unpack_from("<Q", message)[0] - 10000, numbers[place["q"]], numbers[place["dq"]]
+
+        for _ in range(200):
+            tick, q, dq = state()
+            assert not dq.any()
+            np.testing.assert_array_equal(q, log["q"][0])
+        tell(process, "go")
+        while not dq.any():
+            tick, q, dq = state()
+        begun = next(event for event in events if event["event"] == "moves")["tick"]
+        assert begun > 200 - 1
+        np.testing.assert_array_equal(q, log["q"][tick - begun])
+        tell(process, "stop")
+        while dq.any():
+            tick, q, dq = state()
+        stood = next(event for event in events if event["event"] == "stands")["tick"]
+        for _ in range(200):
+            np.testing.assert_array_equal(q, log["q"][stood - begun])
+            assert not dq.any()
+            tick, q, dq = state()
 
 
 def test_a_server_that_dies_is_a_source_that_is_lost(system, address, tmp_path):
@@ -240,7 +304,7 @@ def test_a_ur_arm_gives_positions_velocities_and_currents_as_torque(address, tmp
     pytest.importorskip("rtde_receive", reason="ur-rtde has no wheel for this Python")
     robot = arm("ur10e")
     run = simulate(robot, random_motion(robot, 1), heavy_payload(), rate=500.0, duration=2.2)
-    constants = np.array(TORQUE_CONSTANTS["ur10e"])
+    constants = np.array(ARMS["ur10e"].torque_constants)
     t = 100.0 + run.t
     log = {"timestamp": t, "actual_q": run.q, "actual_qd": run.dq, "actual_current": run.tau / constants}
     with serving("ur_server", log, address, tmp_path) as (_, events):

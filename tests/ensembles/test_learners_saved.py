@@ -186,6 +186,12 @@ def rewritten(path, change, target):
     return target
 
 
+def test_a_model_of_members_that_armload_no_longer_has_is_said_to_be_of_another_version(tree, tmp_path):
+    old = rewritten(tree[0], lambda h, _: h["structure"].update(type="support vectors"), tmp_path / "svr.safetensors")
+    with pytest.raises(ModelError, match=r"svr\.safetensors belongs to another version of armload.*'support vectors'"):
+        load_model(old)
+
+
 CHANGES = {
     "a newer format": lambda h, _: h.update(format=2),
     "a walk that never ends": lambda _, t: t["left"].__setitem__(t["feature"] >= 0, 0),

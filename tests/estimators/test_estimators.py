@@ -16,7 +16,7 @@ from armload.estimators import (
     Tared,
     WeightedLeastSquares,
 )
-from armload.estimators.consistent import (
+from armload.estimators.constrained import (
     _CHART_MEAN,
     _CHART_STD,
     entropic_pull,

@@ -10,18 +10,15 @@ import pytest
 from armload.arms import arm
 from armload.ensembles import BaggingEnsemble, LearnedIdentifier, save_model
 from armload.errors import ArmloadError
-from armload.estimators import BatchIdentifier, CommandedLeastSquares, Identifier, RecursiveLeastSquares, Tared
+from armload.estimators import CommandedLeastSquares, Identifier, RecursiveLeastSquares, Tared
 from armload.identification import METHODS
 from armload.inertia import InertialParameters
 from armload.lab.evaluation import PriorLeastSquares, TrainingMean
 from armload.motion import taie2024
 from armload.posterior import (
     HybridIdentifier,
-    Physics,
     PosteriorLeastSquares,
     SmoothPosteriorLeastSquares,
-    StreamingHybrid,
-    StreamingIdentifier,
 )
 from armload.recording import Recording
 from armload.regression import GaussianPrior, JointFeatures
@@ -64,11 +61,10 @@ CATALOGUE = {
 }
 MAKE = CATALOGUE | {
     "commanded": lambda arm, *_: CommandedLeastSquares(arm, taie2024()),
-    # with few features a solution at every sample is cheap
-    "map-gp": lambda arm, *_: SmoothPosteriorLeastSquares(arm, refresh=0.02, features=FEW),
-    "hybrid": lambda arm, *_: HybridIdentifier(arm, refresh=0.02, features=FEW),
-    "hybrid, with tare": lambda arm, empty, _: HybridIdentifier(arm, empty, refresh=0.02, features=FEW),
-    "hybrid physics": lambda arm, *_: Physics(arm, refresh=0.02, features=FEW),
+    # with few features a solution is cheap
+    "map-gp": lambda arm, *_: SmoothPosteriorLeastSquares(arm, features=FEW),
+    "hybrid": lambda arm, *_: HybridIdentifier(arm, features=FEW),
+    "hybrid, with tare": lambda arm, empty, _: HybridIdentifier(arm, empty, features=FEW),
     "map, with tare": lambda arm, empty, _: PosteriorLeastSquares(arm, empty),
     "rls, tared": lambda arm, empty, _: Tared(RecursiveLeastSquares(arm), empty),
     "trees": lambda arm, _, model: LearnedIdentifier(model, arm),
@@ -89,19 +85,18 @@ def test_no_identifier_escapes_the_list(panda, empty, model):
         return own + [k for child in kind.__subclasses__() for k in shipped(child)]
 
     listed = {type(make(panda, empty, model)) for make in MAKE.values()}
-    live = {StreamingIdentifier, StreamingHybrid}  # forms of listed ones, compared with them in test_streaming.py
-    assert set(shipped(Identifier)) == listed | live
-    assert BatchIdentifier not in listed
+    assert set(shipped(Identifier)) == listed
 
 
-def test_the_stream_and_the_whole_recording_agree(make, log):
+def test_a_stream_that_is_concluded_says_what_the_whole_recording_says(make, log):
     identifier, whole = make(), make().run(log)
     for sample in log:
-        streamed = identifier.update(sample)
-    assert streamed.n_samples == whole.n_samples == len(log)
-    assert streamed.t == whole.t == log.t[-1]
-    # at 50 Hz every sample is a solution of its own, for map too
-    np.testing.assert_allclose(streamed.phi, whole.phi, rtol=0, atol=1e-9)
+        running = identifier.update(sample)
+    concluded = identifier.conclude()
+    assert running.n_samples == concluded.n_samples == whole.n_samples == len(log)
+    assert running.t == concluded.t == whole.t == log.t[-1]
+    np.testing.assert_allclose(concluded.phi, whole.phi, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(concluded.covariance, whole.covariance, rtol=1e-6, atol=1e-12)
 
 
 def test_a_trace_has_every_nth_estimate_and_the_last(make, log):
@@ -175,6 +170,8 @@ def test_memory_does_not_grow(make, log):
     for k in range(4):
         for sample in part:
             identifier.update(sample._replace(t=sample.t + k * (part.t[-1] + 0.02)))
+        if hasattr(identifier, "close"):
+            identifier.close()  # threads are not its memory
         sizes.append(size(identifier))
     assert sizes[-1] <= sizes[0] + 1024  # a few samples may wait to be taken together; there were 300 more
 

@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from armload.arms import arm
-from armload.errors import IdentificationError
+from armload.arms import arm, payload_regressor
+from armload.errors import IdentificationError, RecordingError
 from armload.identification import METHODS, identify
 from armload.identification.identify_log import Z95
-from armload.inertia import InertialParameters, is_consistent
+from armload.inertia import InertialParameters, distance_to_body, is_consistent, nearest_body
 from armload.lab.episodes import Recipe, draw_episodes, simulate_episodes
 from armload.motion import random_motion, taie2024
 from armload.posterior import PosteriorLeastSquares, shipped_model
-from armload.recording import Recording
+from armload.recording import Recording, read_recording, shared_samples
 from armload.regression import payload_prior_std
 from armload.simulation import Sensors, World, simulate
 
@@ -149,14 +149,35 @@ def test_an_empty_arm_holds_nothing_and_a_light_payload_is_held_with_a_tare(real
 
 
 @pytest.mark.parametrize("method", [None, "difference"])
-def test_a_log_that_is_its_own_tare_holds_nothing_and_the_intervals_hold_zero(loaded, real_like, method):
+@pytest.mark.parametrize("part", ["all of it", "its first half", "its second half, from zero on", "every other sample"])
+def test_a_log_is_not_its_own_tare(loaded, real_like, method, part):
     panda, _ = real_like
-    answer = identify(loaded, panda, tare=loaded, method=method)
-    assert not answer.held
-    assert np.all(np.array(answer.phi_low) < 0)
-    assert np.all(np.array(answer.phi_high) > 0)
-    assert np.all(np.isfinite(answer.com))
-    assert "nothing seems to be held" in str(answer)
+    half = len(loaded) // 2
+    rows = {"its first half": slice(half), "its second half, from zero on": slice(half, None)}
+    rows |= {"every other sample": slice(None, None, 2)}
+    tare = loaded.select(rows.get(part, slice(None)))
+    if part == "its second half, from zero on":
+        tare = replace(tare, t=tare.t - tare.t[0])
+    with pytest.raises(RecordingError, match=f"share {len(tare)} measured samples: .* leave the tare out"):
+        identify(loaded, panda, tare=tare, method=method)
+
+
+def test_the_beginning_of_a_log_is_a_tare_for_the_rest_of_it(loaded, real_like):
+    panda, _ = real_like
+    tare, rest = loaded.between(0.0, 3.0), loaded.between(3.0, 10.0)
+    answer = identify(rest, panda, tare=tare)
+    assert not answer.held  # nothing was added
+    assert answer.phi_low[0] < 0.0 < answer.phi_high[0]
+
+
+def test_samples_of_an_arm_that_stands_are_the_same_only_at_the_same_times(panda, still):
+    """A pose that is taken again measures the same: a stand in another log is no copy of this one."""
+    later = replace(still, t=still.t + 60.0)
+    lighter = replace(still, tau=panda.torque(still.q))
+    other = replace(still, tau=np.concatenate([still.tau[:200], lighter.tau[200:]]))
+    assert shared_samples(still, still) == len(still)
+    assert shared_samples(still, still.select(slice(50, 150))) == 100
+    assert [shared_samples(still, log) for log in (later, lighter, other)] == [0, 0, 0]
 
 
 def test_another_frame_moves_the_same_body(loaded):
@@ -233,6 +254,64 @@ def test_arms_as_they_are_are_not_called_strange(panda):
     recipe = Recipe(worlds=("beyond",), motions=("slow",), untared=1.0, duration=30.0)
     for logs in simulate_episodes(draw_episodes(panda, recipe, 4, seed=5)):
         assert not any("check the robot" in note for note in identify(logs.run, panda).notes)
+
+
+@pytest.mark.parametrize("tared", [False, True])
+def test_a_log_that_no_body_explains_is_called_so_by_the_default_method(panda, tared):
+    """A kilogram whose principal moments are all negative, added through the regressor to an empty arm's torque."""
+    how = {"world": World.real_like(panda, 5), "sensors": Sensors.panda(panda), "rate": 500.0}
+    empty = simulate(panda, taie2024(), None, seed=1, **how)
+    tare = simulate(panda, random_motion(panda, 8, duration=15.0), None, seed=2, **how) if tared else None
+    q, dq, ddq = taie2024()(empty.t)
+    Y = payload_regressor(panda.frame_motion(q), dq, ddq)
+
+    def carrying(inertia):
+        phi = np.array([1.0, 0.0, 0.0, 0.05, inertia, 0.0, 0.0, inertia, 0.0, inertia])
+        return identify(replace(empty, tau=empty.tau + Y @ phi), panda, tare=tare)
+
+    sound, impossible = carrying(5e-3), carrying(-0.05)
+    assert (sound.method, sound.interval) == ("hybrid", "calibrated")
+    assert not any("no body fits" in note for note in sound.notes)
+    assert (impossible.method, impossible.interval) == ("hybrid", "approximate")
+    assert any("no body fits within the error bars" in note for note in impossible.notes)
+    assert impossible.consistent  # the nearest body is reported all the same
+
+
+@pytest.mark.parametrize("name", ["lmi", "log-cholesky", "hybrid"])
+def test_what_a_log_says_is_judged_before_a_body_is_made_of_it(panda, loaded, name):
+    identifier = METHODS[name].make(panda)
+    assert identifier.unprojected is None
+    estimate = identifier.run(loaded)
+    mean, covariance = identifier.unprojected
+    assert is_consistent(estimate.phi)
+    assert not is_consistent(mean)
+    away = nearest_body(mean, covariance) - mean
+    assert distance_to_body(mean, covariance) ** 2 == pytest.approx(away @ np.linalg.inv(covariance) @ away, rel=1e-6)
+    identifier.reset()
+    assert identifier.unprojected is None
+
+
+def test_sound_logs_have_a_body_within_the_error_bars(panda):
+    for logs in simulate_episodes(draw_episodes(panda, "broad", 6, seed=31)):
+        for tare in (None, logs.tare):
+            assert not any("no body fits" in note for note in identify(logs.run, panda, tare=tare).notes)
+
+
+@pytest.mark.parametrize(
+    ("log", "tare", "robot"),
+    [
+        ("panda_unloaded_1khz.csv", None, "panda"),
+        ("ur10e_loaded_2805g.csv", None, "ur10e.urdf"),
+        ("ur10e_loaded_2805g.csv", "ur10e_unloaded.csv", "ur10e.urdf"),
+        ("ur10e_unloaded.csv", None, "ur10e.urdf"),
+    ],
+)
+def test_real_logs_have_a_body_within_the_error_bars(real_data, log, tare, robot):
+    own = arm(real_data / robot, "tool0") if robot.endswith(".urdf") else arm(robot)
+    before = None if tare is None else read_recording(real_data / tare, own)
+    answer = identify(read_recording(real_data / log, own), own, tare=before)
+    assert answer.method == "hybrid"
+    assert not any("no body fits" in note for note in answer.notes)
 
 
 def test_error_bars_that_lean_on_the_prior_are_named_and_those_that_a_log_tells_are_not(real_like, loaded):

@@ -12,8 +12,10 @@ from armload.estimators import Estimate, Identifier
 from armload.identification import METHODS
 from armload.lab import load_cells
 from armload.lab.benchmark import ALL, QUICK, Size, default_names, gather, left_out, run_benchmark, write_results
+from armload.lab.benchmark.benchmark_results import summary_json
 from armload.lab.benchmark.benchmark_run import cell_name, measure
 from armload.lab.benchmark.benchmark_tables import AHEAD, group_table, losses_table, repeatability_table
+from armload.lab.benchmark.front import front, table
 from armload.lab.benchmark.populations import population, prior_of
 from armload.lab.benchmark.rows import BASELINES, BOUND, Row, fingerprint, rows_for
 from armload.lab.benchmark.targets import verdicts
@@ -236,6 +238,22 @@ def test_who_is_ahead_of_the_hybrid_is_marked_and_listed():
     assert [row[-1] for row in losses_table(results).rows] == ["map"] * 2 * len(GROUPS)
 
 
+def test_the_first_page_says_where_the_hybrid_loses_and_which_targets_it_missed():
+    errors = np.random.default_rng(2).uniform(3.0, 4.0, 40)
+    cells = made(errors, "hybrid") | made(0.5 * errors, "map-gp") | made(2.0 * errors, "training mean")
+    summary = json.loads(json.dumps(summary_json(gather(cells, SMALL), SMALL)))
+    text = {section.title: section.text for section in front(summary, "p.png", "all.md")}
+    mean = errors.mean()
+    assert "on 1 populations: 6 cells. In 6 cells another row is ahead" in text["Where hybrid loses"]
+    for title, cell in (("Up to 0.1 s: 3 cells", 2 * mean), ("Later: 3 cells", mean)):
+        assert f"- {title} (mass 1, first moment 1, inertia 1). Ahead in them: map-gp 3." in text["Where hybrid loses"]
+        assert f"{cell:.1f} g against {cell / 2:.1f} g" in text["Where hybrid loses"]
+    assert "hybrid at most map-gp: mass on `reference` after 6 s, 2.00 times" in text["Targets"]
+    (row,) = table(summary).rows
+    assert row[5] == f"{mean:.1f} ± {errors.std(ddof=1) / np.sqrt(40):.1f}"  # the hybrid's mass after 6 s
+    assert (row[1], row[7], row[8]) == ("–", "–", "50")  # 1 s and rls-filter are not measured; 4.9 holds the last time
+
+
 def test_a_target_is_reached_missed_or_not_clear():
     errors = np.random.default_rng(1).uniform(3.0, 4.0, 40)
     small = gather(made(errors, "hybrid") | made(1.1 * errors, "map-gp"), SMALL)
@@ -303,11 +321,16 @@ def test_the_files_say_the_same_as_the_cells(finished):
     found = summary["populations"]["untared"]
     assert found["episodes"] == 3
     np.testing.assert_allclose(found["methods"]["rls-filter"]["mae"][-1], errors.mean(axis=0), rtol=1e-3)
-    page, report = (finished / "benchmark.md").read_text("utf-8"), (finished / "report.html").read_text("utf-8")
-    assert f"{1e3 * errors[:, 0].mean():.3g} ±" in page.replace(".0 ±", " ±")
-    assert "training mean" in page
-    assert "same-prior least squares" in page
-    assert report.count("data:image/svg") == 2
+    page, tables, report = (
+        (finished / name).read_text("utf-8") for name in ("benchmark.md", "benchmark_tables.md", "report.html")
+    )
+    assert f"{1e3 * errors[:, 0].mean():.3g} ±" in tables.replace(".0 ±", " ±")
+    assert "training mean" in tables
+    assert "same-prior least squares" in tables
+    assert f"| {1e3 * errors[:, 0].mean():.0f} ±" in page  # rls-filter at the last time
+    assert "(pictures/benchmark.png)" in page
+    assert (finished / "pictures" / "benchmark.png").read_bytes().startswith(b"\x89PNG")
+    assert report.count("data:image/svg") == 3
     assert "<script" not in report
 
 

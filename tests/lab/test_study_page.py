@@ -15,6 +15,7 @@ from armload.lab.study.claims import evaluate
 from armload.lab.study.counterparts import benchmark_rows, first_table, izz_table, ratio_table
 from armload.lab.study.numbers import both_stages
 from armload.lab.study.paper_figures import figures
+from armload.lab.study.plain import against_table, in_plain_words
 from armload.lab.study.study_page import html_report, sections, summary_json, write_page
 from armload.lab.study.study_tables import COMMAND, PROTOCOLS, claims_table, epochs_table, main_tables, value
 from armload.lab.study.summary import paragraphs
@@ -292,6 +293,30 @@ def test_plain_words_follow_from_the_numbers():
     assert "is at 0.25 (mass 0.25, first moment 0.25, inertia 0.25); their last one at 0.1" in text
     assert "trees 160 g; networks 80 g; filtered RLS 400 g; training mean 400 g" in text
     assert "Networks: test payload, nominal arm 0.6; test payload, real-like arms 0.8" in text  # 0.3 and 0.4 over 0.5
+
+
+def test_the_half_page_in_plain_words_follows_from_the_numbers():
+    cells = study(tree_1_payload=3.0)
+    blind = cell("tree", held_out=6.0, ablation="torque", drop=["tau"])
+    cells[blind["name"]] = blind
+    claims = evaluate(cells)
+    text = in_plain_words(cells, claims)
+    assert "3 times as large for the trees and 1 times as large for the networks" in text
+    assert "mass error is 160 g for the trees, 80 g for the networks, 400 g for filtered RLS" in text
+    assert "is 0.4 times (the trees) and 0.2 times (the networks) that of the training mean" in text
+    assert "On held-out rows trees have a mass error of 600 g without the torque and of 100 g with it." in text
+    confirmed = sum(c["verdict"] == "confirmed" for c in claims if c["paper"] is not None)
+    assert f"percentages by which one method is better than another. {confirmed} are confirmed" in text
+    shown = row(against_table(cells), "networks")
+    assert (shown["RLS"], shown["same-prior least squares"]) == ("0.1", "0.8")  # 0.4 over 4 and over 0.5
+    assert len(text.split()) < 400  # half a page
+
+
+def test_the_half_page_says_what_is_not_measured():
+    text = in_plain_words({}, evaluate({}))
+    assert text.count("Not measured yet") == 4
+    assert not re.search(r"\d+ g\b", text)
+    assert {cell for r in against_table({}).rows for cell in r[1:]} == {"–"}
 
 
 def test_what_torque_is_worth_is_measured_against_the_same_training_with_it():

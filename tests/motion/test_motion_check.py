@@ -3,80 +3,73 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 
 from armload.arms import arm
 from armload.errors import MotionError
 from armload.inertia import InertialParameters
 from armload.motion import FourierMotion, check_motion, random_motion, rated_load, taie2024
-from armload.motion.collision import capsule_arm, segment_distance
-
-point = arrays(float, 3, elements=st.floats(-1, 1, allow_subnormal=False).map(lambda x: round(x, 3)))
+from armload.motion.collision import capsule_arm
 
 
-def brute_force(a, b, c, d, steps=401):
-    s = np.linspace(0, 1, steps)
-    p, q = a + np.outer(s, b - a), c + np.outer(s, d - c)
-    return np.linalg.norm(p[:, None] - q[None], axis=2).min()
+def segment_distance(a, b, c, d, steps=2001):
+    """Smallest distance of the segments ab and cd: |p − q|² is convex in q, so that each p has its q in closed form."""
+    p, u = a + np.outer(np.linspace(0, 1, steps), b - a), d - c
+    along = np.clip((p - c) @ u / max(u @ u, 1e-300), 0.0, 1.0)
+    return np.linalg.norm(p - c - np.outer(along, u), axis=1).min()
 
 
-@given(point, point, point, point)
-@settings(max_examples=60, deadline=None)
-def test_segment_distance_is_the_smallest_over_all_pairs_of_points(a, b, c, d):
-    sampled = brute_force(a, b, c, d)
-    exact = float(segment_distance(a, b, c, d))
-    spacing = (np.linalg.norm(b - a) + np.linalg.norm(d - c)) / 400
-    assert sampled - spacing <= exact <= sampled + 1e-9
-
-
-@given(point, point, point)
-@settings(max_examples=30, deadline=None)
-def test_parallel_and_degenerate_segments_have_their_distance_too(a, b, offset):
-    assert float(segment_distance(a, b, a + offset, b + offset)) <= np.linalg.norm(offset) + 1e-9
-    assert float(segment_distance(a, a, b, b)) == pytest.approx(np.linalg.norm(b - a), abs=1e-12)
-    assert float(segment_distance(a, b, b, a)) == pytest.approx(0.0, abs=1e-9)
-    sampled = brute_force(a, b, a + offset, b + offset)
-    assert float(segment_distance(a, b, a + offset, b + offset)) <= sampled + 1e-9
-
-
-def test_segment_distance_takes_many_pairs_at_once():
-    a, b, c, d = np.random.default_rng(3).normal(size=(4, 5, 6, 3))
-    together = segment_distance(a, b, c, d)
-    assert together.shape == (5, 6)
-    assert together[2, 4] == segment_distance(a[2, 4], b[2, 4], c[2, 4], d[2, 4])
-
-
-def test_capsules_ride_on_their_links_as_pinocchio_places_them(any_arm):
-    model = pin.buildModelFromXML(any_arm.urdf)
+def axes(capsules, q):
+    """Both ends of the capsules' axes in the base, as Pinocchio places the links."""
+    model = pin.buildModelFromXML(capsules.arm.urdf)
     data = model.createData()
+    pin.forwardKinematics(model, data, np.asarray(q, dtype=float))
+    placed = [data.oMi[int(link)] for link in capsules.link]
+    return tuple(
+        np.array([place.act(end) for place, end in zip(placed, ends, strict=True)])
+        for ends in (capsules.start, capsules.end)
+    )
+
+
+@pytest.mark.parametrize("floor", [0.0, -0.3])
+def test_clearances_are_those_of_segments_on_the_links_less_their_radii(any_arm, floor):
     capsules = capsule_arm(any_arm)
-    q = np.random.default_rng(0).uniform(-2, 2, size=(5, any_arm.n))
-    starts, ends = capsules.axes(q)
-    for k in range(5):
-        pin.forwardKinematics(model, data, q[k])
-        for c, link in enumerate(capsules.link):
-            placement = data.oMi[int(link)]
-            np.testing.assert_allclose(starts[k, c], placement.act(capsules.start[c]), atol=1e-12)
-            np.testing.assert_allclose(ends[k, c], placement.act(capsules.end[c]), atol=1e-12)
+    poses = np.random.default_rng(0).uniform(-2.5, 2.5, size=(20, any_arm.n))
+    clear = capsules.clearance(poses, floor)
+    for k, q in enumerate(poses):
+        start, end = axes(capsules, q)
+        apart = [
+            segment_distance(start[i], end[i], start[j], end[j]) - capsules.radius[i] - capsules.radius[j]
+            for i, j in capsules.pairs
+        ]
+        assert clear.self[k] == pytest.approx(min(apart), abs=1e-6)  # a sampled distance is too long by 1e-6 at most
+        assert apart[clear.self_pair[k]] == pytest.approx(min(apart), abs=1e-6)
+        height = np.minimum(start[:, 2], end[:, 2]) - capsules.radius - floor
+        height[capsules.link < 2] = np.inf
+        assert clear.floor[k] == pytest.approx(height.min(), abs=1e-12)
+        assert height[clear.floor_part[k]] == pytest.approx(height.min(), abs=1e-12)
+    assert (clear.self < 0).any()  # penetration is among them
 
 
 def test_automatic_capsules_run_from_joint_to_joint_and_end_at_the_flange():
     ur = arm("ur10e")
     capsules = capsule_arm(ur, payload_radius=0.0)
-    starts, ends = capsules.axes(np.random.default_rng(1).uniform(-2, 2, size=(4, 6)))
-    np.testing.assert_allclose(ends[:, :-1], starts[:, 1:], atol=1e-12)
-    q = np.zeros((1, 6))
-    np.testing.assert_allclose(capsules.axes(q)[1][0, -1], ur.frame_pose(q)[1][0], atol=1e-12)
+    for q in np.random.default_rng(1).uniform(-2, 2, size=(4, 6)):
+        start, end = axes(capsules, q)
+        np.testing.assert_allclose(end[:-1], start[1:], atol=1e-12)
+        np.testing.assert_allclose(end[-1], ur.frame_pose(q)[1][0], atol=1e-12)
 
 
 def test_the_payload_ball_sits_a_tenth_of_a_metre_beyond_the_flange(any_arm):
-    q = np.random.default_rng(2).uniform(-1, 1, size=(3, any_arm.n))
+    q = np.random.default_rng(2).uniform(-1, 1, size=any_arm.n)
     R, p = any_arm.frame_pose(q)
-    start, end = capsule_arm(any_arm, payload_radius=0.12).axes(q)
-    np.testing.assert_allclose(start[:, -1], p + 0.1 * R[:, :, 2], atol=1e-12)
-    np.testing.assert_array_equal(start[:, -1], end[:, -1])
+    start, end = axes(capsule_arm(any_arm, payload_radius=0.12), q)
+    np.testing.assert_allclose(start[-1], p[0] + 0.1 * R[0, :, 2], atol=1e-12)
+    np.testing.assert_array_equal(start[-1], end[-1])
+
+
+def test_of_equal_clearances_the_first_instant_is_named():
+    ur = arm("ur5e")  # its shoulder stays where it is
+    assert "at t = 0.00 s" in check_motion(ur, random_motion(ur, 4)).floor_nearest
 
 
 def test_a_panda_is_recognised_by_its_joints_under_any_name(tmp_path, panda):

@@ -78,7 +78,7 @@ def test_an_arm_with_a_known_tool_answers_relative_to_it(panda, log):
 
 
 def test_methods_that_cannot_run_live_are_not_offered(panda):
-    with pytest.raises(IdentificationError, match="unknown method 'tree'") as raised:
+    with pytest.raises(IdentificationError, match="the method tree cannot follow a live stream") as raised:
         OnlineIdentifier(panda, method="tree")
     offered = str(raised.value).split("expected one of ")[1].split(", or the file")[0].split(", ")
     assert not {"tree", "network", "commanded"} & set(offered)

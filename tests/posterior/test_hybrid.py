@@ -1,11 +1,13 @@
 """The hybrid: closed forms of its prior, coverage of its error bars on data of known law, its file, its answers."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from safetensors import safe_open
 from scipy.stats import multivariate_normal
 
 import armload
@@ -25,6 +27,7 @@ from armload.posterior import (
     HybridModel,
     MixturePrior,
     PosteriorLeastSquares,
+    Training,
     shipped_model,
 )
 from armload.posterior import SmoothPosteriorLeastSquares as Smooth
@@ -301,8 +304,32 @@ def test_a_model_answers_the_same_after_it_was_saved(synthetic, mixture, panda, 
             back.calibration.answer(evidence, back.prior).mean, calibration.answer(evidence, mixture).mean
         )
     assert back.provenance == {"note": 1}
+    assert back.training is None
     assert not back.calibrated  # nobody has checked it
     assert HybridModel.wrote(path)
+
+
+@pytest.mark.parametrize(
+    ("pooled", "episodes", "calibrated"),
+    [(0.95, 1000, True), (0.931, 1000, True), (0.95, 999, False), (0.929, 1000, False), (0.971, 1000, False)],
+)
+def test_intervals_are_calibrated_by_what_the_model_says_of_its_training(tmp_path, pooled, episodes, calibrated):
+    checked = Training("broad", episodes, 4, pooled)
+    model = replace(HybridModel.load(SHIPPED[0]), training=checked, provenance={})
+    back = HybridModel.load(model.save(tmp_path / "model.safetensors"))
+    assert back.training == checked
+    assert model.calibrated == back.calibrated == calibrated
+
+
+def test_a_model_of_an_earlier_format_is_refused_in_a_sentence(tmp_path):
+    from safetensors.numpy import load_file, save_file
+
+    with safe_open(SHIPPED[0], framework="np") as file:
+        header = json.loads(file.metadata()["armload-hybrid"])
+    path = tmp_path / "model.safetensors"
+    save_file(load_file(SHIPPED[0]), path, {"armload-hybrid": json.dumps({**header, "format": 2})})
+    with pytest.raises(ModelError, match=r"model\.safetensors belongs to another version of armload: train it again"):
+        HybridModel.load(path)
 
 
 def test_a_file_that_is_no_hybrid_is_refused_in_a_sentence(tmp_path):
@@ -316,7 +343,7 @@ def test_a_file_that_is_no_hybrid_is_refused_in_a_sentence(tmp_path):
             HybridModel.load(tmp_path / f"{name}.safetensors")
 
 
-@pytest.mark.parametrize("broken", ["nan", "negative", "of one kind", "no provenance"])
+@pytest.mark.parametrize("broken", ["nan", "negative", "of one kind", "no provenance", "no share"])
 def test_a_hybrid_with_numbers_that_cannot_be_is_refused_in_a_sentence(tmp_path, broken):
     model = HybridModel.load(SHIPPED[0])
     widths = model.calibration.widths.copy()
@@ -328,7 +355,11 @@ def test_a_hybrid_with_numbers_that_cannot_be_is_refused_in_a_sentence(tmp_path,
         widths = widths[:1]
     calibration = replace(model.calibration, widths=widths)
     provenance: Any = None if broken == "no provenance" else model.provenance
-    path = replace(model, calibration=calibration, provenance=provenance).save(tmp_path / "model.safetensors")
+    assert model.training is not None
+    share: Any = "most" if broken == "no share" else model.training.pooled_coverage
+    training = replace(model.training, pooled_coverage=share)
+    model = replace(model, calibration=calibration, provenance=provenance, training=training)
+    path = model.save(tmp_path / "model.safetensors")
     with pytest.raises(ModelError, match=r"model\.safetensors holds a hybrid armload cannot use"):
         HybridModel.load(path)
 
@@ -357,7 +388,6 @@ def test_a_shipped_model_is_small_and_calibrated_and_belongs_to_its_arm(path):
     assert path == HybridModel.shipped(own)
     assert path.stat().st_size < 5e6
     assert model.calibrated
-    assert model.provenance["episodes"] >= 1000
     assert model.prior_for(own).mean[0] > 0.0
     for other in (other for other in ARMS if other != own.name):
         with pytest.raises(ModelError, match=f"trained for {own.name}: {other} "):

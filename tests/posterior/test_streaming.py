@@ -6,14 +6,13 @@ import pytest
 from armload.arms import Arm, arm, full_arm_regressor, momentum_regressor
 from armload.arms.momentum_row import MomentumRow
 from armload.motion import random_motion, taie2024
-from armload.online.changes import foresee
 from armload.payloads import test_payload as make_payload
-from armload.posterior import HybridIdentifier, PosteriorLeastSquares, StreamingHybrid, StreamingIdentifier
-from armload.posterior.solve import advance
+from armload.posterior import HybridIdentifier, PosteriorLeastSquares
+from armload.posterior.solve import solve_to_go_on
 from armload.regression import Correction, JointFeatures, payload_prior_std
 from armload.regression.information import RegressionData
 from armload.regression.noise import SMOOTH
-from armload.regression.row_stream import RowStream
+from armload.regression.rows import REGRESSOR_RATE, FilteredRegression, Rows
 from armload.simulation import World, simulate
 
 GAIN = 20.0
@@ -44,14 +43,20 @@ def tare(panda, world):
 def rows(panda, log):
     """Rows of the log as the stream makes them, with the features and unknowns of the default method."""
     correction = Correction(panda, panda.limits.effort)
-    stream = RowStream(correction, GAIN, JointFeatures(panda.n), SMOOTH.block)
-    return [row for sample in log if (row := stream.feed(*sample)) is not None]
+    stream = FilteredRegression(panda, GAIN, correction, JointFeatures(panda.n), REGRESSOR_RATE, SMOOTH.block)
+    return [row for sample in log if (row := stream.row(*sample)) is not None]
 
 
 def regression(panda, rows):
     data = RegressionData(Correction(panda, panda.limits.effort), GAIN, JointFeatures(panda.n), SMOOTH.block)
-    data.take_rows(*(np.array(column) for column in zip(*rows, strict=True)))
+    data.take(Rows.of(rows))
     return data
+
+
+def advance(runs, std):
+    """The posterior at the stated scales, and the state that takes further rows."""
+    found = solve_to_go_on(runs, std, None, SMOOTH, 1, None)
+    return found.posterior, found.state
 
 
 @pytest.mark.parametrize("name", ["panda", "ur10e"])
@@ -108,8 +113,8 @@ def test_a_posterior_that_takes_rows_is_the_posterior_of_all_of_them(panda, rows
     cut, std = 3 * len(rows) // 4, payload_prior_std(panda)
     before = [regression(panda, rows[: cut // 2])] if tared else []
     first = cut // 2 if tared else 0
-    _, state = advance([*before, regression(panda, rows[first:cut])], std, steps=0)
-    whole, _ = advance([*before, regression(panda, rows[first:])], std, steps=0)
+    _, state = advance([*before, regression(panda, rows[first:cut])], std)
+    whole, _ = advance([*before, regression(panda, rows[first:])], std)
     for row in rows[cut:]:
         state.take(row)
     unit = np.sqrt(np.diag(whole.information))
@@ -119,7 +124,7 @@ def test_a_posterior_that_takes_rows_is_the_posterior_of_all_of_them(panda, rows
 
 def test_an_innovation_is_what_the_rows_before_did_not_say(panda, rows):
     """e' ~ N(w·phi, v'): the evidence of the last row alone is what it adds to Λ and h."""
-    _, state = advance([regression(panda, rows[:-1])], payload_prior_std(panda), steps=0)
+    _, state = advance([regression(panda, rows[:-1])], payload_prior_std(panda))
     Λ, h = state.information.copy(), state.vector.copy()
     state.take(rows[-1])
     w, e, v = state.seen[:, :10], state.seen[:, 10], state.seen[:, 11]
@@ -128,36 +133,32 @@ def test_an_innovation_is_what_the_rows_before_did_not_say(panda, rows):
 
 
 def test_what_is_foreseen_of_a_row_is_the_innovation_of_its_first_joint_if_it_is_taken(panda, rows):
-    _, state = advance([regression(panda, rows[:-1])], payload_prior_std(panda), steps=0)
+    _, state = advance([regression(panda, rows[:-1])], payload_prior_std(panda))
     state.take(rows[-2])  # no longer the state that the solution left
-    seen, scale = foresee(state, rows[-1])
+    seen, scale = state.predict(rows[-1])
     state.take(rows[-1])
     assert scale == pytest.approx(state.scale)
     assert seen[0] == pytest.approx(state.seen[0], rel=1e-9, abs=1e-12)
 
 
 @pytest.mark.parametrize("tared", [False, True])
-def test_the_live_hybrid_says_what_the_hybrid_says_of_the_log(panda, log, tare, tared):
+def test_the_running_answer_is_near_the_concluded_one(panda, log, tare, tared):
     times = (0.02, 0.1, 0.5, 2.4)
     before = tare if tared else None
-    batch = HybridIdentifier(panda, before).at(log, times)
-    live = StreamingHybrid(panda, before).at(log, times)
-    for slow, fast in zip(batch, live, strict=True):
+    concluded = HybridIdentifier(panda, before).at(log, times)
+    live, running = HybridIdentifier(panda, before), []
+    for sample in log:
+        estimate = live.update(sample)
+        if len(running) < len(times) and sample.t >= log.t[0] + times[len(running)] - 1e-9:
+            running.append(estimate)
+    for slow, fast in zip(concluded, running, strict=True):
         assert np.all(np.abs(fast.phi - slow.phi) < 0.6 * slow.std)
         assert np.all(fast.std < 1.5 * slow.std)
         assert np.all(slow.std < 1.5 * fast.std)
 
 
-def test_the_live_form_of_map_ends_where_map_does(panda, log, tare):
-    slow, fast = (
-        m.run(log)
-        for m in (PosteriorLeastSquares(panda, tare), StreamingIdentifier(PosteriorLeastSquares(panda, tare)))
-    )
-    assert np.all(np.abs(fast.phi - slow.phi) < 0.6 * slow.std)
-
-
 def test_an_answer_is_at_most_ten_milliseconds_old(panda, log):
-    live = StreamingHybrid(panda)
+    live = HybridIdentifier(panda)
     ages = []
     for sample in log.between(0.0, 0.5):
         live.update(sample)
@@ -166,12 +167,12 @@ def test_an_answer_is_at_most_ten_milliseconds_old(panda, log):
 
 
 def test_an_empty_run_may_be_the_tare_of_the_next(panda, log, tare):
-    first = StreamingIdentifier(PosteriorLeastSquares(panda))
+    first = PosteriorLeastSquares(panda)
     first.run(tare)
-    following = first.beside(first)
+    following = first.another(first)
     mass = make_payload().parameters.mass
-    alone, tared = first.beside().run(log), following.run(log)
-    assert tared.std[0] < 0.85 * alone.std[0]
+    untared, tared = first.another().run(log), following.run(log)
+    assert tared.std[0] < 0.85 * untared.std[0]
     assert abs(tared.phi[0] - mass) < 3.0 * tared.std[0]
 
 
@@ -180,7 +181,7 @@ def test_two_tares_say_what_one_tare_of_their_rows_says(panda, rows):
     a, b, std = len(rows) // 3, 2 * len(rows) // 3, payload_prior_std(panda)
     parted = [regression(panda, rows[:a]), regression(panda, rows[a:b]), regression(panda, rows[b:])]
     joined = [regression(panda, rows[:b]), regression(panda, rows[b:])]
-    (two, _), (one, _) = (advance(runs, std, steps=0) for runs in (parted, joined))
+    (two, _), (one, _) = (advance(runs, std) for runs in (parted, joined))
     unit = np.sqrt(np.diag(one.covariance))
     assert two.phi / unit == pytest.approx(one.phi / unit, abs=1e-6)
     assert two.covariance / np.outer(unit, unit) == pytest.approx(one.covariance / np.outer(unit, unit), abs=1e-6)

@@ -66,7 +66,7 @@ class Arm:
         links: inertial parameters (n, 10) of the moving links about their joint frames, where they are to differ from
             the URDF's.
         rated_payload: the maker's rated payload [kg], if known.
-        acceleration, jerk: limits (n,) that a URDF cannot hold.
+        acceleration, jerk: limits (n,) that a URDF cannot hold; those of joints beyond `frame` are passed over.
         link_spread: how far the description's link parameters may be off, in units of 2 % of mass, 2 mm of CoM and 5 %
             of inertia (1 sigma): 1 for an identified model, 10 for nominal figures of unknown quality.
         motor_torque: whether the torque is known to be motor current times a constant, with all of the gear's friction
@@ -146,7 +146,7 @@ class Arm:
 
     @cached_property
     def limits(self) -> Limits:
-        """Joint limits, from the URDF and, for acceleration and jerk, from the catalogue."""
+        """Joint limits, from the URDF and, for acceleration and jerk, from the arm's sheet."""
         model, endless = self._model, np.full(self.n, np.inf)
         wide = model.upperPositionLimit >= 1e3
         return Limits(
@@ -154,8 +154,8 @@ class Arm:
             np.where(wide, np.inf, model.upperPositionLimit),
             np.where(model.upperVelocityLimit > 0, model.upperVelocityLimit, np.inf),
             np.where(model.upperEffortLimit > 0, model.upperEffortLimit, np.inf),
-            endless if self.acceleration is None else np.array(self.acceleration),
-            endless if self.jerk is None else np.array(self.jerk),
+            endless if self.acceleration is None else np.array(self.acceleration[: self.n]),
+            endless if self.jerk is None else np.array(self.jerk[: self.n]),
         )
 
     @property

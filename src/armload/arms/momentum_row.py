@@ -28,6 +28,10 @@ class MomentumRow:
 
     Args:
         arm: the arm.
+
+    Attributes:
+        chain: what `momentum_rows` needs of the arm: rotations and translations of the placements, axes of the joints,
+            which of them turn, gravity.
     """
 
     def __init__(self, arm: Arm) -> None:
@@ -39,7 +43,7 @@ class MomentumRow:
         axes = [data.oMi[k + 1].rotation.T @ along[:, k] for k in range(arm.n)]
         before = [model.jointPlacements[k + 1] for k in range(arm.n)]
         self.arm = arm
-        self._chain = (
+        self.chain = (
             np.array([*(x.rotation for x in before), flange.rotation]),
             np.array([*(x.translation for x in before), flange.translation]),
             np.array(axes),
@@ -49,7 +53,7 @@ class MomentumRow:
 
     def __call__(self, q: NDArray, dq: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Y_p and Y_g − Y_c (n, 10 + 10·n): payload first, then the links; q, dq (n,) [rad, rad/s]."""
-        return _momentum_rows(*self._chain, q, dq)
+        return momentum_rows(*self.chain, q, dq)
 
 
 @njit(cache=True, nogil=True)
@@ -96,7 +100,7 @@ def _poses(rotations, translations, axes, turning, q, R, p, lines):  # pragma: n
 
 
 @njit(cache=True, nogil=True)
-def _momentum_rows(rotations, translations, axes, turning, gravity, q, dq):  # pragma: no cover - compiled
+def momentum_rows(rotations, translations, axes, turning, gravity, q, dq):  # pragma: no cover - compiled
     n = dq.shape[0]
     bodies = n + 1
     R, p, lines = np.empty((bodies, 3, 3)), np.empty((bodies, 3)), np.empty((n, 3))

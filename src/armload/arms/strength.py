@@ -1,14 +1,34 @@
-"""How strong an arm's joints are, from its description alone: the scale of whatever is not known for that arm."""
+"""What an arm is built for, where its sheet does not say: the scale of whatever is not known for that arm.
+
+One rule for each figure, here and nowhere else. How near they come, their figure over the maker's:
+
+| unrated figure                         | panda       | fr3         | ur5e        | ur10e       |
+|----------------------------------------|-------------|-------------|-------------|-------------|
+| `rated_mass`, effort limits known      | 1.21        | 1.19        | 1.72        | 0.90        |
+| `rated_effort` without limits, joints  | 0.44 – 1.24 | 0.45 – 1.28 | 0.27 – 0.78 | 0.48 – 0.71 |
+
+Two fifths of the moving links' mass, another rule for the rated mass, is off by 2.14, 2.07, 1.42 and 0.92.
+"""
 
 from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms.model import Arm
+from armload.inertia import InertialParameters
+
+PAYLOAD_REACH = 0.10  # [m] a payload's centre beyond the payload frame along its z axis, where nothing is known of it
+# [rad/s] of the smooth Coulomb friction c·tanh(dq/w) of a geared joint: measured on two Pandas, and taken for any arm,
+# by the simulated worlds that are like the measured ones and by what identifies
+FRICTION_WIDTH = 0.06
 
 _POSES = 200
 _WEAKEST = 0.15  # of the strongest joint: 0.14 of the Panda's, 0.17 of a UR10e's
+_FULL = 0.7  # of what the joints could hold almost everywhere: makers leave room for dynamics
 
 
 def rated_effort(arm: Arm) -> NDArray[np.float64]:
@@ -22,6 +42,22 @@ def rated_effort(arm: Arm) -> NDArray[np.float64]:
     static = np.abs(arm.torque(poses(arm))).max(axis=0)
     carried = np.maximum.accumulate(static[::-1])[::-1]
     return np.where(np.isfinite(effort), effort, np.maximum(2.0 * np.maximum(carried, _WEAKEST * carried[0]), 1.0))
+
+
+def rated_mass(arm: Arm) -> float:
+    """What the arm may carry [kg]: the maker's figure, or 0.7 of what its joints hold in 95 % of all poses."""
+    return arm.rated_payload if arm.rated_payload is not None else _assumed_mass(arm)
+
+
+@lru_cache(maxsize=16)  # a stream asks at every answer
+def _assumed_mass(arm: Arm) -> float:
+    arm = replace(arm)  # another thread may be computing with this one
+    q = poses(arm)
+    bare = arm.torque(q)
+    kilogram = InertialParameters.from_com(1.0, (0.0, 0.0, PAYLOAD_REACH), 1e-3 * np.eye(3))
+    lever = np.abs(arm.with_payload(kilogram).torque(q) - bare)
+    room = np.maximum(rated_effort(arm) - np.abs(bare), 0.0)
+    return float(max(0.05, _FULL * np.quantile((room / np.maximum(lever, 1e-3)).min(axis=1), 0.05)))
 
 
 def poses(arm: Arm) -> NDArray[np.float64]:

@@ -13,6 +13,7 @@ import contextlib
 import json
 import os
 import select
+import signal
 import subprocess
 import sys
 import threading
@@ -81,16 +82,20 @@ class Detached(Source):
         self._closed = False
         self._twin: Source | None = None
         self._waiting = threading.Lock()  # held while the ring and the pipes are in use
-        self._ring = Ring.create(1 + 3 * arm.n, capacity)
+        self._ring = Ring.create(2 + 3 * arm.n, capacity)  # the last column: when the sample arrived
         self._reader = RingReader(self._ring)
         self._wake, wake = os.pipe()
         self._status, status = os.pipe()
         self._heard = b""
         self._listening = threading.Lock()  # held while events are read
+        self._arrived: float | None = None
         self._last: dict[str, Any] | None = None  # how it ended
         self._calls = 0
         command = [sys.executable, "-P", "-m", "armload.devices.reader_process"]
         theirs = (self._ring.descriptor, wake, status)
+        # Ctrl-C goes to the whole group, and the one who started the reader decides: it never hears of it, not even
+        # before its first line. A signal that comes meanwhile is ours when the mask is taken off
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             self.process = subprocess.Popen(
                 [*command, *map(str, theirs)],
@@ -99,6 +104,7 @@ class Detached(Source):
                 pass_fds=theirs,
             )
         finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
             os.close(wake)
             os.close(status)
         told = {**options, "payloads": payloads_to_json(options["payloads"])} if options.get("payloads") else options
@@ -116,7 +122,7 @@ class Detached(Source):
                 self.process.kill()
             self.close()
             raise
-        self.name, self.n, self.rate = event["name"], event["n"], event["rate"]
+        self.name, self.n, self.rate, self.speed = event["name"], event["n"], event["rate"], event["speed"]
         if spec == "sim":
             from armload.devices.opening import open_source
 
@@ -137,7 +143,12 @@ class Detached(Source):
                 if not len(rows) and not os.read(self._wake, 1 << 16) and self._reader.next >= self._ring.written:
                     return self._say_how_it_ended()
             for row in rows:
-                yield Sample(float(row[0]), row[1 : n + 1], row[n + 1 : 2 * n + 1], row[2 * n + 1 :])
+                self._arrived = float(row[-1])
+                yield Sample(float(row[0]), row[1 : n + 1], row[n + 1 : 2 * n + 1], row[2 * n + 1 : -1])
+
+    def arrived(self) -> float | None:
+        """When the sample handed on last came to the reader; one clock runs for all processes of a machine."""
+        return self._arrived
 
     def read_once(self) -> FrankaStatus:
         """See `FrankaSource.read_once`; waits for the answer.

@@ -55,7 +55,7 @@ def flange_of(arm: Arm) -> str:
     Raises:
         SinkError: the arm is not a built-in one.
     """
-    flange = None if arm.known_as is None else namesake(arm, str(ARMS[arm.known_as]["frame"]))
+    flange = None if arm.known_as is None else namesake(arm, ARMS[arm.known_as].flange)
     if flange is None:
         raise SinkError(f"the flange of {arm.name} is not known: name its frame with flange=…")
     return flange

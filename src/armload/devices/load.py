@@ -15,7 +15,7 @@ from armload.errors import SinkError
 from armload.identification import Identification
 from armload.inertia import NAMES, Z95, InertialParameters, is_consistent, nearest_consistent, to_order
 from armload.online import OnlineEstimate
-from armload.payloads.files import payload_from, read_content
+from armload.payloads.payload_file import payload_from, read_content
 
 _KNOWN = (True,) * 10
 _RELATIVE = {"before": "empty arm before"}  # what reads otherwise than it is called

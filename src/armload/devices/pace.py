@@ -16,6 +16,9 @@ class Pace:
     Args:
         speed: seconds of samples per second of the wall; 1: real time; None: as fast as possible.
 
+    Attributes:
+        due: when the last sample was to pass, on the monotonic clock [s]; None before the first, or without a clock.
+
     Raises:
         SourceError: the speed is not a positive number.
     """
@@ -26,6 +29,7 @@ class Pace:
                 f"the speed is {speed}: expected a positive number, 1 for real time, or None for no clock"
             )
         self.speed = speed
+        self.due: float | None = None
         self._stop = threading.Event()
         self._start: tuple[float, float] | None = None
 
@@ -35,7 +39,8 @@ class Pace:
             self._start = (time.monotonic(), t)
         if self.speed is not None:
             began, first = self._start
-            ahead = began + (t - first) / self.speed - time.monotonic()
+            self.due = began + (t - first) / self.speed
+            ahead = self.due - time.monotonic()
             if ahead > 0:
                 self._stop.wait(ahead)
         return not self._stop.is_set()

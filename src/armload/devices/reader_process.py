@@ -23,6 +23,7 @@ import select
 import signal
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from typing import Any
 
@@ -72,7 +73,7 @@ class _Reader:
                 record = order["record"]
                 recorder = None if record is None else stack.enter_context(Recorder(record, source.n))
                 threading.Thread(target=self.listen, args=(source, lines), daemon=True).start()
-                self.tell(event="ready", name=source.name, n=source.n, rate=source.rate)
+                self.tell(event="ready", name=source.name, n=source.n, rate=source.rate, speed=source.speed)
                 self.pass_on(source, recorder)
             self.tell(event="ended")
         except (ArmloadError, OSError) as error:
@@ -81,10 +82,12 @@ class _Reader:
     def pass_on(self, source: Source, recorder: Recorder | None) -> None:
         row = np.empty(self.ring.columns)
         for sample in source:
+            arrived = source.arrived()
+            arrived = time.monotonic() if arrived is None else arrived
             if recorder is not None:
                 recorder.append(sample)
-            row[0] = sample.t
-            row[1:] = np.concatenate(sample[1:])
+            row[0], row[-1] = sample.t, arrived
+            row[1:-1] = np.concatenate(sample[1:])
             self.ring.write(row)
             with contextlib.suppress(BlockingIOError, BrokenPipeError):  # nobody is waiting, or nobody is there
                 os.write(self.wake, b".")
@@ -150,6 +153,5 @@ def _lines(descriptor: int) -> Iterator[bytes]:
 
 
 if __name__ == "__main__":
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to the whole group: the one who started us decides
     _silence_clients()
     _Reader(*map(int, sys.argv[1:4])).run()

@@ -130,7 +130,7 @@ class Recorded(Source):
     def __init__(self, source: Source, path: str | Path) -> None:
         self.recorder = Recorder(path, source.n)
         self.source = source
-        self.name, self.n, self.rate = source.name, source.n, source.rate
+        self.name, self.n, self.rate, self.speed = source.name, source.n, source.rate, source.speed
 
     def __iter__(self) -> Iterator[Sample]:
         for sample in self.source:
@@ -141,6 +141,10 @@ class Recorded(Source):
         """Close the source and the log."""
         self.source.close()
         self.recorder.close()
+
+    def arrived(self) -> float | None:
+        """When the source's sample arrived."""
+        return self.source.arrived()
 
     def truth(self, t: float) -> InertialParameters | None:
         """What the source knows."""

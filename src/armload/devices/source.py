@@ -7,6 +7,7 @@ with open_source("run.csv", arm) as source:
 
 from __future__ import annotations
 
+import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from types import TracebackType
@@ -26,11 +27,13 @@ class Source(ABC):
         name: what messages call it (a path, an address).
         n: joints.
         rate: nominal samples per second [Hz].
+        speed: seconds of samples that come in a second: 1 but for what is replayed slower or faster.
     """
 
     name: str
     n: int
     rate: float
+    speed: float = 1.0
 
     @abstractmethod
     def __iter__(self) -> Iterator[Sample]:
@@ -43,6 +46,22 @@ class Source(ABC):
     @abstractmethod
     def close(self) -> None:
         """Let go of the robot or the file; nothing happens the second time."""
+
+    def arrived(self) -> float | None:
+        """When the sample handed on last had come to this machine, on its monotonic clock [s].
+
+        None: it did not come, but was made when it was asked for, as of a file that is read as fast as possible.
+        """
+        return None
+
+    def lag(self) -> float:
+        """How old the sample handed on last is since it arrived, on the samples' clock [s]; 0 if it never did.
+
+        What waits for a consumer that is too slow has arrived: in a queue, in the ring of `Detached`, or as a sample
+        of a replay whose time has come.
+        """
+        arrived = self.arrived()
+        return 0.0 if arrived is None else max(0.0, time.monotonic() - arrived) * self.speed
 
     def truth(self, t: float) -> InertialParameters | None:  # noqa: ARG002
         """The payload at time t, where the source knows it (a simulator does)."""

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from armload.ensembles.network import NetworkLearner
     from armload.ensembles.progress import Progress
     from armload.ensembles.stages import MixedEnsemble, TwoStage
-    from armload.ensembles.support_vectors import SupportVectorLearner
     from armload.ensembles.trained_model import LearnedModel
     from armload.ensembles.tree import TreeLearner
 
@@ -28,7 +27,6 @@ __all__ = [
     "MixedEnsemble",
     "NetworkLearner",
     "Progress",
-    "SupportVectorLearner",
     "TreeLearner",
     "TwoStage",
     "load_model",
@@ -43,7 +41,6 @@ _HOME = {
     "MixedEnsemble": "stages",
     "NetworkLearner": "network",
     "Progress": "progress",
-    "SupportVectorLearner": "support_vectors",
     "TreeLearner": "tree",
     "TwoStage": "stages",
     "load_model": "artefact",

@@ -27,7 +27,6 @@ from armload.ensembles.compiled import (
     CompiledTrees,
     Together,
 )
-from armload.ensembles.kernel import CompiledSupportVectors
 from armload.ensembles.trained_model import LearnedModel
 from armload.errors import ArmloadError, ModelError
 from armload.inertia import NAMES
@@ -39,11 +38,7 @@ if TYPE_CHECKING:
 
 FORMAT = 1
 _HEADER = "armload"
-_LEAVES: dict[str, type[Compiled]] = {
-    "trees": CompiledTrees,
-    "networks": CompiledNetworks,
-    "support vectors": CompiledSupportVectors,
-}
+_LEAVES: dict[str, type[Compiled]] = {"trees": CompiledTrees, "networks": CompiledNetworks}
 _BRANCHES: dict[str, type[Beside] | type[Together]] = {"beside": Beside, "together": Together}
 
 
@@ -123,7 +118,7 @@ def load_model(path: str | PathLike[str]) -> LearnedModel:
     """Read a model written by `save_model`.
 
     Raises:
-        ModelError: missing, truncated, altered or foreign file, or one of a newer armload.
+        ModelError: missing, truncated, altered or foreign file, or one of another armload.
     """
     from safetensors import SafetensorError, safe_open
 
@@ -149,6 +144,12 @@ def load_model(path: str | PathLike[str]) -> LearnedModel:
         digest = header.pop("sha256")
         if digest != _digest(header, tensors):
             raise ModelError(f"{path} was altered after it was saved (its SHA-256 differs): copy it again")
+        strange = [kind for kind in _kinds(header["structure"]) if kind not in _LEAVES and kind not in _BRANCHES]
+        if strange:
+            raise ModelError(
+                f"{path} belongs to another version of armload, its members are {strange[0]!r}: expected "
+                f"{' or '.join(_LEAVES)}; train it again"
+            )
         compiled = put_together(header["structure"], "", tensors)
         arm = header["arm"]
         model = LearnedModel(
@@ -208,6 +209,11 @@ def put_together(structure: dict[str, Any], prefix: str, tensors: dict[str, NDAr
     compiled = leaf(**values)
     compiled.validate()
     return compiled
+
+
+def _kinds(structure: dict[str, Any]) -> list[str]:
+    """The types of a tree of parts, its leaves' and its branches'."""
+    return [str(structure["type"]), *(kind for part in structure.get("parts", ()) for kind in _kinds(part))]
 
 
 def _digest(header: dict[str, Any], tensors: dict[str, NDArray]) -> str:

@@ -12,14 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from armload.ensembles.bag import Learner, draw_bag
 from armload.ensembles.network import NetworkLearner
 from armload.ensembles.progress import Report, reporter
-from armload.ensembles.support_vectors import SupportVectorLearner
 from armload.ensembles.tree import TreeLearner
+from armload.ensembles.weak_learner import Learner, draw_bag
 from armload.errors import ModelError
 
-KINDS: dict[str, type[Learner]] = {"tree": TreeLearner, "network": NetworkLearner, "svr": SupportVectorLearner}
+KINDS: dict[str, type[Learner]] = {"tree": TreeLearner, "network": NetworkLearner}
 
 
 Rows = tuple[NDArray[np.float64], NDArray[np.float64]]  # X (N, d) and y (N, k)
@@ -146,8 +145,8 @@ class BaggingEnsemble(OneKind):
     ((1, 1), True)
 
     Args:
-        kind: "tree", "network" or "svr", or a `TreeLearner`, `NetworkLearner` or `SupportVectorLearner` with other
-            settings (the paper's are the defaults; it has no support vectors).
+        kind: "tree" or "network", or a `TreeLearner` or `NetworkLearner` with other settings (the paper's are the
+            defaults).
         members: M; 5 in the paper.
         seed: of every random draw; the same seed and data give the same ensemble.
         bootstrap: False: every member sees every row once (then trees differ only in ties).
@@ -188,7 +187,7 @@ class BaggingEnsemble(OneKind):
 
     @property
     def kind_name(self) -> str:
-        """ "tree", "network" or "svr"."""
+        """ "tree" or "network"."""
         return as_learner(self.kind).kind
 
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.ensembles.trained_model import LearnedModel
 from armload.estimators import Estimate, Identifier
+from armload.inertia import SMALL, Z95
 from armload.recording import Recording, Sample
 
 
@@ -39,6 +43,9 @@ class LearnedIdentifier(Identifier):
         model.check(arm)
         self.model, self.arm, self.single, self.any_motion = model, arm, single, any_motion
         self.name = f"{model.kind} ensemble" + (", single sample" if single else "")
+        # what did not vary in training is not known exactly for that
+        self._family_std = np.maximum(model.phi_std, SMALL / Z95)
+        self.payload_prior = (model.phi_mean, self._family_std)
         self._own = np.zeros(10) if model.error_std is None else model.error_std**2  # variance beside the members'
         if model.error_std is None and model.compiled.n_members == 1:
             self._own = np.full(10, np.inf)
@@ -53,7 +60,26 @@ class LearnedIdentifier(Identifier):
 
     def update(self, sample: Sample) -> Estimate:
         """Take one sample and return the average, or with `single` its own prediction."""
-        t, q, dq, tau = sample
+        self._follow(*sample)
+        return self._last
+
+    def conclude(self) -> Estimate:
+        """The last estimate; with the spread of the training's payloads where the error on held-out ones is unknown.
+
+        How far the members disagree is no error bar.
+        """
+        if self.model.error_std is not None:
+            return self._last
+        return replace(self._last, covariance=np.diag(self._family_std**2))
+
+    def _take(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
+        for sample in zip(t.tolist(), q, dq, tau, strict=True):
+            self._follow(*sample)
+
+    def _estimate(self, t: float) -> Estimate:  # noqa: ARG002
+        return self.conclude()
+
+    def _follow(self, t: float, q: NDArray, dq: NDArray, tau: NDArray) -> None:
         if self._start is None:
             self._start = t
         row = np.empty(1 + 3 * self.arm.n)
@@ -63,17 +89,12 @@ class LearnedIdentifier(Identifier):
             said, count = self.model.compiled.row(row), 1 if self.single else self._count
             _average(self._averages, said, count, self._own, phi, covariance)
             self._last = Estimate(t, phi, covariance, self._count, self.model.frame)
-        return self._last
 
-    def trace(self, recording: Recording, every: int = 1) -> list[Estimate]:
-        """The estimates along a recording of a motion the model knows.
-
-        Raises:
-            ModelError: the recording follows no motion of the model (unless `any_motion`), or is of another arm.
-        """
+    def _check(self, recording: Recording) -> None:
+        """Whole recordings must follow a motion of the model (unless `any_motion`), and be of its arm."""
         if not self.any_motion:
             self.model.check(self.arm, recording)
-        return super().trace(recording, every)
+        super()._check(recording)
 
 
 @njit(cache=True, nogil=True)

@@ -14,7 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.ensembles.bag import (
+from armload.ensembles.checkpoint import Training, TrainingState, Weights
+from armload.ensembles.compiled import CompiledNetworks
+from armload.ensembles.progress import Progress, Report
+from armload.ensembles.weak_learner import (
     INITIAL_WEIGHTS,
     SHUFFLE,
     Bag,
@@ -22,9 +25,6 @@ from armload.ensembles.bag import (
     Learner,
     Scaling,
 )
-from armload.ensembles.checkpoint import Training, TrainingState, Weights
-from armload.ensembles.compiled import CompiledNetworks
-from armload.ensembles.progress import Progress, Report
 from armload.errors import ModelError
 
 _CHUNK = 2000  # validation rows evaluated at once: bounds the memory of the hidden layers

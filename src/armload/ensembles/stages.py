@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from armload.ensembles.bag import Learner
 from armload.ensembles.bagging import (
     BaggingEnsemble,
     Ensemble,
@@ -17,6 +16,7 @@ from armload.ensembles.bagging import (
 )
 from armload.ensembles.compiled import Beside, Together
 from armload.ensembles.progress import Report
+from armload.ensembles.weak_learner import Learner
 from armload.errors import ModelError
 
 STAGES = (slice(0, 4), slice(4, 10))  # (m, m·r) and the inertia

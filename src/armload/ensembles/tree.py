@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.ensembles.bag import (
+from armload.ensembles.compiled import CompiledTrees
+from armload.ensembles.progress import Progress, Report
+from armload.ensembles.weak_learner import (
     TIES,
     Bag,
     Fitted,
     Learner,
 )
-from armload.ensembles.compiled import CompiledTrees
-from armload.ensembles.progress import Progress, Report
 
 
 class TreeLearner(Learner):

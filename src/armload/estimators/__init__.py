@@ -1,8 +1,8 @@
 """The contract of every identifier, and the classic methods, one file each."""
 
 from armload.estimators.acceleration import CommandedLeastSquares, PolynomialLeastSquares
-from armload.estimators.consistent import ConsistentLeastSquares, LogCholeskyLeastSquares
-from armload.estimators.contract import BatchIdentifier, Estimate, Identifier, Tared, samples_until
+from armload.estimators.constrained import ConsistentLeastSquares, LogCholeskyLeastSquares
+from armload.estimators.contract import ArmMismatch, Estimate, Identifier, Tared, samples_until
 from armload.estimators.difference import DifferenceLeastSquares
 from armload.estimators.joint import JointLeastSquares
 from armload.estimators.kalman import ExtendedKalmanFilter
@@ -12,7 +12,7 @@ from armload.estimators.recursive import FilteredRecursiveLeastSquares, Recursiv
 from armload.estimators.total import RecursiveTotalLeastSquares
 
 __all__ = [
-    "BatchIdentifier",
+    "ArmMismatch",
     "CommandedLeastSquares",
     "ConsistentLeastSquares",
     "DifferenceLeastSquares",

@@ -21,7 +21,7 @@ from armload.errors import IdentificationError
 from armload.estimators.normal import NormalLeastSquares
 from armload.motion import Motion
 from armload.recording import Recording
-from armload.regression.information import REGRESSOR_RATE
+from armload.regression.rows import REGRESSOR_RATE
 
 _DEGREE = 4
 _NEIGHBOURS = 4  # samples on either side that a polynomial needs at least

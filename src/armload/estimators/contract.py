@@ -3,14 +3,17 @@
     identifier.reset()
     for sample in recording:
         estimate = identifier.update(sample)
+    estimate = identifier.conclude()
 
-`BatchIdentifier` is for methods that take many samples at once as well as one, `Tared` for what was added since a tare.
+A log is a stream that ends: `run` takes its samples many at a time and concludes. `Tared` is for what was added since a
+tare.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -53,22 +56,53 @@ class Estimate:
         return f"payload about {self.frame} after {self.n_samples} samples:\n" + "\n".join(rows)
 
 
-class Identifier(ABC):
-    """A payload identifier fed sample by sample: constant memory, no acceleration needed from the caller.
+class ArmMismatch(NamedTuple):
+    """What a method found of the arm beside the payload.
 
-    Subclasses implement `reset` and `update`. `name` is how tables and the command line call the method. `calibrated`
-    says whether ±1.96 standard deviations were checked to hold on episodes held out; `known` is what the method knew of
-    the payload beforehand, mean and standard deviation (10,), if that is its own knowledge.
+    torque: "link" or "motor", the side the torque seems to be measured on.
+    offset_ratios: squared torque offsets (n,) over their expected variance.
+    """
+
+    torque: str
+    offset_ratios: NDArray[np.float64]
+
+
+class Identifier(ABC):
+    """A payload identifier: samples one at a time or many, constant memory, no acceleration needed from the caller.
+
+    Subclasses implement `reset`, `_take` (the next N samples) and `_estimate` (what follows from all samples so far); a
+    method with an answer of its own for a running stream overrides `update`.
+
+    Attributes:
+        name: how tables and the command line call the method.
+        calibrated: whether ±1.96 standard deviations were checked to hold on episodes held out.
+        payload_prior: what the method knew of the payload beforehand, mean and standard deviation (10,), if that is its
+            own knowledge; None: nothing, or the weak prior.
     """
 
     name: str
     arm: Arm
     calibrated: bool = False
-    known: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    payload_prior: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    _now: float = np.nan  # time of the last sample
+    _CHUNK = 4096  # samples at a time: bounds the memory of the intermediate arrays
 
     @property
-    def alone(self) -> NDArray[np.float64] | None:
-        """Standard deviation (10,) of the last estimate without what is `known`, under a weak prior; None: the same."""
+    def weak_std(self) -> NDArray[np.float64] | None:
+        """Standard deviation (10,) of the last estimate under a weak payload prior instead; None: it is that one."""
+        return None
+
+    @property
+    def unprojected(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Mean (10,) and covariance (10, 10) of what the data say, of a method whose phi was made a body since.
+
+        None: phi and its covariance are that themselves.
+        """
+        return None
+
+    @property
+    def mismatch(self) -> ArmMismatch | None:
+        """What was found of the arm with the last solution; None: the method asks nothing of it."""
         return None
 
     @abstractmethod
@@ -76,71 +110,32 @@ class Identifier(ABC):
         """Forget everything; the next sample is the first."""
 
     @abstractmethod
+    def _take(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
+        """Take the next N samples: (N,) and three times (N, n)."""
+
+    @abstractmethod
+    def _estimate(self, t: float) -> Estimate:
+        """The estimate from all samples so far, the last of them at t."""
+
     def update(self, sample: Sample) -> Estimate:
         """Take one sample (t, q, dq, tau) and return the estimate so far."""
+        self._now = float(sample.t)
+        self._take(np.array([sample.t]), sample.q[None], sample.dq[None], sample.tau[None])
+        return self._estimate(self._now)
+
+    def conclude(self) -> Estimate:
+        """The estimate from all samples so far, with a last solution where `update` saves one: what `run` returns."""
+        return self._estimate(self._now)
 
     def trace(self, recording: Recording, every: int = 1) -> list[Estimate]:
         """The estimates along a recording, from `reset` on: one per `every` samples, and always the last."""
         self._check(recording)
-        self.reset()
-        out = []
-        for k, sample in enumerate(recording):
-            estimate = self.update(sample)
-            if k % every == 0 or k == len(recording) - 1:
-                out.append(estimate)
-        return out
-
-    def at(self, recording: Recording, times: ArrayLike) -> list[Estimate]:
-        """The estimates `times` [s] after a recording's first sample, from `reset` on: one for each time.
-
-        Each rests on all samples up to then, the first at least; a time beyond the end means the end.
-
-        Raises:
-            IdentificationError: times that are not a rising sequence of numbers from 0 on.
-        """
-        self._check(recording)
-        self.reset()
-        stops = samples_until(recording, times)
-        wanted, found = set(stops.tolist()), {}
-        for k, sample in enumerate(recording, start=1):
-            if k > stops[-1]:
-                break
-            estimate = self.update(sample)
-            if k in wanted:
-                found[k] = estimate
-        return [found[k] for k in stops.tolist()]
-
-    def run(self, recording: Recording) -> Estimate:
-        """The estimate after the whole recording."""
-        return self.trace(recording, every=len(recording))[-1]
-
-    def _check(self, recording: Recording) -> None:
-        if recording.n != self.arm.n:
-            raise IdentificationError(
-                f"{recording.source} has {recording.n} joints: {self.arm.name} has {self.arm.n}; name the right robot"
-            )
-
-
-class BatchIdentifier(Identifier):
-    """An identifier that takes many samples at once as well as one: a log then costs no Python loop over its samples.
-
-    Subclasses implement `_take` (the next N samples) and `_estimate` (what follows from all samples so far).
-    """
-
-    _CHUNK = 4096  # samples at a time: bounds the memory of the intermediate arrays
-
-    def update(self, sample: Sample) -> Estimate:
-        """Take one sample (t, q, dq, tau) and return the estimate so far."""
-        self._take(np.array([sample.t]), sample.q[None], sample.dq[None], sample.tau[None])
-        return self._estimate(float(sample.t))
-
-    def trace(self, recording: Recording, every: int = 1) -> list[Estimate]:
-        """The estimates along a recording, as `update` gives them, computed many samples at a time."""
-        self._check(recording)
         return self._along(recording, [*range(1, len(recording), every), len(recording)])
 
     def at(self, recording: Recording, times: ArrayLike) -> list[Estimate]:
-        """The estimates `times` [s] after a recording's first sample; nothing is solved in between.
+        """The estimates `times` [s] after a recording's first sample, from `reset` on; nothing is solved in between.
+
+        Each rests on all samples up to then, the first at least; a time beyond the end means the end.
 
         Raises:
             IdentificationError: times that are not a rising sequence of numbers from 0 on.
@@ -150,6 +145,10 @@ class BatchIdentifier(Identifier):
         found = dict(zip(distinct := np.unique(stops).tolist(), self._along(recording, distinct), strict=True))
         return [found[k] for k in stops.tolist()]
 
+    def run(self, recording: Recording) -> Estimate:
+        """The estimate after the whole recording."""
+        return self.trace(recording, every=len(recording))[-1]
+
     def _along(self, recording: Recording, stops: list[int]) -> list[Estimate]:
         """The estimates after so many samples each, from `reset` on; `stops` rise."""
         self.reset()
@@ -158,16 +157,15 @@ class BatchIdentifier(Identifier):
             for k in range(start, stop, self._CHUNK):
                 part = slice(k, min(k + self._CHUNK, stop))
                 self._take(recording.t[part], recording.q[part], recording.dq[part], recording.tau[part])
-            out.append(self._estimate(float(recording.t[stop - 1])))
+            self._now = float(recording.t[stop - 1])
+            out.append(self._estimate(self._now))
         return out
 
-    @abstractmethod
-    def _take(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
-        """Take the next N samples: (N,) and three times (N, n)."""
-
-    @abstractmethod
-    def _estimate(self, t: float) -> Estimate:
-        """The estimate from all samples so far, the last of them at t."""
+    def _check(self, recording: Recording) -> None:
+        if recording.n != self.arm.n:
+            raise IdentificationError(
+                f"{recording.source} has {recording.n} joints: {self.arm.name} has {self.arm.n}; name the right robot"
+            )
 
 
 class Tared(Identifier):
@@ -196,20 +194,14 @@ class Tared(Identifier):
         """Forget the run (not the tare); the next sample is the first."""
         self._identifier.reset()
 
-    def update(self, sample: Sample) -> Estimate:
-        """Take one sample (t, q, dq, tau) and return the estimate so far, relative to the tare."""
-        return self._relative(self._identifier.update(sample))
+    def _check(self, recording: Recording) -> None:
+        self._identifier._check(recording)
 
-    def trace(self, recording: Recording, every: int = 1) -> list[Estimate]:
-        """The estimates along a recording, relative to the tare: one per `every` samples, and always the last."""
-        return [self._relative(estimate) for estimate in self._identifier.trace(recording, every)]
+    def _take(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
+        self._identifier._take(t, q, dq, tau)
 
-    def at(self, recording: Recording, times: ArrayLike) -> list[Estimate]:
-        """The estimates `times` [s] after a recording's first sample, relative to the tare."""
-        return [self._relative(estimate) for estimate in self._identifier.at(recording, times)]
-
-    def _relative(self, estimate: Estimate) -> Estimate:
-        before = self.before
+    def _estimate(self, t: float) -> Estimate:
+        estimate, before = self._identifier._estimate(t), self.before
         return replace(estimate, phi=estimate.phi - before.phi, covariance=estimate.covariance + before.covariance)
 
 

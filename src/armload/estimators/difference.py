@@ -5,60 +5,34 @@ torque at the same place of both runs, and goes with their difference:
 
     r_run(t) − r_tare(t + shift) = W_run(t)·phi + e,      r = F[tau − tau_bare]
 
-each r from the acceleration-free filtered regression of its own log. The nominal arm is taken off both, because under a
-payload that the controller does not know the two motions differ by milliradians. `recording.alignment` finds the
-shift from the joint positions. Joints are weighed by the long-run variance of their residual (`autocorrelation`).
+each r from the acceleration-free filtered regression of its own log (`regression.rows`). The nominal arm is taken off
+both, because under a payload that the controller does not know the two motions differ by milliradians.
+`recording.alignment` finds the shift from the joint positions. Joints are weighed by the long-run variance of their
+residual (`regression.block_means`).
 
 Sources: Atkeson, An & Hollerbach, IJRR 1986 (difference of torques with and without load); filtered momentum form: see
-`arms.filtered`.
+`regression.rows`.
 """
 
 from __future__ import annotations
 
+from copy import copy
+from typing import Self
+
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm, momentum_regressor, rated_effort
+from armload.arms import Arm, rated_effort
 from armload.errors import IdentificationError
 from armload.estimators.normal import NormalLeastSquares
 from armload.recording import GAP, Recording
 from armload.recording.alignment import LEAST, TOLERANCE, Aligned, MotionTracker, align
-from armload.regression.filtered import Lag, filtered_regressor
-from armload.regression.information import REGRESSOR_RATE
+from armload.regression import FilteredRegression
+from armload.regression.rows import REGRESSOR_RATE, Rows
 
 _SETTLED = 7.99  # time constants after which a lag has forgotten where it started
 _RESOLUTION = 1e-5  # of the effort limit: two logs differ by so much at least
 _PRIOR_BLOCKS = 8.0  # weight of the rows' own variance, in blocks
-
-
-class _FilteredRows:
-    """r and W of a log at `REGRESSOR_RATE`, torque at its full rate, piece by piece; NaN in r until the lags settle."""
-
-    def __init__(self, arm: Arm, gain: float) -> None:
-        self.arm, self.gain = arm, gain
-        self._torque, self._bare, self._regressor = Lag(gain), Lag(gain), Lag(gain)
-        self._start: float | None = None
-        self._last = -np.inf
-
-    def __call__(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-        """Row indices (M,), r (M, n) and W (M, n, 10) of the next N samples."""
-        if self._start is None:
-            self._start = float(t[0])
-        lagged = self._torque(t, tau)
-        rows = []
-        for k, now in enumerate(t):
-            if now - self._last >= 0.9 / REGRESSOR_RATE:
-                rows.append(k)
-                self._last = now
-        if not rows:
-            return np.empty(0, dtype=int), np.empty((0, self.arm.n)), np.empty((0, self.arm.n, 10))
-        index = np.array(rows)
-        t, q, dq = t[index], q[index], dq[index]
-        p, drift = self.arm.momentum(q, dq)
-        r = lagged[index] - self.gain * p - self._bare(t, drift - self.gain * p, initial=-self.gain * p[0])
-        r[t < self._start + _SETTLED / self.gain] = np.nan
-        Y = momentum_regressor(self.arm.frame_motion(q), dq)
-        return index, r, filtered_regressor(t, Y.momentum, Y.drift, self._regressor)
 
 
 class DifferenceLeastSquares(NormalLeastSquares):
@@ -91,6 +65,7 @@ class DifferenceLeastSquares(NormalLeastSquares):
         self.arm, self.gain, self.tare = arm, gain, tare
         super()._check(tare)
         self._tracker = MotionTracker(tare)
+        self._regression = FilteredRegression(arm, gain, rate=REGRESSOR_RATE)
         self._tare_t, self._tare_r = _filtered_torque(arm, tare, gain)
         super().__init__(arm, weighted=True)
 
@@ -105,20 +80,50 @@ class DifferenceLeastSquares(NormalLeastSquares):
                 f"{LEAST:.0%}; run the same motion without the payload, or use the method map, which takes any tare"
             )
 
+    def fresh(self) -> Self:
+        """Another one with the same tare that has seen nothing yet."""
+        other = copy(self)
+        other._tracker = copy(self._tracker)
+        other._regression = FilteredRegression(self.arm, self.gain, rate=REGRESSOR_RATE)
+        other.reset()
+        return other
+
     @property
     def seconds(self) -> float:
         """How much of the run so far the tare has shown [s]."""
         return self._blocks.duration
 
     def _restart(self) -> None:
-        self._filter = _FilteredRows(self.arm, self.gain)
+        self._regression.reset()
+        self._began: float | None = None
         self._tracker.restart()
 
     def _rows(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-        index, r, W = self._filter(t, q, dq, tau)
+        return self._aligned(self._regression.rows(t, q, dq, tau))
+
+    def take_rows(self, rows: Rows) -> None:
+        """Take rows made elsewhere with the same gain, the payload's columns first."""
+        t = rows.t
+        edges = np.flatnonzero(np.diff(t, prepend=self._last_t) > GAP)
+        for start, stop in zip([0, *edges], [*edges, len(t)], strict=True):
+            if start in edges:
+                self._restart()
+                self._last_row = t[start]
+            if stop > start:
+                part = slice(start, stop)
+                self._add(*self._aligned(Rows(*(column[part] for column in rows))))
+        if len(t):
+            self._last_t, self._count = t[-1], self._count + len(t)
+
+    def _aligned(self, rows: Rows) -> tuple[NDArray, NDArray, NDArray]:
+        """Rows that the tare shows, less its own torque; rows are new, the tracker may release older ones."""
+        if self._began is None and len(rows.t):
+            self._began = float(rows.t[0])
         found: list[Aligned] = []
-        for k, *row in zip(index, r, W, strict=True):
-            found += self._tracker.feed(float(t[k]), q[k], row)
+        for now, pose, *row in zip(rows.t.tolist(), rows.q, rows.r, rows.X[:, :, :10], strict=True):
+            if self._began is not None and now < self._began + _SETTLED / self.gain:
+                row[0] = np.full_like(row[0], np.nan)
+            found += self._tracker.feed(now, pose, row)
         times = np.array([aligned.t for aligned in found])
         y = np.array([aligned.row[0] for aligned in found]).reshape(-1, self.arm.n)
         Y = np.array([aligned.row[1] for aligned in found]).reshape(-1, self.arm.n, 10)
@@ -153,11 +158,12 @@ class DifferenceLeastSquares(NormalLeastSquares):
 
 def _filtered_torque(arm: Arm, log: Recording, gain: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Times (M,) and r (M, n) of a whole log; NaN after every gap until the lags have settled."""
+    regression = FilteredRegression(arm, gain, rate=REGRESSOR_RATE)
     edges = np.flatnonzero(np.diff(log.t) > GAP) + 1
     times, torques = [], []
     for start, stop in zip([0, *edges], [*edges, len(log)], strict=True):
         part = slice(start, stop)
-        index, r, _ = _FilteredRows(arm, gain)(log.t[part], log.q[part], log.dq[part], log.tau[part])
-        times.append(log.t[part][index])
-        torques.append(r)
+        rows = regression.rows(log.t[part], log.q[part], log.dq[part], log.tau[part])
+        times.append(rows.t)
+        torques.append(np.where((rows.t < log.t[start] + _SETTLED / gain)[:, None], np.nan, rows.r))
     return np.concatenate(times), np.concatenate(torques)

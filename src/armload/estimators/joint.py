@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
 from armload.arms import Arm, rated_effort
-from armload.estimators.contract import BatchIdentifier, Estimate
+from armload.estimators.contract import Estimate, Identifier
 from armload.estimators.normal import UNKNOWN
 from armload.recording import Recording, Sample
 from armload.regression import Correction, payload_prior_std
@@ -39,7 +39,7 @@ def _threads() -> ThreadpoolController:
     return ThreadpoolController()
 
 
-class JointLeastSquares(BatchIdentifier):
+class JointLeastSquares(Identifier):
     """Weighted least squares for the payload and for all base parameters of the arm, from a tare and a run.
 
     The covariance is that of phi among all unknowns: what the arm may be instead widens it.

@@ -23,8 +23,8 @@ from armload.estimators.contract import Estimate, Identifier
 from armload.inertia import is_consistent, nearest_consistent
 from armload.recording import GAP, Sample
 from armload.regression import solution_prior_std
-from armload.regression.information import REGRESSOR_RATE
 from armload.regression.mismatch import FRICTION_WIDTH
+from armload.regression.rows import REGRESSOR_RATE
 
 # as fractions of the effort limit: √S of the unmodelled torque per √Hz; first spread of offset and Coulomb friction
 _TORQUE, _OFFSET, _COULOMB = 4e-3, 4e-3, 1e-2
@@ -81,8 +81,16 @@ class ExtendedKalmanFilter(Identifier):
         self._dq, self._ddq = np.zeros(self.arm.n), np.zeros(self.arm.n)  # measured then; lagged acceleration
         self._count = 0
 
-    def update(self, sample: Sample) -> Estimate:
-        """Take one sample (t, q, dq, tau) and return the estimate so far, at most one step old."""
+    def _take(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
+        for sample in zip(t.tolist(), q, dq, tau, strict=True):
+            self._follow(Sample(*sample))
+
+    def _estimate(self, t: float) -> Estimate:
+        phi = slice(2 * self.arm.n, 2 * self.arm.n + 10)
+        return Estimate(t, self._x[phi].copy(), self._P[phi, phi].copy(), self._count, str(self.arm.frame))
+
+    def _follow(self, sample: Sample) -> None:
+        """Take one sample; a step is made of several."""
         n, last = self.arm.n, self._last
         if self._count == 0:
             self._begin()
@@ -105,8 +113,6 @@ class ExtendedKalmanFilter(Identifier):
                 self._dq = now.dq
         self._last = now
         self._count += 1
-        phi = slice(2 * n, 2 * n + 10)
-        return Estimate(float(now.t), self._x[phi].copy(), self._P[phi, phi].copy(), self._count, str(self.arm.frame))
 
     def _begin(self) -> None:
         n, effort = self.arm.n, rated_effort(self.arm)

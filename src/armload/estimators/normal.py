@@ -4,7 +4,7 @@
 
 P_0 is so wide (`UNKNOWN`) that it only keeps the first samples finite. Ordinary least squares (OLS) has w_j = 1,
 weighted least squares (WLS) w_j = 1/s_j², s_j² the variance of joint j's residual, found from the data by solving twice
-more. What the rows are is a subclass's choice; `ols` and `wls` take the acceleration-free ones (`arms.filtered`).
+more. What the rows are is a subclass's choice; `ols` and `wls` take the acceleration-free ones (`regression.rows`).
 
 Sources: Atkeson, An & Hollerbach, IJRR 1986 (OLS); Gautier & Poignet, Control Engineering Practice 2001 (WLS).
 """
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
-from armload.estimators.contract import BatchIdentifier, Estimate
+from armload.estimators.contract import Estimate, Identifier
 from armload.recording import GAP
 from armload.regression import BlockMeans, FilteredRegression
 
@@ -27,7 +27,7 @@ _RESOLUTION = 1e-3  # [N·m] no joint's torque is known better
 _PASSES = 2  # solutions after the first, each with the weights of the one before
 
 
-class NormalLeastSquares(BatchIdentifier):
+class NormalLeastSquares(Identifier):
     """Accumulates rows y = Y·phi joint by joint and solves for phi; a subclass says what y and Y are.
 
     The covariance is G·(Σ_j w_j²·S_j·A_j + P_0⁻¹)·G with G = (Σ_j w_j·A_j + P_0⁻¹)⁻¹ and S_j the long-run variance of
@@ -50,6 +50,11 @@ class NormalLeastSquares(BatchIdentifier):
         self._blocks = BlockMeans((n, 11))  # of [Y, y]
         self._last_t = self._last_row = -np.inf
         self._restart()
+
+    def weighted_solution(self, phi: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+        """phi (10,) and G (10, 10) with the weights that an estimate (10,) asks for, and the rows per second."""
+        w = 1.0 / self._residual_variance(phi) if self._rows_seen else np.ones(self.arm.n)
+        return *self._solve(w), self._blocks.rate
 
     @abstractmethod
     def _restart(self) -> None:
@@ -134,17 +139,17 @@ class OrdinaryLeastSquares(NormalLeastSquares):
     name = "ols"
 
     def __init__(self, arm: Arm, gain: float = 20.0, weighted: bool = False) -> None:
-        self.gain = gain
+        self._regression = FilteredRegression(arm, gain)
         super().__init__(arm, weighted)
 
     def _restart(self) -> None:
-        self._regression = FilteredRegression(self.arm, self.gain)
+        self._regression.reset()
 
     def _rows(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         return t, *self._regression(t, q, dq, tau)
 
 
-class WeightedLeastSquares(OrdinaryLeastSquares):
+class WeightedLeastSquares(NormalLeastSquares):
     """WLS on the same rows as `OrdinaryLeastSquares`: a joint whose torque fits badly counts less.
 
     >>> from armload.arms import arm
@@ -159,4 +164,11 @@ class WeightedLeastSquares(OrdinaryLeastSquares):
     name = "wls"
 
     def __init__(self, arm: Arm, gain: float = 20.0) -> None:
-        super().__init__(arm, gain, weighted=True)
+        self._regression = FilteredRegression(arm, gain)
+        super().__init__(arm, weighted=True)
+
+    def _restart(self) -> None:
+        self._regression.reset()
+
+    def _rows(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+        return t, *self._regression(t, q, dq, tau)

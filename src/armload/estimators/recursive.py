@@ -18,10 +18,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from armload.arms import Arm, payload_regressor
-from armload.estimators.contract import BatchIdentifier, Estimate
+from armload.estimators.contract import Estimate, Identifier
 from armload.recording import GAP
 from armload.regression import BlockMeans
-from armload.regression.filtered import Lag
+from armload.regression.lag import Lag
 
 _AT_REST = 0.01  # [rad/s]
 _TRANSIENT = 5.0  # time constants after which an observer started in motion has settled
@@ -29,7 +29,7 @@ _TRANSIENT = 5.0  # time constants after which an observer started in motion has
 _INITIAL_STD = np.array([10.0] + [1.0] * 3 + [0.3] * 6)
 
 
-class _Recursive(BatchIdentifier):
+class _Recursive(Identifier):
     """The recursion and its uncertainty; a subclass says what y and Y are.
 
     The covariance is A⁻¹·(Σ_j S_j·A_j)·A⁻¹, where A_j is joint j's part of the information A = Σ YᵀY and S_j the

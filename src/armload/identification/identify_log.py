@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from difflib import get_close_matches
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,34 +12,26 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.errors import IdentificationError
-from armload.estimators import Estimate, Identifier
+from armload.estimators import ArmMismatch, Estimate
 from armload.identification.answer import Identification
-from armload.identification.methods import METHODS, default_for
+from armload.identification.choice import Choice, choose
 from armload.identification.plausibility import check_plausible
+from armload.identification.thresholds import DECISIVE, LARGEST_OFFSETS, LEANS, LOWEST_RATE, MISFIT, MOVES
 from armload.inertia import (
     HELD,
     NAMES,
-    SMALL,
     Z95,
     InertialParameters,
+    distance_to_body,
     held,
     is_consistent,
     nearest_body,
     phi_to_com,
 )
-from armload.inertia import determined as told
-from armload.posterior import Posterior, PosteriorLeastSquares
-from armload.recording import Recording
+from armload.inertia import determined as determined_by
+from armload.recording import Recording, check_own_measurements
 from armload.regression import payload_prior_std
 
-LOWEST_RATE = 20.0  # [Hz]
-_MISFIT = 3.0  # standard deviations between the estimate and the nearest body, beyond which something is wrong
-# rms of torque offsets over what is expected, from which on something is wrong: about 1 of most simulated arms, more
-# where friction holds the joints (motor currents)
-_STRANGE = {"link": 5.0, "motor": 8.0}
-_MOVES = 0.05  # [rad] a joint that stays within so much stands
-_LEANS = 3.0  # a log that alone tells a parameter so many times worse leaves it to the learned prior
-_DECISIVE = 9.0  # between two squared distances: 90 to 1
 _CHECK = "check the robot, the base (--gravity), what is mounted and the torques' signs"
 
 
@@ -59,7 +50,7 @@ def identify(
         recording: measured joint torque (rigid body + friction, gravity included), position and velocity.
         arm: the bare arm, with the frame and gravity wanted.
         tare: an earlier log of the same arm, on any motion, with whatever was mounted then; the answer is what was
-            added since.
+            added since. It shares no samples with the recording.
         tool: a tool mounted in the recording whose parameters are known; the answer is what it carries. Whether it was
             mounted at the tare too is found from the tare.
         method: a name in `armload.METHODS`, or the path of a trained model; None: the most trustworthy for the arm,
@@ -73,6 +64,8 @@ def identify(
     for log in (recording, tare):
         if log is not None:
             _check(log, arm)
+    if tare is not None:
+        check_own_measurements(recording, tare)
     say("identifying")
     if tool is None:
         return _answer(_run(recording, arm, tare, method), arm, recording, "arm" if tare is None else "tare")
@@ -117,20 +110,22 @@ def _carries(log: Recording, arm: Arm, tool: InertialParameters) -> tuple[bool, 
 
     The metric is what the log tells by the method that knows best how far it can be trusted.
     """
-    identifier = METHODS[default_for(arm)].make(arm, None)
-    seen = identifier.run(log)
+    seen = choose(arm).identifier.run(log)
     information = np.linalg.inv(seen.covariance)
     with_tool = seen.phi - tool.phi
     ahead = float(seen.phi @ information @ seen.phi - with_tool @ information @ with_tool)
-    return ahead > 0.0, abs(ahead) > _DECISIVE
+    return ahead > 0.0, abs(ahead) > DECISIVE
 
 
 class _Found(NamedTuple):
     """What a method found, and what was known before: mean and standard deviation (10,), used as a prior or not.
 
     calibrated: whether its error bars were checked on held-out episodes.
-    alone: standard deviation (10,) without a learned prior, of a method that has one.
-    strange: how many times the arm's torque offsets are what is expected of them, where that is too often.
+    weak_std: standard deviation (10,) without a learned prior, of a method that has one.
+    unprojected: mean (10,) and covariance (10, 10) of what the log says, before a body was made of it; None: the
+        estimate's.
+    offset_ratio: how many times the arm's torque offsets are what is expected of them, where that is too often.
+    unknown_friction: whether the torques hold gear friction that nobody knew of.
     """
 
     estimate: Estimate
@@ -140,12 +135,20 @@ class _Found(NamedTuple):
     method: str
     why: str
     calibrated: bool = False
-    alone: NDArray[np.float64] | None = None
-    strange: float = 0.0
+    weak_std: NDArray[np.float64] | None = None
+    unprojected: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    offset_ratio: float = 0.0
+    unknown_friction: bool = False
+
+    @property
+    def misfit(self) -> float:
+        """Standard deviations between what the log says and the nearest body."""
+        return distance_to_body(*(self.unprojected or (self.estimate.phi, self.estimate.covariance)))
 
     def less(self, tool: NDArray[np.float64]) -> _Found:
         """The same without a tool (10,)."""
-        return self._replace(estimate=replace(self.estimate, phi=self.estimate.phi - tool))
+        said = None if self.unprojected is None else (self.unprojected[0] - tool, self.unprojected[1])
+        return self._replace(estimate=replace(self.estimate, phi=self.estimate.phi - tool), unprojected=said)
 
 
 def _check(log: Recording, arm: Arm) -> None:
@@ -161,78 +164,43 @@ def _check(log: Recording, arm: Arm) -> None:
 
 
 def _run(recording: Recording, arm: Arm, tare: Recording | None, method: str | Path | None) -> _Found:
-    weak = payload_prior_std(arm)
-    entry = METHODS.get(default_for(arm) if method is None else str(method))
-    if entry is not None and not (entry.needs == "training" and Path(entry.name).is_file()):
-        why = (
-            f"{entry.name} holds for any motion and payload; an ensemble of the paper is taken only when named"
-            if method is None
-            else "asked for"
-        )
-        if method is None and tare is None:
-            why += "; without a tare the error bars allow for the model's errors"
-        identifier = entry.make(arm, tare)
-        found = _found(identifier, recording, weak, entry.prior, why)
-        if _holds_friction(identifier, arm):
-            arm = replace(arm, motor_torque=True)
-            why += "; the torque holds the gears' friction, as that of motor currents does"
-            found = _found(entry.make(arm, tare), recording, weak, entry.prior, why)
-        return found
-    assert method is not None
-    if not Path(method).is_file():
-        near = get_close_matches(str(method), METHODS, 1)
-        raise IdentificationError(
-            f"unknown method {str(method)!r}: expected one of {', '.join(METHODS)}, or the path of a trained model"
-            + (f"; did you mean {near[0]!r}?" if near else "")
-        )
-    from armload.ensembles import LearnedIdentifier, load_model
-    from armload.posterior import HybridIdentifier, HybridModel
-
-    if HybridModel.wrote(method):
-        trained = HybridIdentifier(arm, tare, HybridModel.load(method))
-        return _found(trained, recording, weak, True, f"asked for; {method} was trained for this arm")
-    model = load_model(method)
-    if tare is not None:
-        raise IdentificationError(
-            f"the trained model {method} cannot use a tare (an empty arm lies outside its training): leave the tare "
-            "out, or use the method map"
-        )
-    model.check(arm, recording)
-    estimate = LearnedIdentifier(model, arm).run(recording)
-    family = np.maximum(model.phi_std, SMALL / Z95)  # what did not vary in training is not known exactly for that
-    if model.error_std is None:  # how far the members disagree is no error bar
-        estimate = replace(estimate, covariance=np.diag(family**2))
-    why = f"asked for; {method} was trained on this arm and motion"
-    return _Found(estimate, model.phi_mean, family, True, model.kind, why)
+    found = _found(choose(arm, tare, method), arm, recording)
+    if found.unknown_friction:
+        motor_side = replace(arm, motor_torque=True)
+        found = _found(choose(motor_side, tare, method), motor_side, recording)
+        found = found._replace(why=f"{found.why}; the torque holds the gears' friction, as that of motor currents does")
+    return found
 
 
-def _found(identifier: Identifier, recording: Recording, weak: NDArray, prior: bool, why: str) -> _Found:
-    known, std = (np.zeros(10), weak) if identifier.known is None else identifier.known
+def _found(choice: Choice, arm: Arm, recording: Recording) -> _Found:
+    identifier = choice.identifier
     estimate = identifier.run(recording)
-    asks = isinstance(identifier, PosteriorLeastSquares)
-    strange = _strangeness(identifier.posterior, recording) if asks else 0.0
-    return _Found(estimate, known, std, prior, identifier.name, why, identifier.calibrated, identifier.alone, strange)
+    mean, std = identifier.payload_prior or (np.zeros(10), payload_prior_std(arm))
+    mismatch = identifier.mismatch
+    # where the payload prior is learned, so are error bars that allow for friction
+    unknown = identifier.payload_prior is None and not arm.motor_torque
+    return _Found(
+        estimate=estimate,
+        before=mean,
+        before_std=std,
+        prior=choice.prior,
+        method=identifier.name,
+        why=choice.why,
+        calibrated=identifier.calibrated,
+        weak_std=identifier.weak_std,
+        unprojected=identifier.unprojected,
+        offset_ratio=0.0 if mismatch is None else _offset_ratio(mismatch, recording),
+        unknown_friction=unknown and mismatch is not None and mismatch.torque == "motor",
+    )
 
 
-def _strangeness(posterior: Posterior, recording: Recording) -> float:
+def _offset_ratio(mismatch: ArmMismatch, recording: Recording) -> float:
     """How many times the torque offsets are what is expected of an arm; 0 where that is not too often."""
-    ratios = posterior.ratios["offset"]
-    if posterior.torque == "motor":  # there a joint at rest is held by any friction below stiction
-        ratios = ratios[np.ptp(recording.q, axis=0) > _MOVES]
+    ratios = mismatch.offset_ratios
+    if mismatch.torque == "motor":  # there a joint at rest is held by any friction below stiction
+        ratios = ratios[np.ptp(recording.q, axis=0) > MOVES]
     times = float(np.sqrt(ratios.mean())) if ratios.size else 0.0
-    return times if times > _STRANGE[posterior.torque] else 0.0
-
-
-def _holds_friction(identifier: Identifier, arm: Arm) -> bool:
-    """Whether a log showed gear friction in its torques that nobody knew of: of what is learned, it is part already."""
-    physics = isinstance(identifier, PosteriorLeastSquares) and identifier.known is None
-    return physics and not arm.motor_torque and identifier.posterior.torque == "motor"
-
-
-def _misfit(estimate: Estimate) -> float:
-    """Standard deviations between an estimate and the nearest body."""
-    away = nearest_body(estimate.phi, estimate.covariance) - estimate.phi
-    return float(np.sqrt(away @ np.linalg.inv(estimate.covariance) @ away)) if away.any() else 0.0
+    return times if times > LARGEST_OFFSETS[mismatch.torque] else 0.0
 
 
 def _answer(
@@ -246,7 +214,9 @@ def _answer(
     """What is said of an estimate; `otherwise` (10,): how far off the truth may be beyond the error bars."""
     estimate, before = found.estimate, found.before
     phi, half, half_before = estimate.phi.copy(), Z95 * estimate.std, Z95 * found.before_std
-    determined = told(estimate.std, found.before_std if found.prior else None, found.alone, payload_prior_std(arm))
+    determined = determined_by(
+        estimate.std, found.before_std if found.prior else None, found.weak_std, payload_prior_std(arm)
+    )
     is_held = held(phi[0], estimate.std[0], determined[0])
     # what the log does not tell keeps the interval of what was known before, stretched to an estimate that lies beyond
     reach = np.minimum(half, half_before) if found.prior else half
@@ -265,17 +235,19 @@ def _answer(
         )
     else:
         phi = nearest_body(estimate.phi, estimate.covariance)
-        if _misfit(estimate) > _MISFIT:
+        if found.misfit > MISFIT:
             said.append(f"no body fits within the error bars: {_CHECK}")
             trusted = False
-        elif found.strange:
-            said.append(f"the torques are {found.strange:.0f} times as far off as those of an arm should be: {_CHECK}")
+        elif found.offset_ratio:
+            said.append(
+                f"the torques are {found.offset_ratio:.0f} times as far off as those of an arm should be: {_CHECK}"
+            )
             trusted = False
     low, high = np.minimum(low, phi), np.maximum(high, phi)
     if not determined.all():
         missing = ", ".join(n for n, known in zip(NAMES, determined, strict=True) if not known)
         said.append(f"this motion does not determine {missing}: what was known before is reported for them")
-    if found.alone is not None and np.any(leaning := determined & (found.alone > _LEANS * estimate.std)):
+    if found.weak_std is not None and np.any(leaning := determined & (found.weak_std > LEANS * estimate.std)):
         names = ", ".join(n for n, one in zip(NAMES, leaning, strict=True) if one)
         said.append(
             f"the error bars of {names} rest on what payloads are usually like more than on this log: of something "

@@ -7,8 +7,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
 
 from armload.arms import Arm
 from armload.errors import IdentificationError, ModelError
@@ -120,7 +122,7 @@ def _commanded(*_: object) -> Identifier:
 _CATALOGUE = (
     Method(
         "hybrid",
-        "map-gp with a learned payload prior and learned error bars",
+        "map-gp with a learned payload prior and calibrated intervals",
         "any motion, any payload, with or without a tare, on an arm with a trained model: the default there",
         "this project; Rahimi & Recht, NIPS 2007; Lei et al., JASA 2018; Breiman, Machine Learning 1996",
         tare="own equation",
@@ -138,8 +140,8 @@ _CATALOGUE = (
     ),
     Method(
         "map",
-        "MAP least squares with the arm's rigid mismatch alone as an unknown",
-        "as map-gp at a third of its cost, with wider and rougher error bars",
+        "MAP least squares with only the arm's rigid mismatch as an unknown",
+        "as map-gp at a third of its cost, with wider and less accurate intervals",
         "Khalil, Gautier & Lemoine, ICRA 2007; Bishop 2006, ch. 3",
         tare="own equation",
         prior=True,
@@ -148,7 +150,7 @@ _CATALOGUE = (
     Method(
         "difference",
         "torque difference with a tare along the same motion, on the filtered regression",
-        "a repeated motion that was also run without the payload: then the most accurate of all",
+        "a repeated motion that was also run without the payload: then the most accurate method",
         "Atkeson, An & Hollerbach, IJRR 1986; Hsu et al., ICRA 1987",
         tare="same motion",
         prior=False,
@@ -167,8 +169,8 @@ _CATALOGUE = (
     ),
     Method(
         "log-cholesky",
-        "weighted least squares in a chart of the bodies that can exist",
-        "a body is wanted without a prior, with error bars that know its inertia cannot be negative",
+        "weighted least squares in log-Cholesky coordinates, always physically consistent",
+        "a physically consistent answer without a prior, with intervals that respect the consistency",
         "Rucker & Wensing, RA-L 2022",
         tare="virtual calibration",
         prior=False,
@@ -177,7 +179,7 @@ _CATALOGUE = (
     Method(
         "lmi",
         "weighted least squares subject to physical consistency, a semidefinite program",
-        "as log-cholesky, where the optimum must be the global one, or a reference body shall pull (Python)",
+        "as log-cholesky, but with a global optimum, or regularised towards a reference body (Python)",
         "Sousa & Cortesão, IJRR 2014; Wensing, Kim & Slotine, RA-L 2018; Lee, Wensing & Park, T-RO 2020",
         tare="virtual calibration",
         prior=False,
@@ -186,7 +188,7 @@ _CATALOGUE = (
     Method(
         "wls",
         "weighted least squares on the acceleration-free filtered regression",
-        "a plain estimate without any prior, on an arm whose joints differ in how well their torque fits the model",
+        "a plain estimate without any prior, on an arm whose joints fit the model differently well",
         "Gautier & Poignet, Control Engineering Practice 2001; Hsu et al., ICRA 1987",
         tare="virtual calibration",
         prior=False,
@@ -195,7 +197,7 @@ _CATALOGUE = (
     Method(
         "ols",
         "ordinary least squares on the same rows",
-        "exact for an exact arm and the easiest to reason about: the yardstick of every other row",
+        "exact for an exact arm and the easiest to understand: the reference for all other methods",
         "Atkeson, An & Hollerbach, IJRR 1986; Hsu et al., ICRA 1987",
         tare="virtual calibration",
         prior=False,
@@ -204,7 +206,7 @@ _CATALOGUE = (
     Method(
         "momentum",
         "least squares on the change of momentum over windows of 0.1 s",
-        "as ols, where no filter may stand between sensor and estimate",
+        "as ols, without a filter between sensor and estimate",
         "De Luca et al., IROS 2006; Gautier, ICRA 1997",
         tare="virtual calibration",
         prior=False,
@@ -213,7 +215,7 @@ _CATALOGUE = (
     Method(
         "polynomial",
         "least squares with the acceleration of a local polynomial in the measured positions",
-        "logs whose velocity is poor or missing its scale: only positions and torque enter; stands in for commanded",
+        "logs with poor velocity: only positions and torque are used; replaces commanded on a log",
         "Savitzky & Golay, Analytical Chemistry 1964; Atkeson, An & Hollerbach, IJRR 1986",
         tare="virtual calibration",
         prior=False,
@@ -222,7 +224,7 @@ _CATALOGUE = (
     Method(
         "commanded",
         "least squares with the commanded acceleration of the known trajectory",
-        "you know the motion to the sample and the controller tracks it well",
+        "you know the motion at every sample, and the controller tracks it well",
         "Atkeson, An & Hollerbach, IJRR 1986; Swevers et al., IEEE TRA 1997",
         tare="virtual calibration",
         prior=False,
@@ -232,7 +234,7 @@ _CATALOGUE = (
     Method(
         "ekf",
         "extended Kalman filter on the forward dynamics: joint state, payload and friction",
-        "a filtered joint state is wanted as well, at a few hundred hertz; torque on the link side",
+        "you also want a filtered joint state, at a few hundred hertz; torque on the link side",
         "Bucy & Joseph 1968; Bell & Cathey, IEEE TAC 1993; Gautier & Poignet, Control Engineering Practice 2001",
         tare="virtual calibration",
         prior=True,
@@ -241,7 +243,7 @@ _CATALOGUE = (
     Method(
         "rls-filter",
         "recursive least squares behind a momentum observer, signals lagged alike",
-        "the benchmark of the paper: to compare with published results, best with a tare",
+        "to compare with published results (the benchmark of the paper); best with a tare",
         "Kurdas et al., ICRA 2022",
         tare="virtual calibration",
         prior=False,
@@ -249,8 +251,8 @@ _CATALOGUE = (
     ),
     Method(
         "rtls",
-        "recursive total least squares: the regressor's errors are allowed for",
-        "differentiated velocity and no filter: what rls would give if its acceleration were not noisy",
+        "recursive total least squares: errors in the regressor are modelled",
+        "differentiated velocity without a filter: as rls, without the bias from its noisy acceleration",
         "Kubus, Kröger & Wahl, IROS 2008; Golub & Van Loan, SIAM J. Numer. Anal. 1980",
         tare="virtual calibration",
         prior=False,
@@ -259,7 +261,7 @@ _CATALOGUE = (
     Method(
         "rls",
         "recursive least squares on differentiated velocity",
-        "the plain benchmark: where logs are nearly free of noise, or to see what noise costs",
+        "the plain benchmark: for logs with little noise, or to see the effect of noise",
         "Atkeson, An & Hollerbach, IJRR 1986",
         tare="virtual calibration",
         prior=False,
@@ -268,7 +270,7 @@ _CATALOGUE = (
     Method(
         "tree",
         "bagged decision trees of the paper",
-        "one arm, one motion, one family of payloads, all known when it is trained; an answer from the first sample",
+        "one arm, one motion and one family of payloads, all known at training; answers from the first sample",
         "Taie et al., RA-L 2024; Breiman 1996",
         tare="none",
         prior=True,
@@ -278,7 +280,7 @@ _CATALOGUE = (
     Method(
         "network",
         "bagged neural networks of the paper",
-        "as tree, smoother between the payloads it was trained on, slower to train",
+        "as tree, but smoother between the training payloads and slower to train",
         "Taie et al., RA-L 2024; Breiman 1996",
         tare="none",
         prior=True,
@@ -288,21 +290,11 @@ _CATALOGUE = (
     Method(
         "mixed",
         "trees and networks in one bag, the paper's future work",
-        "as tree, where neither kind alone is trusted",
+        "as tree, to average both kinds",
         "Taie et al., RA-L 2024, section VI",
         tare="none",
         prior=True,
         build=_trained("mixed"),
-        needs="training",
-    ),
-    Method(
-        "svr",
-        "bagged support-vector machines with a Gaussian kernel",
-        "as network, where training must take minutes and a few thousand rows say enough",
-        "Vapnik 1995; Smola & Schölkopf, Statistics and Computing 2004",
-        tare="none",
-        prior=True,
-        build=_trained("svr"),
         needs="training",
     ),
 )
@@ -312,39 +304,65 @@ _ELSEWHERE = "map-gp"
 
 
 def default_for(arm: Arm) -> str:
-    """The name of the most trustworthy method for an arm: the hybrid where one is shipped, map-gp elsewhere."""
-    from armload.posterior import HybridModel
+    """The name of the most trustworthy method for an arm: the hybrid where one is shipped, map-gp elsewhere.
 
-    shipped = HybridModel.shipped(arm)
-    if shipped is None:
+    Raises:
+        ModelError: a hybrid is shipped for the arm, and its file is missing or cannot be read.
+    """
+    from armload.posterior import HybridModel, shipped_model
+
+    if HybridModel.shipped(arm) is None:
         return _ELSEWHERE
+    model = shipped_model(arm)
     try:
-        HybridModel.load(shipped).prior_for(arm)
+        model.prior_for(arm)
     except ModelError:  # an arm of that name with other links
         return _ELSEWHERE
     return DEFAULT
+
+
+def model_file(name: str | Path, names: Sequence[str]) -> Path:
+    """The file of a trained model that was given in place of a method's name.
+
+    Raises:
+        IdentificationError: there is no such file; the message says what was meant, a file or one of `names`.
+    """
+    path, text = Path(name), str(name)
+    if path.is_file():
+        return path
+    if path.suffix or len(path.parts) > 1:  # no method is called so
+        state = "is not a file" if path.exists() else "does not exist"
+        raise IdentificationError(
+            f"the model {text} {state}: expected the .safetensors file that `armload train` wrote, or a method that "
+            "`armload methods` lists"
+        )
+    near = get_close_matches(text, names, 1)
+    raise IdentificationError(
+        f"unknown method {text!r}: expected one of {', '.join(names)}, or the path of a trained model"
+        + (f"; did you mean {near[0]!r}?" if near else "")
+    )
 
 
 # What the paper's related work names (its reference numbers) and armload does not build, with the reason.
 LEFT_OUT: dict[str, str] = {
     "vision: geometry, colour or depth images [8]": "needs a camera and a density; a log of the joints holds neither",
     "exploration: pushing, poking, tilting an object [8]": (
-        "needs contact experiments before the object is grasped, not a log of a grasped one"
+        "needs contact experiments before the grasp; a log is recorded after it"
     ),
     "vision and force/torque sensor together [9]": "needs both sensors",
     "wrist force/torque sensor with an IMU [15]": (
-        "needs a sensor between flange and payload; where there is one, its wrench is the better measurement"
+        "needs a sensor between flange and payload; if there is one, its wrench is the better measurement"
     ),
     "quaternion-based filtering [14]": (
         "estimates orientation and acceleration from an IMU; joint encoders know the orientation already"
     ),
     "chaotic sparrow search with Kent map, Student's t and Lévy flight [19]": (
-        "a global search for a problem that is linear here and has its one optimum in closed form"
+        "a global search; this problem is linear and has one optimum in closed form"
     ),
     "offline techniques of dynamic identification compared in [10]": (
-        "that comparison finds only least squares and machine-learning regression fit to work online"
+        "that comparison finds that only least squares and machine-learning regression work online"
     ),
     "unsupervised classification of payload changes from torque [20]": (
-        "tells that a payload changed, not its ten parameters; `held` answers that question"
+        "detects a change of payload, but gives no parameters; `OnlineIdentifier` detects changes"
     ),
 }

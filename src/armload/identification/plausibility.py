@@ -28,7 +28,6 @@ _NOT_DERIVATIVE = 0.5  # relative rms difference between ∫dq dt and the change
 _EFFORT, _EFFORT_SHARE = 3.0, 0.01  # times the effort limit, in more than this share of the samples
 _NO_TORQUE = 1e-3  # [N·m]
 _FROZEN_TIME, _FROZEN_MOTION = 0.25, 0.1  # [s], [rad] without any change of torque: no sound sensor is so calm
-_SCALE_LOW, _SCALE_HIGH, _SURE = 0.6, 1.7, 2.0  # of the arm's own torque; standard deviations
 _MISFIT = 2.5  # plausible model errors
 
 
@@ -220,14 +219,13 @@ def _check_torque_is_the_arms(recording: Recording, arm: Arm) -> None:
     fit = torque_scale(recording, arm)
     if fit is None:
         return
-    scale, doubt = fit.scale, _SURE * fit.std
-    if scale + doubt < _SCALE_LOW or scale - doubt > _SCALE_HIGH:
-        if scale + doubt < 0:
+    if fit.is_wrong:
+        if fit.is_negative:
             what = "has the opposite sign of"
-        elif scale < 0.25:
-            what = f"holds only {max(scale, 0.0):.0%} of"
+        elif fit.scale < 0.25:
+            what = f"holds only {max(fit.scale, 0.0):.0%} of"
         else:
-            what = f"is {scale:.2f} times"
+            what = f"is {fit.scale:.2f} times"
         raise RecordingError(
             f"{recording.source}: tau {what} the torque {arm.name} needs to carry itself: expected the measured joint "
             "torque in N·m, gravity included; check the robot, the unit, the torque channel and the base (--gravity)"

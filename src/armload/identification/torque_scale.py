@@ -4,7 +4,7 @@ Averaged over a window from t₁ to t₂, the joint torque of the bare arm is (p
 with p the momentum; the payload's is the same with its momentum regressor. So no acceleration is needed. With friction
 and an offset of each joint,
 
-    tau = s·tau_arm + W·phi + offset + level·tanh(q̇/0.05) + noise
+    tau = s·tau_arm + W·phi + offset + level·tanh(q̇/0.06) + noise
 
 is linear in (s, phi, offset, level). All but s get a prior wide enough for any sound robot: a payload of three times
 the rated mass, motor-side friction, a model error of a few per cent of the rated torque, a tenth of it for a joint at
@@ -19,20 +19,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm, momentum_regressor
+from armload.arms import FRICTION_WIDTH, Arm, momentum_regressor, rated_effort, rated_mass
 from armload.recording import Recording
 from armload.recording.windows import Windows, integrals, windows
 
 _MOST_WINDOWS = 120
 _POINTS = 9  # model evaluations per window
-_FRICTION_WIDTH = 0.05  # [rad/s]
 _MODEL_ERROR = 0.03  # of the rated torque, rms
 _OFFSET = 0.05  # of the rated torque
 _FRICTION = 0.2  # of the rated torque: gear friction as motor currents show it
 _STICTION = 0.1  # of the rated torque, of a joint at rest
-_WEAKEST = 0.4  # rating of an unrated wrist, as a share of the largest torque the model asks: 0.3 to 0.4 on real arms
-_UNRATED = 5.0  # [kg] payload assumed where the maker's rating is not known
 _LEVER = 0.15  # [m] of the payload's centre of mass and radius of gyration
+_LOW, _HIGH, _SURE = 0.6, 1.7, 2.0  # of the arm's own torque; standard deviations
 
 
 class TorqueScale(NamedTuple):
@@ -42,6 +40,22 @@ class TorqueScale(NamedTuple):
     std: float
     misfit: float
 
+    @property
+    def is_wrong(self) -> bool:
+        """Whether s is surely beyond what a sound log of the arm shows."""
+        return self.scale + _SURE * self.std < _LOW or self.scale - _SURE * self.std > _HIGH
+
+    @property
+    def is_negative(self) -> bool:
+        """Whether s is surely below 0."""
+        return self.scale + _SURE * self.std < 0
+
+    def contradicts(self, wrong: TorqueScale) -> bool:
+        """Whether s is that of a sound log, and surely another than a wrong one that was seen before."""
+        return _LOW <= self.scale <= _HIGH and abs(self.scale - wrong.scale) > _SURE * float(
+            np.hypot(self.std, wrong.std)
+        )
+
 
 def torque_scale(recording: Recording, arm: Arm) -> TorqueScale | None:
     """Fit the model above to a log; None if the log is too short to say anything."""
@@ -50,12 +64,12 @@ def torque_scale(recording: Recording, arm: Arm) -> TorqueScale | None:
         return None
     own, payload, tau, friction, moving = _averages(recording, arm, parts)
     W, n = own.shape
-    rated = _rated_torque(arm, own)
+    rated = rated_effort(arm)
 
     offset = np.broadcast_to(np.eye(n), (W, n, n))
     level = friction[:, :, None] * np.eye(n)
     A = np.concatenate([payload, offset, level], axis=2)  # (W, n, 10 + 2n)
-    mass = 3.0 * (arm.rated_payload or _UNRATED)
+    mass = 3.0 * rated_mass(arm)
     prior = np.concatenate(
         [mass * np.r_[1.0, [_LEVER] * 3, [_LEVER**2] * 6], _OFFSET * rated, _FRICTION * rated]
     )  # standard deviations
@@ -91,7 +105,7 @@ def _averages(recording: Recording, arm: Arm, parts: Windows) -> tuple[NDArray, 
     own = (p[:, -1] - p[:, 0]) / T + np.einsum("wpi,p->wi", drift, weight)
     payload = (Yp[:, -1] - Yp[:, 0]) / T[:, :, None] + np.einsum("wpij,p->wij", Yd, weight)
     tau = integrals(recording, recording.tau, parts) / T
-    direction = np.tanh(dq / _FRICTION_WIDTH)
+    direction = np.tanh(dq / FRICTION_WIDTH)
     friction, moving = (integrals(recording, x, parts) / T for x in (direction, np.abs(direction)))
     return own, payload, tau, friction, moving
 
@@ -102,14 +116,3 @@ def _some(parts: Windows) -> Windows:
         return parts
     chosen = np.linspace(0, len(parts.first) - 1, _MOST_WINDOWS).round().astype(int)
     return Windows(parts.first[chosen], parts.last[chosen])
-
-
-def _rated_torque(arm: Arm, own: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The torque each joint is made for (n,): its effort limit, or else a guess from what the log asks of the model.
-
-    A joint is at least as strong as those it carries, and the weakest of an arm about a fifth of the strongest.
-    """
-    most = np.abs(own).max(axis=0)
-    carried = np.maximum.accumulate(most[::-1])[::-1]
-    asked = np.maximum(2.0 * carried, _WEAKEST * most.max() + 1.0)
-    return np.where(np.isfinite(arm.limits.effort), arm.limits.effort, asked)

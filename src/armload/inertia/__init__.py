@@ -4,6 +4,7 @@ No other room packs, reorders, moves or projects the 10-vector.
 """
 
 from armload.inertia.consistency import (
+    distance_to_body,
     from_log_cholesky,
     is_consistent,
     log_cholesky,
@@ -41,6 +42,7 @@ __all__ = [
     "InertialParameters",
     "com_to_phi",
     "determined",
+    "distance_to_body",
     "frame_change_matrix",
     "from_log_cholesky",
     "from_order",

@@ -65,6 +65,16 @@ def nearest_body(phi: NDArray[np.float64], covariance: NDArray[np.float64]) -> N
     return nearest_consistent(phi, np.linalg.inv(covariance), margin=_ANSWER)
 
 
+def distance_to_body(phi: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
+    """Standard deviations between an estimate phi (10,) and the nearest body, in the metric of phi's covariance.
+
+    Bodies are a convex cone: where the truth is one and phi ~ N(truth, covariance), the square is at most that of the
+    distance to the truth, a chi-square of ten degrees of freedom.
+    """
+    away = nearest_body(phi, covariance) - phi
+    return float(np.sqrt(away @ np.linalg.solve(covariance, away))) if away.any() else 0.0
+
+
 def nearest_consistent(phi: ArrayLike, information: ArrayLike | None = None, margin: float = 1e-6) -> NDArray:
     """The physically consistent parameters nearest to phi: argmin (x − phi)ᵀ·Λ·(x − phi) subject to J(x) ⪰ margin.
 

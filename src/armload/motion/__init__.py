@@ -3,11 +3,11 @@
 from armload.motion.check import MotionCheck, check_motion, rated_load
 from armload.motion.endless import EndlessMotion
 from armload.motion.export import export_motion
-from armload.motion.files import load_motion, save_motion, taie2024
 from armload.motion.fingerprint import MotionFingerprint
 from armload.motion.fourier import FourierMotion, start_and_stop_at_rest
 from armload.motion.motion import Motion
-from armload.motion.random_fourier import random_motion
+from armload.motion.motion_file import load_motion, save_motion, taie2024
+from armload.motion.random_fourier import excitation, random_motion
 
 __all__ = [
     "EndlessMotion",
@@ -16,6 +16,7 @@ __all__ = [
     "MotionCheck",
     "MotionFingerprint",
     "check_motion",
+    "excitation",
     "export_motion",
     "load_motion",
     "random_motion",

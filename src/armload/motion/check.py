@@ -14,6 +14,7 @@ from armload.motion.collision import PAYLOAD_RADIUS, PAYLOAD_REACH, CapsuleArm, 
 from armload.motion.motion import Motion
 
 QUANTITIES = {"position": "rad", "velocity": "rad/s", "acceleration": "rad/s²", "jerk": "rad/s³", "torque": "N·m"}
+_EQUAL = 1e-9  # [m] clearances that differ by rounding only: the first instant counts
 _AT_REST = 1e-3  # share of the velocity or acceleration limit that still counts as starting and ending at rest
 
 
@@ -168,7 +169,7 @@ def nearest(
 ) -> tuple[tuple[float, str], tuple[float, str]]:
     """The smallest distance to the floor, and of the arm to itself, along poses q (N, n): metres; of what and when."""
     clear = model.clearance(q, floor)
-    k, m = int(np.argmin(clear.floor)), int(np.argmin(clear.self))
+    k, m = (int(np.argmax(x <= x.min() + _EQUAL)) for x in (clear.floor, clear.self))
     down = f"{model.names[clear.floor_part[k]]} at t = {t[k]:.2f} s" if np.isfinite(clear.floor[k]) else ""
     pair = ""
     if np.isfinite(clear.self[m]):

@@ -2,7 +2,8 @@
 
 Capsules are coarse on purpose: a motion must stay clear of them by a margin, not graze the true surface.
 
-- `panda`: one or two capsules per link from the outer size of Franka's links (our figures below, rounded up to 1 cm).
+- an arm whose sheet gives its outer size (the Panda), and any arm whose joints sit as that one's do (an FR3, a Panda
+  with other inertias): the sheet's capsules.
 - any other arm: one capsule from each joint origin to the next, with a radius of half its length, but between 2 % and
   4 % of the sum of these lengths (UR10e: 0.08 m for the upper arm, 0.06 m for the wrist).
 - what the arm holds: a ball of a given radius, centred 0.1 m beyond the payload frame along its z axis.
@@ -15,41 +16,19 @@ little between them that they touch whenever the arm folds.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache, cached_property
 from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armload.arms import Arm
+from armload.arms import ARMS, PAYLOAD_REACH, Arm, Capsule, NearestCapsules, arm
 
-PAYLOAD_REACH = 0.10  # [m] centre of the payload's ball beyond the payload frame, along its z axis
 PAYLOAD_RADIUS = 0.15  # [m]
 _THIN, _THICK = 0.02, 0.04  # radius of an unknown arm's links over the sum of its link lengths
+_SAME_PLACE = 1e-3  # [m] between joints' origins of arms with the same links
 _ROOM_TO_FOLD = 1.2  # links nearer than this multiple of their radii cannot be kept apart by the joints between them
-
-# Panda: origins of joints 1 to 7 in the link before, by which the arm is recognised under any name [m]
-_PANDA_JOINTS = (
-    (0, 0, 0.333),
-    (0, 0, 0),
-    (0, -0.316, 0),
-    (0.0825, 0, 0),
-    (-0.0825, 0.384, 0),
-    (0, 0, 0),
-    (0.088, 0, 0),
-)
-# Panda: link (0 = base), start and end [m] in the link's joint frame, radius [m]. Outer size of the castings.
-_PANDA = (
-    (0, (-0.09, 0, 0.06), (0.0, 0, 0.06), 0.09),
-    (1, (0, 0, -0.333), (0, 0, -0.05), 0.07),
-    (2, (0, 0, -0.06), (0, 0, 0.06), 0.07),
-    (3, (0, 0, -0.22), (0, 0, -0.07), 0.07),
-    (4, (0, 0, -0.06), (0, 0, 0.06), 0.07),
-    (5, (0, 0, -0.31), (0, 0, -0.21), 0.07),
-    (5, (0, 0.08, -0.20), (0, 0.08, -0.06), 0.06),
-    (6, (0, 0, -0.07), (0, 0, 0.01), 0.06),
-    (7, (0, 0, -0.06), (0, 0, 0.08), 0.05),
-)
 
 
 class Clearance(NamedTuple):
@@ -80,14 +59,6 @@ class CapsuleArm:
     pairs: NDArray[np.int64]
     names: tuple[str, ...]
 
-    def axes(self, q: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Both ends (N, C, 3) of the capsules' axes in the base [m] at poses q (N, n)."""
-        R, p = self.arm.link_poses(np.atleast_2d(q))
-        N = len(p)
-        R = np.concatenate([np.broadcast_to(np.eye(3), (N, 1, 3, 3)), R], axis=1)[:, self.link]  # (N, C, 3, 3)
-        p = np.concatenate([np.zeros((N, 1, 3)), p], axis=1)[:, self.link]
-        return p + np.einsum("tcij,cj->tci", R, self.start), p + np.einsum("tcij,cj->tci", R, self.end)
-
     def clearance(self, q: ArrayLike, floor: float | None = 0.0) -> Clearance:
         """Distance to the floor and of the arm to itself at poses q (N, n).
 
@@ -95,32 +66,44 @@ class CapsuleArm:
             q: (N, n) [rad].
             floor: height of the floor in the base's frame [m]; None: there is none.
         """
-        a, b = self.axes(q)
-        N, rows = len(a), np.arange(len(a))
-        height = np.minimum(a[..., 2], b[..., 2]) - self.radius - (0.0 if floor is None else floor)
-        height[:, (self.link < 2) | (floor is None)] = np.inf  # the base, and what only turns on it, stand on the floor
-        lowest = np.argmin(height, axis=1)
-        if len(self.pairs) == 0:
-            none = np.full(N, np.inf)
-            return Clearance(height[rows, lowest], lowest, none, np.zeros(N, dtype=int))
-        i, j = self.pairs.T
-        apart = segment_distance(a[:, i], b[:, i], a[:, j], b[:, j]) - self.radius[i] - self.radius[j]
-        closest = np.argmin(apart, axis=1)
-        return Clearance(height[rows, lowest], lowest, apart[rows, closest], closest)
+        poses = np.atleast_2d(np.asarray(q, dtype=float))
+        apart, pair = self._itself(poses)
+        if floor is None:
+            return Clearance(np.full(len(poses), np.inf), np.zeros(len(poses), dtype=int), apart, pair)
+        height, lowest = self._ground(poses)
+        return Clearance(height - floor, self._above[lowest] if len(self._above) else lowest, apart, pair)
+
+    @cached_property
+    def _capsules(self) -> list[Capsule]:
+        parts = zip(self.link.tolist(), self.start.tolist(), self.end.tolist(), self.radius.tolist(), strict=True)
+        return [Capsule(link, tuple(start), tuple(end), radius) for link, start, end, radius in parts]
+
+    @cached_property
+    def _itself(self) -> NearestCapsules:
+        return NearestCapsules(self.arm, self._capsules, [(int(i), int(j)) for i, j in self.pairs])
+
+    @cached_property
+    def _above(self) -> NDArray[np.int64]:
+        """Which capsules may hit the floor: the base, and what only turns on it, stand on it."""
+        return np.flatnonzero(self.link >= 2)
+
+    @cached_property
+    def _ground(self) -> NearestCapsules:
+        return NearestCapsules(self.arm, self._capsules, [(int(part), -1) for part in self._above])
 
 
 def capsule_arm(arm: Arm, payload_radius: float = PAYLOAD_RADIUS) -> CapsuleArm:
     """The capsules of an arm and of what it holds.
 
     Args:
-        arm: any arm; a Panda by its own measures, others by the distances between their joints.
+        arm: any arm; one whose outer size is known by that, others by the distances between their joints.
         payload_radius: radius of the ball around the payload [m]; 0: nothing is held.
     """
     origins = _joint_origins(arm)  # (n + 1, 3): of joint i + 1 in link i; the last is the payload frame in link n
     length = np.linalg.norm(origins, axis=1)
-    is_panda = arm.n == 7 and np.allclose(origins[:7], _PANDA_JOINTS, atol=1e-3)
-    if is_panda:
-        parts = [(link, np.array(a, float), np.array(b, float), r) for link, a, b, r in _PANDA]
+    measured = _measured(origins)
+    if measured is not None:
+        parts = [(link, np.array(a, float), np.array(b, float), r) for link, a, b, r in measured]
     else:
         radius = np.clip(length / 2, _THIN * length.sum(), _THICK * length.sum())
         parts = [(link, np.zeros(3), origin, radius[link]) for link, origin in enumerate(origins)]
@@ -140,7 +123,7 @@ def capsule_arm(arm: Arm, payload_radius: float = PAYLOAD_RADIUS) -> CapsuleArm:
         between = float(length[link_i + 1 : link_j].sum())  # how far the links between can keep the two apart
         if j == payload:
             between += float(length[-1]) + PAYLOAD_REACH
-        elif is_panda and link_j - link_i == 2:
+        elif measured is not None and link_j - link_i == 2:
             return True  # the joint limits between them keep these apart; their capsules overlap
         return between <= _ROOM_TO_FOLD * (r_i + r_j)
 
@@ -156,34 +139,19 @@ def capsule_arm(arm: Arm, payload_radius: float = PAYLOAD_RADIUS) -> CapsuleArm:
     )
 
 
-def segment_distance(a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> NDArray[np.float64]:
-    """Distance between the segments ab and cd; points (..., 3) [m], result (...).
-
-    The nearest points are either inside both segments, where the connecting line is perpendicular to both, or one of
-    them is an end point: the smallest of these five candidates.
-
-    >>> float(segment_distance([0, 0, 0], [1, 0, 0], [0.5, -1, 2], [0.5, 1, 2]))
-    2.0
-    """
-    a, b, c, d = (np.asarray(x, dtype=float) for x in (a, b, c, d))
-    u, v, w = b - a, d - c, a - c
-    uu, uv, vv, uw, vw = (np.sum(x * y, axis=-1) for x, y in ((u, u), (u, v), (v, v), (u, w), (v, w)))
-    determinant = uu * vv - uv**2
-    crossing = determinant > 1e-12 * np.maximum(uu * vv, 1e-300)  # not parallel, neither of them a point
-    safe = np.where(crossing, determinant, 1.0)
-    s, t = (uv * vw - vv * uw) / safe, (uu * vw - uv * uw) / safe
-    inside = crossing & (s >= 0) & (s <= 1) & (t >= 0) & (t <= 1)
-    between = np.linalg.norm(w + s[..., None] * u - t[..., None] * v, axis=-1)
-    ends = [_point_distance(a, c, d), _point_distance(b, c, d), _point_distance(c, a, b), _point_distance(d, a, b)]
-    return np.minimum.reduce([np.where(inside, between, np.inf), *ends])
+def _measured(origins: NDArray[np.float64]) -> tuple[Capsule, ...] | None:
+    """The capsules of the built-in arm whose joints sit like these (n + 1, 3); None: no such arm was measured."""
+    for facts in ARMS.values():
+        if facts.capsules is not None and facts.joints == len(origins) - 1:
+            theirs = _origins_of(facts.name)
+            if np.allclose(origins[:-1], theirs[:-1], atol=_SAME_PLACE):
+                return facts.capsules
+    return None
 
 
-def _point_distance(p: NDArray, a: NDArray, b: NDArray) -> NDArray[np.float64]:
-    """Distance of the point p to the segment ab."""
-    u, w = b - a, p - a
-    uu = np.sum(u * u, axis=-1)
-    s = np.clip(np.sum(u * w, axis=-1) / np.where(uu > 0, uu, 1.0), 0.0, 1.0)
-    return np.linalg.norm(w - s[..., None] * u, axis=-1)
+@cache
+def _origins_of(name: str) -> NDArray[np.float64]:
+    return _joint_origins(arm(name))
 
 
 def _joint_origins(arm: Arm) -> NDArray[np.float64]:

@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 from armload.arms import Arm, arm, payload_regressor
 from armload.motion.check import check_motion, rated_load
 from armload.motion.collision import capsule_arm
-from armload.motion.files import save_motion
 from armload.motion.fourier import FourierMotion
+from armload.motion.motion_file import save_motion
 
 SEED, STEPS = 2024, 60_000
 HARMONICS, PERIOD = 8, 6.0  # the paper's: eight sinusoids; T = 6 s

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.errors import MotionError
-from armload.motion.files import write_whole
 from armload.motion.motion import Motion
+from armload.motion.motion_file import write_whole
 
 RATES = {"csv": 1000.0, "ros2": 100.0, "ur": 500.0}  # [Hz] by format, the default
 

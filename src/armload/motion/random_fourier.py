@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armload.arms import Arm, Limits
+from armload.arms import Arm, Limits, facts_of
 from armload.errors import MotionError
 from armload.motion.check import check_motion, rated_load
 from armload.motion.collision import CapsuleArm, capsule_arm
 from armload.motion.fourier import FourierMotion
+from armload.motion.motion_file import shipped_motion
 
 _SPEED = 1.5  # [rad/s] velocity limit of an arm whose maker gives none
 _TO_SPEED = 0.25  # [s] in which it reaches its velocity limit, where no acceleration limit is given
@@ -21,6 +22,18 @@ _TRIALS = 24  # of them that are followed up with a motion
 _FACTORS = 0.8 ** np.arange(9)  # by which all amplitudes are reduced until nothing touches
 _ENOUGH = 0.6  # a motion reduced no further than this is taken at once; otherwise the least reduced one
 _FLOOR, _SELF = 0.05, 0.01  # [m] clearances kept
+
+
+def excitation(arm: Arm, seed: int = 0) -> FourierMotion:
+    """The shipped motion that was designed for the arm; for an arm without one a random motion of this seed.
+
+    >>> from armload.arms import arm
+    >>> excitation(arm("panda")).name, excitation(arm("ur5e"), 2).name
+    ('taie2024', 'random-ur5e-2')
+    """
+    facts = facts_of(arm)
+    designed = None if facts is None else facts.excitation
+    return random_motion(arm, seed) if designed is None else shipped_motion(designed)
 
 
 def random_motion(

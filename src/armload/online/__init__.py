@@ -1,6 +1,5 @@
 """Payload identification beside a running robot."""
 
-from armload.online.engines import engine
 from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
 from armload.online.gate import Gate, Health
@@ -12,5 +11,4 @@ __all__ = [
     "Health",
     "OnlineEstimate",
     "OnlineIdentifier",
-    "engine",
 ]

@@ -10,7 +10,7 @@ innovation is d = e − w·m, of variance v + wᵀ·P·w. Over a short window th
 each for several sizes s that are as likely before. The ratios to nothing are in closed form: with P_0 = R·Rᵀ,
 ln p/p_nothing = ½·bᵀ·(A + s⁻²)⁻¹·b − ½·ln|1 + s²·A|, A = Σ Rᵀ·W·Wᵀ·R/v, b = Σ Rᵀ·W·d/v. A change is a payload that
 beats nothing by far, and a push, and goes on doing so: most pushes look like a payload only while they begin. While
-anything beats nothing the detector is uneasy, and whoever asks it should believe no row until that is over. The noise
+anything beats nothing the detector is suspicious, and no row should be believed until that is over. The noise
 is taken to be as large as it has lately been.
 
 Source: generalised likelihood ratio, Willsky & Jones, IEEE T-AC 1976; Bayesian model comparison, Bishop 2006, ch. 3.4.
@@ -23,9 +23,6 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-
-from armload.posterior.sequential import SequentialPosterior
-from armload.regression.row_stream import Row
 
 _WINDOWS = (16, 48)  # rows: 0.08 and 0.24 s
 LONGEST = max(_WINDOWS)
@@ -40,7 +37,7 @@ _LEVEL, _LOWEST, _FORGET = 2.0, 1.0, 0.05  # of the noise: to begin with, at lea
 _OUTLIER = 8.0  # one window counts no more than so many times the level
 
 
-class Suspicion(NamedTuple):
+class Weighed(NamedTuple):
     """ln of the likelihood ratios of a payload and of a push over nothing, and the change of phi (10,) it would be.
 
     rows: how many of the last ones say so.
@@ -52,7 +49,7 @@ class Suspicion(NamedTuple):
     rows: int
 
 
-_NOTHING = Suspicion(0.0, 0.0, np.zeros(10), 0)
+_NOTHING = Weighed(0.0, 0.0, np.zeros(10), 0)
 
 
 def body_root() -> NDArray[np.float64]:
@@ -72,7 +69,7 @@ class ChangeDetector:
         mass: of a payload as the arm usually holds [kg]. effort: torque scale of each joint (n,) [N·m].
 
     Attributes:
-        uneasy: whether the last rows are not what was foreseen. last: how they were weighed.
+        suspicious: whether the last rows are not what was foreseen. last: how they were weighed.
     """
 
     def __init__(self, mass: float, effort: NDArray[np.float64]) -> None:
@@ -86,7 +83,7 @@ class ChangeDetector:
     def reset(self) -> None:
         """Forget the window, not how large the noise has been."""
         self._count = self._alarmed = 0
-        self.uneasy, self.last = False, _NOTHING
+        self.suspicious, self.last = False, _NOTHING
 
     def take(
         self,
@@ -96,7 +93,7 @@ class ChangeDetector:
         scale: NDArray[np.float64],
         mean: NDArray[np.float64],
         covariance: NDArray[np.float64],
-    ) -> Suspicion | None:
+    ) -> Weighed | None:
         """Take a row; None unless the payload seems to have changed.
 
         Args:
@@ -109,7 +106,7 @@ class ChangeDetector:
         _parts(seen, X, scale, self.root, mean, covariance, *(x[k] for x in sums))
         self._h[k] = h
         self._count += 1
-        if self._count % longest == 0 and not self.uneasy:
+        if self._count % longest == 0 and not self.suspicious:
             ratio = _loudness(self._N, self._B)
             self.level += _FORGET * (min(ratio, _OUTLIER * self.level) - self.level)
             self.level = max(self.level, _LOWEST)
@@ -124,10 +121,10 @@ class ChangeDetector:
             lately |= rows == _WINDOWS[0] and payload > push + _LATELY
             most = [max(payload, push) if rows == _WINDOWS[0] else most[0], max(most[1], payload, push)]
             if best is None or payload > best.payload:
-                best = Suspicion(payload, push, self.root @ delta, rows)
+                best = Weighed(payload, push, self.root @ delta, rows)
         self._alarmed = self._alarmed + 1 if alarm and lately else 0
         self.last = best or _NOTHING
-        self.uneasy = most[1] > _ALARM or (self.uneasy and most[0] > _CALM)
+        self.suspicious = most[1] > _ALARM or (self.suspicious and most[0] > _CALM)
         return best if self._alarmed >= _ROWS else None
 
     def ratio(self, shift: NDArray[np.float64]) -> float:
@@ -144,54 +141,6 @@ class ChangeDetector:
     def _window(self, rows: int) -> NDArray[np.intp]:
         """Where the last so many rows are kept."""
         return (self._count - 1 - np.arange(rows)) % max(_WINDOWS)
-
-
-def foresee(state: SequentialPosterior, row: Row) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """`seen` and `scale` of a row as `SequentialPosterior.take` would leave them, but the row is not believed.
-
-    A row's joints are not told of each other.
-    """
-    scale, seen = np.sqrt(row.h * row.weights / state.noise), np.zeros_like(state.seen)
-    own, shared = (state.C, state.own, state.slope), (state.shared_C, state.shared_own, state.shared_slope)
-    _foresee(row.X, row.r, scale, state.tares, *own, *shared, seen)
-    return seen, scale
-
-
-@njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz"})
-def _foresee(
-    X, r, scale, tares, C, own, slope, shared_C, shared_own, shared_slope, seen
-):  # pragma: no cover - compiled
-    n, R, Z = C.shape[0], C.shape[1], slope.shape[2]
-    m, known = Z - 10, X.shape[1] - R
-    z = np.empty(Z)
-    for j in range(n):
-        a = scale[j]
-        for k in range(10):
-            for i in range(tares + 1):
-                z[10 * i + k] = a * X[j, k]
-        for k in range(10, known):
-            z[10 * tares + k] = a * X[j, k]
-        e, v = a * r[j], 1.0
-        for i in range(R):
-            x, total = a * X[j, known + i], 0.0  # of C the lower triangle
-            for k in range(i):
-                total += 2.0 * C[j, i, k] * X[j, known + k]
-            v += x * a * (total + C[j, i, i] * X[j, known + i])
-            e -= own[j, i] * x
-            for k in range(Z):
-                z[k] -= slope[j, i, k] * x
-        for i in range(m):
-            u, total = z[10 + i], 0.0
-            for k in range(i):
-                total += 2.0 * shared_C[i, k] * z[10 + k]
-            v += u * (total + shared_C[i, i] * u)
-            e -= shared_own[i] * u
-        for k in range(10):
-            w = z[k]
-            for i in range(m):
-                w -= shared_slope[i, k] * z[10 + i]
-            seen[j, k] = w
-        seen[j, 10], seen[j, 11] = e, v
 
 
 @njit(cache=True, nogil=True)

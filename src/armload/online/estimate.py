@@ -21,7 +21,9 @@ class OnlineEstimate(Estimate):
     t: time of the last sample, on the stream's clock [s], also of one that could not be used, if its time could.
     n_samples: samples of this payload so far.
     age: how much older the newest sample that counted in phi is than t [s]; it grows while samples cannot be used or do
-        not fit, and while the arm stands, whose samples tell nothing new; `notes` then says so.
+        not fit, and while the arm stands, whose samples tell nothing new; `notes` then says so. Together with `lag`.
+    lag: how long ago the last sample had arrived when it was answered, as far as that was told (`behind`) [s]: what
+        waits for an identifier that is too slow gets old.
     since: when this payload was taken up, on the stream's clock [s].
     relative_to: "arm", "tool" (which the arm was given with), "tare", or "before": the run of the empty arm before the
         last change was taken for a tare. method: its name.
@@ -35,6 +37,7 @@ class OnlineEstimate(Estimate):
     """
 
     age: float
+    lag: float
     since: float
     relative_to: str
     method: str
@@ -56,6 +59,12 @@ class OnlineEstimate(Estimate):
         made = object.__new__(cls)
         object.__setattr__(made, "__dict__", said)
         return made
+
+    def behind(self, lag: float) -> Self:
+        """The same answer, given `lag` seconds after its last sample arrived (`Source.lag`): so much older is it."""
+        if lag == self.lag:
+            return self
+        return type(self).of({**vars(self), "age": self.age - self.lag + lag, "lag": lag})
 
     @property
     def low(self) -> NDArray[np.float64]:
@@ -83,6 +92,7 @@ class OnlineEstimate(Estimate):
             "relative_to": self.relative_to,
             "n_samples": self.n_samples,
             "age": self.age,
+            "lag": self.lag,
             "since": self.since,
             "phi": self.phi.tolist(),
             "phi_low": _finite(self.low),

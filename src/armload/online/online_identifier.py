@@ -20,9 +20,8 @@ from numpy.typing import NDArray
 from armload.arms import Arm
 from armload.errors import IdentificationError
 from armload.estimators import Estimate, Identifier
-from armload.identification import METHODS
+from armload.identification.choice import choose
 from armload.inertia import determined, held
-from armload.online.engines import engine
 from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
 from armload.online.gate import Gate, Health, all_finite
@@ -30,7 +29,7 @@ from armload.online.listening import Listening
 from armload.online.state import load_state, model_fingerprint, save_state
 from armload.online.step import MassStep
 from armload.online.watch import PayloadWatch
-from armload.posterior import StreamingIdentifier
+from armload.posterior import PosteriorLeastSquares
 from armload.recording import Recording, Sample
 from armload.regression import payload_prior_std
 
@@ -63,18 +62,18 @@ class OnlineIdentifier:
 
     def __init__(self, arm: Arm, tare: Recording | None = None, method: str | Path | None = None) -> None:
         self.arm, self.tare, self._tared = arm, tare, tare is not None
-        first = engine(arm, tare, method)
-        self._watch = PayloadWatch(first) if isinstance(first, StreamingIdentifier) else None
+        choice = choose(arm, tare, method, live=True)
+        first = choice.identifier
+        self._watch = PayloadWatch(first) if isinstance(first, PosteriorLeastSquares) else None
         self._engine = first
         self.method = self.engine.name
         self._gate = Gate(arm)
         self._stream = Listening()
         self._weak = payload_prior_std(arm)
         self._step = MassStep(float(self._weak[0]))
-        entry = METHODS.get(self.method)
-        known = self.engine.known
+        known = first.payload_prior
         self._before: NDArray | None = None
-        if entry is None or entry.prior:
+        if choice.prior:
             self._before = self._weak if known is None else known[1]
         self.reset()
 
@@ -242,10 +241,10 @@ class OnlineIdentifier:
 
     def _counted(self, sample: Sample, run: Identifier) -> bool:
         """Remember how old the answer is; whether what was seen lately told it nothing, as the arm stands."""
-        if not isinstance(run, StreamingIdentifier):
+        if not isinstance(run, PosteriorLeastSquares):
             self._told = sample.t
         elif run.fresh:
-            row = None if run.stream is None else run.stream.row
+            row = run.stream.row
             if row is not None and row.h <= 0.0 and run is self._source and self._told > -np.inf:
                 return run.data_t - self._told > _STANDS
             self._told = run.data_t
@@ -272,13 +271,13 @@ class OnlineIdentifier:
 
     def _nothing(self) -> Estimate:
         """What is known beforehand."""
-        mean, std = (np.zeros(10), self._weak) if self.engine.known is None else self.engine.known
+        mean, std = (np.zeros(10), self._weak) if self.engine.payload_prior is None else self.engine.payload_prior
         return Estimate(0.0, mean, np.diag(std**2), 0, str(self.arm.frame))
 
     def _judge(self, estimate: Estimate, run: Identifier, stands: bool) -> None:
         """What the data determine, and whether anything is there."""
         std = estimate.std
-        self._determined = determined(std, self._before, run.alone, self._weak)
+        self._determined = determined(std, self._before, run.weak_std, self._weak)
         self._held = held(float(estimate.phi[0]), float(std[0]), bool(self._determined[0]))
         notes = []
         if not self._moving:
@@ -299,6 +298,7 @@ class OnlineIdentifier:
                 **vars(self._estimate),
                 "t": stream.clock,
                 "age": float(age),
+                "lag": 0.0,
                 "since": stream.clock if self._since is None else self._since,
                 "relative_to": self.relative_to,
                 "method": self.method,

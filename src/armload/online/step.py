@@ -6,7 +6,7 @@ import numpy as np
 
 from armload.estimators import Identifier
 from armload.online.event import Event
-from armload.posterior import StreamingIdentifier
+from armload.posterior import PosteriorLeastSquares
 
 _KNOWN = 0.1  # standard deviation of the two masses, in a payload's own, below which a first guess is made better
 
@@ -24,13 +24,13 @@ class MassStep:
 
     def reset(self) -> None:
         """Forget the change."""
-        self._before: StreamingIdentifier | None = None  # the run that ended, until the kind is known
+        self._before: PosteriorLeastSquares | None = None  # the run that ended, until the kind is known
         self._told = 0.0
 
-    def of(self, event: Event, ended: Identifier | None, run: StreamingIdentifier) -> float:
+    def of(self, event: Event, ended: Identifier | None, run: PosteriorLeastSquares) -> float:
         """Change of mass [kg] of an event as it comes; `ended`: the run that answered last, `run`: the one at work."""
         if event.kind == "change":
-            self._before = ended if isinstance(ended, StreamingIdentifier) else None
+            self._before = ended if isinstance(ended, PosteriorLeastSquares) else None
             self._told = event.mass
             return event.mass
         better = self._between(run)
@@ -40,7 +40,7 @@ class MassStep:
             self._before = None
         return self._told
 
-    def _between(self, run: StreamingIdentifier) -> float | None:
+    def _between(self, run: PosteriorLeastSquares) -> float | None:
         """From the run that ended to another, if both are known well and relative to the same."""
         before = self._before
         if before is None:

@@ -5,10 +5,10 @@ A payload is about the origin and in the axes of the arm's payload frame.
 
 from armload.payloads.container import container, container_loadings, test_payload
 from armload.payloads.families import FAMILIES, draw_payload, random_payload, random_payloads
-from armload.payloads.files import read_payload, write_payload
 from armload.payloads.hand import franka_hand, hand_on
 from armload.payloads.mesh import from_mesh
 from armload.payloads.payload import Box, Payload
+from armload.payloads.payload_file import read_payload, write_payload
 
 __all__ = [
     "FAMILIES",

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from armload.arms import Arm
+from armload.arms import ARMS, Arm
 from armload.errors import ArmError, PayloadError
 from armload.inertia import InertialParameters
 from armload.payloads.payload import Payload
@@ -16,12 +16,15 @@ MASS = 0.73  # [kg]
 COM = (-0.01, 0.0, 0.03)  # [m]
 INERTIA_COM = (1e-3, 2.5e-3, 1.7e-3)  # [kg·m²] diagonal
 TURN = -np.pi / 4  # [rad] panda_hand about the z axis of panda_link8
+HAND = "franka-hand"  # what the sheets of the arms it sits on call it
 
 
-FLANGE = "link8"  # what every Franka calls its flange, behind a prefix
+def fits(frame: str) -> bool:
+    """Whether a frame is called as the flange of an arm that takes the hand, with whatever prefix."""
+    return frame.endswith(_endings())
 
 
-def franka_hand(flange: str = "panda_link8") -> Payload:
+def franka_hand(flange: str = ARMS["panda"].flange) -> Payload:
     """The Franka Hand about the flange, in the flange's axes; `flange`: what the arm calls it (`hand_on`).
 
     The figures 0.73 kg, CoM (−0.01, 0, 0.03) m, inertia diag(1, 2.5, 1.7)·10⁻³ kg·m² about the CoM are those of the
@@ -50,13 +53,18 @@ def hand_on(arm: Arm) -> Payload:
     Raises:
         PayloadError: the arm has no such flange, or several behind its last joint.
     """
-    found = [name for name in arm.frames if name.endswith(FLANGE) and _moves_with(arm, name)]
+    found = [name for name in arm.frames if fits(name) and _moves_with(arm, name)]
     if len(found) != 1:
+        called = " or ".join(f"…{ending}" for ending in _endings())
         raise PayloadError(
-            f"{arm.name} has {len(found) or 'no'} flange{'s' * (len(found) > 1)} of a Franka (…{FLANGE}) for the "
+            f"{arm.name} has {len(found) or 'no'} flange{'s' * (len(found) > 1)} of a Franka ({called}) for the "
             f"Franka Hand: describe the tool in a payload file about a frame of {arm.name}, such as {arm.frame!r}"
         )
     return franka_hand(found[0])
+
+
+def _endings() -> tuple[str, ...]:
+    return tuple(dict.fromkeys(facts.flange_ending for facts in ARMS.values() if facts.hand == HAND))
 
 
 def _moves_with(arm: Arm, frame: str) -> bool:

@@ -4,12 +4,10 @@ from armload.posterior.advice import Advice, advise
 from armload.posterior.bound_worlds import scales_of
 from armload.posterior.calibration import Calibration
 from armload.posterior.cramer_rao import TIMES, Bound, bound, efficiency
-from armload.posterior.evidence import TRAITS, Evidence, Physics
+from armload.posterior.evidence import TRAITS, Evidence
 from armload.posterior.hybrid import HybridIdentifier, shipped_model
-from armload.posterior.hybrid_stream import StreamingHybrid
-from armload.posterior.live import StreamingIdentifier
 from armload.posterior.map import PosteriorLeastSquares, SmoothPosteriorLeastSquares
-from armload.posterior.model_file import HybridModel
+from armload.posterior.model_file import HybridModel, Training
 from armload.posterior.payload_prior import MixturePosterior, MixturePrior
 from armload.posterior.problem import Posterior
 
@@ -24,12 +22,10 @@ __all__ = [
     "HybridModel",
     "MixturePosterior",
     "MixturePrior",
-    "Physics",
     "Posterior",
     "PosteriorLeastSquares",
     "SmoothPosteriorLeastSquares",
-    "StreamingHybrid",
-    "StreamingIdentifier",
+    "Training",
     "advise",
     "bound",
     "efficiency",

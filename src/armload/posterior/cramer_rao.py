@@ -29,8 +29,9 @@ from armload.posterior.problem import Scales
 from armload.posterior.solve import solve
 from armload.recording import Recording
 from armload.regression import Correction, GaussianPrior, JointFeatures, payload_prior_std
-from armload.regression.information import REGRESSOR_RATE, RegressionData
+from armload.regression.information import RegressionData
 from armload.regression.noise import SMOOTH, NoiseModel
+from armload.regression.rows import REGRESSOR_RATE
 
 TIMES = (1.0, 3.0)  # [s] and the whole run
 _EARLIER = 0.95  # of the whole run: a time that is not worth a column of its own

@@ -11,13 +11,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from armload.arms import Arm
-from armload.estimators import DifferenceLeastSquares
 from armload.inertia.cholesky import factor
-from armload.posterior.map import SmoothPosteriorLeastSquares
 from armload.posterior.problem import Posterior
-from armload.recording import Recording
-from armload.regression import JointFeatures, payload_prior_std
 
 _RATIOS = ("noise", "pose", "velocity", "friction")
 TRAITS = (
@@ -32,7 +27,6 @@ TRAITS = (
     "same motion",
 )
 KINDS = ("no tare", "tare", "tare along the same motion")
-_SHOWN = 0.5  # share of the run that a tare along the same motion has to show
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,62 +110,3 @@ def _traits(information, weak, ratios, known):  # pragma: no cover - compiled
         out[16] += 0.2 * np.log10(L[i, i])
     out[17] = known[4]
     return out
-
-
-class Physics(SmoothPosteriorLeastSquares):
-    """The physics of the hybrid: MAP least squares with the arm's rigid and smooth mismatch, and its evidence.
-
-    Where a tare turns out to show the run's own motion, the difference of the two logs' torques is the better evidence
-    and takes its place (`DifferenceLeastSquares`): whatever the arm does wrong, it does wrong in both.
-
-    Args:
-        arm: the bare arm. tare: an earlier log of it, if there is one.
-        refresh: solved anew at most this often [s] while streaming.
-        features: of the smooth mismatch; a model's error bars were calibrated with the default.
-    """
-
-    name = "hybrid physics"
-
-    def __init__(
-        self,
-        arm: Arm,
-        tare: Recording | None = None,
-        refresh: float = 0.1,
-        features: JointFeatures | None = None,
-    ) -> None:
-        self._tare_time = 0.0 if tare is None else tare.duration
-        self._difference = None if tare is None else DifferenceLeastSquares(arm, tare)
-        super().__init__(arm, tare, refresh=refresh, features=features)
-
-    def reset(self) -> None:
-        """Forget the run (not the tare); the next sample is the first."""
-        super().reset()
-        if self._difference is not None:
-            self._difference.reset()
-        self._began: float | None = None
-        self._squares, self._values = 0.0, 0
-
-    def _take(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
-        super()._take(t, q, dq, tau)
-        if self._difference is not None:
-            self._difference._take(t, q, dq, tau)
-        if self._began is None:
-            self._began = float(t[0])
-        self._squares += float(np.sum(dq**2))
-        self._values += dq.size
-
-    def evidence(self, t: float) -> Evidence:
-        """What the last solution, made at t, says without a prior on the payload."""
-        assert self._began is not None
-        speed = float(np.sqrt(self._squares / self._values))
-        difference = None
-        if self._difference is not None and self._difference.seconds >= _SHOWN * (t - self._began) > 0.0:
-            difference = self._difference._estimate(t)
-            if np.any(np.diag(difference.covariance) > self.posterior.covariance.diagonal()):
-                difference = None  # too few rows yet
-        found, Λ, vector = self.posterior, self.posterior.information, self.posterior.vector
-        if difference is not None:
-            Λ = np.asarray(np.linalg.inv(difference.covariance), dtype=float)
-            vector = Λ @ difference.phi
-        seconds, weak = t - self._began, payload_prior_std(self.arm)
-        return Evidence.of(Λ, vector, found, seconds, self._tare_time, speed, weak, difference is not None)

@@ -1,6 +1,9 @@
-"""The hybrid as a stream identifier: physics for what is known, learned parts for what is not."""
+"""The hybrid: physics for what is known, learned parts for what is not, error bars that are checked."""
 
 from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 from numba import njit
@@ -8,74 +11,92 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.errors import ModelError
-from armload.estimators import Estimate
-from armload.inertia import near_consistent, nearest_body
+from armload.inertia import near_consistent, nearest_body, nearest_consistent
 from armload.inertia.cholesky import inverse
 from armload.posterior.calibration import Calibration
-from armload.posterior.evidence import Evidence, Physics
+from armload.posterior.evidence import Evidence
+from armload.posterior.map import PosteriorLeastSquares
 from armload.posterior.model_file import HybridModel
 from armload.posterior.payload_prior import MixturePrior
+from armload.posterior.same_motion import SameMotion
 from armload.recording import Recording
-from armload.regression import JointFeatures, payload_prior_std
+from armload.regression import JointFeatures, payload_prior_std, solution_prior_std
+from armload.regression.noise import SMOOTH
 
 _REMOVED = 0.1  # how likely it is, beforehand, that something was taken off
 
 
-class HybridIdentifier(Physics):
+class HybridIdentifier(PosteriorLeastSquares):
     """MAP least squares with the arm's rigid and smooth mismatch, a learned payload prior, learned error bars.
 
     ±1.96 times an estimate's standard deviation is its 95 % interval, calibrated on simulated episodes: arms that
     differ from their models, payloads of many shapes, motions of many kinds. Estimates are bodies that can exist,
-    unless something was taken off since the tare.
+    unless something was taken off since the tare. Where the tare turns out to show the run's own motion, the difference
+    of the two logs' torques is the better evidence and takes the posterior's place.
 
     Args:
         arm: the bare arm.
         tare: an earlier log of the same arm, on any motion, with whatever was mounted then.
         model: the learned parts; None: those shipped for the arm.
-        refresh: solved anew at most this often [s] while streaming.
-        features: as in `Physics`.
+        features: of the smooth mismatch; a model's error bars were calibrated with the default.
 
     Raises:
         ModelError: no model is shipped for this arm, or it was trained for another one.
     """
 
     name = "hybrid"
+    _noise = SMOOTH
+    _iterations = 5
 
     def __init__(
         self,
         arm: Arm,
         tare: Recording | None = None,
         model: HybridModel | None = None,
-        refresh: float = 0.1,
         features: JointFeatures | None = None,
     ) -> None:
         self.model = shipped_model(arm) if model is None else model
         self._payloads = self.model.prior_for(arm)
         self.calibrated = self.model.calibrated
-        self.known = (self._payloads.mean, self._payloads.std)
-        super().__init__(arm, tare, refresh, features)
+        self.payload_prior = (self._payloads.mean, self._payloads.std)
+        self.features = features or JointFeatures(arm.n)
+        self._weak = payload_prior_std(arm)
+        super().__init__(arm, tare)
+        if tare is not None:
+            self._same_motion = SameMotion(arm, tare, self.gain)
+
+    @property
+    def _features(self) -> JointFeatures:
+        return self.features
 
     def reset(self) -> None:
         """Forget the run (not the tare); the next sample is the first."""
         super().reset()
-        self._phi, self._covariance = self._payloads.mean, np.diag(self._payloads.std**2)
         self._trusted: Evidence | None = None
 
-    def _estimate(self, t: float) -> Estimate:
-        super()._estimate(t)
-        self._trusted = self.model.calibration.trusted(self.evidence(t))
-        tool = self.arm.attached is not None
-        self._phi, self._covariance = answer(self._trusted, self.model.calibration, self._payloads, tool)
-        return self._last(t)
+    def prepare(self) -> None:
+        """Do now what the first sample would have to wait for, the solvers' loading among it."""
+        super().prepare()
+        for nearest in (near_consistent, nearest_consistent):
+            nearest(-self._weak, np.diag(self._weak**-2.0))
 
     @property
-    def alone(self) -> NDArray[np.float64]:
+    def weak_std(self) -> NDArray[np.float64]:
         """Standard deviation (10,) of the last estimate under the weak prior of `payload_prior_std` instead."""
-        return std_alone(self._trusted, payload_prior_std(self.arm))
+        return self._weak if self._trusted is None else _weak_std(self._trusted.information, self._weak)
 
-    def _last(self, t: float) -> Estimate:
-        seen = self._count + len(self._waiting)
-        return Estimate(float(t), self._phi.copy(), self._covariance.copy(), seen, str(self.arm.frame))
+    @property
+    def unprojected(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """What the log says without the learned prior, as far as it can be trusted; None before the first sample."""
+        return None if self._trusted is None else without_learned_prior(self._trusted, solution_prior_std(self.arm))
+
+    def _before(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        return self._payloads.mean, np.diag(self._payloads.std**2)
+
+    def _answer(self, elapsed: float, concluded: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        self._trusted = self.model.calibration.trusted(self.evidence(elapsed))
+        tool = self.arm.attached is not None
+        return answer(self._trusted, self.model.calibration, self._payloads, tool, quick=not concluded)
 
 
 def answer(
@@ -98,15 +119,22 @@ def answer(
     return sign * nearest_body(found.mean, covariance), covariance
 
 
-def std_alone(trusted: Evidence | None, weak: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Standard deviation (10,) under a weak prior of standard deviations `weak`, evidence trusted as far as it is."""
-    if trusted is None:
-        return weak
-    return _std_alone(trusted.information, weak)
+def without_learned_prior(
+    trusted: Evidence, wide: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mean (10,) and covariance (10, 10) under a prior N(0, diag(wide²)), what `map-gp` makes of the same evidence.
+
+    P = (Λ + diag(wide)⁻²)⁻¹, m = P·h, covariance P + gain²·m·mᵀ. A learned prior draws the mean to the bodies it knows,
+    so that its mean cannot tell that no body explains the log.
+    """
+    P = wide[:, None] * np.linalg.inv(np.eye(10) + wide[:, None] * trusted.information * wide) * wide
+    mean = P @ trusted.vector
+    return mean, 0.5 * (P + P.T) + trusted.gain_std**2 * np.outer(mean, mean)
 
 
 @njit(cache=True, nogil=True)
-def _std_alone(information, weak):  # pragma: no cover - compiled
+def _weak_std(information, weak):  # pragma: no cover - compiled
+    """Standard deviation (10,) under a weak prior of standard deviations `weak`, evidence trusted as far as it is."""
     unit, out = np.eye(10), np.empty(10)
     for i in range(10):
         for j in range(10):
@@ -117,13 +145,26 @@ def _std_alone(information, weak):  # pragma: no cover - compiled
     return out
 
 
+@cache
+def _loaded(path: Path, _: int) -> HybridModel:
+    """A model that is read once, until its file changes."""
+    return HybridModel.load(path)
+
+
 def shipped_model(arm: Arm) -> HybridModel:
     """The learned parts that come with armload for an arm.
 
     Raises:
-        ModelError: there are none.
+        ModelError: there are none, or their file is missing or cannot be read.
     """
     path = HybridModel.shipped(arm)
     if path is None:
         raise ModelError(f"no hybrid is shipped for {arm.name}: train one with `armload train --method hybrid`")
-    return HybridModel.load(path)
+    try:
+        return _loaded(path, path.stat().st_mtime_ns)
+    except (ModelError, OSError):
+        state = "cannot be read" if path.exists() else "is missing"
+        raise ModelError(
+            f"the hybrid model of {arm.known_as} is part of armload, and its file {path} {state}: install armload "
+            "again, or name another method (--method map-gp)"
+        ) from None

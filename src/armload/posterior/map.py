@@ -1,23 +1,36 @@
-"""The MAP least squares as identifiers: with the arm's rigid mismatch alone, and with its smooth one."""
+"""MAP least squares as identifiers, for logs and live robots: with the arm's rigid mismatch, and with its smooth one.
+
+A log is a stream that ends: both go through the same rows and the same posterior (`stream.StreamingPosterior`).
+`update` answers from the sequential posterior, in bounded time; `conclude` makes a last solution from all rows, and
+`run` takes the samples of a log many at a time and concludes.
+"""
 
 from __future__ import annotations
+
+from copy import copy
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm, rated_effort
-from armload.estimators import BatchIdentifier, Estimate
+from armload.estimators import ArmMismatch, Estimate, Identifier
+from armload.posterior.evidence import Evidence
 from armload.posterior.problem import Posterior, Scales
+from armload.posterior.same_motion import SameMotion
 from armload.posterior.solve import solve
 from armload.posterior.stream import StreamingPosterior
-from armload.recording import Recording, Sample
+from armload.recording import GAP, Recording, Sample
 from armload.regression import Correction, GaussianPrior, JointFeatures, payload_prior_std, solution_prior_std
 from armload.regression.information import RegressionData
 from armload.regression.noise import RIGID, SMOOTH, NoiseModel
 
+PUBLISH = 0.01  # [s] a live answer is at most so old: faster than a controller takes up a new payload
+FAST = 2.5e-3  # [s] samples that come closer than this share the work of a row and of an answer between them
 
-class PosteriorLeastSquares(BatchIdentifier):
-    """MAP least squares with the arm's rigid mismatch as an unknown, for a log of any motion of any arm.
+
+class PosteriorLeastSquares(Identifier):
+    """MAP least squares with the arm's rigid mismatch as an unknown, for any motion of any arm.
 
     >>> from armload.arms import arm
     >>> PosteriorLeastSquares(arm("panda")).name
@@ -28,96 +41,194 @@ class PosteriorLeastSquares(BatchIdentifier):
         tare: an earlier recording of the same arm, on any motion, with whatever was mounted then; estimates are
             relative to it.
         gain: λ of the lag [1/s].
-        refresh: the posterior is solved anew at most this often [s] while streaming; `run` solves at the end only.
-        prior: what is known about the payload before; None: the weak prior of `payload_prior_std`.
+        prior: what is known about the payload before; None: the weak prior of `solution_prior_std`.
+
+    Attributes:
+        reference: an earlier run of the stream with the same mounted as at the tare; it is a tare, too.
+        fresh: whether the last update brought a new answer. data_t: time of the newest sample in the answer [s].
     """
 
     name = "map"
     _noise: NoiseModel = RIGID
-    _iterations = 12
+    _iterations = 12  # of expectation–maximisation in a last solution; with features it settles in five
+    _same_motion: SameMotion | None = None
 
     def __init__(
-        self,
-        arm: Arm,
-        tare: Recording | None = None,
-        gain: float = 20.0,
-        refresh: float = 0.02,
-        prior: GaussianPrior | None = None,
+        self, arm: Arm, tare: Recording | None = None, gain: float = 20.0, prior: GaussianPrior | None = None
     ) -> None:
-        self.arm, self.gain, self.refresh, self.prior = arm, gain, refresh, prior
+        self.arm, self.gain, self.prior = arm, gain, prior
         self._correction = Correction(arm, rated_effort(arm))
+        self.reference: PosteriorLeastSquares | None = None
+        self._stream: StreamingPosterior | None = None
         self._tare: RegressionData | None = None
         self._start: Scales | None = None
+        self._tare_time = 0.0 if tare is None else tare.duration
         if tare is not None:
+            self._check(tare)
             self._tare = self._data()
             self._tare.add(tare.t, tare.q, tare.dq, tare.tau)
             self._start = self._from_tare(self._tare)
         self.reset()
 
+    @property
+    def _features(self) -> JointFeatures:
+        """Of the smooth part: none."""
+        return JointFeatures(self.arm.n, 0, 0)
+
     def _data(self) -> RegressionData:
         """An empty regression of the kind this method accumulates."""
-        return RegressionData(self._correction, self.gain, block=self._noise.block)
+        return RegressionData(self._correction, self.gain, self._features, self._noise.block)
 
-    def _from_tare(self, tare: RegressionData) -> Scales | None:  # noqa: ARG002
-        """Scales found from the tare once, for all later solutions to begin with; None: begin with those stated."""
-        return None
+    def _from_tare(self, tare: RegressionData) -> Scales | None:
+        """Scales found from the tare once, for all later solutions to begin with; without features those stated."""
+        if not self._features.size:
+            return None
+        return solve([tare], payload_prior_std(self.arm), None, self._noise, self._iterations).scales
+
+    # ------------------------------------------------------------------ samples in, estimates out
 
     def reset(self) -> None:
         """Forget the run (not the tare); the next sample is the first."""
-        self._run: RegressionData | None = None
-        self._waiting: list[Sample] = []
-        self._solved_at, self._posterior, self._count = -np.inf, None, 0
+        if self._stream is not None:
+            self._stream.reset()
+        self._count, self._elapsed, self._due = 0, 0.0, False
+        self._now = self._row_t = self.data_t = -np.inf
+        self._row_elapsed = 0.0
+        self._squares, self._values = 0.0, 0
+        self.fresh = False
+        self._phi, self._covariance = self._before()
 
     def update(self, sample: Sample) -> Estimate:
-        """Take one sample (t, q, dq, tau) and return the estimate so far, at most `refresh` old.
+        """Take one sample (t, q, dq, tau) and return the estimate so far, at most `PUBLISH` old."""
+        stream, step = self.stream, sample.t - self._now
+        self._now, slow = sample.t, step > FAST
+        self._elapsed += step if step <= GAP else 0.0
+        self._count += 1
+        self._squares += float(sample.dq @ sample.dq)
+        self._values += len(sample.dq)
+        new = stream.take(*sample)
+        self.fresh = self._due and (slow or not new)  # of a fast stream, a row and an answer share no sample
+        if new:  # it is due if it would be too old by the next row
+            self._due = self._due or 2.0 * sample.t - self.data_t - self._row_t > 1.05 * PUBLISH
+            self._row_t, self._row_elapsed = sample.t, self._elapsed
+            self.fresh = self._due and slow
+        if self.fresh:
+            self._phi, self._covariance = self._answer(self._row_elapsed)
+            self.data_t, self._due = self._row_t if stream.difference is None else stream.difference.t, False
+        return self.last
 
-        Samples between two solutions wait and are taken together: a row at a time would cost ten times as much.
-        """
-        self._waiting.append(sample)
-        due = self._posterior is None or not 0.0 <= sample.t - self._solved_at < self.refresh
-        if due or len(self._waiting) >= self._CHUNK:
-            t, q, dq, tau = (np.array(column) for column in zip(*self._waiting, strict=True))
-            self._waiting.clear()
-            self._take(t, q, dq, tau)
-        return self._estimate(float(sample.t)) if due else self._last(sample.t)
+    def conclude(self) -> Estimate:
+        """The estimate from all samples so far, after a last solution: what `run` returns of the same samples."""
+        return self._estimate(self._now)
+
+    @property
+    def last(self) -> Estimate:
+        """The last answer."""
+        return Estimate(self._now, self._phi, self._covariance, self._count, str(self.arm.frame))
+
+    def _take(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
+        steps = np.diff(t, prepend=self._now)
+        self._elapsed += float(steps[steps <= GAP].sum())  # an arm that was switched off has told nothing meanwhile
+        self._now = float(t[-1])
+        self._count += len(t)
+        self._squares += float(np.vdot(dq, dq))
+        self._values += dq.size
+        self.stream.take_many(t, q, dq, tau)
+
+    def _estimate(self, t: float) -> Estimate:  # noqa: ARG002
+        self.stream.conclude()
+        self._phi, self._covariance = self._answer(self._elapsed, concluded=True)
+        self.fresh, self._due, self.data_t = True, False, self._now
+        return self.last
+
+    def _before(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """phi and covariance before the first row."""
+        if self.prior is not None:
+            return self.prior.mean, self.prior.covariance
+        return np.zeros(10), np.diag(payload_prior_std(self.arm) ** 2)
+
+    def _answer(
+        self,
+        elapsed: float,  # noqa: ARG002
+        concluded: bool = False,  # noqa: ARG002
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """phi and covariance from the stream as it stands, `elapsed` seconds after the run began."""
+        return self.stream.answer()
+
+    # ------------------------------------------------------------------ what the answer rests on
+
+    @property
+    def stream(self) -> StreamingPosterior:
+        """The posterior of the run."""
+        if self._stream is None:
+            tares, start = () if self._tare is None else (self._tare,), self._start
+            if self.reference is not None:
+                earlier = self.reference.stream
+                tares, start = (*earlier.tares, earlier.finish()), earlier.posterior.scales
+            self._stream = StreamingPosterior(
+                self._correction,
+                self._features,
+                self._noise,
+                solution_prior_std(self.arm),
+                self.prior,
+                tares,
+                start,
+                self.gain,
+                self._iterations,
+                self._same_motion,
+            )
+        return self._stream
 
     @property
     def posterior(self) -> Posterior:
-        """The last solution, with the arm's mismatch and the residual."""
-        if self._posterior is None:
-            raise RuntimeError("no sample has been seen: call update or run first")
-        return self._posterior
+        """The last full solution, with the arm's mismatch and the residual.
 
-    def streaming(self, reference: StreamingPosterior | None = None) -> StreamingPosterior:
-        """The same method for a live stream, with the same tare.
+        Raises:
+            RuntimeError: no sample has been seen.
+        """
+        if not self._count:
+            raise RuntimeError("no sample has been seen: call update or run first")
+        return self.stream.posterior
+
+    @property
+    def mismatch(self) -> ArmMismatch | None:
+        """The side the torque seems to be measured on, and the arm's offsets, by the last solution."""
+        return ArmMismatch(self.posterior.torque, self.posterior.ratios["offset"]) if self._count else None
+
+    def evidence(self, elapsed: float | None = None) -> Evidence:
+        """What the logs say as the stream stands, without a prior on the payload, `elapsed` [s] after the run began."""
+        stream, now = self.stream, self._elapsed if elapsed is None else elapsed
+        said = stream if stream.difference is None else stream.difference
+        earlier = 0.0 if self.reference is None else self.reference.stream.seconds
+        speed, weak = float(np.sqrt(self._squares / self._values)), payload_prior_std(self.arm)
+        difference = stream.difference is not None
+        tare_time = self._tare_time + earlier
+        return Evidence.of(said.information, said.vector, stream.posterior, now, tare_time, speed, weak, difference)
+
+    # ------------------------------------------------------------------ beside a running robot
+
+    def another(self, reference: PosteriorLeastSquares | None = None) -> Self:
+        """Another run of the same arm, that has seen nothing yet.
 
         Args:
-            reference: an earlier run of the stream with the same mounted as at the tare; it is another one.
+            reference: an earlier run with the same mounted as at the tare; it is a tare, too, and estimates are of
+                what was added since.
         """
-        tares, start = () if self._tare is None else (self._tare,), self._start
-        if reference is not None:
-            tares, start = (*reference.tares, reference.finish()), reference.posterior.scales
-        empty = self._data()
-        std = solution_prior_std(self.arm)
-        return StreamingPosterior(self._correction, empty.features, self._noise, std, tares, start, self.gain)
+        other = copy(self)
+        other._stream, other.reference = None, reference
+        if self._same_motion is not None:
+            other._same_motion = self._same_motion.fresh()
+        other.reset()
+        return other
 
-    def _take(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
-        if self._run is None:
-            self._run = self._data()
-        self._run.add(t, q, dq, tau)
-        self._count += len(t)
+    def prepare(self) -> None:
+        """Do now what the first sample would have to wait for."""
+        self.stream.prepare()
 
-    def _estimate(self, t: float) -> Estimate:
-        assert self._run is not None
-        runs = [self._run] if self._tare is None else [self._tare, self._run]
-        prior_std = solution_prior_std(self.arm)
-        self._posterior = solve(runs, prior_std, self.prior, self._noise, self._iterations, self._start)
-        self._solved_at = t
-        return self._last(t)
-
-    def _last(self, t: float) -> Estimate:
-        seen = self._count + len(self._waiting)
-        return Estimate(float(t), self.posterior.phi, self.posterior.covariance, seen, str(self.arm.frame))
+    def close(self) -> None:
+        """Stop the thread that finds the scales; the identifier may go on."""
+        if self._stream is not None:
+            self._stream.close()
 
 
 class SmoothPosteriorLeastSquares(PosteriorLeastSquares):
@@ -131,8 +242,9 @@ class SmoothPosteriorLeastSquares(PosteriorLeastSquares):
     'map-gp'
 
     Args:
-        arm, tare, gain, refresh, prior: as for `PosteriorLeastSquares`.
+        arm, tare, gain, prior: as for `PosteriorLeastSquares`.
         features: of the smooth part; None: 128 of the pose, 12 of the velocity.
+        same_motion: whether a tare along the run's own motion takes the posterior's place in the `evidence`.
     """
 
     name = "map-gp"
@@ -144,15 +256,15 @@ class SmoothPosteriorLeastSquares(PosteriorLeastSquares):
         arm: Arm,
         tare: Recording | None = None,
         gain: float = 20.0,
-        refresh: float = 0.1,
         prior: GaussianPrior | None = None,
         features: JointFeatures | None = None,
+        same_motion: bool = False,
     ) -> None:
         self.features = features or JointFeatures(arm.n)
-        super().__init__(arm, tare, gain, refresh, prior)
+        if same_motion and tare is not None:
+            self._same_motion = SameMotion(arm, tare, gain)
+        super().__init__(arm, tare, gain, prior)
 
-    def _data(self) -> RegressionData:
-        return RegressionData(self._correction, self.gain, self.features, self._noise.block)
-
-    def _from_tare(self, tare: RegressionData) -> Scales:
-        return solve([tare], payload_prior_std(self.arm), None, self._noise, self._iterations).scales
+    @property
+    def _features(self) -> JointFeatures:
+        return self.features

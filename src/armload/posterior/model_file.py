@@ -6,7 +6,7 @@ safetensors with JSON in its header, nothing in it is executed when it is read.
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -22,10 +22,32 @@ from armload.posterior.calibration import COVERAGE, Calibration
 from armload.posterior.evidence import KINDS, TRAITS
 from armload.posterior.payload_prior import MixturePrior
 
-FORMAT = 2  # 1: the widths scaled the torque's gain too
+FORMAT = 3  # 1: the widths scaled the torque's gain too; 2: whether they were checked stood in the provenance
 _HEADER = "armload-hybrid"
+SHIPPED = ("panda", "fr3", "ur5e", "ur10e")  # arms of the catalogue whose model is part of the package
 ENOUGH = 1000  # episodes: the share of a parameter's intervals that hold is then within 1.5 points of what is said
-POOLED = "pooled coverage, cross-validated"  # in the provenance
+
+
+@dataclass(frozen=True)
+class Training:
+    """What a model was trained on, and how well the intervals of its kind held.
+
+    population, episodes, seed: of the simulated episodes, see `train_hybrid`.
+    pooled_coverage: share of the held-out truths, of all parameters, times and episodes, inside their 95 % interval.
+    """
+
+    population: str
+    episodes: int
+    seed: int
+    pooled_coverage: float
+
+    @property
+    def calibrated(self) -> bool:
+        """Whether 93–97 % of what was held out lay inside the intervals, and episodes enough set their widths.
+
+        Of few episodes the share held out lies near 95 %, too: their folds are judged by each other.
+        """
+        return abs(self.pooled_coverage - COVERAGE) <= 0.02 and self.episodes >= ENOUGH
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +58,8 @@ class HybridModel:
         prior: over the payloads.
         calibration: of the evidence and of the widths.
         arm_name, arm_fingerprint, frame: of the arm it was trained on (`kinship`); the prior is about that frame.
-        provenance: what it was trained with, for people.
+        provenance: what else is known of its training, for people.
+        training: what it was trained on and how well it held; None: nobody has checked it.
     """
 
     prior: MixturePrior
@@ -46,15 +69,12 @@ class HybridModel:
     frame: str
     n: int
     provenance: dict[str, Any]
+    training: Training | None = None
 
     @property
     def calibrated(self) -> bool:
-        """Whether 93–97 % of what training held out lay inside the intervals, and episodes enough set their widths.
-
-        Of few episodes the share held out lies near 95 %, too: their folds are judged by each other.
-        """
-        held = abs(float(self.provenance.get(POOLED, 0.0)) - COVERAGE) <= 0.02
-        return held and int(self.provenance.get("episodes", 0)) >= ENOUGH
+        """Whether the training has shown that the intervals hold (`Training.calibrated`)."""
+        return self.training is not None and self.training.calibrated
 
     def prior_for(self, arm: Arm) -> MixturePrior:
         """The payload prior about the frame of an arm: of this model's kind, whatever its frame, base and hand.
@@ -98,6 +118,7 @@ class HybridModel:
             "traits": list(TRAITS),
             "level": calibration.level,
             "bag": None if calibration.bag is None else take_apart(calibration.bag, "bag.", tensors),
+            "training": None if self.training is None else asdict(self.training),
             "provenance": self.provenance,
         }
         path = Path(path)
@@ -145,7 +166,9 @@ class HybridModel:
                 )
             if not all(np.all(np.isfinite(array)) for array in tensors.values()):
                 raise ValueError("numbers that are not finite")
-            header["provenance"].get(POOLED)
+            training, provenance = header["training"], header["provenance"]
+            if not isinstance(provenance, dict):
+                raise ValueError(f"a provenance that is {provenance!r}")
             calibration = Calibration(bag, float(header["level"]), times, widths)
             return cls(
                 prior,
@@ -154,7 +177,8 @@ class HybridModel:
                 arm["fingerprint"],
                 arm["frame"],
                 int(arm["joints"]),
-                header["provenance"],
+                provenance,
+                None if training is None else _training(training),
             )
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise ModelError(f"{path} holds a hybrid armload cannot use ({error}): copy it again") from None
@@ -172,6 +196,13 @@ class HybridModel:
 
     @staticmethod
     def shipped(arm: Arm) -> Path | None:
-        """The model that comes with armload for an arm of the catalogue; None: there is none."""
-        path = Path(__file__).parent / "models" / f"{arm.known_as}.safetensors"
-        return path if path.is_file() else None
+        """The file of the model that is part of armload for an arm (`SHIPPED`), there or not; None: there is none."""
+        return Path(__file__).parent / "models" / f"{arm.known_as}.safetensors" if arm.known_as in SHIPPED else None
+
+
+def _training(found: dict[str, Any]) -> Training:
+    """The training of a header; anything else than its four facts is an error."""
+    made = Training(**found)
+    if not all(type(value) is kind for value, kind in zip(asdict(made).values(), (str, int, int, float), strict=True)):
+        raise ValueError(f"a training of {found}")
+    return made

@@ -28,7 +28,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from armload.regression.row_stream import Row
+from armload.regression.rows import Row
 
 
 @dataclass(eq=False)
@@ -63,15 +63,21 @@ class SequentialPosterior:
         """Condition on one row of each joint."""
         self.scale = np.sqrt(row.h * row.weights / self.noise)
         if row.h > 0.0:
-            _take(
-                row.X,
-                row.r,
-                self.scale,
-                self.tares,
-                *(self.C, self.own, self.slope),
-                *(self.shared_C, self.shared_own, self.shared_slope),
-                *(self.information, self.vector, self.seen),
-            )
+            self._condition(row, self.scale, self.seen, True)
+
+    def predict(self, row: Row) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """`seen` (n, 12) and `scale` (n,) of a row as `take` would leave them; the row is not conditioned on.
+
+        A row's joints are then not told of each other.
+        """
+        scale, seen = np.sqrt(row.h * row.weights / self.noise), np.zeros_like(self.seen)
+        self._condition(row, scale, seen, False)
+        return seen, scale
+
+    def _condition(self, row: Row, scale: NDArray, seen: NDArray, condition: bool) -> None:
+        own, shared = (self.C, self.own, self.slope), (self.shared_C, self.shared_own, self.shared_slope)
+        found = (self.information, self.vector, seen)
+        _condition(row.X, row.r, scale, self.tares, *own, *shared, *found, condition)
 
     def copy(self) -> Self:
         """Another one in the same state."""
@@ -79,8 +85,21 @@ class SequentialPosterior:
 
 
 @njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz"})
-def _take(X, r, scale, tares, C, own, slope, shared_C, shared_own, shared_slope, information, vector, seen):
-    # pragma: no cover - compiled
+def _product(lower, x, c):  # pragma: no cover - compiled
+    """c = C·x from the lower triangle of a symmetric C."""
+    for i in range(x.shape[0]):
+        total, row, xi = 0.0, lower[i], x[i]
+        for k in range(i):
+            total += row[k] * x[k]
+            c[k] += row[k] * xi
+        c[i] = total + row[i] * xi
+
+
+@njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz"})
+def _condition(
+    X, r, scale, tares, C, own, slope, shared_C, shared_own, shared_slope, information, vector, seen, condition
+):  # pragma: no cover - compiled
+    """Each joint's row freed of its own weights, then of what the joints share; the state changes if `condition`."""
     n, R, Z = C.shape[0], C.shape[1], slope.shape[2]
     m = Z - 10
     known = X.shape[1] - R  # 10 + p
@@ -97,12 +116,7 @@ def _take(X, r, scale, tares, C, own, slope, shared_C, shared_own, shared_slope,
         e, v = a * r[j], 1.0
         for i in range(R):
             x[i] = a * X[j, known + i]
-        for i in range(R):
-            total, row, xi = 0.0, C[j, i], x[i]
-            for k in range(i):
-                total += row[k] * x[k]
-                c[k] += row[k] * xi
-            c[i] = total + row[i] * xi
+        _product(C[j], x, c)
         for i in range(R):
             v += x[i] * c[i]
             e -= own[j, i] * x[i]
@@ -110,21 +124,17 @@ def _take(X, r, scale, tares, C, own, slope, shared_C, shared_own, shared_slope,
             xi, row = x[i], slope[j, i]
             for k in range(Z):
                 z[k] -= row[k] * xi
-        for i in range(R):
-            g = c[i] / v
-            own[j, i] += g * e
-            row = slope[j, i]
-            for k in range(Z):
-                row[k] += g * z[k]
-            row = C[j, i]
-            for k in range(i + 1):
-                row[k] -= g * c[k]
-        for i in range(m):
-            total, row, u = 0.0, shared_C[i], z[10 + i]
-            for k in range(i):
-                total += row[k] * z[10 + k]
-                c[k] += row[k] * u
-            c[i] = total + row[i] * u
+        if condition:
+            for i in range(R):
+                g = c[i] / v
+                own[j, i] += g * e
+                row = slope[j, i]
+                for k in range(Z):
+                    row[k] += g * z[k]
+                row = C[j, i]
+                for k in range(i + 1):
+                    row[k] -= g * c[k]
+        _product(shared_C, z[10:], c)
         for k in range(10):
             w[k] = z[k]
         for i in range(m):
@@ -133,17 +143,17 @@ def _take(X, r, scale, tares, C, own, slope, shared_C, shared_own, shared_slope,
             e -= shared_own[i] * u
             for k in range(10):
                 w[k] -= shared_slope[i, k] * u
-        for i in range(m):
-            g = c[i] / v
-            shared_own[i] += g * e
-            for k in range(10):
-                shared_slope[i, k] += g * w[k]
-            row = shared_C[i]
-            for k in range(i + 1):
-                row[k] -= g * c[k]
-        seen[j, 10], seen[j, 11] = e, v
-        for i in range(10):
-            seen[j, i] = w[i]
-            vector[i] += w[i] * e / v
-            for k in range(10):
-                information[i, k] += w[i] * w[k] / v
+        seen[j, :10], seen[j, 10], seen[j, 11] = w, e, v
+        if condition:
+            for i in range(m):
+                g = c[i] / v
+                shared_own[i] += g * e
+                for k in range(10):
+                    shared_slope[i, k] += g * w[k]
+                row = shared_C[i]
+                for k in range(i + 1):
+                    row[k] -= g * c[k]
+            for i in range(10):
+                vector[i] += w[i] * e / v
+                for k in range(10):
+                    information[i, k] += w[i] * w[k] / v

@@ -16,6 +16,7 @@ Sources: information form and EM: Bishop 2006, ch. 3 and 9; arm and load togethe
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -26,13 +27,21 @@ from armload.posterior.problem import Posterior, Problem, Scales
 from armload.posterior.sequential import SequentialPosterior
 from armload.regression import GaussianPrior
 from armload.regression.information import RegressionData
-from armload.regression.noise import RIGID, SMOOTH, NoiseModel
+from armload.regression.noise import RIGID, NoiseModel
 
 
 @cache
 def threads() -> ThreadpoolController:
     """Limits BLAS to one thread: for matrices of a hundred rows more cost up to 100 × on a busy machine."""
     return ThreadpoolController()
+
+
+@dataclass(eq=False)
+class Solution:
+    """The posterior of the accumulated rows, and the same as a state that takes further rows of the last run."""
+
+    posterior: Posterior
+    state: SequentialPosterior
 
 
 def solve(
@@ -47,30 +56,38 @@ def solve(
 
     Unknowns z = [phi_0, phi, eta], and g_j: tares carry phi_0, the last run phi_0 + phi. Each payload is
     near zero within `prior_std` (10,), a tare's moments also within `_REACH` of its mass; the last one follows `prior`
-    where that is given. `start` holds scales found before, of the same runs or of all but the last.
+    where that is given. `start` holds scales found before, of the same runs or of all but the last; one step of
+    expectation–maximisation fewer than `iterations` is made from there.
     """
     with threads().limit(limits=1):
-        problem = Problem(runs, prior_std, prior, noise)
-        scales = problem.scales(start)
-        for _ in range(iterations - 1):
-            scales = problem.improved(scales, problem.posterior(scales))
+        problem, scales = _improved(runs, prior_std, prior, noise, iterations - 1, start)
         return problem.answer(scales, problem.posterior(scales))
 
 
-def advance(
+def solve_to_go_on(
     runs: list[RegressionData],
     prior_std: NDArray[np.float64],
-    noise: NoiseModel = SMOOTH,
-    start: Scales | None = None,
-    steps: int = 1,
-) -> tuple[Posterior, SequentialPosterior]:
-    """The posterior after some steps of expectation–maximisation from `start`, and the same ready to take further rows.
-
-    Arguments as of `solve`.
-    """
+    prior: GaussianPrior | None,
+    noise: NoiseModel,
+    iterations: int,
+    start: Scales | None,
+) -> Solution:
+    """The same, with the state that takes further rows. Arguments as of `solve`."""
     with threads().limit(limits=1):
-        problem = Problem(runs, prior_std, None, noise)
-        scales = problem.scales(start)
-        for _ in range(steps):
-            scales = problem.improved(scales, problem.posterior(scales))
-        return problem.answer(scales, problem.posterior(scales)), problem.sequential(scales)
+        problem, scales = _improved(runs, prior_std, prior, noise, iterations - 1, start)
+        return Solution(problem.answer(scales, problem.posterior(scales)), problem.sequential(scales))
+
+
+def _improved(
+    runs: list[RegressionData],
+    prior_std: NDArray[np.float64],
+    prior: GaussianPrior | None,
+    noise: NoiseModel,
+    steps: int,
+    start: Scales | None,
+) -> tuple[Problem, Scales]:
+    problem = Problem(runs, prior_std, prior, noise)
+    scales = problem.scales(start)
+    for _ in range(steps):
+        scales = problem.improved(scales, problem.posterior(scales))
+    return problem, scales

@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from copy import deepcopy
-from dataclasses import dataclass
 from queue import SimpleQueue
 from threading import Thread
 from typing import Any
@@ -25,12 +24,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from armload.posterior.problem import Posterior, Scales
+from armload.posterior.same_motion import Difference, SameMotion
 from armload.posterior.sequential import SequentialPosterior
-from armload.posterior.solve import advance
-from armload.regression import Correction, JointFeatures
+from armload.posterior.solve import Solution, solve_to_go_on
+from armload.regression import Correction, GaussianPrior, JointFeatures
 from armload.regression.information import RegressionData
 from armload.regression.noise import NoiseModel, share_of_noise, whole_noise
-from armload.regression.row_stream import Row, RowStream
+from armload.regression.rows import REGRESSOR_RATE, FilteredRegression, Row, Rows
 
 _EARLY = 0.1  # [s] until then a slow residual shows one value: the posterior is made of all rows anew
 # rows after which the scales are found anew (0.1, 0.3, … 12 s), then every so many; and how many later they are adopted
@@ -38,14 +38,6 @@ _REFITS = (20, 60, 100, 150, 200, 300, 400, 600, 800, 1200, 1600, 2400)
 _REFIT_EVERY, _ADOPTED = 2000, 20
 _CHUNK = 50  # rows handed over at once in between
 _LATE = 50  # rows that can be taken back, a quarter of a second: more than a change takes to be noticed
-
-
-@dataclass(eq=False)
-class Solution:
-    """A solution and what it rests on: the posterior at the accumulated rows, and brought up to date."""
-
-    posterior: Posterior
-    state: SequentialPosterior
 
 
 class Worker:
@@ -74,17 +66,19 @@ class Worker:
 
 
 class StreamingPosterior:
-    """What a live stream says about the payload, sample by sample.
+    """What a stream says about the payload, sample by sample, and once more when it ends.
 
     Args:
         correction: the unknowns eta of the arm. features: of each joint's nonparametric part. noise: as for `solve`.
-        prior_std: of each payload (10,).
+        prior_std: of each payload (10,). prior: of the run's payload, where more is known; None: `prior_std` alone.
         tares: what earlier runs said, all with the same mounted; `start`: the scales found from them.
-        gain: λ of the lag [1/s].
+        gain: λ of the lag [1/s]. iterations: of expectation–maximisation in the last solution.
+        same_motion: asks whether the tare shows the run's motion; None: nobody asks.
 
     Attributes:
         posterior: the last full solution; its scales, ratios and torque side hold until the next.
-            refits: full solutions so far. row: the last row; seconds: what all rows stand for [s].
+        difference: what the torque difference with a tare along the same motion says, where it is the better evidence.
+        solutions: full solutions so far. rows: how many. row: the last one; seconds: what all rows stand for [s].
     """
 
     def __init__(
@@ -93,13 +87,18 @@ class StreamingPosterior:
         features: JointFeatures,
         noise: NoiseModel,
         prior_std: NDArray[np.float64],
+        prior: GaussianPrior | None = None,
         tares: Sequence[RegressionData] = (),
         start: Scales | None = None,
         gain: float = 20.0,
+        iterations: int = 5,
+        same_motion: SameMotion | None = None,
     ) -> None:
-        self.correction, self.features, self.noise, self.prior_std = correction, features, noise, prior_std
+        self.correction, self.features, self.noise = correction, features, noise
+        self.prior_std, self.prior, self.iterations = prior_std, prior, iterations
         self.tares, self.gain, self.start = tuple(tares), gain, start
-        self._rows = RowStream(correction, gain, features, noise.block)
+        self._regression = FilteredRegression(correction.arm, gain, correction, features, REGRESSOR_RATE, noise.block)
+        self._same_motion = same_motion
         self._whole = whole_noise(correction, noise)
         self._base: SequentialPosterior | None = None
         self._worker: Worker | None = None
@@ -108,23 +107,41 @@ class StreamingPosterior:
     def reset(self) -> None:
         """Forget the run (not the tare); the next sample is the first."""
         self._abandon()
-        self._rows.reset()
+        self._regression.reset()
+        if self._same_motion is not None:
+            self._same_motion = self._same_motion.fresh()
         self._run = self._empty()
-        if self._base is None:
-            self.first, self._base = advance([*self.tares, self._run], self.prior_std, self.noise, self.start, steps=0)
-            self._base.noise = self._whole
-        self.posterior, self._state = self.first, self._base.copy()
+        self._state: SequentialPosterior | None = None  # made when the first row asks for it
         self._early: list[Row] | None = []
+        self._early_is_old = True
         self._waiting: list[Row] = []
-        self.rows, self.seconds, self.refits = 0, 0.0, 0
+        self.rows, self.seconds, self.solutions = 0, 0.0, 0
         self.row: Row | None = None
+        self.difference: Difference | None = None
+        self._posterior: Posterior | None = None
+
+    def prepare(self) -> None:
+        """Do now what the first answer would have to wait for: the posterior of the tares alone."""
+        if self._base is None:
+            first = self._solved([*self.tares, self._empty()], self.start, 0)
+            self._first, self._base = first.posterior, first.state
+            self._base.noise = self._whole
+
+    @property
+    def posterior(self) -> Posterior:
+        """The last full solution: of the tares alone before there was one."""
+        if self._posterior is None:
+            self.prepare()
+            return self._first
+        return self._posterior
 
     def _empty(self) -> RegressionData:
         return RegressionData(self.correction, self.gain, self.features, self.noise.block)
 
     def take(self, t: float, q: NDArray, dq: NDArray, tau: NDArray) -> bool:
         """Take one sample (n,); times rise. True if it completed a row, that is, if there is something new."""
-        row = self._rows.feed(t, q, dq, tau)
+        self.prepare()
+        row = self._regression.row(t, q, dq, tau)
         if row is None:
             return False
         self.rows += 1
@@ -133,18 +150,30 @@ class StreamingPosterior:
         self._waiting.append(row)
         if self._early is not None:
             self._early.append(row)
-            self._state_is_old = True
+            self._early_is_old = True
             if self.seconds >= _EARLY:
                 self._from_early()
                 self._early = None
         else:
+            assert self._state is not None
             self._state.take(row)
         self._beside(row)
         return True
 
+    def take_many(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
+        """Take samples (N,), (N, n) of a log: their rows are accumulated, and count once the stream is concluded."""
+        rows = self._regression.rows(t, q, dq, tau)
+        if len(rows.t):
+            self._accumulate_waiting()
+            self._run.take(rows)
+            if self._same_motion is not None:
+                self._same_motion.take(rows)
+            self.rows += len(rows.t)
+            self.seconds += float(rows.h.sum())
+
     def look(self, t: float, q: NDArray, dq: NDArray, tau: NDArray) -> Row | None:
         """Pass a sample over: the row it completes, if it does, counts for nothing here."""
-        return self._rows.feed(t, q, dq, tau)
+        return self._regression.row(t, q, dq, tau)
 
     @property
     def state(self) -> SequentialPosterior | None:
@@ -154,85 +183,136 @@ class StreamingPosterior:
     @property
     def information(self) -> NDArray[np.float64]:
         """Λ (10, 10): what the logs alone say, all else integrated out."""
-        self._from_early()
-        return self._state.information
+        return self._current.information
 
     @property
     def vector(self) -> NDArray[np.float64]:
         """Λ·phi_ML (10,)."""
-        self._from_early()
-        return self._state.vector
+        return self._current.vector
 
     def answer(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """phi (10,) and its covariance (10, 10) under the weak prior, as `solve` gives them."""
-        return _answer(self.information, self.vector, self.prior_std, self.noise.overrated, self.posterior.gain_std**2)
+        """phi (10,) and its covariance (10, 10) under the Gaussian prior, as `solve` gives them."""
+        state, gain = self._current, self.posterior.gain_std**2
+        mean, root = np.zeros(10), np.diag(self.prior_std)
+        if self.prior is not None:
+            mean, root = self.prior.mean, self.prior.root
+        return _answer(state.information, state.vector, mean, root, self.noise.overrated, gain)
+
+    @property
+    def _current(self) -> SequentialPosterior:
+        self.prepare()
+        self._from_early()
+        assert self._state is not None
+        return self._state
 
     def _from_early(self) -> None:
         """The state of a run so short that the residual shows one value: with less noise the shorter it is."""
-        if self._early is None or not self._state_is_old:
+        if self._early is None or not self._early_is_old:
             return
         assert self._base is not None
         self._state = self._base.copy()
         self._state.noise = self._whole * share_of_noise(self.seconds)
         for row in self._early:
             self._state.take(row)
-        self._state_is_old = False
+        self._early_is_old = False
+
+    # ------------------------------------------------------------------ full solutions
+
+    def conclude(self) -> None:
+        """A last solution from all rows so far, as no more will come; it begins with the scales found from the tare."""
+        self._abandon()
+        self._accumulate_waiting()
+        self._adopt(self._solved([*self.tares, self._run], self.start, self.iterations - 1))
+        self.difference = self._better(self.posterior.covariance)
+
+    def _solved(self, runs: list[RegressionData], start: Scales | None, steps: int) -> Solution:
+        return solve_to_go_on(runs, self.prior_std, self.prior, self.noise, steps + 1, start)
+
+    def _better(self, covariance: NDArray) -> Difference | None:
+        return None if self._same_motion is None else self._same_motion.better(covariance)
+
+    def _accumulate(self, rows: Sequence[Row], covariance: NDArray | None = None) -> Difference | None:
+        """Add rows to what is accumulated; with a covariance to compare with, ask whether the tare shows the motion."""
+        if rows:
+            together = Rows.of(rows)
+            self._run.take(together)
+            if self._same_motion is not None:
+                self._same_motion.take(together)
+        return None if covariance is None else self._better(covariance)
+
+    def _accumulate_waiting(self) -> None:
+        rows, self._waiting = self._waiting, []
+        self._accumulate(rows)
 
     # ------------------------------------------------------------------ beside the stream
 
     def _beside(self, row: Row) -> None:
-        """Hand rows over, begin a refit, adopt one: each at fixed numbers of rows."""
+        """Hand rows over, begin a solution, adopt one: each at fixed numbers of rows."""
         if self._future is not None:
+            assert self._catching_up is not None
             self._catching_up.put(row)
             if self.rows >= self._adopt_at:
                 self.hold()
         elif self._ready is not None:
-            self._ready.state.take(row)
+            self._ready[0].state.take(row)
         if self._ready is not None and self.rows >= self._adopt_at:
-            ready, self._ready = self._ready, None
-            self._adopt(ready)
+            (solution, self.difference), self._ready = self._ready, None
+            self._adopt(solution)
             return
         if self._future is not None or self._ready is not None:
             return
+        if (self._last is not None or self._found is not None) and self.rows >= self._adopt_at:
+            self.hold()
+            assert self._found is not None
+            (self.difference,), self._found = self._found, None
         due = self.rows in _REFITS or self.rows % _REFIT_EVERY == 0
         if due or len(self._waiting) >= _CHUNK + _LATE:
             rows, self._waiting = self._waiting[:-_LATE], self._waiting[-_LATE:]
+            covariance = self.posterior.covariance
             if self._worker is None:
                 self._worker = Worker()
+            self._adopt_at = self.rows + _ADOPTED
             if due:
-                self._catching_up = SimpleQueue()
-                self._adopt_at = self.rows + _ADOPTED
-                self._future = self._worker.submit(self._refit, rows, self._waiting.copy(), self._catching_up)
+                late, following = self._waiting.copy(), SimpleQueue()
+                self._catching_up = following
+                self._future = self._worker.submit(self._refit, rows, late, following, covariance)
             else:
-                self._last = self._worker.submit(_accumulate, self._run, rows)
+                self._last = self._worker.submit(self._accumulate, rows, covariance)
 
-    def _refit(self, rows: list[Row], late: list[Row], following: SimpleQueue) -> Solution:
-        _accumulate(self._run, rows)
+    def _refit(
+        self, rows: list[Row], late: list[Row], following: SimpleQueue, covariance: NDArray
+    ) -> tuple[Solution, Difference | None]:
+        difference = self._accumulate(rows, covariance)
         run = deepcopy(self._run, {id(self.correction): self.correction})
-        _accumulate(run, late)
-        solution = self._solution(run)
+        if late:
+            run.take(Rows.of(late))
+        solution = self._step(run)
         while (row := following.get()) is not None:
             solution.state.take(row)
-        return solution
+        return solution, difference
 
-    def _solution(self, run: RegressionData) -> Solution:
-        start = self.posterior.scales if self.refits else self.start
-        return Solution(*advance([*self.tares, run], self.prior_std, self.noise, start))
+    def _step(self, run: RegressionData) -> Solution:
+        """One step of expectation–maximisation from the last solution's scales."""
+        return self._solved([*self.tares, run], self.posterior.scales if self.solutions else self.start, 1)
 
     def _adopt(self, solution: Solution) -> None:
         self._early = None
         if np.isfinite(solution.state.information.sum() + solution.state.vector.sum()):  # else the last one goes on
-            self.posterior, self._state = solution.posterior, solution.state
-            self.refits += 1
+            self._posterior, self._state = solution.posterior, solution.state
+            self.solutions += 1
+        elif self._state is None:
+            self.prepare()
+            assert self._base is not None
+            self._state = self._base.copy()
 
     def hold(self) -> None:
         """Wait for what is done beside; nothing is from then on, until the next rows. What is adopted when stays."""
         if self._future is not None:
+            assert self._catching_up is not None
             self._catching_up.put(None)
-            self._ready, self._future = self._future.result(), None
+            self._ready, self._future, self._catching_up = self._future.result(), None, None
         if self._last is not None:
-            self._last.result()
-            self._last = None
+            self._found, self._last = (self._last.result(),), None
 
     def finish(self, taken_back: int = 0) -> RegressionData:
         """All rows so far, accumulated, for another run to take as its tare; this one may go on later.
@@ -243,25 +323,28 @@ class StreamingPosterior:
         self._abandon()
         rows, self._waiting = self._waiting, []
         kept = max(len(rows) - taken_back, 0)
-        _accumulate(self._run, rows[:kept])
+        self._accumulate(rows[:kept])
         if kept < len(rows):
             self.rows -= len(rows) - kept
             self.seconds -= sum(row.h for row in rows[kept:])
-            self._adopt(self._solution(self._run))
+            self._adopt(self._step(self._run))
         return self._run
 
     def _abandon(self) -> None:
         """Let a solution under way go nowhere."""
         future: Future | None = getattr(self, "_future", None)
         if future is not None:
+            assert self._catching_up is not None
             self._catching_up.put(None)
             future.exception()  # waited for, whatever became of it: its tare may have gone on meanwhile
-        self._future: Future[Solution] | None = None
-        self._ready: Solution | None = None  # a solution that waits to be adopted
+        self._future: Future[tuple[Solution, Difference | None]] | None = None
+        self._catching_up: SimpleQueue[Row | None] | None = None  # rows since it was begun
+        self._ready: tuple[Solution, Difference | None] | None = None  # a solution that waits to be adopted
         last: Future | None = getattr(self, "_last", None)
         if last is not None:
             last.result()
-        self._last: Future[None] | None = None
+        self._last: Future[Difference | None] | None = None
+        self._found: tuple[Difference | None] | None = None  # what waits to be adopted of it
 
     def close(self) -> None:
         """Stop the second thread."""
@@ -271,25 +354,14 @@ class StreamingPosterior:
             self._worker = None
 
 
-def _accumulate(run: RegressionData, rows: list[Row]) -> None:
-    if rows:
-        h, X, r, weights = (np.array(column) for column in zip(*rows, strict=True))
-        run.take_rows(h, X, r, weights)
-
-
 @njit(cache=True, nogil=True)
-def _answer(information, vector, s, overrated, gain):  # pragma: no cover - compiled
-    A = np.eye(10)
+def _answer(information, vector, mean, root, overrated, gain):  # pragma: no cover - compiled
+    """The Gaussian posterior under N(mean, root·rootᵀ), its covariance widened as stated."""
     if not np.isfinite(information.sum() + vector.sum()):
-        return np.zeros(10), np.diag(s * s)
-    for i in range(10):
-        for j in range(10):
-            A[i, j] += s[i] * information[i, j] * s[j]
-    covariance = np.linalg.inv(A)
-    for i in range(10):
-        for j in range(10):
-            covariance[i, j] *= s[i] * s[j]
-    phi = covariance @ vector
+        return mean.copy(), root @ root.T
+    turned = np.ascontiguousarray(root.T)
+    covariance = root @ np.linalg.inv(np.eye(10) + turned @ information @ root) @ turned
+    phi = mean + covariance @ (vector - information @ mean)
     out = np.empty((10, 10))
     for i in range(10):
         for j in range(10):

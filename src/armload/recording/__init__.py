@@ -1,6 +1,7 @@
 """Recordings: what a robot's joints did, the files they come in, and whether they can be believed."""
 
 from armload.recording.alignment import Alignment, same_motion
+from armload.recording.copies import check_own_measurements, shared_samples
 from armload.recording.files import has_topics, read_recording, write_recording
 from armload.recording.recording import CHANNELS, GAP, Recording, Sample
 
@@ -10,8 +11,10 @@ __all__ = [
     "Alignment",
     "Recording",
     "Sample",
+    "check_own_measurements",
     "has_topics",
     "read_recording",
     "same_motion",
+    "shared_samples",
     "write_recording",
 ]

@@ -2,9 +2,10 @@
 
 from armload.regression.block_means import BlockMeans
 from armload.regression.features import JointFeatures
-from armload.regression.filtered import FilteredRegression, first_order_lag
+from armload.regression.lag import first_order_lag
 from armload.regression.mismatch import Correction
 from armload.regression.prior import GaussianPrior, payload_prior_std, solution_prior_std
+from armload.regression.rows import FilteredRegression
 
 __all__ = [
     "BlockMeans",

@@ -56,7 +56,8 @@ class JointFeatures:
         return np.random.default_rng([_SEED, self.n]).normal(size=(count, self.n)) / scale[:, None]
 
     @cached_property
-    def _velocity_waves(self) -> NDArray[np.float64]:
+    def velocity_waves(self) -> NDArray[np.float64]:
+        """Waves (velocity/2,) over the stretched velocity."""
         # quantiles of the half-normal, so that few waves already span the functions evenly
         from scipy.stats import halfnorm
 
@@ -70,16 +71,16 @@ class JointFeatures:
 
     def of_velocity(self, dq: ArrayLike) -> NDArray[np.float64]:
         """g (N, n, velocity) at velocities (N, n); the mean square of a weighted sum is the weights'."""
-        angle = np.arcsinh(np.atleast_2d(dq) / _SLOW)[:, :, None] * self._velocity_waves
+        angle = np.arcsinh(np.atleast_2d(dq) / _SLOW)[:, :, None] * self.velocity_waves
         return np.concatenate([np.cos(angle), np.sin(angle)], axis=2) / np.sqrt(max(self.velocity // 2, 1))
 
     def of_sample(self, q: NDArray[np.float64], dq: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
         """f (pose,) and g (n, velocity) of one sample (n,): for a live stream, at its pace."""
-        return _of_sample(q, dq, self.waves, self._velocity_waves)
+        return features_of_sample(q, dq, self.waves, self.velocity_waves)
 
 
 @njit(cache=True, nogil=True)
-def _of_sample(q, dq, waves, velocity_waves):  # pragma: no cover - compiled
+def features_of_sample(q, dq, waves, velocity_waves):  # pragma: no cover - compiled
     half, few, n = waves.shape[0], velocity_waves.shape[0], q.shape[0]
     pose, velocity = np.empty(2 * half), np.empty((n, 2 * few))
     for i in range(half):

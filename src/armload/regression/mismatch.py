@@ -25,10 +25,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armload.arms import LINK_SPREAD, Arm, MomentumRegressor, full_arm_regressor
+from armload.arms import FRICTION_WIDTH, LINK_SPREAD, Arm, MomentumRegressor, full_arm_regressor
 from armload.inertia import InertialParameters
-
-FRICTION_WIDTH = 0.06  # [rad/s] of the smooth Coulomb friction
 
 # prior standard deviations, as fractions of the joint's effort limit (per rad/s, per rad/s²)
 _PER_JOINT = {"offset": 4e-3, "coulomb": 1e-2, "viscous": 5e-3, "rotor": 3e-4}

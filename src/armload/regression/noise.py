@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.regression.information import NOVELTY, REGRESSOR_RATE
+from armload.regression.information import NOVELTY
 from armload.regression.mismatch import Correction
+from armload.regression.rows import REGRESSOR_RATE
 
 # [s] a run shorter than this sees one value of a residual that changes slowly: its mean does not grow with 1/T
 _MOMENT = 0.1

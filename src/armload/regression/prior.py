@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armload.arms import Arm
+from armload.arms import Arm, rated_mass
 from armload.errors import IdentificationError
 from armload.inertia import InertialParameters
 
@@ -22,12 +22,8 @@ _WIDE = 4.0
 
 
 def payload_prior_std(arm: Arm) -> NDArray[np.float64]:
-    """Standard deviation (10,) of the weak payload prior: half the rated payload, 15 cm from the flange.
-
-    Where no rated payload is known, 0.4 × the mass of the arm's moving links is taken (that of a strong arm).
-    """
-    rated = arm.rated_payload or 0.4 * float(arm.link_parameters[:, 0].sum())
-    return 0.5 * rated * np.array([1.0] + [0.15] * 3 + [0.15**2] * 6)
+    """Standard deviation (10,) of the weak payload prior: half of `rated_mass`, 15 cm from the flange."""
+    return 0.5 * rated_mass(arm) * np.array([1.0] + [0.15] * 3 + [0.15**2] * 6)
 
 
 def solution_prior_std(arm: Arm) -> NDArray[np.float64]:

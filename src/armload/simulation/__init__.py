@@ -4,7 +4,6 @@ from armload.simulation.continued import ContinuedRun
 from armload.simulation.controller import Command, Gains
 from armload.simulation.friction import Friction
 from armload.simulation.plant import build_model, settled_start
-from armload.simulation.ratings import is_panda, rated_mass
 from armload.simulation.residual import SmoothTorque
 from armload.simulation.resolution import Resolution
 from armload.simulation.runs import Run, simulate, simulate_many
@@ -29,9 +28,7 @@ __all__ = [
     "TorqueRun",
     "World",
     "build_model",
-    "is_panda",
     "moderate_stiffness",
-    "rated_mass",
     "settled_start",
     "simulate",
     "simulate_many",

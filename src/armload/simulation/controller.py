@@ -13,14 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm, poses, rated_effort
+from armload.arms import Arm, facts_of, poses, rated_effort
 from armload.motion import Motion
-from armload.simulation.ratings import is_panda
 
-# Joint stiffness that libfranka's example programs set before they move (`setJointImpedance` in examples_common.cpp);
-# Franka publishes no damping. With 2 kg at arm's length the Panda then sags 4 mrad in joint 2.
-_PANDA_STIFFNESS = (3000.0, 3000.0, 3000.0, 2500.0, 2500.0, 2000.0, 2000.0)  # [N·m/rad]
-# Other arms: the full rated torque bends a joint by this much [rad]; a payload takes about a third of it.
+# Where an arm's sheet gives no stiffness, the full rated torque bends a joint by this much [rad]; a payload takes about
+# a third of it. (With libfranka's stiffness and 2 kg at arm's length the Panda sags 4 mrad in joint 2.)
 _FULL_LOAD_SAG = 0.02
 # Critical damping of the bare links alone would leave the smallest wrists too loose against friction, as their motors'
 # inertia is not modelled: a displaced joint needs at least this long to come back. (franka_ros' joint impedance example
@@ -37,9 +34,9 @@ class Gains:
 
     @classmethod
     def of(cls, arm: Arm) -> Gains:
-        """The gains an arm is simulated with: libfranka's stiffness for the Panda, by rated torque elsewhere.
+        """The gains an arm is simulated with: its sheet's stiffness, or one by rated torque.
 
-        Other arms bend by 20 mrad under their rated torque. The damping is our choice, as Franka publishes none:
+        Arms without bend by 20 mrad under their rated torque. The damping is our choice, as no maker publishes any:
         critical for the bare arm's mean joint inertia and at least 10 ms·kp, kd = max(2·sqrt(kp·M_ii), 0.01·kp).
 
         >>> from armload.arms import arm
@@ -47,7 +44,9 @@ class Gains:
         np.float64(3000.0)
         """
         inertia = np.mean([np.diag(arm.mass_matrix(q)) for q in poses(arm)], axis=0)
-        stiffness = np.array(_PANDA_STIFFNESS) if is_panda(arm) else rated_effort(arm) / _FULL_LOAD_SAG
+        facts = facts_of(arm)
+        given = None if facts is None else facts.position_stiffness
+        stiffness = rated_effort(arm) / _FULL_LOAD_SAG if given is None else np.array(given)
         return cls(stiffness, np.maximum(2.0 * np.sqrt(stiffness * inertia), _SHORTEST_RETURN * stiffness))
 
     def stiffer(self, factor: float) -> Gains:

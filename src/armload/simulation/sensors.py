@@ -3,22 +3,21 @@
 Each effect is one field of `Sensors`; `dataclasses.replace(sensors, vibration=None)` switches one off. In order: lag
 behind the command, skew between channels, vibration, white noise, quantisation, jitter of the stamps, lost samples.
 
-The Panda's figures are measured on a real log at 1 kHz. There, the velocity channel is aligned with the position
-channel to 0.3 ms, so no skew is modelled between them; the torque channel's skew cannot be told from the log, 1 ms is
-our choice.
+An arm's sheet holds its figures where they were measured, as on a Panda's log at 1 kHz. There, the velocity channel is
+aligned with the position channel to 0.3 ms, so no skew is modelled between them.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm, rated_effort
+from armload.arms import ARMS, Arm, ArmFacts, facts_of, rated_effort
 from armload.errors import ArmError
 from armload.recording import Recording
-from armload.simulation.ratings import is_panda
 
 _BAND = (15.0, 120.0)  # [Hz] of the vibration
 _VIBRATION_RATE = 1000.0  # [Hz] at least; slower logs see the vibration aliased, as they do in reality
@@ -64,45 +63,43 @@ class Sensors:
 
     @classmethod
     def panda(cls, arm: Arm) -> Sensors:
-        """As measured on a Franka Emika Panda.
+        """As measured on a Franka Emika Panda, for any arm of as many joints.
 
         Raises:
             ArmError: the arm does not have 7 joints.
         """
-        if arm.n != 7:
-            raise ArmError(f"{arm.name} has {arm.n} joints: the Panda's sensors have 7; use Sensors.generic(arm)")
-        return cls(
-            torque_noise=np.array([0.045, 0.035, 0.052, 0.032, 0.022, 0.020, 0.026]),
-            velocity_noise=np.full(7, 2e-3),
-            position_noise=np.full(7, 2e-6),
-            vibration=np.array([0.28, 0.38, 0.24, 0.37, 0.08, 0.09, 0.02]),
-            torque_quantum=np.array([0.0357] * 4 + [0.0064] * 3),
-            command_lag=5.5e-3,
-            torque_skew=1e-3,
-            jitter=1e-4,
-            lost=0.08,
-        )
+        panda = ARMS["panda"]
+        if arm.n != panda.joints:
+            raise ArmError(
+                f"{arm.name} has {arm.n} joints: the Panda's sensors have {panda.joints}; use Sensors.generic(arm)"
+            )
+        return cls.measured(panda)
+
+    @classmethod
+    def measured(cls, facts: ArmFacts) -> Sensors:
+        """As an arm's sheet says; ideal in what it leaves out."""
+        said: dict[str, Any] = facts.sensors or {}
+        made: dict[str, Any] = {name: np.array(x) if isinstance(x, tuple) else x for name, x in said.items()}
+        return cls(**made)
 
     @classmethod
     def generic(cls, arm: Arm) -> Sensors:
         """The Panda's figures in proportion to the joints' rated torque, for an arm nobody has measured for us."""
-        effort = rated_effort(arm)
-        return cls(
+        effort, like = rated_effort(arm), ARMS["panda"]
+        return replace(
+            cls.measured(like),
             torque_noise=5e-4 * effort,
-            velocity_noise=np.full(arm.n, 2e-3),
-            position_noise=np.full(arm.n, 2e-6),
+            velocity_noise=np.full(arm.n, max(like.velocity_noise or (0.0,))),
+            position_noise=np.full(arm.n, max(like.position_noise or (0.0,))),
             vibration=4e-3 * effort,
             torque_quantum=4e-4 * effort,
-            command_lag=5.5e-3,
-            torque_skew=1e-3,
-            jitter=1e-4,
-            lost=0.08,
         )
 
     @classmethod
     def of(cls, arm: Arm) -> Sensors:
-        """The Panda's sensors, or the like for another arm."""
-        return cls.panda(arm) if is_panda(arm) else cls.generic(arm)
+        """As the arm's sheet says, or the like for an arm nobody has measured for us."""
+        facts = facts_of(arm)
+        return cls.generic(arm) if facts is None or facts.sensors is None else cls.measured(facts)
 
     def evenly(self) -> Sensors:
         """The same sensors with a log that is evenly spaced and complete."""

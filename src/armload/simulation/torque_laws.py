@@ -10,7 +10,7 @@ per inertia would leave the light wrist joints to their friction. The damping is
     D(q) = 2·K^(1/2)·(K^(−1/2)·M̂(q)·K^(−1/2))^(1/2)·K^(1/2).
 
 Sources: Siciliano, Sciavicco, Villani, Oriolo, Robotics, 2009, section 8.5; the damping: Albu-Schäffer, Ott, Frese,
-Hirzinger, ICRA 2003; stiffness as in libfranka's example joint_impedance_control.cpp.
+Hirzinger, ICRA 2003.
 """
 
 from __future__ import annotations
@@ -22,27 +22,27 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm, rated_effort
+from armload.arms import Arm, facts_of, rated_effort
 from armload.errors import MotionError
 from armload.motion import Motion
-from armload.simulation.ratings import is_panda
 
 # (t [s], q (n,) [rad], dq (n,) [rad/s]) → joint torque (n,) [N·m]
 Law = Callable[[float, NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
 
-_PANDA_STIFFNESS = (600.0, 600.0, 600.0, 600.0, 250.0, 150.0, 50.0)  # [N·m/rad]
-_FULL_LOAD_SAG = 0.1  # [rad] other arms: what the full rated torque bends a joint by
+_FULL_LOAD_SAG = 0.1  # [rad] what the full rated torque bends a joint by, where an arm's sheet gives no stiffness
 _YIELDING = 0.025  # [s] of rated torque per rad/s, against which a taught arm moves: our choice
 
 
 def moderate_stiffness(arm: Arm) -> NDArray[np.float64]:
-    """Stiffness (n,) for `JointImpedance` [N·m/rad]: libfranka's example's for the Panda, by rated torque elsewhere.
+    """Stiffness (n,) for `JointImpedance` [N·m/rad]: its sheet's, or one by rated torque.
 
     >>> from armload.arms import arm
     >>> moderate_stiffness(arm("panda")).tolist()
     [600.0, 600.0, 600.0, 600.0, 250.0, 150.0, 50.0]
     """
-    return np.array(_PANDA_STIFFNESS) if is_panda(arm) else rated_effort(arm) / _FULL_LOAD_SAG
+    facts = facts_of(arm)
+    given = None if facts is None else facts.impedance_stiffness
+    return rated_effort(arm) / _FULL_LOAD_SAG if given is None else np.array(given)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ is there only where the torque is measured on the motor's side of the gear; so i
 that its motor need not (`Stiction`), on arms that are known to measure there. Gain, offset and drift are the
 sensor's own.
 
-How large each part is and how it is drawn says `armload.simulation.mismatch`. Worlds beyond the measured ones
+How large each part is and how it is drawn says `armload.simulation.model_error`. Worlds beyond the measured ones
 (`World.beyond`) are to make a learner and its error bars ready for an arm that nobody has measured.
 """
 
@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from armload.arms import Arm
 from armload.errors import ArmError
 from armload.simulation.friction import Friction
-from armload.simulation.mismatch import (
+from armload.simulation.model_error import (
     GAIN,
     LENGTHS,
     LOAD,

@@ -9,6 +9,7 @@ client. It prints one JSON line per event: ready, connected, load, done.
 import argparse
 import contextlib
 import json
+import os
 import select
 import socket
 import struct
@@ -85,15 +86,20 @@ def serve(connection, client, options, log, urdf):
     state = State(options.version)
     udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     udp.bind((options.address, 0))
-    port, row, start = None, 0, None
+    port, tick, row, start = None, 0, 0, None  # milliseconds so far; of them in motion
+    moves, heard = not options.stand, [connection, *([sys.stdin] if options.stand else [])]
     lost = set(options.lose)
     while True:
-        due = None if start is None else start + row * 1e-3 - time.monotonic()
-        if due is None or due > 0:
-            readable, _, _ = select.select([connection], [], [], due)
-        else:
-            readable, _, _ = select.select([connection], [], [], 0.0)
-        if readable:
+        due = None if start is None else max(0.0, start + tick * 1e-3 - time.monotonic())
+        readable, _, _ = select.select(heard, [], [], due)
+        if sys.stdin in readable:
+            order = os.read(sys.stdin.fileno(), 100).split()
+            if not order:
+                heard.remove(sys.stdin)
+            else:
+                moves = order[-1] == b"go"
+                say("moves" if moves else "stands", tick=tick)
+        if connection in readable:
             command, number, size = struct.unpack("<3I", receive(connection, 12))
             body = receive(connection, size - 12)
             answer = b"\0"
@@ -111,15 +117,17 @@ def serve(connection, client, options, log, urdf):
             elif command == GET_MODEL and options.version == 10:
                 answer += urdf.encode()
             connection.sendall(struct.pack("<3I", command, number, 12 + len(answer)) + answer)
-        if start is not None and time.monotonic() >= start + row * 1e-3:
+        if start is not None and time.monotonic() >= start + tick * 1e-3:
             if row == len(log["t"]):
                 return
-            if row not in lost:
+            if not (moves and row in lost):
                 # the message's number is its time in milliseconds
-                number = round(1000 * float(log["t"][row]))
-                start = max(start, time.monotonic() - row * 1e-3)  # what is late stays late: a robot sends no bursts
-                udp.sendto(state.message(number, *(log[name][row] for name in ("q", "dq", "tau"))), (client[0], port))
-            row += 1
+                number = round(1000 * float(log["t"][0])) + tick
+                start = max(start, time.monotonic() - tick * 1e-3)  # what is late stays late: a robot sends no bursts
+                q, dq, tau = (log[name][row] for name in ("q", "dq", "tau"))
+                udp.sendto(state.message(number, q, dq if moves else 0.0 * dq, tau), (client[0], port))
+            tick += 1
+            row += moves
 
 
 def main():
@@ -128,6 +136,9 @@ def main():
     parser.add_argument("--address", default="127.0.0.1")
     parser.add_argument("--version", type=int, choices=(5, 10), default=5)
     parser.add_argument("--urdf", help="file with the robot's description, for version 10")
+    parser.add_argument(
+        "--stand", action="store_true", help="stand still until a line on standard input says go, and again at stop"
+    )
     parser.add_argument("--lose", type=int, nargs="*", default=[], help="rows that never arrive")
     options = parser.parse_args()
     with np.load(options.log) as file:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from importlib import resources
 from typing import TYPE_CHECKING, NoReturn
 
 from armload.errors import UsageError
@@ -98,7 +99,7 @@ def add_arm_arguments(parser: argparse.ArgumentParser, default: str | None = Non
         required=required and default is None,
         default=default,
         metavar="NAME|FILE.urdf",
-        help="panda, fr3, ur5e, ur10e, or the path of a URDF file" + (f" (default: {default})" if default else ""),
+        help=f"{', '.join(_arms())}, or the path of a URDF file" + (f" (default: {default})" if default else ""),
     )
     parser.add_argument(
         "--frame", metavar="F", help="link whose frame the payload is about (default: the flange; a URDF's last link)"
@@ -109,6 +110,12 @@ def add_arm_arguments(parser: argparse.ArgumentParser, default: str | None = Non
         metavar="X,Y,Z",
         help="gravity in the axes of the robot's base [m/s²], for a tilted base (default: 0,0,-9.81)",
     )
+
+
+def _arms() -> list[str]:
+    """The built-in arms, by their sheets: --help must not wait for what `armload.arms` imports."""
+    sheets = resources.files("armload").joinpath("arms", "descriptions").iterdir()
+    return sorted(sheet.name.removesuffix(".toml") for sheet in sheets if sheet.name.endswith(".toml"))
 
 
 def add_identifier_arguments(parser: argparse.ArgumentParser) -> None:

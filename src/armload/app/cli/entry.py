@@ -14,13 +14,16 @@ imports what it needs when it runs, so that `armload --help` costs nothing.
 
 from __future__ import annotations
 
+import _thread
 import difflib
 import importlib
 import os
 import sys
+import time
 import traceback
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 from armload.app.cli.arguments import Parser, attach_values
 from armload.errors import ArmloadError, UsageError
@@ -68,7 +71,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure") and (stream.encoding or "").lower().replace("-", "") != "utf8":
             stream.reconfigure(errors="replace")  # a terminal that cannot show "m²" still gets the answer
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), _no_interruption_lost():
         warnings.showwarning = _show_warning
         code = _guarded(arguments, show_traceback)
     try:
@@ -85,6 +88,10 @@ def _guarded(arguments: list[str], show_traceback: bool) -> int:
             code = _run(arguments)
         except SystemExit as stop:  # argparse ends `--help` and `--version` so
             code = stop.code if isinstance(stop.code, int) else 0
+        except Exception as error:
+            if _interrupted(error):
+                raise KeyboardInterrupt from error
+            raise
         sys.stdout.flush()
         return code
     except KeyboardInterrupt:
@@ -99,6 +106,42 @@ def _guarded(arguments: list[str], show_traceback: bool) -> int:
     except Exception as error:
         hint = "" if show_traceback else "; this is a bug: set ARMLOAD_TRACEBACK=1 (or --traceback) to see where"
         return _fail(f"{type(error).__name__}: {str(error) or 'no message'}{hint}", 1, show_traceback)
+
+
+def _interrupted(error: BaseException | None) -> bool:
+    """Whether an error is what others made of a Ctrl-C: compiled code and compilers answer it with their own."""
+    seen: set[int] = set()
+    while error is not None and id(error) not in seen:
+        if isinstance(error, KeyboardInterrupt):
+            return True
+        seen.add(id(error))
+        error = error.__cause__ or (None if error.__suppress_context__ else error.__context__)
+    return False
+
+
+@contextmanager
+def _no_interruption_lost() -> Iterator[None]:
+    """A Ctrl-C that falls into a destructor or a callback of compiled code, as while numba compiles, comes again.
+
+    Python prints such an exception and goes on as if nothing had been.
+    """
+    before = sys.unraisablehook
+
+    def hook(unraisable: sys.UnraisableHookArgs) -> None:
+        if issubclass(unraisable.exc_type, KeyboardInterrupt):
+            _thread.start_new_thread(again, ())
+        else:
+            before(unraisable)
+
+    def again() -> None:
+        time.sleep(0.01)  # until the hook has returned: within it the interruption would be lost again
+        _thread.interrupt_main()
+
+    sys.unraisablehook = hook
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
 
 
 def _run(arguments: list[str]) -> int:

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
 # the names of armload.devices.FORMS, so that --help need not import them; a test compares
 _FORMS = ("franka", "franka-desk", "ur", "ur-payload", "urdf", "mjcf", "sdf", "ros2")
-_MAKERS = {"franka": ("panda", "fr3"), "ur": ("ur5e", "ur10e")}
 _EXAMPLES = """\
 examples:
   armload identify run.csv --robot panda --json > held.json
@@ -126,14 +125,14 @@ def run(options: argparse.Namespace) -> None:
 def _flanges() -> list[str]:
     from armload.arms import ARMS
 
-    return sorted({str(facts["frame"]) for facts in ARMS.values()})
+    return sorted({facts.flange for facts in ARMS.values()})
 
 
 def _is_flange(frame: str) -> bool:
     """Whether a frame is called as a built-in arm's flange, with whatever prefix."""
-    from armload.payloads.hand import FLANGE
+    from armload.arms import ARMS
 
-    return frame.endswith((*_flanges(), FLANGE))
+    return frame.endswith(tuple(facts.flange_ending for facts in ARMS.values()))
 
 
 def _on(load: Load, arm: Arm) -> bool:
@@ -157,16 +156,16 @@ def _arm_of(load: Load) -> Arm | None:
     """The arm that a result names; None where it is only known to whoever made it."""
     from armload.arms import ARMS, arm
 
-    return arm(load.robot) if load.robot in ARMS else None
+    return None if load.robot is None or load.robot not in ARMS else arm(load.robot)
 
 
 def _part(name: str, load: Load, arm: Arm | None) -> InertialParameters:
     """A part about the load's own frame; the Franka Hand sits on the flange, whatever that is called."""
     from armload.devices import about
     from armload.payloads import franka_hand
-    from armload.payloads.hand import FLANGE
+    from armload.payloads.hand import HAND, fits
 
-    if name == "franka-hand" and load.frame is not None and load.frame.endswith(FLANGE):
+    if name == HAND and load.frame is not None and fits(load.frame):
         return franka_hand(load.frame).parameters
     return about(payload_of(name, arm), load.frame, arm)
 
@@ -183,12 +182,14 @@ def _doubts(parts: list[str], load: Load) -> list[str]:
 
 
 def _notes(load: Load, to: str) -> list[str]:
+    from armload.arms import ARMS
     from armload.devices import CONTROLLERS
 
     notes = []
     if load.undetermined:
         notes.append(f"not determined by the log: {', '.join(load.undetermined)}; written as known beforehand")
-    maker = next((maker for maker, arms in _MAKERS.items() if load.robot in arms), None)
+    facts = ARMS.get(load.robot or "")
+    maker = None if facts is None else facts.controller
     if maker is not None and to in CONTROLLERS and not to.startswith(maker):
         notes.append(f"it was identified on a {load.robot}: another maker's flange may have other axes")
     if to == "franka" and load.relative_to == "arm":

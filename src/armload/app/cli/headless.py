@@ -16,9 +16,9 @@ from armload.online import OnlineEstimate
 def lines(session: Session, every: float = 0.1, duration: float | None = None) -> Iterator[str]:
     """One JSON object per `every` seconds of the stream's clock, one at each change, and one for the last sample.
 
-    The fields are those of `OnlineEstimate.to_dict`, and `robot`; and `truth`, phi as it really is, where the source
-    knows. What is not determined yet says so in the line. While samples have no times that rise, a line comes every
-    `every` seconds of this machine's clock.
+    The fields are those of `OnlineEstimate.to_dict`, and `robot`; `lost`, how many samples the source had to drop so
+    far; and `truth`, phi as it really is, where the source knows. What is not determined yet says so in the line. While
+    samples have no times that rise, a line comes every `every` seconds of this machine's clock.
 
     Args:
         session: runs here, in this thread. every: 0: one line per sample. duration: end after so long [s].
@@ -47,7 +47,8 @@ def line_of(estimate: OnlineEstimate, robot: str, truth: InertialParameters | No
 
 
 def _json(estimate: OnlineEstimate, session: Session) -> str:
-    return json.dumps(line_of(estimate, session.arm.name, session.truth(estimate.t)), allow_nan=False)
+    told = line_of(estimate, session.arm.name, session.truth(estimate.t))
+    return json.dumps({**told, "lost": session.lost}, allow_nan=False)
 
 
 def _finite(value: Any) -> Any:

@@ -34,7 +34,7 @@ examples:
 The page is for this machine only (http://127.0.0.1:8080) unless --host says otherwise: whoever can open it can read
 everything on it, switch the method and tare. Nothing is written to the robot.
 """
-_ROBOTS = {"sim": "panda", "fr3": "fr3", "panda": "panda"}  # whose arm is plain from the source
+_SIMULATED = "panda"
 
 
 def _speed(text: str) -> float | None:
@@ -98,11 +98,13 @@ def run(options: argparse.Namespace) -> int | None:
     """Identify until the source ends (--headless) or somebody interrupts; 2 if an error was told meanwhile."""
     from armload.app.page.session import Session
     from armload.devices import open_source
-    from armload.recording import read_recording
+    from armload.recording import check_own_measurements, read_recording
 
     options.robot = options.robot or _robot_of(options.source)
     arm = _arm_of(options)
     tare = None if options.tare is None else read_recording(options.tare, arm, topic=options.topic)
+    if tare is not None and options.source != "sim" and "://" not in options.source:  # a log
+        check_own_measurements(read_recording(options.source, arm, topic=options.topic), tare)
     # the page takes time from its own process: what runs on the clock is read in another one
     beside = True if not options.headless and options.speed is not None and options.speed <= 1.0 else None
     source = open_source(
@@ -166,7 +168,12 @@ def _serve(session, options: argparse.Namespace) -> int | None:
 
 def _robot_of(source: str) -> str:
     """The robot where --robot does not name one."""
-    kind = urlsplit(source).scheme if "://" in source else source
-    if kind not in _ROBOTS:
-        raise UsageError(f"{source}: name the robot with --robot, such as --robot panda")
-    return _ROBOTS[kind]
+    from armload.arms import ARMS
+
+    if source == "sim":
+        return _SIMULATED
+    scheme = urlsplit(source).scheme if "://" in source else None
+    speaking = [name for name, facts in ARMS.items() if scheme is not None and facts.scheme == scheme]
+    if len(speaking) != 1:
+        raise UsageError(f"{source}: name the robot with --robot, such as --robot {_SIMULATED}")
+    return speaking[0]

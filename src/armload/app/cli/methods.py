@@ -70,8 +70,11 @@ def page() -> str:
         "# Methods",
         "",
         "Written by `armload methods --markdown`. Every method takes the same log and gives the same ten parameters",
-        "with error bars: `armload identify LOG --method NAME`, in Python `METHODS[NAME].make(arm, tare)`. They stand",
-        "in the order of recommendation; [results](results.md) measures the main ones.",
+        "with intervals: `armload identify LOG --method NAME`, in Python `METHODS[NAME].make(arm, tare)`. The best",
+        "come first. The [benchmark](benchmark.md) and [older results](results.md) measure the main ones.",
+        "",
+        "In most cases do not choose: the default is `hybrid` where one is trained for the arm, else `map-gp`. Take",
+        "`map-gp` for a wide and thin payload, and `rls-filter` to compare with published results.",
         "",
         "| name | what it is | when to use it | tare | source |",
         "|---|---|---|---|---|",
@@ -82,7 +85,7 @@ def page() -> str:
         lines.append(f"| {name} | {method.title} | {method.when}{needs} | {method.tare} | {method.source} |")
     lines += [
         "",
-        "What a method makes of a tare, an earlier log of the same arm:",
+        "How a method uses a tare, an earlier log of the same arm:",
         "",
         *(f"- **{name}**: {text}." for name, text in _TARES.items()),
         "",
@@ -97,8 +100,8 @@ def page() -> str:
 
 _NEEDS = {"tare": "a tare", "training": "a trained model's file", "motion": "the commanded motion (Python only)"}
 _TARES = {
-    "own equation": "the tare, of any motion, is one more log in the same equations",
-    "virtual calibration": "what the method says of the tare is subtracted from what it says of the run",
-    "same motion": "the tare follows the run's own motion, and is subtracted sample by sample",
+    "own equation": "the tare, on any motion, is one more log in the same equations",
+    "virtual calibration": "the method's answer to the tare is subtracted from its answer to the run",
+    "same motion": "the tare must follow the run's own motion; it is subtracted sample by sample",
     "none": "the method cannot use one",
 }

@@ -62,7 +62,7 @@ def parser() -> Parser:
     """The arguments of `armload train`."""
     parser = Parser(
         prog="armload train",
-        description="Train the hybrid for an arm, or a bag of trees, networks or support vectors on a data set.",
+        description="Train the hybrid for an arm, or a bag of trees or networks on a data set.",
         epilog=_EXAMPLES,
     )
     parser.add_argument(
@@ -100,7 +100,7 @@ def parser() -> Parser:
     hybrid.add_argument("--json", action="store_true", default=None, help="print that report and nothing else")
     ensemble = parser.add_argument_group("ensemble")
     ensemble.add_argument("--dataset", metavar="DIR", help="folder written by armload dataset")
-    ensemble.add_argument("--kind", choices=("tree", "network", "mixed", "svr"), help="(default: tree)")
+    ensemble.add_argument("--kind", choices=("tree", "network", "mixed"), help="(default: tree)")
     ensemble.add_argument(
         "--stages", type=int, choices=(1, 2), help="2: mass and first moments apart from inertia (default: 1)"
     )

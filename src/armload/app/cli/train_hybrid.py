@@ -9,7 +9,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +27,6 @@ if TYPE_CHECKING:
 
 _EVERY = 20.0  # [s] between two lines of progress
 _WORST, _FEWEST = 3, 20  # cells named; episodes that one must rest on
-_PACKAGES = ("armload", "jax", "joblib", "mujoco", "numpy", "pin", "scikit-learn", "scipy")
 
 
 def run(options: argparse.Namespace) -> None:
@@ -37,7 +35,7 @@ def run(options: argparse.Namespace) -> None:
 
     from armload.arms import arm
     from armload.lab.training import train_hybrid
-    from armload.lab.training.hybrid import EPISODES
+    from armload.lab.training.hybrid import EPISODES, versions
     from armload.posterior.model_file import ENOUGH
 
     robot = arm(options.robot, options.frame)
@@ -54,13 +52,11 @@ def run(options: argparse.Namespace) -> None:
         model, coverage = train_hybrid(
             robot, episodes=episodes, seed=options.seed, folder=work, jobs=jobs, progress=progress
         )
-    found = summary(robot, coverage)
-    model = replace(model, provenance={**model.provenance, **found, "versions": versions()})
     model.save(out)
     report = {
         "command": _command(options, episodes),
         "seeds": [options.seed],
-        **found,
+        **summary(robot, coverage),
         "versions": versions(),
         "jobs": jobs,
         "resumed": resumed,
@@ -95,36 +91,13 @@ def _command(options: argparse.Namespace, episodes: int) -> str:
 
 def summary(robot: Arm, coverage: Coverage) -> dict[str, Any]:
     """What the intervals were found to be worth, ready for JSON; null where no episode was."""
-    from armload.inertia import NAMES
-    from armload.lab.training.records import TIMES
-    from armload.posterior.evidence import KINDS
-
     return {
         "robot": robot.name,
         "frame": str(robot.frame),
         "episodes": coverage.episodes,
         "pooled": round(coverage.pooled, 4),
-        "compared_with": list(KINDS),
-        "times": list(TIMES),
-        "parameters": list(NAMES),
-        "cells": _plain(coverage.cells.tolist()),
-        "ratio": _plain(coverage.ratio.tolist()),
-        "counts": coverage.counts.tolist(),
+        **coverage.table(),
     }
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, list):
-        return [_plain(part) for part in value]
-    return round(value, 4) if value == value else None
-
-
-def versions() -> dict[str, str]:
-    """Versions of what can change a trained number."""
-    from importlib.metadata import version
-    from platform import python_version
-
-    return {"python": python_version(), **{name: version(name) for name in _PACKAGES}}
 
 
 def cells_table(coverage: Coverage) -> RichTable:

@@ -1,8 +1,8 @@
 """What a live stream says, as lines of JSON or as a page in the browser."""
 
+from armload.app.page.drawing import Box, com_region, equivalent_box, equivalent_ellipsoid
 from armload.app.page.history import History
 from armload.app.page.session import Entry, Session
-from armload.app.page.shapes import Box, com_region, equivalent_box, equivalent_ellipsoid
 
 __all__ = [
     "Box",

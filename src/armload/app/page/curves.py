@@ -12,7 +12,17 @@ from armload.inertia import NAMES, UNITS
 # Okabe & Ito, "Color Universal Design", 2008: told apart by the colour-blind
 COLOURS = ((0, 114, 178), (213, 94, 0), (0, 158, 115))
 _WIDER = 1.5  # times the narrowest present interval that is shown beyond the values
+_UNKNOWN = 1e9  # half-width of an interval of which nothing is known, in any unit
 _ALIKE = 5.0  # times the narrowest: present intervals up to this wide are shown whole
+
+HEIGHT = 122  # [px] of a plot
+PADDING = (8, 14, 0, 0)  # [px] above, right, below, left
+# uPlot takes the least of 1, 2, 2.5, 5, 10, … that leaves `space` [px] between two ticks: at most twice as much. The y
+# axis has HEIGHT − 8 − 24 px: at uPlot's own 30 px between them that can mean one tick, at half of it at least three.
+AXES = (
+    {"size": 24, "gap": 2, "ticks": {"size": 4}},
+    {"size": 58, "gap": 3, "ticks": {"size": 4}, "space": 15},
+)
 
 
 class Group(NamedTuple):
@@ -62,7 +72,9 @@ def data_of(group: Group, t: NDArray[np.float64], rows: NDArray[np.float64]) -> 
     """uPlot's data for `series_of`, from a history of phi, half-widths and truth.
 
     Intervals are cut to what leaves the curves readable: the range of the values and of the truth, and somewhat more
-    than the present intervals.
+    than the present intervals. Every number is finite, as one that is not would leave uPlot without a scale: where
+    nobody knows the truth its line lies under that of the value, in the same colour; before the first estimate the
+    values are 0, with intervals as wide as the plot.
 
     Args:
         t: (N,) [s]. rows: (N, 30).
@@ -73,26 +85,24 @@ def data_of(group: Group, t: NDArray[np.float64], rows: NDArray[np.float64]) -> 
         t, rows = np.array([t[0] - 0.1, t[0]]), np.repeat(rows, 2, axis=0)
     places = list(group.places)
     phi, half, truth = rows[:, :10][:, places], rows[:, 10:20][:, places], rows[:, 20:][:, places]
-    half = np.where(np.isfinite(half), half, 1e9)
+    phi, half = np.where(np.isfinite(phi), phi, 0.0), np.where(np.isfinite(half), half, _UNKNOWN)
     lowest, highest = _range(phi, half[-1], truth)
     out = [t]
     for k in range(len(places)):
         ends = np.clip([phi[:, k] + half[:, k], phi[:, k] - half[:, k]], lowest, highest)
-        out += [ends[0], ends[1], np.clip(phi[:, k], lowest, highest), truth[:, k]]
+        value = np.clip(phi[:, k], lowest, highest)
+        out += [ends[0], ends[1], value, np.where(np.isfinite(truth[:, k]), truth[:, k], value)]
     return tuple(np.ascontiguousarray(x) for x in out)
 
 
 def _range(phi: NDArray, now: NDArray, truth: NDArray) -> tuple[float, float]:
     """What a plot shows: the middle nine tenths of the values, the present ones, the truth and some room."""
-    if not np.isfinite(phi).any():
-        return -1.0, 1.0
-    seen = np.concatenate([np.nanquantile(phi, [0.05, 0.95], axis=0).ravel(), phi[-1], truth[np.isfinite(truth)]])
-    seen = seen[np.isfinite(seen)]
+    seen = np.concatenate([np.quantile(phi, [0.05, 0.95], axis=0).ravel(), phi[-1], truth[np.isfinite(truth)]])
     low, high = float(seen.min()), float(seen.max())
     room = max(_WIDER * float(np.min(now)), 0.35 * (high - low), 1e-6)
-    room = min(room, max(3.0 * (high - low), 1e-2)) if np.min(now) > 1e8 else room
+    room = min(room, max(3.0 * (high - low), 1e-2)) if np.min(now) >= _UNKNOWN else room
     ends = phi[-1] + np.array([[-1.0], [1.0]]) * now
-    whole = ends[:, (now <= _ALIKE * np.min(now)) & (now < 1e8) & np.isfinite(phi[-1])]  # one far wider is cut
+    whole = ends[:, (now <= _ALIKE * np.min(now)) & (now < _UNKNOWN)]  # one far wider is cut
     return min(low - room, whole[0].min(initial=np.inf)), max(high + room, whole[1].max(initial=-np.inf))
 
 

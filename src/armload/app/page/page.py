@@ -15,7 +15,10 @@ from typing import Any
 
 from armload.app.page import tables
 from armload.app.page.curves import (
+    AXES,
     GROUPS,
+    HEIGHT,
+    PADDING,
     bands_of,
     data_of,
     legend_of,
@@ -24,7 +27,8 @@ from armload.app.page.curves import (
 from armload.app.page.download import ENDINGS, file_of
 from armload.app.page.scene import Scene
 from armload.app.page.session import Session
-from armload.errors import ArmloadError, UsageError
+from armload.arms import Arm
+from armload.errors import ArmloadError, ModelError, UsageError
 from armload.identification import METHODS, default_for
 
 _NUMBERS, _CURVES = 3, 8  # pictures from which on numbers and curves follow
@@ -121,10 +125,10 @@ class Page:
                     series_of(group),
                     bands=bands_of(group),
                     scales={"x": {"time": False}, "y": {"auto": True}},
-                    axes=({"size": 24, "gap": 2, "ticks": {"size": 4}}, {"size": 58, "gap": 3, "ticks": {"size": 4}}),
+                    axes=AXES,
                     legend={"show": False},
-                    padding=(8, 14, 0, 0),
-                    height=122,
+                    padding=PADDING,
+                    height=HEIGHT,
                 )
                 self._plots.append(plot)
             gui.add_html(_KEY)
@@ -175,9 +179,16 @@ def methods_for(session: Session) -> tuple[str, ...]:
         name
         for name, method in METHODS.items()
         if (method.needs == "" or (method.needs == "tare" and session.tare is not None))
-        and (name != "hybrid" or default_for(session.arm) == "hybrid")
+        and (name != "hybrid" or _has_hybrid(session.arm))
     ]
     return tuple(names) if session.method in names else (session.method, *names)
+
+
+def _has_hybrid(arm: Arm) -> bool:
+    try:
+        return default_for(arm) == "hybrid"
+    except ModelError:  # its file is missing: who asks for it is told so
+        return True
 
 
 def _told(client: Any, title: str, action: Any) -> bool:

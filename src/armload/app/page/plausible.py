@@ -1,4 +1,4 @@
-"""Whether a live stream is what it claims to be: the checks of a log, on what was seen lately, a few times."""
+"""Whether a live stream is what it claims to be: the checks of a log, on what was seen lately, again and again."""
 
 from __future__ import annotations
 
@@ -10,24 +10,31 @@ from armload.app.page.recent import Recent
 from armload.arms import Arm
 from armload.errors import ArmloadError
 from armload.identification import check_plausible
+from armload.identification.torque_scale import TorqueScale, torque_scale
 from armload.online import Health, OnlineEstimate
-from armload.recording import Sample
+from armload.recording import Recording, Sample
 
 _SAID = "the samples are not plausible, the answer is not to be trusted"
-_AFTER = (3.0, 6.0, 12.0, 24.0)  # [s] of motion: the more was seen, the surer are the checks
+# [s] of motion to the first check, and at most between two; meanwhile each comes after twice the motion, as the checks
+# get surer the more was seen
+_SOONEST, _LATEST = 3.0, 24.0
 _SINCE = 2.0  # [s] of these since the last interruption or change of payload, at least
 _LOOKED_AT = 15.0  # [s] at most
 _STEP, _MOVED = 0.25, 0.01  # [s] between two looks at the joints; [rad] that one has to move meanwhile
 
 
 class Plausibility:
-    """Checks the samples a session has kept once the arm has moved for 3 s, and again after 6, 12 and 24 s.
+    """Checks the samples a session has kept once the arm has moved for 3 s, after 6, 12 and 24 s, and then every 24 s.
+
+    A doubt stays, whatever is held, until evidence takes it back: no check has said anything for as much motion as the
+    doubt rested on, and if the torque's scale was wrong it is surely another one now. A log in which nothing is to be
+    seen takes nothing back. While there is a doubt the checks come every 3 s; once it is taken back, as at first.
 
     Args:
         arm: the arm. name: what the stream is called in messages.
 
     Attributes:
-        doubt: what the last check said, one sentence; None: nothing.
+        doubt: what the last check that found something said, one sentence; None: nothing is in doubt.
     """
 
     def __init__(self, arm: Arm, name: str) -> None:
@@ -38,7 +45,10 @@ class Plausibility:
     def reset(self) -> None:
         """Forget the stream."""
         self.doubt: str | None = None
-        self._moved, self._checks = 0.0, 0
+        self._wrong: TorqueScale | None = None  # the torque's scale when it was in doubt, if that was wrong
+        self._doubted, self._rests_on = 0.0, 0.0  # [s] of motion: at the last check that doubted; that it rested on
+        self._moved, self._checked = 0.0, False
+        self._began, self._due = 0.0, _SOONEST  # [s] of motion when frequent checks began; of the next check
         self._breaks = 0  # pauses and jumps so far
         self.forget()
 
@@ -59,19 +69,22 @@ class Plausibility:
             return False
         self._looked = sample
         self._first = sample.t if self._first is None else self._first
-        if last is None or self._checks == len(_AFTER) or not 0.0 < sample.t - last.t < 2.0 * _STEP:
+        if last is None or not 0.0 < sample.t - last.t < 2.0 * _STEP:
             return False
         if np.abs(np.subtract(sample.q, last.q)).max() > _MOVED:  # dq may be what is wrong
             self._moved += sample.t - last.t
             self._since += sample.t - last.t
-        if self._moved < _AFTER[self._checks] or self._since < _SINCE:
+        if self._moved < self._due or self._since < _SINCE:
             return False
-        self._checks += 1
-        return self._check(recent)
+        changed = self._check(recent)
+        if changed or self.doubt is not None:
+            self._began = self._moved
+        self._due = self._moved + min(max(self._moved - self._began, _SOONEST), _LATEST)
+        return changed
 
     def look_at_last(self, recent: Recent) -> bool:
         """The stream has ended: check what there is of one that never was; whether `doubt` came or went."""
-        return self._checks == 0 and self._since > 0.0 and self._check(recent)
+        return not self._checked and self._since > 0.0 and self._check(recent)
 
     def qualified(self, estimate: OnlineEstimate) -> OnlineEstimate:
         """The estimate with what is to be said of samples that cannot be right: no interval holds then."""
@@ -83,11 +96,26 @@ class Plausibility:
         assert self._looked is not None
         assert self._first is not None
         log, before = recent.recording(min(_LOOKED_AT, self._looked.t - self._first)), self.doubt
+        self._checked = True
         if log is None:
             return False
         try:
             check_plausible(replace(log, source=self._name), self._arm)
-            self.doubt = None
         except ArmloadError as error:
             self.doubt = f"{_SAID}: {error}"
+            self._doubted, self._rests_on = self._moved, min(self._since, _LOOKED_AT)
+            scale = torque_scale(log, self._arm)
+            self._wrong = scale if scale is not None and scale.is_wrong else self._wrong
+        else:
+            if before is not None and self._speaks_against_the_doubt(log):
+                self.doubt = self._wrong = None
         return (self.doubt is None) != (before is None)
+
+    def _speaks_against_the_doubt(self, log: Recording) -> bool:
+        """Whether a log that passed the checks tells more than that it might be sound."""
+        if self._moved - self._doubted < self._rests_on:
+            return False
+        if self._wrong is None:
+            return True
+        scale = torque_scale(log, self._arm)
+        return scale is not None and scale.contradicts(self._wrong)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from armload.app.page.shapes import (
+from armload.app.page.drawing import (
     Box,
     arm_parts,
     com_region,

@@ -167,7 +167,7 @@ class Session:
             self._recent.append(sample)
             if self._plausibility.look(sample, estimate.health, self._recent):
                 self._doubted()
-        estimate = self._plausibility.qualified(estimate)
+        estimate = self._plausibility.qualified(estimate).behind(self.source.lag())
         self.sample, self.estimate = sample if usable else self.sample, estimate
         if self._trouble or self._identifier.trouble is not None:
             self._listen(self._identifier.trouble)

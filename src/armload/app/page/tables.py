@@ -7,11 +7,12 @@ from html import escape
 
 import numpy as np
 
+from armload.app.page.drawing import CHI2_95, com_region
 from armload.app.page.session import Entry
-from armload.app.page.shapes import CHI2_95, com_region
 from armload.inertia import NAMES, UNITS, Z95, InertialParameters
 from armload.online import OnlineEstimate
 from armload.online.listening import UNUSED
+from armload.recording import GAP
 
 _DIM = "color:var(--mantine-color-dimmed)"
 _TEXT = "font-size:13px;line-height:1.45;font-variant-numeric:tabular-nums;padding:2px 8px"
@@ -110,10 +111,12 @@ def said(entry: Entry) -> str:
 
 
 def stream(name: str, estimate: OnlineEstimate | None, lost: int = 0) -> str:
-    """Where samples come from, how many counted, and why others were left out."""
+    """Where samples come from, how many counted, why others were left out, and whether this machine keeps up."""
     if estimate is None:
         return f'<div style="{_TEXT};{_DIM}" data-armload="health">{escape(name)}</div>'
     said = f"{name}: t = {estimate.t:.1f} s, {estimate.health}"
+    if estimate.lag >= GAP:
+        said += f"; answered {estimate.lag:.1f} s after it arrived: this machine is too busy"
     if lost:
         said += f"; {lost} lost: this machine is too busy"
     return f'<div style="{_TEXT};{_DIM}" data-armload="health">{escape(said)}</div>'

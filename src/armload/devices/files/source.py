@@ -59,6 +59,7 @@ class Replay(Source):
         self.loop = loop
         self._payload = payload
         self._pace = Pace(speed)
+        self.speed = speed or 1.0
 
     def __iter__(self) -> Iterator[Sample]:
         lap = self.recording.duration + float(np.median(np.diff(self.recording.t)))
@@ -76,6 +77,10 @@ class Replay(Source):
     def close(self) -> None:
         """End the replay; an iteration that waits ends at once."""
         self._pace.stop()
+
+    def arrived(self) -> float | None:
+        """When the sample handed on last was due; None without a clock."""
+        return self._pace.due
 
     def truth(self, t: float) -> InertialParameters | None:  # noqa: ARG002
         """The payload given, at any time."""

@@ -10,6 +10,7 @@ packets.
 from __future__ import annotations
 
 import importlib
+import time
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -69,6 +70,7 @@ class FrankaSource(Source):
             raise SourceError(f"{arm.name} has {arm.n} joints: a {facts.called} has 7; name the arm that is there")
         self.name, self.n = f"{system}://{address}", arm.n
         self._closed = False
+        self._arrived: float | None = None
         client = load_client(system)
         try:
             self.robot: Any = client.Robot(address, client.RealtimeConfig.kIgnore)
@@ -78,12 +80,17 @@ class FrankaSource(Source):
     def __iter__(self) -> Iterator[Sample]:
         while not self._closed:
             state = self._state()
+            self._arrived = time.monotonic()  # the client drops all but the newest state
             yield Sample(state.time.to_sec(), np.array(state.q), np.array(state.dq), np.array(state.tau_J))
 
     def close(self) -> None:
         """Let go of the robot."""
         self._closed = True
         self.robot = None
+
+    def arrived(self) -> float | None:
+        """When the client had the state handed on last."""
+        return self._arrived
 
     def read_once(self) -> FrankaStatus:
         """The robot's present velocity and the masses it counts with."""

@@ -52,7 +52,7 @@ class PayloadNode:
             if body is None:
                 continue
             last = estimate.t
-            newest = estimate.t - estimate.age if isinstance(estimate, OnlineEstimate) else estimate.t
-            self._publish(message_of(body, self._source.stamp(newest), self._kind))
+            old = estimate.age - estimate.lag if isinstance(estimate, OnlineEstimate) else 0.0  # on the samples' clock
+            self._publish(message_of(body, self._source.stamp(estimate.t - old), self._kind))
             if told is not None:
                 told(body)

@@ -53,7 +53,8 @@ class Ros2Source(Source):
         self._arm, self._timeout, self._closed = arm, timeout, False
         self._states = JointStates(arm, topic)
         self._heard: deque[tuple[Any, int]] = deque(maxlen=SENSOR_DEPTH)
-        self._first: deque[Sample] = deque()
+        self._first: deque[tuple[Sample, float]] = deque()
+        self._arrived: float | None = None
         self.connection = Ros2Connection(node)
         try:
             self.connection.subscribe(self.connection.JointState, topic, self._hear, sensor=True)
@@ -69,9 +70,14 @@ class Ros2Source(Source):
             SourceError: nothing was heard for `timeout` seconds, or the first message lacks velocities or efforts.
         """
         while not self._closed:
-            sample = self._first.popleft() if self._first else self._next()
-            if sample is not None:
+            heard = self._first.popleft() if self._first else self._next()
+            if heard is not None:
+                sample, self._arrived = heard
                 yield sample
+
+    def arrived(self) -> float | None:
+        """When the middleware had taken in the message handed on last."""
+        return self._arrived
 
     def stamp(self, t: float) -> int:
         """The header's stamp of the sample at time t, since 1970 [ns]."""
@@ -85,14 +91,16 @@ class Ros2Source(Source):
     def _hear(self, message: Any, received: int) -> None:
         self._heard.append((message, received))
 
-    def _next(self) -> Sample | None:
-        """The next sample of the arm; None: closed meanwhile."""
+    def _next(self) -> tuple[Sample, float] | None:
+        """The next sample of the arm and when it arrived, on the monotonic clock [s]; None: closed meanwhile."""
         begun = time.monotonic()
         while not self._closed:
             while self._heard:
-                sample = self._states.sample(*self._heard.popleft())
+                message, received = self._heard.popleft()
+                sample = self._states.sample(message, received)
                 if sample is not None:
-                    return sample
+                    waited = max(0, time.time_ns() - received) if received else 0  # a middleware may not tell
+                    return sample, time.monotonic() - waited / 1e9
             waited = time.monotonic() - begun
             if self._timeout is not None and waited > self._timeout:
                 raise SourceError(self._silence())
@@ -101,10 +109,10 @@ class Ros2Source(Source):
 
     def _measured_rate(self) -> float:
         while len(self._first) < _TO_TELL_THE_RATE:
-            sample = self._next()
-            assert sample is not None  # nobody can close what is still being opened
-            self._first.append(sample)
-        steps = np.diff([sample.t for sample in self._first])
+            heard = self._next()
+            assert heard is not None  # nobody can close what is still being opened
+            self._first.append(heard)
+        steps = np.diff([sample.t for sample, _ in self._first])
         steps = steps[steps > 0]
         return float(1.0 / np.median(steps)) if len(steps) else float("nan")
 

@@ -18,14 +18,9 @@ from armload.devices.pace import Pace
 from armload.devices.source import Source
 from armload.errors import PayloadError
 from armload.inertia import InertialParameters
-from armload.motion import EndlessMotion, Motion, random_motion, taie2024
+from armload.motion import EndlessMotion, Motion, excitation
 from armload.recording import Recording, Sample
-from armload.simulation import (
-    ContinuedRun,
-    Sensors,
-    World,
-    is_panda,
-)
+from armload.simulation import ContinuedRun, Sensors, World
 
 _PIECE = 0.25  # [s]
 _BEFORE = 0.05  # [s] of the piece before that the sensors still see: more than their lags
@@ -44,7 +39,7 @@ class Simulator(Source):
 
     Args:
         arm: as its controller and the identification know it.
-        motion: repeated endlessly; None: the published excitation on a Panda, a random one elsewhere.
+        motion: repeated endlessly; None: the one designed for the arm, a random one elsewhere.
         payloads: (time [s], payload) pairs in the order of time: from that time on the arm holds this payload, None
             nothing. Before the first it holds nothing.
         world: the arm as it really is; None: nominal.
@@ -74,7 +69,7 @@ class Simulator(Source):
         seed: int = 0,
     ) -> None:
         if motion is None:
-            motion = taie2024() if is_panda(arm) else random_motion(arm, seed)
+            motion = excitation(arm, seed)
         self.arm = arm
         self.motion = EndlessMotion(motion)
         self.name = f"simulated {arm.name}"
@@ -84,6 +79,7 @@ class Simulator(Source):
         self._world, self._sensors, self._seed = world, sensors, seed
         self._end = None if duration is None else round(duration * rate)
         self._pace = Pace(speed)
+        self.speed = speed or 1.0
 
     def __iter__(self) -> Iterator[Sample]:
         for t, q, dq, tau in self._pieces():
@@ -95,6 +91,10 @@ class Simulator(Source):
     def close(self) -> None:
         """End the simulation; an iteration that waits ends at once."""
         self._pace.stop()
+
+    def arrived(self) -> float | None:
+        """When the sample handed on last was due; None without a clock."""
+        return self._pace.due
 
     def truth(self, t: float) -> InertialParameters:
         """What the arm holds at time t; ten zeros where it holds nothing."""

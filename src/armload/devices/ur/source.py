@@ -20,13 +20,11 @@ from typing import Any
 
 import numpy as np
 
-from armload.arms import Arm
+from armload.arms import ARMS, Arm
 from armload.devices.source import Source
 from armload.errors import SourceError
 from armload.recording import Sample
 
-# [N·m/A] per joint, of one UR10e, with which its logs fit its description (shamilmamedov/dynamic_calibration)
-TORQUE_CONSTANTS = {"ur10e": (11.98, 11.976, 9.836, 10.70, 10.70, 10.70)}
 _FIELDS = ["timestamp", "actual_q", "actual_qd", "actual_current"]
 _LOOK = 2e-4  # [s] between two looks for the next sample
 _SILENCE = 1.0  # [s] after which the arm counts as lost
@@ -51,7 +49,8 @@ class URSource(Source):
         if arm.n != 6:
             raise SourceError(f"{arm.name} has {arm.n} joints: a UR arm has 6; name the arm that is there")
         if torque_constants is None:
-            torque_constants = TORQUE_CONSTANTS.get(arm.known_as or arm.name)
+            facts = ARMS.get(arm.known_as or arm.name)
+            torque_constants = None if facts is None else facts.torque_constants
         if torque_constants is None:
             raise SourceError(
                 f"{arm.name} measures motor currents, and no torque constants are known for it: give six numbers in "
@@ -60,6 +59,7 @@ class URSource(Source):
         self._constants = np.array(torque_constants, dtype=float)
         if self._constants.shape != (6,) or not np.all(np.isfinite(self._constants)):
             raise SourceError(f"torque constants are {list(torque_constants)}: expected six finite numbers in N·m/A")
+        self._arrived: float | None = None
         self._stop = threading.Event()
         self._client = _connect(address)
         self.rate = 500.0
@@ -79,8 +79,12 @@ class URSource(Source):
             q, dq, current = client.getActualQ(), client.getActualQd(), client.getActualCurrent()
             if client.getTimestamp() != t:
                 continue  # the next packet came in between: the values may be of either
-            last = t
+            last, self._arrived = t, heard
             yield Sample(float(t), np.array(q), np.array(dq), self._constants * current)
+
+    def arrived(self) -> float | None:
+        """When the client had the values handed on last."""
+        return self._arrived
 
     def close(self) -> None:
         """Let go of the robot."""

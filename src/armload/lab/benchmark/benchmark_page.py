@@ -1,8 +1,7 @@
-"""The benchmark's page: one list of sections, as Markdown for the docs and as HTML with figures."""
+"""All tables of the benchmark: one list of sections, as Markdown for the docs and as HTML with figures."""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -11,20 +10,23 @@ from armload.lab.benchmark.benchmark_run import Size
 from armload.lab.benchmark.benchmark_tables import Results, subject
 from armload.lab.benchmark.populations import PRIOR, REPEAT
 from armload.lab.benchmark.rows import BOUND, left_out
-from armload.lab.benchmark.targets import MISSED, NOT_CLEAR, REACHED, targets_table, verdicts
+from armload.lab.benchmark.targets import targets_table
 from armload.lab.report import Section
-from armload.lab.report.shown import GROUPS, SHOWN_SCALE, SHOWN_UNITS, Table, short
+from armload.lab.report.shown import GROUPS, Table
 
 if TYPE_CHECKING:
     from armload.lab.report.style import Figure
 
 TITLE = "Benchmark"
+APPENDIX = "Benchmark: all tables"
 COMMAND = "armload benchmark"
 SHOWN = (0.1, 1.0, 6.0)  # [s]
 PAIRS = (("hybrid", "map-gp"), ("hybrid", "rls-filter+tare"))
+_TARGETS = f"""A cell is one population, time and group of parameters. {tables.AHEAD} marks a row that is ahead by more
+than two standard errors of the paired difference."""
 _ROWS = f"""Each row is a method of the [catalogue](methods.md), on the same logs as every other row. `+tare` marks
-virtual calibration: what the method says of the tare is subtracted (Kurdas et al., ICRA 2022); the same name without it
-ignores the tare and, where a tool was mounted, is told the tool. All other methods use the tare in their own equations.
+virtual calibration: the method's answer to the tare is subtracted (Kurdas et al., ICRA 2022). The same name without it
+ignores the tare and, where a tool was mounted, knows the tool. All other methods use the tare in their own equations.
 Two baselines are in every table: the mean of {PRIOR}, and least squares with the mean and covariance of the same
 payloads as a prior."""
 
@@ -41,7 +43,11 @@ def sections(
     drawn, of = figures or {}, subject(results)
     shown = {name: m for name, m in results.items() if name != REPEAT}
     out = [
-        Section("In plain words", _in_words(results), (targets_table(results), tables.losses_table(results))),
+        Section(
+            "Targets, and where the default method loses",
+            _TARGETS,
+            (targets_table(results), tables.losses_table(results)),
+        ),
         Section("What was run", _what_was_run(results, size), (tables.populations_table(results),)),
     ]
     if shown:
@@ -49,7 +55,11 @@ def sections(
         out.append(Section("Errors by population", _ROWS, by_time))
         widths = tuple(tables.intervals_table(results, time) for time in _times(size))
         own = () if of is None else tuple(tables.own_intervals_table(results, t, of) for t in _times(size)[-2:])
-        out.append(Section("Intervals", "How often the methods are right about their own error.", (*widths, *own)))
+        out.append(
+            Section(
+                "Intervals", "Coverage: how often the methods' own 95 % intervals contain the truth.", (*widths, *own)
+            )
+        )
     pairs = tuple(
         tables.paired_table(results, a, b, group)
         for a, b in PAIRS
@@ -57,12 +67,12 @@ def sections(
         for group in GROUPS
     )
     if pairs:
-        text = "Both methods answer the same episodes, so that their difference is known better than either error."
+        text = "Both methods answer the same episodes, so the difference is known better than either error."
         out.append(Section("Method against method", text, pairs))
     if REPEAT in results:
         text = "The same payload on one arm again and again: how much the answer moves, whatever its error."
         out.append(Section("Repeatability", text, (tables.repeatability_table(results[REPEAT], _times(size)[-2:]),)))
-    out.append(Section("Cost", "What an answer costs beside the others.", (tables.cost_table(results),)))
+    out.append(Section("Cost", "Computing time of an answer.", (tables.cost_table(results),)))
     for name, m in shown.items():
         detail: list[Table] = [tables.parameter_table(m, time) for time in _times(size)[-2:]]
         if name == "reference" or drawn:
@@ -83,39 +93,10 @@ def _times(size: Size) -> tuple[float, ...]:
     return tuple(time for time in SHOWN if time in size.times) or size.times[-2:]
 
 
-def _in_words(results: Results) -> str:
-    of, told = subject(results), []
-    m = results.get("reference") or next(iter(results.values()))
-    if of is not None and of in m.rows:
-        i, said = m.rows.index(of), []
-        for time in SHOWN:
-            error = m.absolute[i, :, m.index(time)].mean(axis=0)
-            parts = (f"{short(SHOWN_SCALE * float(error[p].mean()))} {SHOWN_UNITS[p][0]}" for p in GROUPS.values())
-            said.append(f"after {time:g} s " + ", ".join(parts))
-        told.append(
-            f"Mean absolute errors of `{of}` on the population `{m.population.name}` (mass, first moments, inertia): "
-            + "; ".join(said)
-            + "."
-        )
-    judged = verdicts(results)
-    if judged:
-        count = Counter(v["verdict"] for v in judged)
-        parts = ", ".join(f"{count[verdict]} {verdict}" for verdict in (REACHED, NOT_CLEAR, MISSED))
-        told.append(f"Of {len(judged)} targets, {parts}.")
-    if of is not None:
-        lost = len(tables.losses_table(results))
-        cells = sum(3 * len(x.times) for name, x in results.items() if of in x.rows and name != REPEAT)
-        told.append(
-            f"In {lost} of {cells} cells (population, time, group of parameters) some other row is ahead of `{of}` by "
-            f"more than two standard errors; they are listed, and marked {tables.AHEAD} in the tables below."
-        )
-    return "\n\n".join(told)
-
-
 def _what_was_run(results: Results, size: Size) -> str:
     trained = {row: text for m in results.values() for row, text in m.trained.items()}
     split = "; ".join(f"`{row}` was trained on other episodes ({text})" for row, text in trained.items())
-    said = [
+    parts = [
         f"`{COMMAND}` on simulated logs of a {size.robot} at {size.rate:g} Hz, {sum(m.runs for m in results.values())} "
         f"episodes. Split: no method sees these episodes before it answers them, and nothing is trained on their seeds"
         + (f"; {split}." if split else ".")
@@ -125,14 +106,14 @@ def _what_was_run(results: Results, size: Size) -> str:
     ]
     unfinished = {name: m.unfinished for name, m in results.items() if m.unfinished}
     if unfinished:
-        parts = ", ".join(f"{name} ({', '.join(rows)})" for name, rows in unfinished.items())
-        said.append(f"Not finished, and left out of the tables: {parts}. The same command goes on.")
+        named = ", ".join(f"{name} ({', '.join(rows)})" for name, rows in unfinished.items())
+        parts.append(f"Not finished, and left out of the tables: {named}. The same command goes on.")
     absent = [name for name in size.populations if name not in results]
     if absent:
-        said.append(f"Not measured yet: {', '.join(absent)}.")
+        parts.append(f"Not measured yet: {', '.join(absent)}.")
     if any(m.bound is None for m in results.values()):
-        said.append(f"The row `{BOUND}` is not measured everywhere: efficiencies are missing there.")
+        parts.append(f"The row `{BOUND}` is not measured everywhere: efficiencies are missing there.")
     few = [name for name, m in results.items() if m.runs < 30]
     if few:
-        said.append(f"Fewer than 30 episodes, shares of intervals are coarse: {', '.join(few)}.")
-    return "\n\n".join(said)
+        parts.append(f"Fewer than 30 episodes, shares of intervals are coarse: {', '.join(few)}.")
+    return "\n\n".join(parts)

@@ -1,19 +1,22 @@
-"""What is written from the finished cells: the summary (JSON), the page (Markdown), the report (HTML)."""
+"""What is written from the finished cells: summary (JSON), page, picture and tables (Markdown), report (HTML)."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from armload.atomic import replacing
 from armload.errors import ReportError
 from armload.inertia import NAMES, UNITS
-from armload.lab.benchmark.benchmark_page import COMMAND, PAIRS, TITLE, sections
+from armload.lab.benchmark.benchmark_page import APPENDIX, COMMAND, PAIRS, TITLE, sections
 from armload.lab.benchmark.benchmark_run import Size
-from armload.lab.benchmark.benchmark_tables import Results
+from armload.lab.benchmark.benchmark_tables import Results, losses
+from armload.lab.benchmark.front import front, picture
 from armload.lab.benchmark.measured import Measured, gather
 from armload.lab.benchmark.population_figures import figures
 from armload.lab.benchmark.populations import REPEAT
@@ -21,7 +24,9 @@ from armload.lab.benchmark.targets import verdicts
 from armload.lab.experiment import listed, write_json
 from armload.lab.report import write_markdown, write_report
 from armload.lab.report.shown import GROUPS
+from armload.lab.report.style import look
 
+_NOTE = f"Written by `{COMMAND}`; every number on this page comes from its cells."
 _rounded = partial(listed, digits=4)
 
 
@@ -36,7 +41,8 @@ def write_results(
 
     Args:
         cells: finished cells by name (`run_benchmark`). size: how much was asked for.
-        summary, page, report: the files to write; folders are made.
+        summary, page, report: the files to write; folders are made. Beside the page PAGE.md come its appendix
+            PAGE_tables.md and its picture pictures/PAGE.png.
 
     Returns:
         what was written, by what it is.
@@ -47,14 +53,47 @@ def write_results(
     results = gather(cells, size)
     if not results:
         raise ReportError(f"nothing is measured yet: run `{COMMAND}` until a part of it is finished")
-    written = {"summary": Path(summary), "page": Path(page), "report": Path(report)}
+    written = {"summary": Path(summary), "report": Path(report), **pages(page)}
     for path in written.values():
         path.parent.mkdir(parents=True, exist_ok=True)
-    write_json(written["summary"], summary_json(results, size), indent=None)
-    note = f"Written by `{COMMAND}`; every number on this page comes from its cells."
-    write_markdown(written["page"], sections(results, size), TITLE, note)
-    write_report(written["report"], sections(results, size, figures(results)), f"armload {TITLE.lower()}")
+    numbers = summary_json(results, size)
+    write_json(written["summary"], numbers, indent=None)
+    write_front(numbers, written["page"])
+    write_markdown(written["tables"], sections(results, size), APPENDIX, _NOTE)
+    first = front(numbers)
+    first[0] = replace(first[0], figures=((picture(numbers), "Errors over time and coverage."),))
+    write_report(written["report"], [*first, *sections(results, size, figures(results))], f"armload {TITLE.lower()}")
     return written
+
+
+def pages(page: str | Path) -> dict[str, Path]:
+    """The page's own path and those of what belongs to it, by what they are.
+
+    >>> pages("docs/benchmark.md")["picture"].as_posix()
+    'docs/pictures/benchmark.png'
+    """
+    page = Path(page)
+    beside = page.with_name(f"{page.stem}_tables{page.suffix}")
+    return {"page": page, "tables": beside, "picture": page.parent / "pictures" / f"{page.stem}.png"}
+
+
+def write_front(numbers: Mapping[str, Any], page: str | Path) -> None:
+    """Write the first page and its picture from the summary alone; folders must exist.
+
+    Raises:
+        ReportError: a file cannot be written.
+    """
+    paths = pages(page)
+    drawn = paths["picture"]
+    try:
+        with replacing(drawn) as temporary, look():
+            picture(numbers).savefig(temporary, format="png", dpi=110, metadata={"Software": None})
+    except OSError as error:
+        raise ReportError(
+            f"the picture cannot be written to {drawn}: {error.strerror}; name a page elsewhere"
+        ) from None
+    link = drawn.relative_to(paths["page"].parent).as_posix()
+    write_markdown(paths["page"], front(numbers, link, paths["tables"].name), TITLE, _NOTE)
 
 
 def summary_json(results: Results, size: Size) -> dict[str, Any]:
@@ -63,7 +102,8 @@ def summary_json(results: Results, size: Size) -> dict[str, Any]:
     populations: by name `episodes`, `seeds` and `methods`; of each method, (T, 10) by time and parameter, `mae`,
     `standard_error` over the episodes, `seed_spread` (standard deviation of the seeds' means), `coverage` of its 95 %
     intervals, `half_width`, where the bound was measured `efficiency`, and on the repeated payload `repeatability`.
-    paired: `ratio`, `difference` and `standard_error` (T, 3) by group. targets: `targets.verdicts`.
+    paired: `ratio`, `difference` and `standard_error` (T, 3) by group. targets: `targets.verdicts`. losses:
+    `tables.losses`.
     """
     paired = [
         {
@@ -88,7 +128,8 @@ def summary_json(results: Results, size: Size) -> dict[str, Any]:
         "groups": list(GROUPS),
         "populations": {name: _population(m) for name, m in results.items()},
         "paired": paired,
-        "targets": [{k: _rounded(v) if isinstance(v, float) else v for k, v in t.items()} for t in verdicts(results)],
+        "targets": [_plain(target) for target in verdicts(results)],
+        "losses": [_plain(loss) for loss in losses(results)],
     }
 
 
@@ -111,3 +152,7 @@ def _population(m: Measured) -> dict[str, Any]:
         methods[row] |= {"refused": m.refused[row]} if row in m.refused else {}
         methods[row] |= {"trained": m.trained[row]} if row in m.trained else {}
     return {"episodes": m.runs, "seeds": list(m.comparison.seeds), "prior": m.comparison.prior, "methods": methods}
+
+
+def _plain(numbers: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: _rounded(value) if isinstance(value, float) else value for name, value in numbers.items()}

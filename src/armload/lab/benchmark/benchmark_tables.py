@@ -204,9 +204,9 @@ def efficiency_table(m: Measured, times: Sequence[float]) -> Table | None:
     return Table(f"{m.population.name}: efficiency", ("method", "after [s]", *NAMES), tuple(rows), note)
 
 
-def losses_table(results: Results) -> Table:
-    """Where another row is ahead of the subject, the one that is most."""
-    of, rows = subject(results), []
+def losses(results: Results) -> list[dict]:
+    """Where another row is ahead of the subject: population, time [s], group, errors of both [SI], the best row."""
+    of, found = subject(results), []
     for name, m in results.items():
         if of not in m.rows or of is None or name == REPEAT:
             continue
@@ -215,9 +215,19 @@ def losses_table(results: Results) -> Table:
                 better = [row for row in m.rows if ahead(m, row, t, k, of)]
                 if better:
                     error = {row: float(m.grouped[m.rows.index(row), :, t, k].mean()) for row in (of, *better)}
-                    best, unit = min(better, key=lambda row: error[row]), SHOWN_UNITS[GROUPS[group]][0]
-                    values = (f"{short(SHOWN_SCALE * error[row])} {unit}" for row in (of, best))
-                    rows.append((name, f"{time:g} s", group, *values, best))
+                    best = min(better, key=lambda row: error[row])
+                    cell = {"population": name, "time": float(time), "group": group}
+                    found.append(cell | {"error": error[of], "better": error[best], "which": best})
+    return found
+
+
+def losses_table(results: Results) -> Table:
+    """Where another row is ahead of the subject, the one that is most."""
+    of, rows = subject(results), []
+    for loss in losses(results):
+        unit = SHOWN_UNITS[GROUPS[loss["group"]]][0]
+        values = (f"{short(SHOWN_SCALE * loss[key])} {unit}" for key in ("error", "better"))
+        rows.append((loss["population"], f"{loss['time']:g} s", loss["group"], *values, loss["which"]))
     columns = ("population", "after", "group", str(of), "better", "which")
     note = (
         f"Every population, time and group where some row is ahead of {of} by more than two standard errors of the "

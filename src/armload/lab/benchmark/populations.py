@@ -7,14 +7,13 @@ from functools import cache
 
 import numpy as np
 
-from armload.arms import Arm
+from armload.arms import Arm, rated_mass
 from armload.errors import ArmError
 from armload.inertia import InertialParameters
 from armload.lab.cells import key_of
 from armload.lab.episodes import LIGHTEST, POPULATIONS, TOOL_SHARE, Episode, Recipe, draw_episodes, simulate_episodes
 from armload.payloads import draw_payload
 from armload.regression import GaussianPrior
-from armload.simulation import rated_mass
 
 REPEAT = "repeat"
 _PAYLOADS = 400  # that the baselines are told of

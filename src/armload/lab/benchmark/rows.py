@@ -30,7 +30,7 @@ _LEFT_OUT = {
     "training": "needs a model trained for one motion, which no episode here runs",
     "motion": "needs the commanded motion, which a log does not hold",
 }
-_TRAINED = ("population", "episodes", "seed")  # what of a model's provenance the page repeats
+_TRAINED = ("population", "episodes", "seed")  # what of a model's training the page repeats
 _PROBE = Recipe(duration=2.0, same_motion=1.0)
 _PROBE_SEED, _PROBE_RATE, _PROBE_TIMES = 5, 100.0, (0.1, 1.0, 2.0)
 _DIGITS = 5  # of an answer that count as the same
@@ -132,5 +132,5 @@ def bound_std(arm: Arm, logs: EpisodeLogs, prior: GaussianPrior, times: Sequence
 
 def trained_on(identifier: Any) -> str:
     """What a trained method says it was trained on, "" for one that was not."""
-    provenance = getattr(getattr(identifier, "model", None), "provenance", None) or {}
-    return ", ".join(f"{name} {provenance[name]}" for name in _TRAINED if name in provenance)
+    training = getattr(getattr(identifier, "model", None), "training", None)
+    return "" if training is None else ", ".join(f"{name} {getattr(training, name)}" for name in _TRAINED)

@@ -7,12 +7,12 @@ alone is worth, `PriorLeastSquares` what least squares makes of the same prior a
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
 from armload.estimators import Estimate, Identifier
 from armload.posterior import PosteriorLeastSquares
-from armload.recording import Recording, Sample
+from armload.recording import Recording
 from armload.regression import GaussianPrior
 
 
@@ -41,13 +41,14 @@ class TrainingMean(Identifier):
         """Start counting samples anew."""
         self._count = 0
 
-    def update(self, sample: Sample) -> Estimate:
-        """The same answer at every sample."""
-        self._count += 1
-        return Estimate(float(sample.t), self.prior.mean, self.prior.covariance, self._count, str(self.arm.frame))
+    def _take(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:  # noqa: ARG002
+        self._count += len(t)
+
+    def _estimate(self, t: float) -> Estimate:
+        return Estimate(t, self.prior.mean, self.prior.covariance, self._count, str(self.arm.frame))
 
 
-class PriorLeastSquares(Identifier):
+class PriorLeastSquares(PosteriorLeastSquares):
     """MAP least squares that knows the training payloads: phi ~ N(mean, covariance) instead of a weak prior.
 
     Everything else is `PosteriorLeastSquares`: the acceleration-free regression r = W·phi, the arm's own mismatch as
@@ -62,21 +63,4 @@ class PriorLeastSquares(Identifier):
     name = "same-prior least squares"
 
     def __init__(self, arm: Arm, mean: ArrayLike, covariance: ArrayLike, tare: Recording | None = None) -> None:
-        self.arm, self.prior = arm, GaussianPrior(np.asarray(mean), np.asarray(covariance))
-        self._solver = PosteriorLeastSquares(arm, tare, prior=self.prior)
-
-    def reset(self) -> None:
-        """Forget the run (not the tare); the next sample is the first."""
-        self._solver.reset()
-
-    def update(self, sample: Sample) -> Estimate:
-        """Take one sample (t, q, dq, tau) and return the estimate so far."""
-        return self._solver.update(sample)
-
-    def trace(self, recording: Recording, every: int = 1) -> list[Estimate]:
-        """The estimates along a recording: one per `every` samples, and always the last."""
-        return self._solver.trace(recording, every)
-
-    def at(self, recording: Recording, times: ArrayLike) -> list[Estimate]:
-        """The estimates `times` [s] after a recording's first sample; nothing is solved in between."""
-        return self._solver.at(recording, times)
+        super().__init__(arm, tare, prior=GaussianPrior(np.asarray(mean), np.asarray(covariance)))

@@ -116,7 +116,7 @@ def ratio_table(cells: Cells) -> Table:
 
 
 def first_table(cells: Cells) -> Table:
-    """What the first sample of a run tells, beside what the whole run tells."""
+    """The first estimate of a run and the last, with their errors."""
     read = {"first": at_first, "end": at_end}
     mean = list(benchmark(cells, "training-mean", "row").values())
     blind = at_first(mean, REAL)
@@ -143,7 +143,7 @@ def first_table(cells: Cells) -> Table:
     note = (
         "Test payload, rows split at random. First: the answer to the first sample of a run. Over the training mean: "
         "error of the first estimate on real-like arms over that of the training mean, geometric mean over the ten "
-        f"parameters; below 1 the first sample told something. {SPREAD} {NOT_YET}"
+        f"parameters; below 1 the first sample helped. {SPREAD} {NOT_YET}"
     )
     return Table("First estimates", (*columns, "over the training mean"), tuple(filled), note, baselines_of(filled))
 

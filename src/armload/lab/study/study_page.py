@@ -21,6 +21,7 @@ from armload.lab.study.counterparts import (
     training_rows,
 )
 from armload.lab.study.numbers import PAPER_EPOCHS, Cells, at_end, cap, held_out
+from armload.lab.study.plain import against_table, in_plain_words
 from armload.lab.study.statements import RULES
 from armload.lab.study.study_tables import COMMAND, PROTOCOLS, claims_table, epochs_table, main_tables, parameter_table
 
@@ -55,7 +56,7 @@ was not moved along the same path. The real log holds no such run: there both ro
 log and are the same. Filter gain, forgetting and start of the recursion are ours: [7] does not state them.
 
 **No real Panda with a payload was measured.** Its stand-in are arms that differ from their model as real ones do, in
-links, friction, offsets and a smooth residual; and, where a log of a real unloaded Panda was at hand, that log with
+links, friction, offsets and a smooth residual. Where a log of a real unloaded Panda was available, it is that log with
 the test payload's torque added. Read "real robot" in a claim as the paper's, "real-like" as ours."""
 
 
@@ -67,7 +68,8 @@ def sections(cells: Cells, claims: Sequence[dict[str, Any]], figures: dict[int, 
         return tuple((drawn[n], _CAPTIONS[n]) for n in numbers if n in drawn)
 
     return [
-        Section("In plain words", "\n\n".join(summary.paragraphs(cells, claims)), (ratio_table(cells),)),
+        Section("In plain words", in_plain_words(cells, claims), (against_table(cells),)),
+        Section("The findings in numbers", "\n\n".join(summary.paragraphs(cells, claims)), (ratio_table(cells),)),
         Section("What was run", _what_was_run(cells) + "\n\n" + _PAPER_GIVES, _run_tables(cells)),
         Section("Every method under every protocol", _PROTOCOLS, main_tables(cells)),
         Section("Figures 4 to 8", _FIGURES, _figure_tables(cells), shown(4, 5, 6, 7, 8)),
@@ -145,11 +147,11 @@ def _versions(cells: Cells) -> dict[str, str]:
 
 _PROTOCOLS = """Split: what was held out from training, rows drawn at random (the paper's) or whole payloads; epochs:
 the cap. The errors of a group are averaged over its parameters. Read a column against the row `training mean`: a method
-above it tells nothing of the parameter. `same-prior least squares` are MAP least squares whose prior is the payloads
-the ensembles were trained with: what an ensemble has to beat.
+with a larger error has no information on the parameter. `same-prior least squares` are MAP least squares whose prior
+has the mean and covariance of the payloads of the training: what an ensemble has to beat.
 
 `test rows, single samples` are the held-out rows of the simulated data set. Rows split at random put neighbours of
-every test row, the same payload two milliseconds away, into the training: that measures memorising. The other columns
+every test row, the same payload two milliseconds away, into the training. This measures memorising. The other columns
 are whole runs: the running mean of an ensemble at the end, the mean over the second half for RLS and filtered RLS (as
 in [7]), the last estimate of the other least squares. Payloads held out, `other payloads` (outside the container's
 family) and `other motions` measure what was learned."""
@@ -157,11 +159,11 @@ _FIGURES = """The tables are the figures in numbers. For the test payload the pa
 used: mass and first moments come from single-stage ensembles, the inertia from two-stage ones, as the paper found
 better."""
 _FIRST = """The paper calls its estimates accurate from the first time step. An ensemble answers from the first sample
-on; what that is worth shows beside the training mean, which needs no sample, and beside least squares. RLS and MAP
+on. Compare this answer with the training mean, which needs no sample, and with least squares. RLS and MAP
 least squares need more than one sample: their first estimate is what they start from, zero (an error of 100 %) or, for
-same-prior least squares, the mean of the training payloads. Filtered RLS reads gravity off the first sample, for these
-runs start at rest: it has the mass and a part of the first moments, and nothing of the inertia."""
-_ABLATIONS = """Each table changes one thing; a row stands below the one it is compared with, which has the same split
+same-prior least squares, the mean of the training payloads. Filtered RLS takes gravity from the first sample, as
+these runs start at rest: it has the mass and a part of the first moments, but no inertia."""
+_ABLATIONS = """Each table changes one thing. A row stands below the one it is compared with, which has the same split
 and the same cap on epochs. In SI units the mass is a hundred times larger than the moments of inertia and dominates
 both the loss of a network and the splits of a tree."""
 

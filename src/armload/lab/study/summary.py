@@ -1,4 +1,4 @@
-"""The study in plain words, every number and every comparison computed from the cells."""
+"""The findings of the study in numbers, every number and every comparison computed from the cells."""
 
 from __future__ import annotations
 
@@ -64,14 +64,14 @@ def paragraphs(cells: Cells, claims: Sequence[dict[str, Any]]) -> list[str]:
 
 def _tally(claims: Sequence[dict[str, Any]]) -> str:
     numbered = [claim for claim in claims if claim["paper"] is not None]
-    said = [claim for claim in claims if claim["paper"] is None]
+    stated = [claim for claim in claims if claim["paper"] is None]
     close = [c for c in numbered if c["verdict"] == CONFIRMED and abs(c["ours"] - c["paper"]) <= _SIZE]
     vague = [c for c in numbered if within_spread(c)]
     return (
         f"**The claims.** The paper gives {len(numbered)} comparisons as a percentage, repeats included: "
         f"{_counts(numbered)}. Of those confirmed, {len(close)} agree with the paper's number within {_SIZE:g} points. "
         f"Of all measured, {len(vague)} are smaller than their own spread over seeds or arms: others might "
-        f"turn them. It makes {len(said)} statements without a number: {_counts(said)}."
+        f"reverse them. It makes {len(stated)} statements without a number: {_counts(stated)}."
     )
 
 
@@ -147,8 +147,8 @@ def _first_step(cells: Cells) -> str:
     if blind is None or not first:
         return _capital(_NOT_YET)
     text = (
-        "Error of the first estimate on real-like arms over that of the training mean, which looks at no measurement: "
-        "geometric mean over the ten parameters, and by group. "
+        "Error of the first estimate on real-like arms divided by that of the training mean, which uses no "
+        "measurement: geometric mean over the ten parameters, and by group. "
         + _capital("; ".join(f"{name}: {_over(errors, blind)}" for name, errors in first.items()))
         + "."
     )
@@ -157,20 +157,20 @@ def _first_step(cells: Cells) -> str:
     if hit:
         text += (
             f" The training mean happens to be within {100 * _HIT:g} % of the truth on {_listed(hit)}, which in the "
-            "geometric mean counts against whoever looks at measurements, and hardly within a group."
+            "geometric mean counts against every method that uses measurements, and hardly within a group."
         )
     prior = list(benchmark(cells, "same-prior").values())
     begin, end = at_first(prior, REAL), at_end(prior, REAL)
     if begin is not None and end is not None:
         text += (
-            f" What being early is worth against {LEAST_SQUARES['same-prior']}, which are told the same payloads: "
+            f" For comparison {LEAST_SQUARES['same-prior']}, whose prior is the same payloads: "
             f"their first estimate, the prior, is at {_over(begin, blind)}; their last one at {_over(end, blind)}."
         )
     filtered = at_first(list(benchmark(cells, "rls-filter").values()), REAL)
     if filtered is not None:
         masses = [f"{name} {_mass(errors)}" for name, errors in first.items()]
         masses += [f"{LEAST_SQUARES['rls-filter']} {_mass(filtered)}", f"{TRAINING_MEAN} {_mass(blind)}"]
-        text += f" The mass alone, from one sample: {'; '.join(masses)}."
+        text += f" Error of the mass from one sample: {'; '.join(masses)}."
     return text
 
 
@@ -198,27 +198,30 @@ def _same_prior(cells: Cells) -> str:
                 ratios.append(f"{PROTOCOLS[protocol]} {short(ratio, 2)}")
         sentences.append(f"{_capital(name)}: " + ("; ".join(ratios) + "." if ratios else _NOT_YET))
     return (
-        "Error of an ensemble over that of the least squares that are told the training payloads as a Gaussian prior, "
+        "Error of an ensemble divided by that of least squares with a Gaussian prior fitted to the training payloads, "
         "at the end of a run, geometric mean over the parameters (above 1: the ensemble is worse). "
         + " ".join(sentences)
     )
 
 
 def _without_torque(cells: Cells) -> str:
-    told = []
+    sentences = []
     for reference, cell in compared(cells, "torque"):
         a, b = held_out([reference]), held_out([cell])
         if a is not None and b is not None:
             ratios = [short(b[:, p].mean() / a[:, p].mean(), 2) for p in GROUPS.values()]
             name = ensemble_shown(cell["spec"]["kind"], cell["spec"]["scale"], most=cap(cell))
-            told.append(f"{name}, {SPLITS[cell['spec']['split']]} held out: {_each(ratios)}, mass error {_mass(b)}")
-    if not told:
+            sentences.append(
+                f"{name}, {SPLITS[cell['spec']['split']]} held out: {_each(ratios)}, mass error {_mass(b)}"
+            )
+    if not sentences:
         return _capital(_NOT_YET)
     return (
-        "Error of single samples of single-stage ensembles that never saw the torque over that of those that did. "
-        + _capital("; ".join(told))
+        "Error of single samples of single-stage ensembles without the torque, divided by that of the same ensembles "
+        "with it. "
+        + _capital("; ".join(sentences))
         + ". The controller does not know the payload, so the joints sag under it by up to a few milliradians: in "
-        "noise-free simulation position and velocity alone tell of the payload, as much as the controller is soft."
+        "noise-free simulation position and velocity alone reveal the payload, the more the softer the controller is."
     )
 
 
@@ -228,8 +231,8 @@ def _stages(cells: Cells) -> str:
         found = matched(cells, Ensemble(kind, 1, "row", scale), Ensemble(kind, 2, "row", scale))
         sentences.append(_ratios(found, f"{LEARNERS[kind]}, {_UNITS[scale]}"))
     return (
-        "Error of two-stage over single-stage training on held-out rows; if scaling the outputs brings the ratios to "
-        "1, it was the scale, not the stages. " + " ".join(sentences)
+        "Error of two-stage divided by that of single-stage training on held-out rows. Ratios near 1 after scaling the "
+        "outputs mean that the scale made the difference, not the stages. " + " ".join(sentences)
     )
 
 
@@ -243,7 +246,8 @@ def _scales(cells: Cells) -> str:
         sentences.append(_ratios(found, LEARNERS[kind]))
     return (
         "The paper does not say how it scaled inputs and outputs; our main rows are in SI units. Error of standardised "
-        "over SI training on held-out rows, single-stage, geometric mean within a group. " + " ".join(sentences)
+        "divided by that of SI training on held-out rows, single-stage, geometric mean within a group. "
+        + " ".join(sentences)
     )
 
 

@@ -3,31 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, astuple, dataclass, replace
+from dataclasses import asdict, astuple, replace
+from importlib import metadata
 from pathlib import Path
+from platform import python_version
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm, kinship
+from armload.arms import Arm, kinship, rated_mass
 from armload.errors import ModelError
-from armload.inertia import Z95
 from armload.lab.cells import key_of
-from armload.lab.episodes import (
-    LIGHTEST,
-    POPULATIONS,
-    TOOL_SHARE,
-    Episode,
-    draw_episodes,
-)
-from armload.lab.training.calibrating import fit_calibration, nearest
+from armload.lab.episodes import LIGHTEST, POPULATIONS, TOOL_SHARE, Episode, draw_episodes
+from armload.lab.training.calibrating import fit_calibration
+from armload.lab.training.coverage import FOLDS, Coverage, cross_validated
 from armload.lab.training.records import TIMES, Records, measure_episodes
 from armload.payloads import draw_payload
-from armload.posterior import TRAITS, Calibration, HybridModel, MixturePrior
-from armload.posterior.evidence import KINDS
-from armload.posterior.model_file import POOLED
+from armload.posterior import TRAITS, HybridModel, MixturePrior, Training
 from armload.regression import payload_prior_std
-from armload.simulation import rated_mass
 from armload.version import __version__
 
 EPISODES = 2400
@@ -45,26 +38,9 @@ FAMILIES = {
     "light": 0.05,
     "tool and payload": 0.1,
 }
-FOLDS = 4
+_PACKAGES = ("armload", "jax", "joblib", "mujoco", "numpy", "pin", "scikit-learn", "scipy")
 # a payload unlike all families must not be pulled to one of them: a wide component, in units of the weak prior
 _ANYTHING, _ANYTHING_SHARE = 2.0, 0.03
-
-
-@dataclass(frozen=True)
-class Coverage:
-    """How well the intervals held on episodes that training had not seen.
-
-    pooled: share of all parameters, times and episodes that lay inside.
-    cells: (3, B, 10) the same by what there was to compare with (`KINDS`), time and parameter; NaN where nothing was.
-    ratio: (3, B, 10) mean half-width over mean absolute error. episodes: how many.
-    counts: (3, B) how many of the episodes a cell rests on.
-    """
-
-    pooled: float
-    cells: NDArray[np.float64]
-    ratio: NDArray[np.float64]
-    episodes: int
-    counts: NDArray[np.int64]
 
 
 def train_hybrid(
@@ -89,7 +65,8 @@ def train_hybrid(
         progress: called as progress(done, total).
 
     Returns:
-        the model, and the coverage of its kind on episodes held out (cross-validated).
+        the model, with all that its file says of it, and the coverage of its kind on episodes held out
+        (cross-validated).
 
     Raises:
         ModelError: too few episodes.
@@ -106,14 +83,15 @@ def train_hybrid(
         kinship(arm),
         str(arm.frame),
         arm.n,
-        {
-            "population": population,
-            "episodes": episodes,
-            "seed": seed,
-            POOLED: round(checked.pooled, 4),
-        },
+        {**checked.table(), "versions": versions()},
+        Training(population, episodes, seed, round(checked.pooled, 4)),
     )
     return model, checked
+
+
+def versions() -> dict[str, str]:
+    """Versions of what can change a trained number."""
+    return {"python": python_version(), **{name: metadata.version(name) for name in _PACKAGES}}
 
 
 def payload_mixture(arm: Arm, seed: int = 0) -> MixturePrior:
@@ -135,54 +113,6 @@ def payload_mixture(arm: Arm, seed: int = 0) -> MixturePrior:
     fitted = MixturePrior.fit(samples, FAMILIES, seed)
     wide = np.diag((_ANYTHING * payload_prior_std(arm)) ** 2)
     return fitted.joined(MixturePrior(np.ones(1), np.zeros((1, 10)), wide[None], ("anything",)), _ANYTHING_SHARE)
-
-
-def cross_validated(
-    records: Records, prior: MixturePrior, seed: int = 0, learned: tuple[str, ...] = ("tree", "network")
-) -> Coverage:
-    """Coverage of the intervals on held-out episodes: each fold is answered by a calibration fitted on the others.
-
-    The folds together lie near 95 % whatever the luck of the draw: where one holds more of the wild episodes, the
-    others' widths are the smaller. `coverage_on` new episodes tells how lucky the widths are.
-    """
-    episodes = np.random.default_rng([seed, 8]).permutation(np.unique(records.episode))
-    error, half = np.zeros((2, len(records), 10))
-    for k in range(FOLDS):
-        held = np.isin(records.episode, episodes[k::FOLDS])
-        calibration = fit_calibration(records.select(~held), prior, learned=learned, seed=seed + k)
-        error[held], half[held] = _answered(records.select(held), prior, calibration)
-    return _coverage(records, error, half)
-
-
-def coverage_on(records: Records, prior: MixturePrior, calibration: Calibration) -> Coverage:
-    """Coverage of a finished model's intervals on episodes that it was not trained on."""
-    return _coverage(records, *_answered(records, prior, calibration))
-
-
-def _answered(
-    records: Records, prior: MixturePrior, calibration: Calibration
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Absolute errors and half-widths (N, 10)."""
-    error, half = np.zeros((2, len(records), 10))
-    for k in range(len(records)):
-        found = calibration.answer(records.evidence(k), prior)
-        error[k] = np.abs(found.mean - records.truth[k])
-        half[k] = Z95 * np.sqrt(np.diag(found.covariance))
-    return error, half
-
-
-def _coverage(records: Records, error: NDArray[np.float64], half: NDArray[np.float64]) -> Coverage:
-    inside = error <= half
-    cells, ratio = np.full((len(KINDS), len(TIMES), 10), np.nan), np.full((len(KINDS), len(TIMES), 10), np.nan)
-    counts, which = np.zeros((len(KINDS), len(TIMES)), dtype=int), nearest(records.t, np.array(TIMES))
-    for kind in range(len(KINDS)):
-        for b in range(len(TIMES)):
-            rows = (records.kind == kind) & (which == b)
-            counts[kind, b] = rows.sum()
-            if rows.any():
-                cells[kind, b] = inside[rows].mean(axis=0)
-                ratio[kind, b] = half[rows].mean(axis=0) / error[rows].mean(axis=0)
-    return Coverage(float(inside.mean()), cells, ratio, len(np.unique(records.episode)), counts)
 
 
 def episode_records(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from armload.atomic import replacing
 from armload.errors import ModelError
 from armload.lab.episodes import Episode, simulate_episodes
-from armload.posterior import Evidence, Physics
+from armload.posterior import Evidence, SmoothPosteriorLeastSquares
 from armload.recording import Recording
 
 TIMES = (0.02, 0.05, 0.1, 0.5, 1.0, 3.0, 6.0)  # [s] since the run began
@@ -129,14 +129,14 @@ def _measured(first: int, batch: Sequence[Episode], times: tuple[float, ...]) ->
 
 def evidence_over_time(arm: Any, run: Recording, tare: Recording | None, times: Sequence[float]) -> list[Evidence]:
     """Evidence `times` [s] after a run began."""
-    physics = Physics(arm, tare)
+    physics = SmoothPosteriorLeastSquares(arm, tare, same_motion=True)
     stops = np.searchsorted(run.t, run.t[0] + np.asarray(times), side="right")
     out, start = [], 0
     for stop in np.maximum(stops, 2):
         part = slice(start, stop)
         if stop > start:
             physics._take(run.t[part], run.q[part], run.dq[part], run.tau[part])
-        physics._estimate(float(run.t[stop - 1]))
-        out.append(physics.evidence(float(run.t[stop - 1])))
+        physics.conclude()
+        out.append(physics.evidence())
         start = stop
     return out

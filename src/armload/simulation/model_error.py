@@ -1,10 +1,10 @@
 """How far a simulated arm is off its model, part by part: the figures, and draws of links and friction.
 
-The figures for the Panda are measured ones: two robots, published model, below 10 Hz. After links, offsets and friction
-have been fitted, (.20 .29 .19 .20 .08 .05 .05) N·m rms remain, smooth in q and repeatable: a torque outside the
-rigid-body span. The link figures (2 % of mass, 2 mm, 5 % of inertia, times `Arm.link_spread`: a model identified on a
-robot is better than a maker's drawing) are our choice. Other arms scale with rated torque. What is beyond the measured
-ones is our choice altogether.
+An arm's sheet may hold measured figures (the Panda's: two robots, published model, below 10 Hz). What remains there
+after links, offsets and friction have been fitted is smooth in q and repeatable: a torque outside the rigid-body span.
+The link figures (2 % of mass, 2 mm, 5 % of inertia, times `Arm.link_spread`: a model identified on a robot is better
+than a maker's drawing) are our choice. Arms without scale with rated torque. What is beyond the measured ones is our
+choice altogether.
 """
 
 from __future__ import annotations
@@ -12,18 +12,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import LINK_SPREAD, Arm, rated_effort
+from armload.arms import FRICTION_WIDTH, LINK_SPREAD, Arm, facts_of, rated_effort
 from armload.inertia import com_to_phi, nearest_consistent, phi_to_com
 from armload.simulation.friction import Friction
-from armload.simulation.ratings import is_panda
 
 _LINK_MOST = 10.0  # a spread of links beyond this many of `LINK_SPREAD` would leave no arm
 _LIGHTEST_LINK = 0.2  # of the model's mass
-_PANDA_OFFSET = (0.2, 0.3, 0.12, 0.25, 0.05, 0.08, 0.02)  # [N·m], 1 sigma
-_PANDA_FRICTION = (0.25, 0.25, 0.2, 0.35, 0.35, 0.2, 0.26)  # [N·m]
-_PANDA_RESIDUAL = (0.20, 0.28, 0.19, 0.20, 0.08, 0.05, 0.045)  # [N·m], rms
-_OTHER_OFFSET, _OTHER_FRICTION, _OTHER_RESIDUAL = 0.003, 0.01, 0.0035  # of the rated torque
-_FRICTION_WIDTH = 0.06  # [rad/s]
+_OFFSET, _FRICTION, _RESIDUAL = 0.003, 0.01, 0.0035  # of the rated torque, of an arm that nobody has measured
 _FRICTION_SPREAD = 0.3
 
 # beyond the measured ones
@@ -38,10 +33,14 @@ _ROTOR = (0.002, 0.02)  # [s²] rotor inertia over rated torque
 
 def sizes(arm: Arm) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Offset, friction and residual (n,) of an arm like the measured ones [N·m]."""
-    if is_panda(arm):
-        return np.array(_PANDA_OFFSET), np.array(_PANDA_FRICTION), np.array(_PANDA_RESIDUAL)
-    rated = rated_effort(arm)
-    return rated * _OTHER_OFFSET, rated * _OTHER_FRICTION, rated * _OTHER_RESIDUAL
+    rated, facts = rated_effort(arm), facts_of(arm)
+
+    def size(measured: tuple[float, ...] | None, share: float) -> NDArray[np.float64]:
+        return rated * share if measured is None else np.array(measured)
+
+    if facts is None:
+        return rated * _OFFSET, rated * _FRICTION, rated * _RESIDUAL
+    return size(facts.offset, _OFFSET), size(facts.friction, _FRICTION), size(facts.residual, _RESIDUAL)
 
 
 def on_motor(arm: Arm, rng: np.random.Generator) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -57,7 +56,7 @@ def _spread(level: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.
 
 def plain_friction(level: NDArray[np.float64], rng: np.random.Generator) -> Friction:
     """tanh friction of the measured width, its level scattered about the given one."""
-    return Friction(_spread(level, rng), np.full(len(level), _FRICTION_WIDTH))
+    return Friction(_spread(level, rng), np.full(len(level), FRICTION_WIDTH))
 
 
 def any_friction(level: NDArray[np.float64], rng: np.random.Generator, load: float) -> Friction:

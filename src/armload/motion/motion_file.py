@@ -25,8 +25,13 @@ def taie2024() -> FourierMotion:
     >>> motion.n, motion.harmonics, motion.duration
     (7, 8, 6.0)
     """
-    text = resources.files("armload.motion").joinpath("motions/taie2024.json").read_text(encoding="utf-8")
-    return _from_text(text, "taie2024.json")
+    return shipped_motion("taie2024")
+
+
+def shipped_motion(name: str) -> FourierMotion:
+    """A motion that comes with armload, by name."""
+    text = resources.files("armload.motion").joinpath(f"motions/{name}.json").read_text(encoding="utf-8")
+    return _from_text(text, f"{name}.json")
 
 
 def load_motion(path: str | Path) -> FourierMotion:

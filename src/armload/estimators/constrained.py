@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
-from armload.estimators.contract import Estimate, Tared
+from armload.estimators.contract import Estimate, Identifier, Tared
 from armload.estimators.normal import UNKNOWN, WeightedLeastSquares
 from armload.inertia import (
     InertialParameters,
@@ -48,22 +48,35 @@ _CHART_MEAN = np.array([0.0] + [np.log(0.05)] * 3 + [0.0] * 6)
 _CHART_STD = np.array([2.0] + [1.5] * 3 + [0.1] * 3 + [0.3] * 3)
 
 
-class _ConsistentLeastSquares(WeightedLeastSquares):
+class _ConsistentLeastSquares(Identifier):
     """Weighted least squares, less the tare's, handed to a subclass that makes a body of it."""
 
     def __init__(self, arm: Arm, tare: Recording | None = None, gain: float = 20.0) -> None:
-        super().__init__(arm, gain)
+        self.arm, self._free = arm, WeightedLeastSquares(arm, gain)
         self.before = None if tare is None else Tared(WeightedLeastSquares(arm, gain), tare).before
 
+    def reset(self) -> None:
+        """Forget the run (not the tare); the next sample is the first."""
+        self._free.reset()
+        self._unprojected: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+
+    @property
+    def unprojected(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """The unconstrained estimate less the tare's, and its covariance; None before the first sample."""
+        return self._unprojected
+
+    def _take(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
+        self._free._take(t, q, dq, tau)
+
     def _estimate(self, t: float) -> Estimate:
-        free = super()._estimate(t)
-        w = 1.0 / self._residual_variance(free.phi) if self._rows_seen else np.ones(self.arm.n)
-        phi, G = self._solve(w)
-        spread = max(1.0, _CORRELATION * self._blocks.rate) * G
+        free = self._free._estimate(t)
+        phi, G, rate = self._free.weighted_solution(free.phi)
+        spread = max(1.0, _CORRELATION * rate) * G
         covariance = free.covariance
         if self.before is not None:
             phi, spread = phi - self.before.phi, spread + self.before.covariance
             covariance = covariance + self.before.covariance
+        self._unprojected = phi, covariance
         body, covariance = self._body(phi, _inverse(spread), covariance)
         return replace(free, phi=body, covariance=covariance)
 

@@ -5,7 +5,8 @@ Pure functions of numbers; nothing here knows how a picture is made.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from functools import cache
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,16 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 from armload.arms import Arm
 from armload.inertia import InertialParameters, phi_to_com
 
+if TYPE_CHECKING:
+    from trimesh import Trimesh
+
 CHI2_95 = 7.814727903251179  # 95 % quantile of chi² with three degrees of freedom
 _THICK, _THIN = 0.042, 0.026  # radius of the first and the last link, in units of the length of all links
 _SHORT = 1e-3  # [m] a link shorter than this shows its joint only
-
-
-class Mesh(NamedTuple):
-    """Triangles: vertices (V, 3) [m] and faces (F, 3), turning left when seen from outside."""
-
-    vertices: NDArray[np.float64]
-    faces: NDArray[np.int_]
 
 
 class Part(NamedTuple):
@@ -30,7 +27,7 @@ class Part(NamedTuple):
 
     frame: int
     kind: str  # "link" or "joint"
-    mesh: Mesh
+    mesh: Trimesh
 
 
 class Box(NamedTuple):
@@ -41,49 +38,36 @@ class Box(NamedTuple):
     lengths: NDArray[np.float64]
 
 
-def capsule(start: ArrayLike, end: ArrayLike, radius: float, sides: int = 24) -> Mesh:
+def capsule(start: ArrayLike, end: ArrayLike, radius: float, sides: int = 24) -> Trimesh:
     """All points at `radius` [m] from the segment between two points (3,): a rounded link."""
+    from trimesh import creation, geometry
+
     start, end = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
-    latitudes = np.linspace(-np.pi / 2, np.pi / 2, sides // 2 + 1)[1:-1]
-    half = len(latitudes) // 2 + 1
-    latitudes = np.concatenate([latitudes[:half], latitudes[half - 1 :]])  # the equator twice: once at either end
-    far = np.repeat([0.0, float(np.linalg.norm(end - start))], [half, len(latitudes) - half])
-    return _turned(radius * np.cos(latitudes), radius * np.sin(latitudes) + far, radius, start, end, sides)
-
-
-def drum(centre: ArrayLike, axis: ArrayLike, radius: float, length: float, sides: int = 32) -> Mesh:
-    """A cylinder about a centre (3,) [m], along an axis (3,): a joint."""
-    centre, half = np.asarray(centre, dtype=float), 0.5 * length * np.asarray(axis, dtype=float) / np.linalg.norm(axis)
-    rims = np.array([0.0, 0.0, length, length])  # each rim twice: the edge stays sharp where light is smoothed
-    return _turned(np.full(4, radius), rims, 0.0, centre - half, centre + half, sides)
-
-
-def ellipsoid(semi_axes: ArrayLike, sides: int = 24) -> Mesh:
-    """An ellipsoid about the origin with these semi-axes (3,) [m] along x, y and z."""
-    ball = capsule(np.zeros(3), np.zeros(3), 1.0, sides)
-    return Mesh(ball.vertices * np.asarray(semi_axes, dtype=float), ball.faces)
-
-
-def _turned(radii: NDArray, heights: NDArray, cap: float, start: NDArray, end: NDArray, sides: int) -> Mesh:
-    """The surface of circles (R,) above one another, closed by a point `cap` beyond either end."""
     length = float(np.linalg.norm(end - start))
-    z = (end - start) / length if length > 0 else np.array([0.0, 0.0, 1.0])
-    x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
-    x /= np.linalg.norm(x)
-    turn = 2 * np.pi * np.arange(sides) / sides
-    circle = np.cos(turn)[:, None] * x + np.sin(turn)[:, None] * np.cross(z, x)
-    rings = start + radii[:, None, None] * circle + heights[:, None, None] * z
-    vertices = np.vstack([rings.reshape(-1, 3), start - cap * z, start + (length + cap) * z])
-    bottom, top, last = len(vertices) - 2, len(vertices) - 1, (len(radii) - 1) * sides
-    k, after = np.arange(sides), (np.arange(sides) + 1) % sides
-    faces = [
-        np.stack([np.full(sides, bottom), after, k], 1),
-        np.stack([last + k, last + after, np.full(sides, top)], 1),
-    ]
-    for ring in range(0, last, sides):
-        faces.append(np.stack([ring + k, ring + after, ring + sides + k], 1))
-        faces.append(np.stack([ring + after, ring + sides + after, ring + sides + k], 1))
-    return Mesh(np.asarray(vertices, dtype=float), np.concatenate(faces))
+    mesh = creation.capsule(height=length, radius=radius, count=[sides, sides])
+    place = np.array(geometry.align_vectors([0.0, 0.0, 1.0], (end - start) / length))
+    place[:3, 3] = 0.5 * (start + end)
+    return mesh.apply_transform(place)
+
+
+def drum(centre: ArrayLike, axis: ArrayLike, radius: float, length: float, sides: int = 32) -> Trimesh:
+    """A cylinder about a centre (3,) [m], along an axis (3,): a joint; its rims stay sharp where light is smoothed."""
+    from trimesh import creation
+
+    centre, half = np.asarray(centre, dtype=float), 0.5 * length * np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    return creation.cylinder(radius=radius, segment=[centre - half, centre + half], sections=sides).smooth_shaded
+
+
+def ellipsoid(semi_axes: ArrayLike) -> Trimesh:
+    """An ellipsoid about the origin with these semi-axes (3,) [m] along x, y and z; always of the same faces."""
+    return _ball().copy().apply_scale(np.asarray(semi_axes, dtype=float))
+
+
+@cache
+def _ball() -> Trimesh:
+    from trimesh import creation
+
+    return creation.icosphere(subdivisions=3)
 
 
 def arm_parts(arm: Arm) -> list[Part]:

@@ -1,0 +1,153 @@
+"""What is known of each built-in arm and no URDF says: one sheet per arm, `descriptions/NAME.toml`, with its sources.
+
+An arm is added by its sheet and its `descriptions/NAME.urdf`; nothing else names it. A key carries its unit, a table
+its source:
+
+    [payload]
+    "rated [kg]" = 3.0
+    source = "data sheet"
+
+What a sheet leaves out is not known, and each user's rule for unknown arms holds (`strength.py`).
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, field, fields
+from importlib import resources
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+from armload.errors import ArmError
+
+_SHEETS = "descriptions"
+
+
+def _said(table: str, key: str, default: Any = MISSING) -> Any:
+    """A fact that stands in a table of the sheet under a key, its unit included; with a default it may be left out."""
+    return field(default=default, metadata={"table": table, "key": key})
+
+
+class Capsule(NamedTuple):
+    """All points within `radius` [m] of a segment that is fixed to a link (0 is the base), in its joint frame [m]."""
+
+    link: int
+    start: tuple[float, float, float]
+    end: tuple[float, float, float]
+    radius: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArmFacts:
+    """One arm's sheet. Figures per joint are (n,), units stand in the keys; None: not known."""
+
+    name: str  # of the arm, its sheet and its description
+    product: str = _said("arm", "product")
+    joints: int = _said("arm", "joints")
+    flange: str = _said("flange", "frame")  # what its maker counts payloads from
+    flange_ending: str = _said("flange", "ending")  # what every such flange is called behind a prefix
+    hand: str | None = _said("flange", "hand", None)  # the built-in tool that sits on it
+    rated_payload: float = _said("payload", "rated [kg]")
+    torque_side: str = _said("torque", "side")  # of the gear on which torque is measured: "link" or "motor"
+    link_spread: float = _said("links", "spread")  # see `Arm`
+    acceleration: tuple[float, ...] | None = _said("limits", "acceleration [rad/s²]", None)
+    jerk: tuple[float, ...] | None = _said("limits", "jerk [rad/s³]", None)
+    position_stiffness: tuple[float, ...] | None = _said("control", "position_stiffness [N·m/rad]", None)
+    impedance_stiffness: tuple[float, ...] | None = _said("control", "impedance_stiffness [N·m/rad]", None)
+    offset: tuple[float, ...] | None = _said("mismatch", "offset [N·m]", None)
+    friction: tuple[float, ...] | None = _said("mismatch", "friction [N·m]", None)
+    residual: tuple[float, ...] | None = _said("mismatch", "residual [N·m]", None)
+    torque_noise: tuple[float, ...] | None = _said("sensors", "torque_noise [N·m]", None)
+    velocity_noise: tuple[float, ...] | None = _said("sensors", "velocity_noise [rad/s]", None)
+    position_noise: tuple[float, ...] | None = _said("sensors", "position_noise [rad]", None)
+    vibration: tuple[float, ...] | None = _said("sensors", "vibration [N·m]", None)
+    torque_quantum: tuple[float, ...] | None = _said("sensors", "torque_quantum [N·m]", None)
+    command_lag: float | None = _said("sensors", "command_lag [s]", None)
+    torque_skew: float | None = _said("sensors", "torque_skew [s]", None)
+    jitter: float | None = _said("sensors", "jitter [s]", None)
+    lost: float | None = _said("sensors", "lost [1]", None)
+    capsules: tuple[Capsule, ...] | None = _said("collision", "capsules [m]", None)  # its outer size
+    excitation: str | None = _said("motion", "excitation", None)  # the shipped motion that was designed for it
+    scheme: str | None = _said("connection", "scheme", None)  # of its address as a live source
+    controller: str | None = _said("connection", "controller", None)  # whose forms of a load it takes
+    torque_constants: tuple[float, ...] | None = _said("current", "torque_constants [N·m/A]", None)
+
+    def __post_init__(self) -> None:
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            if isinstance(value, tuple) and entry.name != "capsules" and len(value) != self.joints:
+                raise ArmError(
+                    f"{entry.name} of the sheet of {self.name} has {len(value)} numbers: expected {self.joints}, one "
+                    "per joint"
+                )
+        if self.torque_side not in ("link", "motor"):
+            raise ArmError(f"torque side of the sheet of {self.name} is {self.torque_side!r}: expected link or motor")
+
+    @property
+    def of_arm(self) -> dict[str, Any]:
+        """The fields of `Arm` that the sheet fills."""
+        return {
+            "rated_payload": self.rated_payload,
+            "acceleration": self.acceleration,
+            "jerk": self.jerk,
+            "link_spread": self.link_spread,
+            "motor_torque": self.torque_side == "motor",
+            "known_as": self.name,
+        }
+
+    @property
+    def sensors(self) -> dict[str, Any] | None:
+        """What its sensors add, by the names of `armload.simulation.Sensors`; None: nobody has measured them."""
+        of_sensors = [entry.name for entry in fields(self) if entry.metadata.get("table") == "sensors"]
+        found = {name: getattr(self, name) for name in of_sensors if getattr(self, name) is not None}
+        return found or None
+
+
+def read_sheet(name: str, text: str) -> ArmFacts:
+    """The facts of one arm from the text of its sheet.
+
+    Raises:
+        ArmError: not TOML, a table without its source, a key or unit that is not known, or a fact that is missing.
+    """
+    try:
+        tables = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ArmError(f"the sheet of {name} is not TOML: {error}") from None
+    places = {(f.metadata["table"], f.metadata["key"]): f for f in fields(ArmFacts) if f.metadata}
+    facts: dict[str, Any] = {"name": name}
+    for table, entries in tables.items():
+        if not isinstance(entries, dict) or not entries.get("source"):
+            raise ArmError(f"[{table}] of the sheet of {name} has no source: say where its figures are from")
+        for key, value in entries.items():
+            if key == "source":
+                continue
+            if (table, key) not in places:
+                known = ", ".join(repr(k) for t, k in places if t == table) or "another table"
+                raise ArmError(f"[{table}] of the sheet of {name} has {key!r}: expected {known}")
+            facts[places[table, key].name] = _frozen(value)
+    required = [(table, key) for (table, key), f in places.items() if f.default is MISSING]
+    missing = [f"{key!r} in [{table}]" for table, key in required if places[table, key].name not in facts]
+    if missing:
+        raise ArmError(f"the sheet of {name} lacks {missing[0]}: every arm's sheet says it")
+    if "capsules" in facts:
+        facts["capsules"] = tuple(Capsule(*capsule) for capsule in facts["capsules"])
+    return ArmFacts(**facts)
+
+
+def _read_all() -> Mapping[str, ArmFacts]:
+    sheets = sorted(resources.files("armload.arms").joinpath(_SHEETS).iterdir(), key=lambda file: file.name)
+    found = {file.name.removesuffix(".toml"): file for file in sheets if file.name.endswith(".toml")}
+    return MappingProxyType({name: read_sheet(name, file.read_text(encoding="utf-8")) for name, file in found.items()})
+
+
+def description_of(name: str) -> str:
+    """The URDF of a built-in arm."""
+    return resources.files("armload.arms").joinpath(_SHEETS, f"{name}.urdf").read_text(encoding="utf-8")
+
+
+def _frozen(value: Any) -> Any:
+    return tuple(_frozen(x) for x in value) if isinstance(value, list) else value
+
+
+ARMS: Mapping[str, ArmFacts] = _read_all()

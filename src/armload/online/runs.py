@@ -1,0 +1,89 @@
+"""The runs of a stream: one for each payload, the last two kept, in case what they held is held again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from armload.estimators import Estimate
+from armload.posterior import PosteriorLeastSquares
+
+_SAME = float(chi2.ppf(0.9, 4))  # of mass and first moments: nine of ten runs of the same payload lie within
+_REFERENCE = 3.0  # [s] an empty run must have lasted to be a tare: with less it knows the arm no better than the prior
+
+Gaussian = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
+class Runs:
+    """The runs of a stream.
+
+    Attributes:
+        current: the run at work. previous: the one before it. earlier: the one before that, which may come back.
+    """
+
+    def __init__(self, first: PosteriorLeastSquares) -> None:
+        self._first = self.current = first
+        self.previous: PosteriorLeastSquares | None = None
+        self.earlier: PosteriorLeastSquares | None = None
+
+    def __iter__(self) -> Iterator[PosteriorLeastSquares]:
+        """All runs that are kept, each once."""
+        kept = (self._first, self.current, self.previous, self.earlier)
+        return iter({id(run): run for run in kept if run is not None}.values())
+
+    def reset(self) -> None:
+        """Forget the stream; the next sample is the first of the first run."""
+        for run in self:
+            run.close()
+        self.current, self.previous, self.earlier = self._first, None, None
+        self.current.reset()
+
+    def follow(self, run: PosteriorLeastSquares, passing: bool) -> PosteriorLeastSquares | None:
+        """Begin a new run after the current one; `passing`: that one was so short that it was no payload's.
+
+        Returns:
+            the run that is not kept any more, if it is none of the others.
+        """
+        if passing:
+            dropped, self.earlier = self.current, self.previous
+        else:
+            dropped, self.earlier, self.previous = self.earlier, self.previous, self.current
+        self.current = run
+        return self._unless_kept(dropped)
+
+    def go_back(self) -> PosteriorLeastSquares | None:
+        """Take the earlier run up again; the current one is returned, if it is none of the others."""
+        assert self.earlier is not None
+        dropped, self.current, self.earlier = self.current, self.earlier, None
+        return self._unless_kept(dropped)
+
+    def _unless_kept(self, run: PosteriorLeastSquares | None) -> PosteriorLeastSquares | None:
+        return None if any(run is kept for kept in (self.current, self.previous, self.earlier)) else run
+
+    def reference_for_next(self, held: bool) -> PosteriorLeastSquares | None:
+        """The run that the next one takes for a tare: the empty arm's, if there was one for long enough."""
+        run = self.current
+        if run.reference is None and not held and run.stream.seconds >= _REFERENCE:
+            return run
+        return run.reference
+
+    def payload_of(self, earlier: PosteriorLeastSquares | None) -> Gaussian | None:
+        """phi (10,) and covariance of an earlier run, relative to what the current one is relative to, if it can be."""
+        if earlier is None:
+            return None
+        if self.current.reference is earlier:
+            return np.zeros(10), np.zeros((10, 10))
+        if self.current.reference is not earlier.reference:
+            return None
+        return earlier.last.phi, earlier.last.covariance
+
+    def is_earlier(self, estimate: Estimate) -> bool:
+        """Whether an estimate's mass and first moments are those of the earlier run."""
+        then = self.payload_of(self.earlier)
+        if then is None:
+            return False
+        phi, covariance = (estimate.phi - then[0])[:4], (estimate.covariance + then[1])[:4, :4]
+        return bool(phi @ np.linalg.solve(covariance, phi) < _SAME)

@@ -1,0 +1,43 @@
+"""Whether two logs hold the same measurements: a copy, a cut, or two cuts of one log that overlap."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.errors import RecordingError
+from armload.recording.recording import Recording
+
+
+def check_own_measurements(log: Recording, tare: Recording) -> None:
+    """Refuse a tare that shares measured samples with the log: against itself a log weighs nothing, whatever it holds.
+
+    Raises:
+        RecordingError: they share samples.
+    """
+    if (count := shared_samples(log, tare)) > 0:
+        raise RecordingError(
+            f"the tare {tare.source} and the log {log.source} share {count} measured samples: expected an earlier log "
+            "of its own, without what is to be identified; record one, or leave the tare out"
+        )
+
+
+def shared_samples(log: Recording, other: Recording) -> int:
+    """How many samples of one log are in the other, too: equal in every measured number, bit for bit.
+
+    Of an arm that moves, position, velocity and torque of all joints never repeat, so that any such sample counts,
+    whatever its time. One that stands may well measure the same twice: there the samples count only if their times are
+    equal, too, and no time that both logs have shows anything else.
+    """
+    if log.n != other.n:
+        return 0
+    measured = set(_keys(other, np.any(other.dq, axis=1)))
+    if moving := sum(key in measured for key in _keys(log, np.any(log.dq, axis=1))):
+        return moving
+    _, here, there = np.intersect1d(log.t, other.t, return_indices=True)
+    return len(here) if _keys(log, here) == _keys(other, there) else 0
+
+
+def _keys(log: Recording, rows: NDArray) -> list[bytes]:
+    """The samples at the given rows, without their times; −0.0 is 0.0."""
+    return [row.tobytes() for row in np.concatenate([log.q[rows], log.dq[rows], log.tau[rows]], axis=1) + 0.0]

@@ -1,0 +1,258 @@
+"""Rows of the acceleration-free filtered regression, from one sample or many: the one kernel of every method.
+
+The load torque tau_L = tau_J − tau_bare equals d/dt(Y_p·phi) + (Y_g − Y_c)·phi. The first-order lag F = λ/(s + λ) on
+both sides removes the derivative:
+
+    r = F[tau_J − tau_bare] = W·phi,      W = λ·(Y_p − F[Y_p]) + F[Y_g − Y_c] = λ·Y_p + F[Y_g − Y_c − λ·Y_p]
+
+exactly, if F[Y_p] starts at Y_p(0) and the other lags at 0. The bare arm enters the same way through its momentum, so
+neither q̈ nor a derivative of a measured signal occurs. What else a row may hold passes the same lag:
+
+    r = W·phi + Z·eta + G·g + e        X = [W Z G] (n, 10 + p + R)
+
+eta is the arm's rigid mismatch (`mismatch.py`), g are each joint's weights of its smooth features (`features.py`). The
+lag is discretised by the bilinear rule; torque is lagged at its full rate, the rest at the rate of the rows.
+
+Sources: Hsu, Bodson, Sastry, Paden 1987; Middleton & Goodwin 1988; Slotine & Li 1989.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from armload.arms import Arm
+from armload.arms.momentum_row import MomentumRow, momentum_rows
+from armload.recording import GAP
+from armload.regression.features import JointFeatures, features_of_sample
+from armload.regression.mismatch import FRICTION_WIDTH, Correction
+
+REGRESSOR_RATE = 200.0  # [Hz] rows are made no more often where a rate is set: they hold nothing above a few hertz
+SPACING = 0.9 / REGRESSOR_RATE  # [s] between rows at least: clocks jitter
+_STILL = 1e-3  # [rad] an arm that stays so near shows one value of its stiction: more of it tells nothing new
+
+
+class Row(NamedTuple):
+    """One row of each joint, at t [s] and q (n,): X (n, size), r (n,), what it stands for h [s], its weights (n,)."""
+
+    t: float
+    q: NDArray[np.float64]
+    h: float
+    X: NDArray[np.float64]
+    r: NDArray[np.float64]
+    weights: NDArray[np.float64]
+
+
+class Rows(NamedTuple):
+    """M rows of each joint: t (M,), q (M, n), h (M,) [s], X (M, n, size), r (M, n), weights (M, n)."""
+
+    t: NDArray[np.float64]
+    q: NDArray[np.float64]
+    h: NDArray[np.float64]
+    X: NDArray[np.float64]
+    r: NDArray[np.float64]
+    weights: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, rows: Sequence[Row]) -> Rows:
+        """Single rows put together, one at least."""
+        return cls(*(np.array(column) for column in zip(*rows, strict=True)))
+
+
+class FilteredRegression:
+    """Turns samples (t, q, dq, tau) into rows of the regression, one at a time or many; after a gap it starts anew.
+
+    >>> from armload.arms import arm
+    >>> r, W = FilteredRegression(arm("panda"))([0.0], np.zeros((1, 7)), np.zeros((1, 7)), np.zeros((1, 7)))
+    >>> r.shape, W.shape
+    ((1, 7), (1, 7, 10))
+
+    Args:
+        arm: the bare arm (with whatever is `attached`).
+        gain: λ of the lag [1/s]; the observer gain of a momentum observer.
+        mismatch: the arm's rigid unknowns eta; None: the rows have none.
+        features: of each joint's smooth mismatch; None: the rows have none.
+        rate: rows per second at most [Hz]; None: every sample gives one.
+        settling: [s] that one pose of a standing arm counts; beyond it a row stands for no time.
+    """
+
+    def __init__(
+        self,
+        arm: Arm,
+        gain: float = 20.0,
+        mismatch: Correction | None = None,
+        features: JointFeatures | None = None,
+        rate: float | None = None,
+        settling: float = np.inf,
+    ) -> None:
+        self.arm, self.gain = arm, gain
+        self._momentum = MomentumRow(arm)
+        self._links = np.ascontiguousarray(arm.link_parameters.ravel())
+        self._waves, self._velocity_waves = np.zeros((0, arm.n)), np.zeros(0)
+        if features is not None and features.size:
+            self._waves, self._velocity_waves = features.waves, features.velocity_waves
+        self._wide = 10 + (0 if mismatch is None else mismatch.size)
+        apart = -1.0 if rate is None else SPACING * REGRESSOR_RATE / rate
+        self._settings = np.array([gain, apart, settling, 0.0 if mismatch is None else mismatch.presliding])
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the past: the next sample is the first."""
+        n, pose, velocity = self.arm.n, 2 * len(self._waves), 2 * len(self._velocity_waves)
+        self._clock = np.full(3, -np.inf)  # times of the last sample, of the last row, and since when the arm rests
+        self._joints = np.full((5, n), np.nan)  # lagged torque, last torque; of the bare arm; the pose of rest
+        self._regressor = np.zeros((2, n, self._wide))  # states of the lags, their last inputs
+        self._pose, self._velocity = np.zeros((2, pose)), np.zeros((2, n, velocity))
+
+    def rows(self, t: ArrayLike, q: ArrayLike, dq: ArrayLike, tau: ArrayLike) -> Rows:
+        """The rows that the next N samples complete: t (N,) rising [s]; q, dq, tau (N, n) [rad, rad/s, N·m]."""
+        times = np.require(np.atleast_1d(t), float, ["C", "W"])
+        poses, dq, tau = (np.require(np.atleast_2d(x), float, ["C", "W"]) for x in (q, dq, tau))
+        index, *rows = self._advance(times, poses, dq, tau)
+        return Rows(times[index], poses[index], *rows)
+
+    def row(self, t: float, q: NDArray, dq: NDArray, tau: NDArray) -> Row | None:
+        """The row that a sample completes, if it does; q, dq, tau (n,)."""
+        q, dq, tau = (x if x.flags.writeable else x.copy() for x in (q, dq, tau))  # one type of array: one compilation
+        index, h, X, r, weights = self._advance(np.array([t]), q[None], dq[None], tau[None])
+        return Row(t, q, h[0], X[0], r[0], weights[0]) if len(index) else None
+
+    def __call__(
+        self, t: ArrayLike, q: ArrayLike, dq: ArrayLike, tau: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """r (M, n) [N·m] and X (M, n, size) of the rows that the next N samples complete."""
+        rows = self.rows(t, q, dq, tau)
+        return rows.r, rows.X
+
+    def _advance(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> tuple:
+        states = (self._clock, self._joints, self._regressor, self._pose, self._velocity)
+        waves = (self._waves, self._velocity_waves)
+        return _advance(t, q, dq, tau, self._settings, *self._momentum.chain, self._links, *waves, *states)
+
+
+@njit(cache=True, nogil=True)
+def _advance(
+    t,
+    q,
+    dq,
+    tau,
+    settings,
+    rotations,
+    translations,
+    axes,
+    turning,
+    gravity,
+    links,
+    waves,
+    velocity_waves,
+    clock,
+    joints,
+    regressor,
+    pose_lag,
+    velocity_lag,
+):  # pragma: no cover - compiled
+    gain, apart, settling, excess = settings
+    count, before, at = 0, clock[0], clock[1]
+    for now in t:
+        if now - before > GAP or now - at >= apart:
+            at = now
+            count += 1
+        before = now
+    n, wide = q.shape[1], regressor.shape[2]
+    size = wide + pose_lag.shape[1] + velocity_lag.shape[2]
+    h, X, r = np.empty(count), np.empty((count, n, size)), np.empty((count, n))
+    weights, index = np.empty((count, n)), np.empty(count, np.int64)
+    m = 0
+    for k in range(t.shape[0]):
+        now = t[k]
+        fresh = now - clock[0] > GAP
+        if fresh:
+            joints[0] = 0.0
+        else:
+            x = gain * (now - clock[0])
+            for j in range(n):
+                joints[0, j] += x / (2.0 + x) * (tau[k, j] + joints[1, j] - 2.0 * joints[0, j])
+        joints[1] = tau[k]
+        clock[0] = now
+        if not fresh and now - clock[1] < apart:
+            continue
+        step = 0.0 if fresh else now - clock[1]
+        clock[1] = now
+        momentum, drift = momentum_rows(rotations, translations, axes, turning, gravity, q[k], dq[k])
+        pose, velocity = features_of_sample(q[k], dq[k], waves, velocity_waves)
+        inputs = (momentum, drift, links, dq[k], pose, velocity)
+        _lagged(inputs, gain, step, fresh, joints, regressor, pose_lag, velocity_lag, X[m], r[m])
+        for j in range(n):
+            weights[m, j] = 1.0 / (1.0 + excess * (1.0 - np.tanh(abs(dq[k, j]) / FRICTION_WIDTH) ** 2))
+        moved = not np.isfinite(clock[2])
+        for j in range(n):
+            moved |= abs(q[k, j] - joints[4, j]) > _STILL
+        if moved:
+            clock[2] = now
+            joints[4] = q[k]
+        h[m] = 0.0 if now - clock[2] > settling else step
+        index[m] = k
+        m += 1
+    return index, h, X, r, weights
+
+
+@njit(cache=True, nogil=True)
+def _lagged(inputs, gain, h, fresh, joints, regressor, pose_lag, velocity_lag, X, r):  # pragma: no cover - compiled
+    """One row from what goes into its lags, h seconds after the last; `fresh`: the lags start here."""
+    momentum, drift, links, dq, pose, velocity = inputs
+    n, few, many, wide = dq.shape[0], velocity.shape[1], pose.shape[0], regressor.shape[2]
+    S, U, P, UP, V, UV = regressor[0], regressor[1], pose_lag[0], pose_lag[1], velocity_lag[0], velocity_lag[1]
+    torque, B, UB = joints[0], joints[2], joints[3]
+    x = gain * h
+    keep, mix = (2.0 - x) / (2.0 + x), x / (2.0 + x)
+    for k in range(many):
+        if fresh:
+            P[k], UP[k] = 0.0, pose[k]
+        P[k] = keep * P[k] + mix * (pose[k] + UP[k])
+        UP[k] = pose[k]
+    for j in range(n):
+        p = bare = 0.0
+        for k in range(links.shape[0]):
+            p += momentum[j, 10 + k] * links[k]
+            bare += drift[j, 10 + k] * links[k]
+        u = bare - gain * p
+        if fresh:
+            B[j], UB[j] = -gain * p, u
+        B[j] = keep * B[j] + mix * (u + UB[j])
+        UB[j] = u
+        r[j] = torque[j] - gain * p - B[j]
+        for k in range(wide):
+            i = k - 10
+            if k < 10:
+                Y, D = momentum[j, k], drift[j, k]
+            elif i < 4 * n:  # offset, Coulomb and viscous friction, rotor: `Correction.regressor`
+                Y = D = 0.0
+                if i % n == j:
+                    if i < n:
+                        D = 1.0
+                    elif i < 2 * n:
+                        D = np.tanh(dq[j] / FRICTION_WIDTH)
+                    elif i < 3 * n:
+                        D = dq[j]
+                    else:
+                        Y = dq[j]
+            else:
+                Y, D = momentum[j, 10 + i - 4 * n], drift[j, 10 + i - 4 * n]
+            u = D - gain * Y
+            if fresh:
+                S[j, k], U[j, k] = -gain * Y, u
+            S[j, k] = keep * S[j, k] + mix * (u + U[j, k])
+            U[j, k] = u
+            X[j, k] = gain * Y + S[j, k]
+        for k in range(many):
+            X[j, wide + k] = P[k]
+        for k in range(few):
+            if fresh:
+                V[j, k], UV[j, k] = 0.0, velocity[j, k]
+            V[j, k] = keep * V[j, k] + mix * (velocity[j, k] + UV[j, k])
+            UV[j, k] = velocity[j, k]
+            X[j, wide + many + k] = V[j, k]

@@ -1,0 +1,99 @@
+"""The sheets of the built-in arms: complete, with a source each, and the only place that knows an arm by name."""
+
+import ast
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armload
+from armload.app.cli.arguments import _arms
+from armload.arms import ARMS, arm, facts_of, rated_effort, rated_mass
+from armload.arms.facts import description_of, read_sheet
+from armload.devices.opening import SCHEMES
+from armload.errors import ArmError
+from armload.motion import excitation
+from armload.motion.collision import capsule_arm
+from armload.payloads import hand_on
+from armload.payloads.hand import HAND
+
+SHEET = """
+[arm]
+product = "a two-joint arm"
+joints = 2
+source = "ours"
+[flange]
+frame = "tip"
+ending = "tip"
+source = "ours"
+[payload]
+"rated [kg]" = 1.0
+source = "ours"
+[torque]
+side = "link"
+source = "ours"
+[links]
+spread = 1.0
+source = "ours"
+"""
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_a_sheet_and_its_description_are_of_one_arm(name):
+    facts, robot = ARMS[name], arm(name)
+    assert (facts.name, facts.joints, facts.flange) == (name, robot.n, robot.frame)
+    assert facts.flange.endswith(facts.flange_ending)
+    assert facts.scheme in SCHEMES
+    assert f'name="{facts.flange}"' in description_of(name)
+    assert facts_of(robot) is facts
+    assert excitation(robot).n == robot.n
+    if facts.hand == HAND:
+        assert hand_on(robot).parameters.frame == facts.flange
+    if facts.capsules is not None:
+        assert [part.link for part in facts.capsules] == capsule_arm(robot, 0.0).link.tolist()
+        assert {part.link for part in facts.capsules} <= set(range(robot.n + 1))
+
+
+def test_the_command_line_names_the_same_arms():
+    assert _arms() == list(ARMS)
+
+
+def test_an_arm_cut_short_by_its_frame_has_no_figures_per_joint():
+    short = arm("panda", frame="panda_link5")
+    assert facts_of(short) is None
+    assert short.limits.acceleration.tolist() == [15.0, 7.5, 10.0, 12.5, 15.0]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (SHEET.replace('joints = 2\nsource = "ours"', "joints = 2"), r"\[arm\] of the sheet of two has no source"),
+        (SHEET.replace('"rated [kg]"', '"rated [lb]"'), r"has 'rated \[lb\]': expected 'rated \[kg\]'"),
+        (SHEET.replace("[links]", "[bars]"), r"\[bars\] of the sheet of two has 'spread': expected another table"),
+        (SHEET.replace("spread = 1.0\n", ""), r"lacks 'spread' in \[links\]"),
+        (SHEET.replace('"link"', '"joint"'), "torque side of the sheet of two is 'joint'"),
+        (SHEET + '[current]\n"torque_constants [N·m/A]" = [1.0]\nsource = "ours"', "has 1 numbers: expected 2"),
+        ("[arm\n", "is not TOML"),
+    ],
+)
+def test_a_sheet_that_is_not_whole_is_refused_in_a_sentence(wrong, said):
+    assert read_sheet("two", SHEET).joints == 2
+    with pytest.raises(ArmError, match=said):
+        read_sheet("two", wrong)
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_what_is_assumed_of_an_unrated_arm_lies_within_a_factor_of_two_of_its_maker_s_figure(name):
+    known = arm(name)
+    assert rated_mass(known) == known.rated_payload
+    assert 0.5 < rated_mass(replace(known, rated_payload=None)) / known.rated_payload < 2.0
+    np.testing.assert_array_equal(rated_effort(known), known.limits.effort)
+
+
+def test_no_module_asks_an_arm_for_its_name():
+    for path in Path(armload.__file__).parent.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Compare | ast.MatchValue):
+                asked = [x.value for x in ast.walk(node) if isinstance(x, ast.Constant) and isinstance(x.value, str)]
+                assert not set(asked) & set(ARMS), f"{path}:{node.lineno} compares with {asked}: ask the arm's sheet"
