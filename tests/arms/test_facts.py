@@ -11,12 +11,14 @@ import armload
 from armload.app.cli.arguments import _arms
 from armload.arms import ARMS, arm, facts_of, rated_effort, rated_mass
 from armload.arms.facts import description_of, read_sheet
+from armload.devices import Simulator, open_source
 from armload.devices.opening import SCHEMES
 from armload.errors import ArmError
 from armload.motion import excitation
 from armload.motion.collision import capsule_arm
-from armload.payloads import hand_on
+from armload.payloads import draw_payload, hand_on
 from armload.payloads.hand import HAND
+from armload.regression import payload_prior_std
 
 SHEET = """
 [arm]
@@ -89,6 +91,15 @@ def test_what_is_assumed_of_an_unrated_arm_lies_within_a_factor_of_two_of_its_ma
     assert rated_mass(known) == known.rated_payload
     assert 0.5 < rated_mass(replace(known, rated_payload=None)) / known.rated_payload < 2.0
     np.testing.assert_array_equal(rated_effort(known), known.limits.effort)
+
+
+def test_one_payload_is_assumed_of_an_unrated_arm_by_the_prior_and_the_simulator_alike():
+    unrated = replace(arm("ur10e"), rated_payload=None)
+    assert payload_prior_std(unrated)[0] == 0.5 * rated_mass(unrated)
+    drawn = draw_payload("boxes", 0, rated=rated_mass(unrated)).parameters
+    with open_source("sim", unrated, speed=None, duration=0.01) as source:
+        assert isinstance(source, Simulator)
+        assert source._payloads[1].mass == drawn.mass
 
 
 def test_no_module_asks_an_arm_for_its_name():

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
-from armload.arms import Arm
+from armload.arms import Arm, rated_mass
 from armload.devices.detached import Detached
 from armload.devices.files.source import Replay
 from armload.devices.franka import source as franka
@@ -167,9 +167,8 @@ def _simulator(
     if world not in worlds:
         raise SourceError(f"there is no world {world!r}: expected one of {', '.join(worlds)}")
     if payloads is None:
-        rated = {} if arm.rated_payload is None else {"rated": arm.rated_payload}
-        payloads = []
+        rated, payloads = rated_mass(arm), []
         for k in range(180):
-            payloads += [(5.0 + 20.0 * k, draw_payload("boxes", seed + k, **rated)), (20.0 + 20.0 * k, None)]
+            payloads += [(5.0 + 20.0 * k, draw_payload("boxes", seed + k, rated=rated)), (20.0 + 20.0 * k, None)]
     seen = Sensors.of(arm) if sensors else None
     return Simulator(arm, payloads=payloads, world=worlds[world](), sensors=seen, seed=seed, **more)

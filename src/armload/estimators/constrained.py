@@ -54,6 +54,7 @@ class _ConsistentLeastSquares(Identifier):
     def __init__(self, arm: Arm, tare: Recording | None = None, gain: float = 20.0) -> None:
         self.arm, self._free = arm, WeightedLeastSquares(arm, gain)
         self.before = None if tare is None else Tared(WeightedLeastSquares(arm, gain), tare).before
+        self.reset()
 
     def reset(self) -> None:
         """Forget the run (not the tare); the next sample is the first."""

@@ -7,7 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from armload.inertia import NAMES, UNITS, InertialParameters
+from armload.estimators import Estimate
+from armload.inertia import HELD, NAMES, UNITS, InertialParameters, nearest_body
+
+
+def is_removal(estimate: Estimate, mass_determined: bool) -> bool:
+    """Whether something was taken off, beyond doubt: then no body has these parameters, and none is looked for."""
+    return bool(mass_determined and estimate.phi[0] < -HELD * estimate.std[0])
+
+
+def body_of(estimate: Estimate, mass_determined: bool) -> np.ndarray:
+    """phi (10,) of the likeliest body in the estimate's metric; the estimate's own where something was taken off."""
+    return estimate.phi if is_removal(estimate, mass_determined) else nearest_body(estimate.phi, estimate.covariance)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,19 +13,17 @@ from numpy.typing import NDArray
 from armload.arms import Arm
 from armload.errors import IdentificationError
 from armload.estimators import ArmMismatch, Estimate
-from armload.identification.answer import Identification
+from armload.identification.answer import Identification, body_of, is_removal
 from armload.identification.choice import Choice, choose
 from armload.identification.plausibility import check_plausible
 from armload.identification.thresholds import DECISIVE, LARGEST_OFFSETS, LEANS, LOWEST_RATE, MISFIT, MOVES
 from armload.inertia import (
-    HELD,
     NAMES,
     Z95,
     InertialParameters,
     distance_to_body,
     held,
     is_consistent,
-    nearest_body,
     phi_to_com,
 )
 from armload.inertia import determined as determined_by
@@ -224,25 +222,21 @@ def _answer(
     high = np.where(determined, phi + half, np.maximum(before + half_before, phi + reach))
     if otherwise is not None:
         low, high = np.minimum(low, low + otherwise), np.maximum(high, high + otherwise)
-    removed = determined[0] and phi[0] < -HELD * estimate.std[0]
+    phi = body_of(estimate, determined[0])
     said, trusted = list(notes), found.calibrated and otherwise is None
-    if removed:
+    if is_removal(estimate, determined[0]):
         said.append(
             "something was taken off since the tare: the added mass is negative, so no body has these parameters"
             if relative_to == "tare"
             else "the mass is negative: less is mounted than the model of the arm and its tool assume, or the torque's "
             "sign is turned"
         )
-    else:
-        phi = nearest_body(estimate.phi, estimate.covariance)
-        if found.misfit > MISFIT:
-            said.append(f"no body fits within the error bars: {_CHECK}")
-            trusted = False
-        elif found.offset_ratio:
-            said.append(
-                f"the torques are {found.offset_ratio:.0f} times as far off as those of an arm should be: {_CHECK}"
-            )
-            trusted = False
+    elif found.misfit > MISFIT:
+        said.append(f"no body fits within the error bars: {_CHECK}")
+        trusted = False
+    elif found.offset_ratio:
+        said.append(f"the torques are {found.offset_ratio:.0f} times as far off as those of an arm should be: {_CHECK}")
+        trusted = False
     low, high = np.minimum(low, phi), np.maximum(high, phi)
     if not determined.all():
         missing = ", ".join(n for n, known in zip(NAMES, determined, strict=True) if not known)

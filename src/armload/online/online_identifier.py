@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from armload.arms import Arm
 from armload.errors import IdentificationError
 from armload.estimators import Estimate, Identifier
+from armload.identification.answer import body_of
 from armload.identification.choice import choose
 from armload.inertia import determined, held
 from armload.online.estimate import OnlineEstimate
@@ -146,6 +147,23 @@ class OnlineIdentifier:
         if sample.t - self._moved > 0.1 * _RECENT and np.abs(sample.dq).max() > _MOVING:
             self._moved = sample.t
         self._identify(sample)
+        return self._said()
+
+    def conclude(self) -> OnlineEstimate:
+        """A last solution from all samples of the current payload, as no more will come.
+
+        It says what `armload.identify` says of a log of the same samples, if they show no change of payload.
+        """
+        if self._watch is not None and self._watch.settling:
+            return self._said()
+        if self.health.used:
+            estimate = self._engine.conclude() if self._watch is None else self._watch.conclude()
+            if all_finite(estimate.phi):
+                run = self._engine if self._watch is None else self._watch.answered
+                self._told = self._internal
+                self._judge(estimate, run, False)
+                self._estimate = replace(estimate, phi=body_of(estimate, bool(self._determined[0])))
+                self._source = run
         return self._said()
 
     def close(self) -> None:

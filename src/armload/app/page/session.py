@@ -126,8 +126,8 @@ class Session:
                 break
         if self._plausibility.look_at_last(self._recent):
             self._doubted()
-            if self.estimate is not None:
-                self.estimate = self._plausibility.qualified(self.estimate)
+        if self.estimate is not None:
+            self.estimate = self._plausibility.qualified(self._identifier.conclude())
         self._say("the source has ended")
         self.ended = True
 

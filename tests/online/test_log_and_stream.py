@@ -1,0 +1,96 @@
+"""A log is a stream that ends: `identify` says of a log what the stream says once it is concluded."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from armload.arms import arm
+from armload.identification import identify
+from armload.inertia import Z95, InertialParameters
+from armload.motion import random_motion, taie2024
+from armload.online import OnlineIdentifier
+from armload.payloads import test_payload as make_payload
+from armload.recording import Recording
+from armload.simulation import World, simulate
+
+TOOL = InertialParameters.from_com(0.4, (0.0, 0.01, 0.05), np.diag([1e-3, 1e-3, 5e-4]))
+
+
+def logs(name, rate=200.0, seconds=2.0, seed=3):
+    """A run with a payload and a tare on another motion, of an arm that differs from its model."""
+    robot = arm(name)
+    world = World.real_like(robot, seed=seed)
+    motion = taie2024() if name == "panda" else random_motion(robot, seed=7, duration=seconds + 1.0)
+    run = simulate(robot, motion, make_payload().parameters, world=world, rate=rate, seed=1).between(0.0, seconds)
+    tare = simulate(robot, random_motion(robot, seed=5, duration=4.0), world=world, rate=rate, seed=2)
+    return robot, run, tare
+
+
+def with_a_gap(log):
+    keep = (log.t < log.t[0] + 0.8) | (log.t > log.t[0] + 1.3)
+    return Recording(log.t[keep], log.q[keep], log.dq[keep], log.tau[keep])
+
+
+@pytest.fixture(scope="module")
+def panda_logs():
+    return logs("panda")
+
+
+@pytest.fixture(scope="module")
+def same_motion(panda_logs):
+    robot, run, _ = panda_logs
+    world = World.real_like(robot, seed=3)
+    return robot, run, simulate(robot, taie2024(), world=world, rate=200.0, seed=9).between(0.0, 3.0)
+
+
+def case(kind, panda_logs, same_motion):
+    """(arm, run, tare, tool) of a kind of log."""
+    robot, run, tare = panda_logs
+    if kind == "same motion":
+        robot, run, tare = same_motion
+    if kind == "motor torque":
+        robot, run, tare = logs("ur10e", seed=4)
+    if kind == "30 Hz":
+        robot, run, tare = logs("panda", rate=30.0)
+    if kind == "gaps":
+        run = with_a_gap(run)
+    wants_tare = kind in ("tare", "same motion", "motor torque")
+    return robot, run, tare if wants_tare else None, TOOL if kind == "tool" else None
+
+
+@pytest.mark.parametrize("method", [None, "map-gp"])
+@pytest.mark.parametrize("kind", ["untared", "tare", "same motion", "tool", "30 Hz", "gaps", "motor torque"])
+def test_identify_says_what_the_concluded_stream_says(kind, method, panda_logs, same_motion):
+    robot, run, tare, tool = case(kind, panda_logs, same_motion)
+    answer = identify(run, robot, tare=tare, tool=tool, method=method)
+    carrying = robot if tool is None else robot.with_payload(robot.in_frame(tool))
+    stream = OnlineIdentifier(carrying, tare, method)
+    for sample in run:
+        stream.update(*sample)
+    end, found = stream.conclude(), stream.engine.conclude()  # `found`: before a body was made of it
+    stream.close()
+    assert stream.event is None
+    assert stream.health.used == answer.n_samples == end.n_samples == len(run)
+    assert (end.method, end.relative_to) == (answer.method, answer.relative_to)
+    unit = np.maximum(end.std, 1e-6)
+    np.testing.assert_allclose((end.phi - answer.phi) / unit, 0.0, rtol=0, atol=1e-5)
+    assert end.determined.tolist() == answer.determined
+    assert end.held == answer.held
+    low, high = np.minimum(found.phi - Z95 * found.std, end.phi), np.maximum(found.phi + Z95 * found.std, end.phi)
+    for ours, theirs in ((low, answer.phi_low), (high, answer.phi_high)):
+        np.testing.assert_allclose(((ours - theirs) / unit)[end.determined], 0.0, rtol=0, atol=1e-5)
+
+
+def test_a_tare_along_the_same_motion_is_the_better_evidence_on_a_stream_too(same_motion):
+    robot, run, tare = same_motion
+    stream, other = OnlineIdentifier(robot, tare), OnlineIdentifier(robot, replace(tare, t=tare.t + 100.0))
+    plain = OnlineIdentifier(robot)
+    for sample in run:
+        ends = [identifier.update(*sample) for identifier in (stream, other, plain)]
+    for identifier in (stream, other, plain):
+        identifier.close()
+    truth = make_payload().parameters.phi
+    assert abs(ends[0].phi[0] - truth[0]) < 0.02
+    assert ends[0].std[0] < 0.5 * ends[2].std[0]
+    assert ends[1].phi[0] == pytest.approx(ends[0].phi[0], abs=1e-6)  # whatever the tare's clock
