@@ -35,9 +35,11 @@ class Constant(Identifier):
     def reset(self):
         self.count = 0
 
-    def update(self, sample):
-        self.count += 1
-        return Estimate(sample.t, self.phi, np.eye(10), self.count, str(self.arm.frame))
+    def _take(self, t, *_):
+        self.count += len(t)
+
+    def _estimate(self, t):
+        return Estimate(t, self.phi, np.eye(10), self.count, str(self.arm.frame))
 
 
 @pytest.fixture
