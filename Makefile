@@ -8,6 +8,7 @@ WORKERS ?= 2
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
 # One thread for each test worker: nested BLAS threads fight over the cores and make a test slower, never faster.
+# One worker for each file: what its tests share (a study, a demo) is made once.
 test test-all test-robots: export OMP_NUM_THREADS = 1
 test test-all test-robots: export OPENBLAS_NUM_THREADS = 1
 test test-all test-robots: export MPLBACKEND = agg
@@ -22,10 +23,10 @@ demo: $(VENV)/.stamp ## simulate, train small ensembles, identify an unseen payl
 	$(BIN)/armload demo --out out/demo
 
 test: lint ## lint, types and every test that needs nothing but Python (this is what CI runs)
-	$(BIN)/python -m pytest -n $(WORKERS) -m "not full"
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile -m "not full"
 
 test-all: lint parts ## as test, and the tests marked full too (skipped with a reason where their program is missing)
-	$(BIN)/python -m pytest -n $(WORKERS) -m ""
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile -m ""
 
 test-robots: $(VENV)/.stamp parts ## the makers' clients, ROS 2 and the page in a browser, each where it can be installed
 	$(BIN)/python -m pytest -m full tests/devices tests/app/test_live_browser.py

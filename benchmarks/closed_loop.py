@@ -1,6 +1,6 @@
 """What a model-based controller gains from the identified payload: tracking error and external-torque residual.
 
-    python benchmarks/closed_loop.py [--seeds 8] [--quick]
+    python benchmarks/closed_loop.py [--seeds 8] [--jobs 1] [--quick]
 
 A simulated Panda under joint torque control at 1 kHz (`armload.simulation.JointImpedance`: inverse dynamics of the
 model, libfranka's example stiffness). Every seed is another arm that differs from its model as real ones do
@@ -13,11 +13,13 @@ docs/pictures/closed_loop.png and the table in docs/why.md.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from study_of_arms import ROOT, Study
+from script import markdown_table, mean_and_spread, rounded
+from study_of_arms import Study
 
 from armload.arms import Arm
 from armload.inertia import InertialParameters
@@ -26,16 +28,8 @@ from armload.motion import Motion, random_motion
 from armload.posterior import HybridIdentifier
 from armload.recording import Recording
 from armload.regression import FilteredRegression
-from armload.simulation import (
-    JointImpedance,
-    Sensors,
-    World,
-    torque_controlled,
-)
+from armload.simulation import JointImpedance, Sensors, World, torque_controlled
 
-RESULT = ROOT / "benchmarks" / "results" / "closed_loop.json"
-FIGURE = ROOT / "docs" / "pictures" / "closed_loop.png"
-COMMAND = "python benchmarks/closed_loop.py"
 DECLARED = ("nothing", "identified", "truth")
 SETTLE = 1.0  # [s] before a log begins
 OBSERVER = 20.0  # [1/s]
@@ -95,8 +89,11 @@ def rms(x: NDArray[np.float64], axis: int | None = None) -> Any:
     return np.sqrt(np.mean(np.square(x), axis=axis))
 
 
-def measure(robot: Arm, seed: int) -> tuple[list[dict[str, Any]], dict[str, dict[str, NDArray[np.float64]]]]:
-    """One row per payload and declaration; and for a figure, the heaviest payload's errors and residuals over time."""
+def measure(robot: Arm, seed: int) -> tuple[list[dict[str, Any]], dict[str, dict[str, list[float]]]]:
+    """One row per payload and declaration; and for a figure, the heaviest payload's errors and residuals over time.
+
+    Of the residuals, those of joint 2 of the first arm.
+    """
     world = World.real_like(robot, seed)
     identifier = HybridIdentifier(robot, tare_of(robot, world, seed))
     excitation, work = (random_motion(robot, base + seed, duration=6.0) for base in (2000, 3000))
@@ -109,7 +106,8 @@ def measure(robot: Arm, seed: int) -> tuple[list[dict[str, Any]], dict[str, dict
             joints, flange = errors(robot, work, truth)
             started = seen.t - seen.t[0] > STARTING
             external = residual(robot, told, seen)[started]
-            curves[declared] = {"t": truth.t[::10], "flange": flange, "t seen": seen.t[started], "external": external}
+            shown = {"t": truth.t[::10], "flange": 1e3 * flange, "t seen": seen.t[started], "external": external[:, 1]}
+            curves[declared] = {name: values.tolist() for name, values in shown.items()}
             rows.append(
                 {
                     "seed": seed,
@@ -125,7 +123,7 @@ def measure(robot: Arm, seed: int) -> tuple[list[dict[str, Any]], dict[str, dict
                     "residual_max_Nm": np.abs(external).max(),
                 }
             )
-    return rows, curves
+    return rows, curves if seed == 0 else {}
 
 
 QUANTITIES = {
@@ -144,31 +142,18 @@ def summarise(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
             mine = [row for row in rows if (row["payload"], row["declared"]) == (name, declared)]
             entry: dict[str, Any] = {"payload": name, "declared": declared, "seeds": len(mine)}
             for quantity in QUANTITIES:
-                values = np.array([row[quantity] for row in mine])
-                entry[quantity] = [float(values.mean()), float(values.std(ddof=1)) if len(mine) > 1 else 0.0]
+                entry[quantity] = mean_and_spread([row[quantity] for row in mine])
             out.append(entry)
     return out
 
 
-def rounded(mean: float, spread: float) -> str:
-    """Mean ± spread, to two digits of the spread."""
-    places = 2 if spread <= 0.0 else max(0, 1 - int(np.floor(np.log10(spread))))
-    return f"{mean:.{places}f} ± {spread:.{places}f}"
-
-
 def table(summary: list[dict[str, Any]]) -> str:
     """The summary as Markdown."""
-    lines = [
-        "| payload | declared | " + " | ".join(QUANTITIES.values()) + " |",
-        "|---|---|" + "---:|" * len(QUANTITIES),
-    ]
-    for entry in summary:
-        cells = [rounded(*entry[quantity]) for quantity in QUANTITIES]
-        lines.append(f"| {entry['payload']} | {entry['declared']} | " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+    rows = [(e["payload"], e["declared"], *(rounded(*e[quantity]) for quantity in QUANTITIES)) for e in summary]
+    return markdown_table(("payload", "declared", *QUANTITIES.values()), "ll" + "r" * len(QUANTITIES), rows)
 
 
-def draw(summary: list[dict[str, Any]], curves: dict[str, dict[str, NDArray[np.float64]]]) -> None:
+def draw(summary: list[dict[str, Any]], _: Any, curves: dict[str, dict[str, list[float]]], file: Path) -> None:
     """One run over time, and all runs."""
     styles = dict(zip(DECLARED, ((COLOURS[3], "-"), (COLOURS[0], "-"), ("black", (0, (2, 1)))), strict=True))
     names = list(PAYLOADS)
@@ -177,8 +162,8 @@ def draw(summary: list[dict[str, Any]], curves: dict[str, dict[str, NDArray[np.f
         (over, outside), (tracking, alarm) = figure.subplots(2, 2)
         for declared in DECLARED:
             (colour, dash), one = styles[declared], curves[declared]
-            over.plot(one["t"], 1e3 * one["flange"], color=colour, linestyle=dash, label=f"declared: {declared}")
-            outside.plot(one["t seen"], one["external"][:, 1], color=colour, linestyle=dash, lw=1.2)
+            over.plot(one["t"], one["flange"], color=colour, linestyle=dash, label=f"declared: {declared}")
+            outside.plot(one["t seen"], one["external"], color=colour, linestyle=dash, lw=1.2)
         over.set(
             title=f"one run, {names[-1]} held", xlabel="time [s]", ylabel="flange off its path [mm]", ylim=(0, None)
         )
@@ -201,30 +186,24 @@ def draw(summary: list[dict[str, Any]], curves: dict[str, dict[str, NDArray[np.f
             axes.set_ylim(top=1.8 * axes.get_ylim()[1])
         tracking.set_title(f"all runs: mean and spread over {summary[0]['seeds']} arms")
         alarm.set_title("all runs: a weaker collision goes unnoticed")
-        FIGURE.parent.mkdir(exist_ok=True)
-        figure.savefig(FIGURE, dpi=100)
+        figure.savefig(file, dpi=100)
 
 
-def main() -> None:
-    assert __doc__ is not None
-    Study(
-        about=__doc__,
-        command=COMMAND,
-        result=RESULT,
-        mark="closed loop",
-        seeds=8,
-        conditions={
-            "arm": "panda, World.real_like, one per seed; Sensors.panda",
-            "controller": "joint impedance with inverse dynamics, moderate_stiffness, 1 kHz, effort limits",
-            "identification": "hybrid: 6 s of log with nothing declared, 20 s of tare on another motion",
-            "observer_1_per_s": OBSERVER,
-        },
-        measure=measure,
-        summarise=summarise,
-        table=table,
-        draw=lambda summary, _, curves: draw(summary, curves),
-    ).run()
-
+STUDY = Study(
+    name="closed_loop",
+    mark="closed loop",
+    seeds=8,
+    conditions={
+        "arm": "panda, World.real_like, one per seed; Sensors.panda",
+        "controller": "joint impedance with inverse dynamics, moderate_stiffness, 1 kHz, effort limits",
+        "identification": "hybrid: 6 s of log with nothing declared, 20 s of tare on another motion",
+        "observer_1_per_s": OBSERVER,
+    },
+    measure=measure,
+    summarise=summarise,
+    table=table,
+    draw=draw,
+)
 
 if __name__ == "__main__":
-    main()
+    STUDY.run()

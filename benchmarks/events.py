@@ -1,6 +1,6 @@
 """How well changes of payload are noticed on a live stream, and what is known shortly after one.
 
-    python benchmarks/events.py [--quick] [--parts steps,quiet,hybrid,pushes,hybrid_pushes,cycles,real]
+    python benchmarks/events.py [--quick] [--parts steps,quiet,hybrid,pushes,hybrid_pushes,cycles,real] [--jobs 1]
 
 Every scene is another real-like Panda (`World.real_like`, the sensors as measured: `Sensors.panda`, 8 % of the samples
 lost) that goes on moving, every other one along the published excitation, the rest along random motions. What the arm
@@ -23,12 +23,12 @@ the first second after each change; 95 % bounds are Poisson's, one-sided above.
 
 Scenes are cells in out/events: what was measured once is not measured again while `online/watch.py` and
 `online/changes.py` stay as they are. Written to benchmarks/results/events.json, where a part that was not asked for
-keeps what was measured of it before. In full about 50 minutes of CPU time.
+keeps what was measured of it before. In full about 50 minutes of CPU time. Printed only: --quick, two short scenes of
+each part; --seed, added to all seeds, to set constants on others; --scenes, at most so many of each part.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import time
 from dataclasses import asdict, dataclass, replace
@@ -40,22 +40,22 @@ from numpy.typing import NDArray
 from real_logs import data
 from scipy.signal import savgol_filter
 from scipy.stats import chi2
+from script import RESULTS, ROOT, options, say, write
 from threadpoolctl import threadpool_limits
 
 import armload.online
-from armload import Recording, __version__, arm, read_recording
+from armload import Recording, arm, read_recording
 from armload.arms import payload_regressor
 from armload.devices import Simulator
 from armload.inertia import Z95
-from armload.lab import save_cell
-from armload.lab.cells import finished_cell, key_of
+from armload.lab.cells import key_of
+from armload.lab.experiment import Task, run_tasks, source_key
 from armload.motion import random_motion, taie2024
 from armload.online import OnlineIdentifier
 from armload.payloads import draw_payload
 from armload.simulation import Sensors, World, simulate
 
-HERE = Path(__file__).resolve().parent
-CELLS = HERE.parent / "out" / "events"
+CELLS = ROOT / "out" / "events"
 FIRST_SEED = 50_000  # constants were set on seeds below 10 000
 FAMILIES = ("boxes", "shapes", "container")
 STEP, EVERY = 0.2, (5.0, 20.0)  # [kg] at least, [s] between
@@ -485,18 +485,12 @@ def of_real(cell: dict) -> dict[str, Any]:
 # ---------------------------------------------------------------------- the run
 
 
-def code() -> str:
-    """Of what decides when something is noticed."""
-    folder = Path(armload.online.__path__[0])
-    return key_of(*((folder / name).read_text() for name in ("changes.py", "watch.py")))
-
-
 def summary(cells: dict[str, list[dict]]) -> dict[str, Any]:
     """All parts that have cells."""
     out: dict[str, Any] = {}
     for part, found in cells.items():
         if part == "real":
-            out[part] = {cell["method"]: of_real(cell) for cell in found}
+            out[part] = {cell["name"].removeprefix("real-"): of_real(cell) for cell in found}
         elif found:
             out[part] = of_pushes(found) if "pushes" in part else of_part(found)
     return out
@@ -508,52 +502,44 @@ def in_all(parts: dict[str, Any]) -> dict[str, Any]:
     return poisson(sum(x["count"] for x in quiet), sum(x["hours"] for x in quiet)) if quiet else {}
 
 
+def tasks(part: str, quick: bool, seed: int, most: int) -> list[Task]:
+    """The cells of a part."""
+    code = source_key(*(Path(armload.online.__path__[0]) / name for name in ("changes.py", "watch.py")))
+    if part == "real":
+        return [Task.of_one(f"real-{method}", key_of(method, code), real, method) for method in ("map-gp", "hybrid")]
+    drawn = [replace(scene, seed=scene.seed + seed) for scene in scenes(quick, most) if scene.part == part]
+    named = {f"{part}-{scene.seed}-{scene.seconds:g}s": scene for scene in drawn}
+    return [Task.of_one(name, key_of(asdict(scene), code), measured, scene) for name, scene in named.items()]
+
+
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="two short scenes of each part; written to out/")
-    parser.add_argument("--parts", default="steps,quiet,hybrid,pushes,hybrid_pushes,cycles,real")
-    parser.add_argument("--cells", type=Path, default=CELLS)
-    parser.add_argument("--seed", type=int, default=0, help="added to all seeds, to set constants on others")
-    parser.add_argument("--scenes", type=int, default=1000, help="at most so many of each part")
-    asked = parser.parse_args()
-    parts, now = asked.parts.split(","), code()
-    cells: dict[str, list[dict]] = {part: [] for part in parts}
+    asked = options(
+        __doc__,
+        quick=False,
+        parts="steps,quiet,hybrid,pushes,hybrid_pushes,cycles,real",
+        cells=CELLS,
+        seed=0,
+        scenes=1000,
+        jobs=1,
+    )
+    cells = {}
     with threadpool_limits(1):
-        todo = [
-            replace(scene, seed=scene.seed + asked.seed)
-            for scene in scenes(asked.quick, asked.scenes)
-            if scene.part in parts
-        ]
-        for scene in sorted(todo, key=lambda s: (s.seed % 1000, s.seed)):  # some of each part first
-            name = f"{scene.part}-{scene.seed}-{scene.seconds:g}s"
-            key = key_of(asdict(scene), now)
-            cell = finished_cell(asked.cells, name, key)
-            if cell is None:
-                cell = {"name": name, "key": key} | measured(scene)
-                save_cell(asked.cells, cell, indent=None)
-                print(name, cell["cpu_s"], len(cell["steps"]), "changes", len(cell["events"]), "events", flush=True)
-            cells[scene.part].append(cell)
-        for method in ("map-gp", "hybrid") if "real" in parts else ():
-            name, key = f"real-{method}", key_of(method, now)
-            cell = finished_cell(asked.cells, name, key)
-            if cell is None:
-                cell = {"name": name, "key": key, "method": method} | real(method)
-                save_cell(asked.cells, cell, indent=None)
-            cells["real"].append(cell)
+        for part in asked.parts.split(","):
+            wanted = tasks(part, asked.quick, asked.seed, asked.scenes)
+            cells[part] = list(run_tasks(wanted, asked.cells, jobs=asked.jobs, say=say).values())
     full = not asked.quick and not asked.seed and asked.scenes >= 1000
-    path = HERE / "results" / "events.json" if full else asked.cells / "summary.txt"
+    path = RESULTS / "events.json"
     before = json.loads(path.read_text())["parts"] if full and path.is_file() else {}
     found = before | summary(cells)
     result = {
-        "command": "python benchmarks/events.py" + (" --quick" if asked.quick else ""),
-        "version": __version__,
         "seeds_from": FIRST_SEED + asked.seed,
         "targets": {"median_delay_s": 0.3, "missed": 0.01, "false_alarms_per_hour": 1.0},
         "parts": found | {"false_alarms_in_all": in_all(found)},
     }
-    text = json.dumps(result, indent=1)
-    path.write_text(text + "\n")
-    print(text)
+    if full:
+        write("events", result)
+    else:
+        print(json.dumps(result, indent=1))
 
 
 if __name__ == "__main__":

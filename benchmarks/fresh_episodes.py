@@ -14,29 +14,24 @@ core for each episode; goes on from --work.
 
 from __future__ import annotations
 
-import argparse
-import json
+from argparse import Namespace
 from pathlib import Path
 
 import numpy as np
-from hybrid_ablation import GROUPS, gaussian
+from hybrid_ablation import GROUPS, by_tare_and_time, gaussian
 from numpy.typing import NDArray
-from study_of_arms import ROOT, write_table
+from script import ROOT, markdown_table, options, write, write_table
 
 from armload import Arm, arm
 from armload.app.cli.printing import console
 from armload.app.cli.train_hybrid import cells_table, episodes_shown, summary
-from armload.atomic import replacing
 from armload.lab.training import Records
-from armload.lab.training.calibrating import nearest
 from armload.lab.training.coverage import coverage_on
-from armload.lab.training.hybrid import drawn_episodes, episode_records, versions
-from armload.lab.training.records import TIMES
+from armload.lab.training.hybrid import drawn_episodes, episode_records
 from armload.posterior import HybridModel, shipped_model
 from armload.regression import solution_prior_std
 
 SEED = 1  # trainings have seed 0
-RESULTS = ROOT / "benchmarks" / "results"
 COMPARED = ("its physics, map-gp", "same-prior least squares", "predict the mean")
 LIGHT = 0.2  # [kg]
 SHOWN = (
@@ -65,7 +60,7 @@ def errors(robot: Arm, model: HybridModel, records: Records) -> dict[str, NDArra
 
 def compared(error: dict[str, NDArray[np.float64]], records: Records, families: NDArray[np.str_]) -> list[dict]:
     """Mean errors of every row, and how far the others are above the hybrid, subset by subset and time by time."""
-    which, family, mass = nearest(records.t, np.array(TIMES)), families[records.episode], records.truth[:, 0]
+    family, mass = families[records.episode], records.truth[:, 0]
     everything = np.ones(len(records), dtype=bool)
     subsets = {"all": everything}
     subsets |= {f"world: {g.removeprefix('broad ')}": records.group == g for g in np.unique(records.group)}
@@ -73,19 +68,18 @@ def compared(error: dict[str, NDArray[np.float64]], records: Records, families: 
     subsets |= {f"below {LIGHT} kg": mass < LIGHT, f"{LIGHT} kg and above": mass >= LIGHT}
     out = []
     for subset, rows in subsets.items():
-        for kind, what in ((0, "no tare"), (1, "tare")):
-            for b, t in enumerate(TIMES):
-                cell = rows & (records.kind == kind) & (which == b)
-                line: dict = {"subset": subset, "what": what, "t": t, "episodes": int(cell.sum())}
-                for group, part in GROUPS.items():
-                    own = 1e3 * error["hybrid"][cell][:, part].mean(axis=1)
-                    line[group] = {"hybrid": round(float(own.mean()), 3)}
-                    for name in COMPARED:
-                        more = 1e3 * error[name][cell][:, part].mean(axis=1) - own
-                        line[group][name] = round(float((own + more).mean()), 3)
-                        line[group][f"{name}, more"] = round(float(more.mean()), 3)
-                        line[group][f"{name}, more, se"] = round(float(more.std(ddof=1) / np.sqrt(len(more))), 3)
-                out.append(line)
+        for named, cell in by_tare_and_time(records):
+            cell = cell & rows
+            line: dict = {"subset": subset, **named, "episodes": int(cell.sum())}
+            for group, part in GROUPS.items():
+                own = 1e3 * error["hybrid"][cell][:, part].mean(axis=1)
+                line[group] = {"hybrid": round(float(own.mean()), 3)}
+                for name in COMPARED:
+                    more = 1e3 * error[name][cell][:, part].mean(axis=1) - own
+                    line[group][name] = round(float((own + more).mean()), 3)
+                    line[group][f"{name}, more"] = round(float(more.mean()), 3)
+                    line[group][f"{name}, more, se"] = round(float(more.std(ddof=1) / np.sqrt(len(more))), 3)
+            out.append(line)
     return out
 
 
@@ -113,7 +107,7 @@ def sentence(verdict: dict[str, int]) -> str:
 
 def table(lines: list[dict]) -> str:
     """Mean errors [g · g·m · g·m²] of the rows that docs/hybrid.md shows, as Markdown."""
-    out = ["| episodes | answered by | 0.1 s | 1 s | 6 s |", "|---|---|---|---|---|"]
+    out = []
     for what, subset, title in SHOWN:
         cells = [
             next(line for line in lines if (line["what"], line["subset"], line["t"]) == (what, subset, t))
@@ -122,48 +116,40 @@ def table(lines: list[dict]) -> str:
         for name in ("hybrid", *COMPARED):
             errors = [[cell[group][name] for group in GROUPS] for cell in cells]
             shown = (f"{mass:.0f} · {moment:.1f} · {inertia:.2f}" for mass, moment, inertia in errors)
-            first = f"{title}, {cells[1]['episodes']}" if name == "hybrid" else ""
-            out.append(f"| {first} | {name} | {' | '.join(shown)} |")
-    return "\n".join(out)
+            out.append((f"{title}, {cells[1]['episodes']}" if name == "hybrid" else "", name, *shown))
+    return markdown_table(("episodes", "answered by", "0.1 s", "1 s", "6 s"), "lllll", out)
+
+
+def new_records(robot: Arm, asked: Namespace) -> Records:
+    """Those of the episodes that nothing was trained on; both scripts that look at them go on from the same folder."""
+    work = Path(asked.work or f"out/fresh-{robot.name}")
+    with episodes_shown() as progress:
+        return episode_records(
+            robot, episodes=asked.episodes, seed=SEED, folder=work, jobs=asked.jobs, progress=progress
+        )
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--robot", default="panda")
-    parser.add_argument("--episodes", type=int, default=2000)
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--work", type=Path)
-    options = parser.parse_args()
-    robot = arm(options.robot)
-    model = shipped_model(robot)
-    work = options.work or Path(f"out/fresh-{robot.name}")
-    with episodes_shown() as progress:
-        records = episode_records(
-            robot, episodes=options.episodes, seed=SEED, folder=work, jobs=options.jobs, progress=progress
-        )
+    asked = options(__doc__, robot="panda", episodes=2000, jobs=2, work="")
+    robot = arm(asked.robot)
+    model, records = shipped_model(robot), new_records(robot, asked)
     found = coverage_on(records, model.prior_for(robot), model.calibration)
     console().print(cells_table(found))
     print(f"pooled: {100 * found.pooled:.1f} %")
-    drawn = drawn_episodes(robot, episodes=options.episodes, seed=SEED)
+    drawn = drawn_episodes(robot, episodes=asked.episodes, seed=SEED)
     families = np.array([episode.payload.name.split()[0] for episode in drawn])
     lines = compared(errors(robot, model, records), records, families)
     verdict = verdicts(lines)
     print(sentence(verdict))
-    asked = [f"--robot {robot.name}"] * (robot.name != "panda") + [f"--episodes {options.episodes}"]
     result = {
-        "command": " ".join(["python benchmarks/fresh_episodes.py", *asked]),
         "population": "broad",
         "seed": SEED,
         "trained": {key: getattr(model.training, key) for key in ("population", "episodes", "seed")},
         **summary(robot, found),
         "errors": lines,
         "verdicts": verdict,
-        "versions": versions(),
     }
-    path = RESULTS / f"fresh_episodes_{robot.name}.json"
-    with replacing(path) as part:
-        part.write_text(json.dumps(result, allow_nan=False) + "\n", encoding="utf-8")
-    print(f"wrote {path}")
+    write(f"fresh_episodes_{robot.name}", result, indent=None)
     if robot.name == "panda":
         write_table(ROOT / "docs" / "hybrid.md", "new episodes", table(lines) + "\n\n" + sentence(verdict))
 

@@ -1,6 +1,6 @@
 """Identification while a person guides the arm by hand, as when a robot is taught.
 
-    python benchmarks/hand_guided.py [--seeds 6] [--quick]
+    python benchmarks/hand_guided.py [--seeds 6] [--jobs 1] [--quick]
 
 A simulated Panda (another real-like arm for every seed, a tare of the empty arm) holds a payload nobody declared. While
 its enabling button is pressed it compensates the gravity of what was declared
@@ -20,12 +20,14 @@ Writes benchmarks/results/hand_guided.json, docs/pictures/hand_guided.png and th
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from closed_loop import PAYLOADS, SETTLE, rounded, tare_of
+from closed_loop import PAYLOADS, SETTLE, tare_of
 from numpy.typing import NDArray
-from study_of_arms import ROOT, Study
+from script import markdown_table, mean_and_spread, rounded
+from study_of_arms import Study
 
 from armload.arms import Arm
 from armload.estimators import Identifier
@@ -34,17 +36,8 @@ from armload.inertia import InertialParameters
 from armload.lab.report.style import COLOURS, look, new_figure
 from armload.motion import FourierMotion, Motion, random_motion
 from armload.recording import Recording
-from armload.simulation import (
-    GravityCompensation,
-    JointImpedance,
-    Sensors,
-    World,
-    torque_controlled,
-)
+from armload.simulation import GravityCompensation, JointImpedance, Sensors, World, torque_controlled
 
-RESULT = ROOT / "benchmarks" / "results" / "hand_guided.json"
-FIGURE = ROOT / "docs" / "pictures" / "hand_guided.png"
-COMMAND = "python benchmarks/hand_guided.py"
 LOGS = ("guided", "all", "pauses", "led")
 TRIED = ("hybrid", "map-gp", "rls-filter")
 GUIDED, HELD = 3.0, 2.0  # [s] button pressed, button let go
@@ -252,10 +245,10 @@ def measure(robot: Arm, seed: int) -> tuple[list[dict[str, Any]], dict[str, Any]
             )
     if seed != SHOWN:
         return rows, {}
-    curves: dict[str, Any] = {"push": (at, push), "mass": held.mass}
+    curves: dict[str, Any] = {"push": [at.tolist(), push.tolist()], "mass": held.mass}
     for part in ("guided", "pauses"):
         trace = methods["hybrid"].trace(parts[part], every=200)
-        curves[part] = np.array([(e.t, e.phi[0], 1.96 * e.std[0]) for e in trace]).T
+        curves[part] = np.array([(e.t, e.phi[0], 1.96 * e.std[0]) for e in trace]).T.tolist()
     return rows, curves
 
 
@@ -266,10 +259,9 @@ def summarise(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
         for method in TRIED:
             mine = [row for row in rows if (row["log"], row["method"]) == (part, method)]
             entry: dict[str, Any] = {"log": part, "method": method, "seeds": len(mine)}
-            relative = np.array([100.0 * row["mass_error_kg"] / row["true_mass_kg"] for row in mine])
-            moment = np.array([row["first_moment_error_gm"] for row in mine])
-            for quantity, values in (("mass_error_percent", relative), ("first_moment_error_gm", moment)):
-                entry[quantity] = [float(values.mean()), float(values.std(ddof=1)) if len(mine) > 1 else 0.0]
+            relative = [100.0 * row["mass_error_kg"] / row["true_mass_kg"] for row in mine]
+            entry["mass_error_percent"] = mean_and_spread(relative)
+            entry["first_moment_error_gm"] = mean_and_spread([row["first_moment_error_gm"] for row in mine])
             entry["mass_covered"] = sum(row["mass_covered"] for row in mine)
             entry["covered_of_all_percent"] = float(np.mean([10.0 * row["covered_of_ten"] for row in mine]))
             entry["push_mean_N"] = float(np.mean([row["push_mean_N"] for row in mine]))
@@ -287,21 +279,24 @@ SAID = {
 
 def table(summary: list[dict[str, Any]]) -> str:
     """The summary as Markdown."""
-    lines = [
-        "| samples given | the hand pushes [N] | method | mass error [%] | first moment error [g·m] "
-        "| mass within its 95 % interval | of all ten [%] |",
-        "|---|---:|---|---:|---:|---:|---:|",
-    ]
-    for entry in summary:
-        mass, moment = (rounded(*entry[quantity]) for quantity in ("mass_error_percent", "first_moment_error_gm"))
-        lines.append(
-            f"| {SAID[entry['log']]} | {entry['push_mean_N']:.0f} | {entry['method']} | {mass} | {moment} "
-            f"| {entry['mass_covered']} of {entry['seeds']} | {entry['covered_of_all_percent']:.0f} |"
+    columns = "samples given", "the hand pushes [N]", "method", "mass error [%]", "first moment error [g·m]"
+    columns += "mass within its 95 % interval", "of all ten [%]"
+    rows = [
+        (
+            SAID[entry["log"]],
+            f"{entry['push_mean_N']:.0f}",
+            entry["method"],
+            rounded(*entry["mass_error_percent"]),
+            rounded(*entry["first_moment_error_gm"]),
+            f"{entry['mass_covered']} of {entry['seeds']}",
+            f"{entry['covered_of_all_percent']:.0f}",
         )
-    return "\n".join(lines)
+        for entry in summary
+    ]
+    return markdown_table(columns, "lrlrrrr", rows)
 
 
-def draw(rows: list[dict[str, Any]], curves: dict[str, Any]) -> None:
+def draw(_: Any, rows: list[dict[str, Any]], curves: dict[str, Any], file: Path) -> None:
     """One session over time, and all sessions."""
     schedule, colour = Schedule(), dict(zip(TRIED, COLOURS, strict=False))
     with look():
@@ -316,7 +311,7 @@ def draw(rows: list[dict[str, Any]], curves: dict[str, Any]) -> None:
             ("pauses", "from the pauses", COLOURS[0]),
             ("guided", "from what was guided", COLOURS[3]),
         ):
-            at, value, half = curves[part]
+            at, value, half = np.array(curves[part])
             mass.fill_between(at, value - half, value + half, color=shade, alpha=0.25, lw=0, step="post")
             mass.plot(at, value, color=shade, label=said, drawstyle="steps-post", marker=".", ms=3)
         mass.axhline(curves["mass"], color="black", lw=0.9, ls="--", label="truth")
@@ -342,29 +337,23 @@ def draw(rows: list[dict[str, Any]], curves: dict[str, Any]) -> None:
         every.set_title("all sessions (open: outside its 95 % interval)")
         every.grid(axis="x", visible=False)
         every.legend(loc="lower left")
-        FIGURE.parent.mkdir(exist_ok=True)
-        figure.savefig(FIGURE, dpi=100)
+        figure.savefig(file, dpi=100)
 
 
-def main() -> None:
-    assert __doc__ is not None
-    Study(
-        about=__doc__,
-        command=COMMAND,
-        result=RESULT,
-        mark="hand guided",
-        seeds=6,
-        conditions={
-            "arm": "panda, World.real_like, one per seed; Sensors.panda; 20 s of tare on another motion",
-            "schedule": f"{ROUNDS} times {GUIDED:g} s guided, {HELD:g} s held; {ROUNDS * GUIDED:g} s led",
-            "hands": f"{STIFFNESS:g} N/m, {DAMPING:g} N·s/m, wander {1e3 * WANDER:g} mm rms; flange and {ELBOW}",
-        },
-        measure=measure,
-        summarise=summarise,
-        table=table,
-        draw=lambda _, rows, curves: draw(rows, curves),
-    ).run()
-
+STUDY = Study(
+    name="hand_guided",
+    mark="hand guided",
+    seeds=6,
+    conditions={
+        "arm": "panda, World.real_like, one per seed; Sensors.panda; 20 s of tare on another motion",
+        "schedule": f"{ROUNDS} times {GUIDED:g} s guided, {HELD:g} s held; {ROUNDS * GUIDED:g} s led",
+        "hands": f"{STIFFNESS:g} N/m, {DAMPING:g} N·s/m, wander {1e3 * WANDER:g} mm rms; flange and {ELBOW}",
+    },
+    measure=measure,
+    summarise=summarise,
+    table=table,
+    draw=draw,
+)
 
 if __name__ == "__main__":
-    main()
+    STUDY.run()

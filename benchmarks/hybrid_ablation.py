@@ -8,22 +8,23 @@ episodes; se is the standard error over the folds. Writes benchmarks/results/hyb
 
 from __future__ import annotations
 
-import argparse
 import json
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
+from script import options, say, write
 
-from armload import __version__, arm
+from armload import arm
 from armload.inertia import Z95
-from armload.lab.training import payload_mixture
+from armload.lab.training import Records, payload_mixture
 from armload.lab.training.calibrating import fit_calibration, nearest
 from armload.lab.training.coverage import FOLDS
 from armload.lab.training.hybrid import EPISODES, episode_records
 from armload.lab.training.records import TIMES
 from armload.posterior import MixturePrior
 
-RESULTS = Path(__file__).parent / "results" / "hybrid_ablation.json"
 SHOWN = (0.1, 1.0, 6.0)  # [s]
 GROUPS = {"mass_g": slice(0, 1), "first_moment_g_m": slice(1, 4), "inertia_g_m2": slice(4, 10)}
 
@@ -37,14 +38,18 @@ def gaussian(prior: MixturePrior) -> MixturePrior:
     return MixturePrior(np.ones(1), prior.mean[None], second[None], ("all",))
 
 
+def by_tare_and_time(records: Records, times: Sequence[float] = TIMES) -> Iterator[tuple[dict, NDArray[np.bool_]]]:
+    """Without and with a tare, time by time: what it is called and which of the records (N,) it is."""
+    which = nearest(records.t, np.array(TIMES))
+    for kind, what in ((0, "no tare"), (1, "tare")):
+        for t in times:
+            yield {"what": what, "t": t}, (records.kind == kind) & (which == TIMES.index(t))
+
+
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--work", type=Path, default=Path("out/hybrid-panda"))
-    parser.add_argument("--episodes", type=int, default=EPISODES)
-    parser.add_argument("--jobs", type=int, default=1)
-    options = parser.parse_args()
+    asked = options(__doc__, work=Path("out/hybrid-panda"), episodes=EPISODES, jobs=1)
     panda = arm("panda")
-    records = episode_records(panda, episodes=options.episodes, folder=options.work, jobs=options.jobs)
+    records = episode_records(panda, episodes=asked.episodes, folder=asked.work, jobs=asked.jobs)
     prior = payload_mixture(panda)
     rows = {
         "predict the training mean": None,
@@ -56,7 +61,6 @@ def main() -> None:
         "hybrid: both": (prior, ("tree", "network")),
     }
     episodes = np.random.default_rng([0, 8]).permutation(np.unique(records.episode))
-    which = nearest(records.t, np.array(TIMES))
     out = []
     for name, how in rows.items():
         error, half = np.zeros((len(records), 10)), np.zeros((len(records), 10))
@@ -77,22 +81,18 @@ def main() -> None:
                 found = calibration.answer(records.evidence(int(row)), used)
                 error[row] = np.abs(found.mean - records.truth[row])
                 half[row] = Z95 * np.sqrt(np.diag(found.covariance))
-        for kind, what in ((0, "no tare"), (1, "tare")):
-            for t in SHOWN:
-                cell = (records.kind == kind) & (which == TIMES.index(t))
-                line = {"row": name, "what": what, "t": t, "episodes": int(cell.sum())}
-                for group, part in GROUPS.items():
-                    e, h = error[cell][:, part], half[cell][:, part]
-                    folds = [1e3 * error[cell & (fold == k)][:, part].mean() for k in range(FOLDS)]
-                    line[group] = round(1e3 * float(e.mean()), 3)
-                    line[f"{group}_se"] = round(float(np.std(folds, ddof=1) / np.sqrt(FOLDS)), 3)
-                    line[f"{group}_half_width"] = round(1e3 * float(h.mean()), 3)
-                    line[f"{group}_inside"] = round(float(np.mean(e <= h)), 4)
-                out.append(line)
-                print(json.dumps(line), flush=True)
-    command = f"python benchmarks/hybrid_ablation.py --episodes {options.episodes}"
-    report = {"command": command, "version": __version__, "seed": 0, "folds": FOLDS, "rows": out}
-    RESULTS.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+        for named, cell in by_tare_and_time(records, SHOWN):
+            line = {"row": name, **named, "episodes": int(cell.sum())}
+            for group, part in GROUPS.items():
+                e, h = error[cell][:, part], half[cell][:, part]
+                folds = [1e3 * error[cell & (fold == k)][:, part].mean() for k in range(FOLDS)]
+                line[group] = round(1e3 * float(e.mean()), 3)
+                line[f"{group}_se"] = round(float(np.std(folds, ddof=1) / np.sqrt(FOLDS)), 3)
+                line[f"{group}_half_width"] = round(1e3 * float(h.mean()), 3)
+                line[f"{group}_inside"] = round(float(np.mean(e <= h)), 4)
+            out.append(line)
+            say(json.dumps(line))
+    write("hybrid_ablation", {"seed": 0, "folds": FOLDS, "rows": out})
 
 
 if __name__ == "__main__":

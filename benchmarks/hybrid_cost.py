@@ -11,25 +11,20 @@ the end of the run.
 
 from __future__ import annotations
 
-import argparse
-import json
-import os
-import platform
 import time
-from pathlib import Path
 
 import numpy as np
+from script import options, write
 from sklearn.ensemble import BaggingRegressor
 from threadpoolctl import threadpool_limits
 
-from armload import __version__, arm
+from armload import arm
 from armload.estimators import FilteredRecursiveLeastSquares, Identifier
 from armload.motion import random_motion
 from armload.payloads import test_payload
 from armload.posterior import HybridIdentifier, SmoothPosteriorLeastSquares
 from armload.simulation import Sensors, World, simulate
 
-HERE = Path(__file__).resolve().parent
 SAMPLE = 1e-3  # [s]
 
 
@@ -91,9 +86,7 @@ def sklearn_row() -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seconds", type=float, default=20.0)
-    seconds = parser.parse_args().seconds
+    seconds = options(__doc__, seconds=20.0).seconds
     robot = arm("panda")
     world, sensors = World.real_like(robot, 1), Sensors.panda(robot)
     motion = random_motion(robot, 1, duration=seconds, harmonics=10)
@@ -107,9 +100,6 @@ def main() -> None:
             "rls-filter": measure(FilteredRecursiveLeastSquares(robot), log),
         }
     result = {
-        "command": f"python benchmarks/hybrid_cost.py --seconds {seconds:g}",
-        "version": __version__,
-        "machine": f"{platform.machine()}, {os.cpu_count()} cores",
         "samples": len(log),
         "sample_time_s": SAMPLE,
         "sklearn_row_s": row,
@@ -117,9 +107,7 @@ def main() -> None:
         "ratio_to_1_ms": {name: {k: v / SAMPLE for k, v in m.items() if "bytes" not in k} for name, m in found.items()},
         "ratio_to_sklearn_row": {name: m["light_median"] / row for name, m in found.items()},
     }
-    text = json.dumps(result, indent=1)
-    (HERE / "results" / "hybrid_cost.json").write_text(text + "\n")
-    print(text)
+    write("hybrid_cost", result)
 
 
 if __name__ == "__main__":

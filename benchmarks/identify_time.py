@@ -10,10 +10,7 @@ say little.
 
 from __future__ import annotations
 
-import argparse
 import json
-import os
-import platform
 import resource
 import subprocess
 import sys
@@ -21,13 +18,14 @@ import tempfile
 import time
 from pathlib import Path
 
-from armload import __version__, arm
+from script import options, write
+
+from armload import arm
 from armload.motion import random_motion
 from armload.payloads import test_payload
 from armload.recording import write_recording
 from armload.simulation import Sensors, World, simulate
 
-HERE = Path(__file__).resolve().parent
 TARE = 20.0  # [s]
 
 
@@ -44,10 +42,7 @@ def timed(folder: Path, ending: str, method: str) -> dict[str, float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seconds", type=float, default=60.0)
-    parser.add_argument("--method", default="hybrid")
-    asked = parser.parse_args()
+    asked = options(__doc__, seconds=60.0, method="hybrid")
     robot = arm("panda")
     world, sensors = World.real_like(robot, 1), Sensors.panda(robot)
     motions = (random_motion(robot, 1, duration=asked.seconds, harmonics=10), random_motion(robot, 2, duration=TARE))
@@ -59,18 +54,7 @@ def main() -> None:
             for ending in ("csv", "parquet"):
                 write_recording(folder / f"{part}.{ending}", log)
         found = {ending: timed(folder, ending, asked.method) for ending in ("csv", "parquet")}
-    result = {
-        "command": f"python benchmarks/identify_time.py --seconds {asked.seconds:g} --method {asked.method}",
-        "version": __version__,
-        "machine": f"{platform.machine()}, {os.cpu_count()} cores",
-        "load": round(os.getloadavg()[0], 1),
-        "samples": samples,
-        "truth_kg": test_payload().parameters.mass,
-        "identify": found,
-    }
-    text = json.dumps(result, indent=1)
-    (HERE / "results" / "identify_time.json").write_text(text + "\n")
-    print(text)
+    write("identify_time", {"samples": samples, "truth_kg": test_payload().parameters.mass, "identify": found})
 
 
 if __name__ == "__main__":

@@ -9,24 +9,20 @@ threads counted, with BLAS on one thread: wall time on a shared machine measures
 
 from __future__ import annotations
 
-import json
-import os
-import platform
 import statistics
 import time
 import warnings
 from collections.abc import Callable
-from importlib.metadata import version
-from pathlib import Path
 
 import numpy as np
+from script import write
 from threadpoolctl import threadpool_limits
 
 from armload.ensembles import BaggingEnsemble, NetworkLearner
+from armload.lab.experiment import versions
 
 ROWS, PAYLOADS, MEMBERS = 20_000, 77, 5
 SEEDS = 3  # of the comparison of losses
-RESULT = Path(__file__).parent / "results" / "learner_speed.json"
 
 
 def table(seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
@@ -144,10 +140,7 @@ def main() -> None:
         "rows": ROWS,
         "features": X.shape[1],
         "members": MEMBERS,
-        "cores": os.cpu_count(),
-        "load_before": round(os.getloadavg()[0], 2),
-        "python": platform.python_version(),
-        "versions": {p: version(p) for p in ("numpy", "numba", "scikit-learn", "jax")},
+        "learners": versions("numba", "scikit-learn", "jax"),
         "races": races,
         "validation_loss_after_20_epochs": {
             "what": "mean squared error on 3000 rows in scaled units, mean of the members; batch 200, equal epochs",
@@ -156,8 +149,7 @@ def main() -> None:
             "ratio_median": round(statistics.median(ours / theirs for ours, theirs in losses), 4),
         },
     }
-    RESULT.parent.mkdir(exist_ok=True)
-    RESULT.write_text(json.dumps(result, indent=2) + "\n")
+    write("learner_speed", result)
     print(f"{'processor time, or wall':28} {'armload':>12} {'scikit-learn':>14} {'ratio':>7}")
     for name, r in races.items():
         ours, theirs = (r[who].get("cpu_s", r[who]["wall_s"]) for who in ("armload", "scikit_learn"))

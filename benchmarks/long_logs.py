@@ -1,12 +1,12 @@
 """Whether the hybrid's error bars hold on logs longer than those they were calibrated on.
 
-    python benchmarks/long_logs.py [--robot panda] [--episodes 40] [--worlds real_like]
+    python benchmarks/long_logs.py [--robot panda] [--episodes 40] [--worlds real_like] [--jobs 1]
 
 The shipped model's widths were calibrated up to 6 s after a run began. Here runs last 60 s: every episode is another
 arm, payload and motion (a Fourier motion that repeats, a slow one that does not, stops at ever new poses, pick and
 place), logged at 200 Hz, identified without and with a tare of 20 s on another motion, at several times of the same
-run. Written to benchmarks/results/long_logs_ROBOT.json, for each world, with and without a tare, and each group of
-parameters, over time:
+run. Goes on from out/long_logs. Written to benchmarks/results/long_logs_ROBOT.json, for each world, with and without a
+tare, and each group of parameters, over time:
 
 coverage: share of the 95 % intervals that hold the truth. The episodes are few: `standard_error` is that of the
     coverage, with an episode's parameters taken as one observation.
@@ -18,27 +18,21 @@ slope: d ln(error) / d ln(t) between two times; −0.5 where errors average out,
 
 from __future__ import annotations
 
-import argparse
-import json
-import time
 from dataclasses import asdict, replace
-from pathlib import Path
+from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
+from script import ROOT, options, say, write
 
-from armload import Arm, Recording, __version__, arm
+from armload import Arm, Recording, arm
 from armload.inertia import Z95
-from armload.lab.episodes import (
-    Episode,
-    Recipe,
-    draw_episodes,
-    simulate_episodes,
-)
+from armload.lab.cells import key_of
+from armload.lab.episodes import Episode, Recipe, draw_episodes, simulate_episodes
+from armload.lab.experiment import Task, run_tasks, source_key
 from armload.posterior import HybridIdentifier, HybridModel, shipped_model
 
-HERE = Path(__file__).resolve().parent
 TIMES = (1.0, 3.0, 6.0, 15.0, 30.0, 60.0)  # [s] since the run began
 FIRST_SEED = 910_001  # nothing is trained on it
 GROUPS = {"mass": slice(0, 1), "first_moment": slice(1, 4), "inertia": slice(4, 10)}
@@ -46,18 +40,32 @@ MOTIONS = ("harmonics", "long", "point-to-point", "pick-and-place")
 LONG = Recipe(payloads=("boxes", "shapes", "tools", "container"), motions=MOTIONS, duration=TIMES[-1])
 
 
+@cache
 def episodes(robot: Arm, world: str, count: int) -> list[Episode]:
     """`count` long episodes on arms of a world."""
     recipe = replace(LONG, worlds=(world,), elapsed=(30.0, 600.0) if world == "beyond" else LONG.elapsed)
     return draw_episodes(robot, recipe, count, FIRST_SEED, motions=count)
 
 
-def measured(
+def answered(
     robot: Arm, model: HybridModel, run: Recording, tare: Recording | None, truth: NDArray
-) -> tuple[NDArray, NDArray]:
+) -> dict[str, list[list[float]]]:
     """|error| and half-width (T, 10) at the times."""
     found = HybridIdentifier(robot, tare, model).at(run, TIMES)
-    return np.abs([e.phi - truth for e in found]), Z95 * np.array([e.std for e in found])
+    error, half = np.abs([e.phi - truth for e in found]), Z95 * np.array([e.std for e in found])
+    return {"error": error.tolist(), "half": half.tolist()}
+
+
+def measured(name: str, world: str, count: int, k: int) -> dict[str, Any]:
+    """One episode as a cell's numbers."""
+    robot = arm(name)
+    model, episode = shipped_model(robot), episodes(robot, world, count)[k]
+    logs = next(iter(simulate_episodes([episode])))
+    return {
+        "motion": next(kind for kind in MOTIONS if f"run-{kind}" in str(episode.motion.name)),
+        "no tare": answered(robot, model, logs.run, None, logs.truth.phi),
+        "tare": answered(robot, model, logs.run, logs.tare, logs.truth.phi),
+    }
 
 
 def table(error: NDArray, half: NDArray) -> dict:
@@ -85,44 +93,31 @@ def table(error: NDArray, half: NDArray) -> dict:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--robot", default="panda")
-    parser.add_argument("--episodes", type=int, default=40)
-    parser.add_argument("--worlds", default="real_like")
-    asked = parser.parse_args()
-    robot = arm(asked.robot)
-    model = shipped_model(robot)
+    asked = options(__doc__, robot="panda", episodes=40, worlds="real_like", jobs=1)
+    name, count, code, worlds = asked.robot, asked.episodes, source_key(), {}
+    for world in asked.worlds.split(","):
+        tasks = [
+            Task.of_one(f"{name}-{world}-{count}-{k}", key_of(code, TIMES), measured, name, world, count, k)
+            for k in range(count)
+        ]
+        cells = list(run_tasks(tasks, ROOT / "out" / "long_logs", jobs=asked.jobs, say=say).values())
+        kinds = np.array([cell["motion"] for cell in cells])
+        tables = worlds[world] = {}
+        for what in ("no tare", "tare"):
+            error, half = (np.array([cell[what][x] for cell in cells]) for x in ("error", "half"))
+            inside = (error <= half).mean(axis=2)
+            by_motion = {kind: inside[kinds == kind].mean(axis=0).round(3).tolist() for kind in sorted(set(kinds))}
+            tables[what] = table(error, half) | {"coverage_by_motion": by_motion}
+    trained = shipped_model(arm(name)).training
     result = {
-        "command": f"python benchmarks/long_logs.py --robot {robot.name} --episodes {asked.episodes} "
-        f"--worlds {asked.worlds}",
-        "robot": robot.name,
-        "version": __version__,
-        "model": None if model.training is None else asdict(model.training),
+        "robot": name,
+        "model": None if trained is None else asdict(trained),
         "first_seed": FIRST_SEED,
-        "episodes": asked.episodes,
+        "episodes": count,
         "times_s": list(TIMES),
-        "worlds": {},
+        "worlds": worlds,
     }
-    with threadpool_limits(1):
-        for world in asked.worlds.split(","):
-            drawn, found = episodes(robot, world, asked.episodes), {"no tare": [], "tare": []}
-            for k, logs in enumerate(simulate_episodes(drawn), start=1):
-                for name, tare in (("no tare", None), ("tare", logs.tare)):
-                    found[name].append(measured(robot, model, logs.run, tare, logs.truth.phi))
-                print(f"{world}: {k} of {len(drawn)}, {time.process_time():.0f} s of CPU time", flush=True)
-            tables = {}
-            kinds = np.array([next(kind for kind in MOTIONS if f"run-{kind}" in str(e.motion.name)) for e in drawn])
-            for name, pairs in found.items():
-                error, half = (np.array(x) for x in zip(*pairs, strict=True))
-                tables[name] = table(error, half)
-                inside = (error <= half).mean(axis=2)
-                tables[name]["coverage_by_motion"] = {
-                    kind: inside[kinds == kind].mean(axis=0).round(3).tolist() for kind in sorted(set(kinds))
-                }
-            result["worlds"][world] = tables
-            text = json.dumps(result, indent=1)
-            (HERE / "results" / f"long_logs_{robot.name}.json").write_text(text + "\n")
-    print(text)
+    write(f"long_logs_{name}", result)
 
 
 if __name__ == "__main__":

@@ -16,6 +16,8 @@ waited for, as from a robot. The ensembles have the paper's sizes (five trees on
 hidden units) on made-up data, which the cost does not depend on; `sklearn_row` is scikit-learn's own
 `BaggingRegressor.predict` on one row in the same run.
 
+--quick: 20 s of each and a soak of a minute, printed only. --soak: its minutes; 0 keeps what was measured before.
+
 The soak feeds the hybrid an hour at 1 kHz: 3.6 million samples, 120 changes of payload.
 
 Written to benchmarks/results/online_speed.json. About 25 minutes on a quiet core.
@@ -23,10 +25,8 @@ Written to benchmarks/results/online_speed.json. About 25 minutes on a quiet cor
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
-import platform
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -37,17 +37,13 @@ from typing import Any
 import numpy as np
 from hybrid_cost import sklearn_row
 from learner_speed import table
+from script import RESULTS, options, say, write
 from threadpoolctl import threadpool_limits
 
-from armload import Recording, __version__, arm
+from armload import Recording, arm
 from armload.arms import Arm
 from armload.devices import Replay, Simulator
-from armload.ensembles import (
-    BaggingEnsemble,
-    LearnedIdentifier,
-    NetworkLearner,
-    save_model,
-)
+from armload.ensembles import BaggingEnsemble, LearnedIdentifier, NetworkLearner, save_model
 from armload.inertia import InertialParameters
 from armload.motion import random_motion
 from armload.online import OnlineIdentifier
@@ -55,7 +51,6 @@ from armload.posterior import StreamingIdentifier
 from armload.recording import Sample
 from armload.simulation import Sensors, World, simulate
 
-RESULT = Path(__file__).resolve().parent / "results" / "online_speed.json"
 SAMPLE = 1e-3  # [s]
 KINDS = ("ordinary", "adopted", "early", "change")
 SEED = 60_001
@@ -175,7 +170,7 @@ def soak(log: Recording, minutes: float) -> dict[str, Any]:
         last = estimate.event
         if k in marks:
             memory[f"{marks[k]:g} min"] = round(rss(), 1)
-            print("soak:", f"{marks[k]:g} min,", memory, flush=True)
+            say(f"soak: {marks[k]:g} min, {memory}")
     identifier.close()
     sizes = list(memory.values())
     return {
@@ -202,12 +197,7 @@ def ensembles(robot: Arm, folder: Path) -> dict[str, Path]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="20 s of each, a soak of 1 minute; printed only")
-    parser.add_argument(
-        "--soak", type=float, default=60.0, help="minutes of simulated time; 0: keep what was measured before"
-    )
-    asked = parser.parse_args()
+    asked = options(__doc__, quick=False, soak=60.0)
     robot = arm("panda")
     timed, paced, minutes = (20.0, 5.0, 1.0) if asked.quick else (300.0, 60.0, asked.soak)
     log = minute(robot)
@@ -243,19 +233,15 @@ def main() -> None:
                 engine.reset()
                 methods[f"{name}, the ensemble alone"] = measure(engine, engine.update, samples(log, count), count)
             identifier.close()
-            print(name, json.dumps(methods[name]), flush=True)
+            say(f"{name} {json.dumps(methods[name])}")
         for name in ("hybrid", "hybrid, with a tare", "trees"):
             identifier = makers[name]()
             real_time[name] = in_real_time(identifier, log, round(paced / SAMPLE))
             identifier.close()
-            print(name, json.dumps(real_time[name]), flush=True)
+            say(f"{name} {json.dumps(real_time[name])}")
         after = sklearn_row()
-        soaked = soak(log, minutes) if minutes > 0 else json.loads(RESULT.read_text())["soak"]
+        soaked = soak(log, minutes) if minutes > 0 else json.loads((RESULTS / "online_speed.json").read_text())["soak"]
     result = {
-        "command": "python benchmarks/online_speed.py" + (" --quick" if asked.quick else f" --soak {asked.soak:g}"),
-        "version": __version__,
-        "machine": f"{platform.machine()}, {os.cpu_count()} cores",
-        "load": [round(x, 2) for x in os.getloadavg()],
         "targets": {"hybrid_p50_us": 100, "hybrid_p99.9_us": 500, "ensembles_p50_us": 20, "oldest_answer_ms": 10},
         "samples": count,
         "sklearn_row_us": [round(1e6 * row, 1), round(1e6 * after, 1)],
@@ -267,10 +253,10 @@ def main() -> None:
         "in_real_time": real_time,
         "soak": soaked,
     }
-    text = json.dumps(result, indent=1)
-    if not asked.quick:
-        RESULT.write_text(text + "\n")
-    print(text)
+    if asked.quick:
+        print(json.dumps(result, indent=1))
+    else:
+        write("online_speed", result)
 
 
 if __name__ == "__main__":

@@ -14,24 +14,18 @@ Writes benchmarks/results/payload_intervals.json. Goes on from --work, which fre
 
 from __future__ import annotations
 
-import argparse
-import json
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
-from fresh_episodes import RESULTS, SEED
+from fresh_episodes import SEED, new_records
+from hybrid_ablation import by_tare_and_time
 from numpy.typing import NDArray
+from script import options, write
 
 from armload import Arm, arm
-from armload.app.cli.train_hybrid import episodes_shown
-from armload.atomic import replacing
 from armload.inertia import Z95, determined
 from armload.lab.training import Records
-from armload.lab.training.calibrating import nearest
-from armload.lab.training.hybrid import episode_records, versions
-from armload.lab.training.records import TIMES
 from armload.payloads import solids
 from armload.posterior import HybridModel, shipped_model
 from armload.posterior.hybrid import std_alone
@@ -91,30 +85,20 @@ def held(robot: Arm, model: HybridModel, records: Records) -> dict[str, NDArray[
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--episodes", type=int, default=2000)
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--work", type=Path, default=Path("out/fresh-panda"))
-    options = parser.parse_args()
+    asked = options(__doc__, episodes=2000, jobs=2, work="")
     robot = arm("panda")
-    model = shipped_model(robot)
-    with episodes_shown() as progress:
-        records = episode_records(
-            robot, episodes=options.episodes, seed=SEED, folder=options.work, jobs=options.jobs, progress=progress
-        )
+    model, records = shipped_model(robot), new_records(robot, asked)
     bodies = np.array([wide(k) for k in range(len(np.unique(records.episode)))])
-    which, cells, weights = nearest(records.t, np.array(TIMES)), [], []
+    cells, weights = [], []
     for name, some in (("wide", exchanged(records, bodies)), ("as drawn", records)):
         inside = held(robot, model, some)
-        for kind, what in ((0, "no tare"), (1, "tare")):
-            for b, t in enumerate(TIMES):
-                rows = (records.kind == kind) & (which == b)
-                for method, found in inside.items():
-                    shares = {group: round(float(found[rows][:, part].mean()), 4) for group, part in GROUPS.items()}
-                    line = {"payloads": name, "what": what, "t": t, "method": method, "episodes": int(rows.sum())}
-                    cells.append(line | shares)
-                    if t in (0.1, 1.0, 6.0):
-                        print(*line.values(), *(f"{group} {100 * x:.1f} %" for group, x in shares.items()), sep="  ")
+        for named, rows in by_tare_and_time(records):
+            for method, found in inside.items():
+                shares = {group: round(float(found[rows][:, part].mean()), 4) for group, part in GROUPS.items()}
+                line = {"payloads": name, **named, "method": method, "episodes": int(rows.sum())}
+                cells.append(line | shares)
+                if named["t"] in (0.1, 1.0, 6.0):
+                    print(*line.values(), *(f"{group} {100 * x:.1f} %" for group, x in shares.items()), sep="  ")
         if name == "as drawn":
             for low, high in pairwise(WEIGHTS):
                 rows = (low <= some.truth[:, 0]) & (some.truth[:, 0] < high) & (records.kind < 2) & (records.t > 0.8)
@@ -123,18 +107,8 @@ def main() -> None:
                 }
                 weights.append({"kg": [low, high], "episodes": len(np.unique(records.episode[rows]))} | shares)
                 print(weights[-1])
-    result = {
-        "command": f"python benchmarks/payload_intervals.py --episodes {options.episodes}",
-        "population": "broad",
-        "seed": SEED,
-        "cells": cells,
-        "weights": weights,
-        "versions": versions(),
-    }
-    path = RESULTS / "payload_intervals.json"
-    with replacing(path) as part:
-        part.write_text(json.dumps(result, allow_nan=False) + "\n", encoding="utf-8")
-    print(f"wrote {path}")
+    result = {"population": "broad", "seed": SEED, "cells": cells, "weights": weights}
+    write("payload_intervals", result, indent=None)
 
 
 if __name__ == "__main__":

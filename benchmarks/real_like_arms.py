@@ -8,33 +8,22 @@ the empty arm on yet another motion. Writes benchmarks/results/real_like_arms.js
 
 from __future__ import annotations
 
-import argparse
-import json
 import time
-from pathlib import Path
 
 import numpy as np
+from script import ROOT, options, write
 
-from armload import FilteredRecursiveLeastSquares, PosteriorLeastSquares, RecursiveLeastSquares, __version__, arm
+from armload import __version__, arm
 from armload.inertia import NAMES, InertialParameters
-from armload.lab.evaluation import (
-    Comparison,
-    EvaluationRun,
-    Table,
-    compare,
-)
+from armload.lab.evaluation import Comparison, EvaluationRun, catalogued, compare
+from armload.lab.report import markdown
 from armload.motion import random_motion
 from armload.payloads import random_payloads
-from armload.posterior import HybridIdentifier, SmoothPosteriorLeastSquares
 from armload.regression import GaussianPrior
-from armload.simulation import (
-    Run,
-    Sensors,
-    World,
-    simulate_many,
-)
+from armload.simulation import Run, Sensors, World, simulate_many
 
-HERE = Path(__file__).resolve().parent
+METHODS = ("rls", "rls-filter", "rls-filter, with tare", "map", "map, with tare", "map-gp, with tare")
+METHODS += ("hybrid", "hybrid, with tare")
 TIMES = (0.5, 1.0, 3.0, 6.0)  # [s]
 COMMAND = "python benchmarks/real_like_arms.py"
 
@@ -65,28 +54,12 @@ def run(count: int) -> Comparison:
         [p.parameters for p in random_payloads(400, seed=10_000)], "400 payloads of the population"
     )
     return compare(
-        {
-            "rls": lambda _: RecursiveLeastSquares(robot),
-            "rls-filter": lambda _: FilteredRecursiveLeastSquares(robot),
-            "rls-filter, with tare": FilteredRecursiveLeastSquares(robot),
-            "map": lambda _: PosteriorLeastSquares(robot),
-            "map, with tare": lambda tare: PosteriorLeastSquares(robot, tare),
-            "map-gp, with tare": lambda tare: SmoothPosteriorLeastSquares(robot, tare),
-            "hybrid": lambda _: HybridIdentifier(robot),
-            "hybrid, with tare": lambda tare: HybridIdentifier(robot, tare),
-        },
+        catalogued(robot, *METHODS),
         cases(count),
         TIMES,
         training=prior,
         split="payloads, arms and motions all differ, none of them in the hybrid's training; tare on another motion",
     )
-
-
-def markdown(table: Table) -> str:
-    """A table of the comparison as Markdown."""
-    rows = [table.columns, ["---"] * len(table.columns), *table.rows]
-    lines = ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows]
-    return f"**{table.title}**\n\n" + "\n".join(lines) + f"\n\n{table.note}\n"
 
 
 def page(c: Comparison) -> str:
@@ -112,16 +85,12 @@ def page(c: Comparison) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cases", type=int, default=24)
-    arguments = parser.parse_args()
+    asked = options(__doc__, cases=24)
     started = time.perf_counter()
-    comparison = run(arguments.cases)
+    comparison = run(asked.cases)
     print(comparison)
     coverage = comparison.coverage()
     result = {
-        "command": f"{COMMAND} --cases {arguments.cases}",
-        "version": __version__,
         "wall_s": round(time.perf_counter() - started, 1),
         "conditions": comparison.conditions,
         "parameters": list(NAMES),
@@ -133,8 +102,8 @@ def main() -> None:
             m: np.round(comparison.half_width()[k], 6).tolist() for k, m in enumerate(comparison.methods)
         },
     }
-    (HERE / "results" / "real_like_arms.json").write_text(json.dumps(result, indent=1) + "\n")
-    (HERE.parent / "docs" / "results.md").write_text(page(comparison))
+    write("real_like_arms", result)
+    (ROOT / "docs" / "results.md").write_text(page(comparison))
 
 
 if __name__ == "__main__":

@@ -10,28 +10,27 @@ the rest as runs.
 
 from __future__ import annotations
 
-import json
 import os
 from pathlib import Path
 
 import numpy as np
 from scipy.signal import savgol_filter
+from script import ROOT, write
 
-from armload import Recording, __version__, arm, read_recording
+from armload import Recording, arm, read_recording
 from armload.arms import payload_regressor
 from armload.estimators import FilteredRecursiveLeastSquares, Tared
 from armload.identification import identify
 from armload.payloads import test_payload
 from armload.posterior import HybridIdentifier, PosteriorLeastSquares, SmoothPosteriorLeastSquares
 
-HERE = Path(__file__).resolve().parent
 METHODS = ("hybrid", "map-gp", "map", "rls", "rls-filter")
 WINDOWS = np.arange(10.0, 14.75, 0.5)  # [s] since the start of the log: every half second that six follow
 
 
 def data() -> Path:
     """The folder of real logs."""
-    folder = Path(os.environ.get("ARMLOAD_REAL_DATA", HERE.parents[1] / "shared" / "data"))
+    folder = Path(os.environ.get("ARMLOAD_REAL_DATA", ROOT.parent / "shared" / "data"))
     if not folder.is_dir():
         raise SystemExit(f"real logs not found in {folder}: set ARMLOAD_REAL_DATA to their folder")
     return folder
@@ -107,16 +106,9 @@ def semi_real(folder: Path) -> dict:
 
 def main() -> None:
     folder = data()
-    result = {
-        "command": "ARMLOAD_REAL_DATA=FOLDER python benchmarks/real_logs.py",
-        "version": __version__,
-        "ur10e_pair": ur10e(folder),
-        "panda_unloaded_phantom": phantom(folder),
-        "panda_semi_real": semi_real(folder),
-    }
-    text = json.dumps(result, indent=1)
-    (HERE / "results" / "real_logs.json").write_text(text + "\n")
-    print(text)
+    command = "ARMLOAD_REAL_DATA=FOLDER python benchmarks/real_logs.py"
+    first = {"command": command, "ur10e_pair": ur10e(folder), "panda_unloaded_phantom": phantom(folder)}
+    write("real_logs", first | {"panda_semi_real": semi_real(folder)})
 
 
 if __name__ == "__main__":

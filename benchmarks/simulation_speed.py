@@ -7,34 +7,22 @@ Prints the ratio of simulated to elapsed time and writes benchmarks/results/simu
 
 from __future__ import annotations
 
-import argparse
-import json
-import platform
 import time
-from pathlib import Path
 
-import mujoco
+from script import options, say, write
 
 from armload.arms import arm
 from armload.motion import taie2024
 from armload.payloads import container_loadings
-from armload.simulation import (
-    Run,
-    Sensors,
-    World,
-    simulate_many,
-)
+from armload.simulation import Run, Sensors, World, simulate_many
 
 RATE = 3244 / 6  # [Hz] the paper's rows per run over its period
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=77)
-    parser.add_argument("--workers", type=int, default=2)
-    arguments = parser.parse_args()
+    asked = options(__doc__, runs=77, workers=2)
     panda, motion = arm("panda"), taie2024()
-    payloads = (container_loadings() * arguments.runs)[: arguments.runs]
+    payloads = (container_loadings() * asked.runs)[: asked.runs]
     cases = {
         "nominal, ideal sensors": (World.nominal(panda), Sensors.ideal()),
         "real-like, Panda's sensors": (World.real_like(panda, seed=0), Sensors.panda(panda).evenly()),
@@ -44,7 +32,7 @@ def main() -> None:
     for name, (world, sensors) in cases.items():
         runs = [Run(motion, payload, world, sensors, seed) for seed, payload in enumerate(payloads)]
         start, busy = time.perf_counter(), time.process_time()
-        logs = simulate_many(panda, runs, rate=RATE, workers=arguments.workers)
+        logs = simulate_many(panda, runs, rate=RATE, workers=asked.workers)
         elapsed, busy = time.perf_counter() - start, time.process_time() - busy
         simulated = len(runs) * motion.duration
         rows.append(
@@ -59,18 +47,9 @@ def main() -> None:
             }
         )
         ratio = f"{simulated / elapsed:.0f} × real time"
-        print(f"{name:<28} {simulated:.0f} s in {elapsed:.2f} s: {ratio}; {busy:.2f} s of processor time")
-    result = {
-        "what": "simulated time over elapsed time (ratio), physics, controller, world and sensors included",
-        "workers": arguments.workers,
-        "python": platform.python_version(),
-        "mujoco": mujoco.__version__,
-        "machine": platform.machine(),
-        "cases": rows,
-    }
-    path = Path(__file__).parent / "results" / "simulation_speed.json"
-    path.parent.mkdir(exist_ok=True)
-    path.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+        say(f"{name:<28} {simulated:.0f} s in {elapsed:.2f} s: {ratio}; {busy:.2f} s of processor time")
+    what = "simulated time over elapsed time (ratio), physics, controller, world and sensors included"
+    write("simulation_speed", {"what": what, "workers": asked.workers, "cases": rows})
 
 
 if __name__ == "__main__":

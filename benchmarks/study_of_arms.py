@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import argparse
-import json
-import re
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from armload import __version__, arm
-from armload.arms import Arm
+from script import RESULTS, ROOT, options, say, write, write_table
 
-ROOT = Path(__file__).resolve().parents[1]
+from armload import arm
+from armload.arms import Arm
+from armload.lab.cells import key_of
+from armload.lab.experiment import Task, run_tasks, source_key
+
 PAGE = ROOT / "docs" / "why.md"
 Rows = list[dict[str, Any]]
 
@@ -21,60 +22,57 @@ Rows = list[dict[str, Any]]
 class Study(NamedTuple):
     """A study of simulated Pandas, one for each seed.
 
-    about: for --help. command: that repeats it. result: the JSON. mark: where its table stands on the page.
-    seeds: how many arms. conditions: said in the JSON.
-    measure: of an arm and a seed, rows and, of at least one seed, curves for the figure.
-    summarise: rows → summary. table: summary → Markdown. draw: of summary, rows and curves.
+    name: of the script, its result and its figure. mark: where its table stands on the page. seeds: how many arms.
+    conditions: said in the JSON. measure: of an arm and a seed, rows and, of at least one seed, curves for the figure,
+    ready for JSON. summarise: rows → summary. table: summary → Markdown. draw: of summary, rows, curves and a file.
     """
 
-    about: str
-    command: str
-    result: Path
+    name: str
     mark: str
     seeds: int
     conditions: dict[str, Any]
     measure: Callable[[Arm, int], tuple[Rows, dict[str, Any]]]
     summarise: Callable[[Rows], Rows]
     table: Callable[[Rows], str]
-    draw: Callable[[Rows, Rows, dict[str, Any]], None]
+    draw: Callable[[Rows, Rows, dict[str, Any], Path], None]
+
+    @property
+    def command(self) -> str:
+        return f"python benchmarks/{self.name}.py"
+
+    @property
+    def result(self) -> Path:
+        return RESULTS / f"{self.name}.json"
+
+    @property
+    def figure(self) -> Path:
+        return ROOT / "docs" / "pictures" / f"{self.name}.png"
 
     def run(self) -> None:
-        """As the command line says."""
-        parser = argparse.ArgumentParser(description=self.about, formatter_class=argparse.RawDescriptionHelpFormatter)
-        parser.add_argument("--seeds", type=int, default=self.seeds)
-        parser.add_argument("--quick", action="store_true", help="two seeds, printed and not written")
-        arguments = parser.parse_args()
-        seeds = 2 if arguments.quick else arguments.seeds
-        started, robot, rows, curves = time.process_time(), arm("panda"), [], {}
-        for seed in range(seeds):
-            mine, shown = self.measure(robot, seed)
-            rows += mine
-            curves = curves or shown
-            print(f"arm {seed + 1} of {seeds}, {time.process_time() - started:.0f} s of CPU", flush=True)
+        """As the command line says; arms that were measured are kept in out/."""
+        asked = options(sys.modules["__main__"].__doc__, seeds=self.seeds, jobs=1, quick=False)
+        code = source_key(), source_key(ROOT / "benchmarks")
+        count = 2 if asked.quick else asked.seeds
+        tasks = [Task.of_one(f"arm-{k}", key_of(code, k), _measured, self.measure, k) for k in range(count)]
+        cells = run_tasks(tasks, ROOT / "out" / self.name, jobs=asked.jobs, say=say).values()
+        rows, curves = [row for cell in cells for row in cell["rows"]], [c["curves"] for c in cells if c["curves"]]
         summary = self.summarise(rows)
         print(self.table(summary))
-        if arguments.quick:
+        if asked.quick:
             return
-        self.draw(summary, rows, curves)
+        self.figure.parent.mkdir(exist_ok=True)
+        self.draw(summary, rows, curves[0], self.figure)
         result = {
-            "command": f"{self.command} --seeds {seeds}",
-            "version": __version__,
-            "cpu_s": round(time.process_time() - started, 1),
+            "cpu_s": round(sum(cell["cpu_s"] for cell in cells), 1),
             "conditions": self.conditions,
             "summary_mean_and_standard_deviation": summary,
             "rows": rows,
         }
-        self.result.write_text(json.dumps(result, indent=1, default=float) + "\n")
+        write(self.name, result)
         write_table(PAGE, self.mark, self.table(summary))
 
 
-def write_table(page: Path, name: str, text: str) -> None:
-    """Put a table between its marks on a page."""
-    marks = f"<!-- {name} -->", f"<!-- /{name} -->"
-    old = page.read_text(encoding="utf-8")
-    new, count = re.subn(
-        f"{re.escape(marks[0])}.*?{re.escape(marks[1])}", f"{marks[0]}\n{text}\n{marks[1]}", old, flags=re.DOTALL
-    )
-    if count != 1:
-        raise SystemExit(f"{page} has {count} places {marks[0]} … {marks[1]}: expected one")
-    page.write_text(new, encoding="utf-8")
+def _measured(measure: Callable[[Arm, int], tuple[Rows, dict[str, Any]]], seed: int) -> dict[str, Any]:
+    started = time.process_time()
+    rows, curves = measure(arm("panda"), seed)
+    return {"rows": rows, "curves": curves, "cpu_s": time.process_time() - started}

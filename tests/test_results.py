@@ -10,7 +10,7 @@ import pytest
 from armload import World, arm
 from armload.identification import identify
 from armload.inertia import NAMES
-from armload.lab.benchmark.results import write_front
+from armload.lab.benchmark.benchmark_results import write_front
 from armload.motion import random_motion, taie2024
 from armload.payloads import test_payload
 from armload.simulation import Sensors, simulate

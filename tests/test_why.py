@@ -16,9 +16,9 @@ PAGE = (ROOT / "docs" / "why.md").read_text(encoding="utf-8")
 
 @pytest.fixture(scope="module", params=["closed_loop", "hand_guided"])
 def study(request):
-    """A script of benchmarks/ as a module, and what it measured."""
+    """What a script of benchmarks/ studies, and what it measured."""
     script = script_of(request.param)
-    return script, json.loads(script.RESULT.read_text(encoding="utf-8"))
+    return script.STUDY, json.loads(script.STUDY.result.read_text(encoding="utf-8"))
 
 
 def script_of(name):
@@ -34,8 +34,8 @@ def script_of(name):
 
 
 def test_the_summary_is_that_of_the_rows(study):
-    script, result = study
-    written, again = result["summary_mean_and_standard_deviation"], script.summarise(result["rows"])
+    study, result = study
+    written, again = result["summary_mean_and_standard_deviation"], study.summarise(result["rows"])
     assert len(written) == len(again) > 0
     for old, new in zip(written, again, strict=True):
         assert old.keys() == new.keys()
@@ -44,12 +44,12 @@ def test_the_summary_is_that_of_the_rows(study):
 
 
 def test_the_page_shows_the_table_the_figure_and_the_command(study):
-    script, result = study
-    assert script.table(result["summary_mean_and_standard_deviation"]) in PAGE
-    assert script.COMMAND in PAGE
-    assert result["command"].startswith(script.COMMAND)
-    assert f"({script.FIGURE.relative_to(ROOT / 'docs')})" in PAGE
-    assert script.FIGURE.stat().st_size < 120_000
+    study, result = study
+    assert study.table(result["summary_mean_and_standard_deviation"]) in PAGE
+    assert study.command in PAGE
+    assert result["command"].startswith(study.command)
+    assert f"({study.figure.relative_to(ROOT / 'docs')})" in PAGE
+    assert study.figure.stat().st_size < 120_000
 
 
 # ---------------------------------------------------------------- the person

@@ -1,16 +1,21 @@
 """The other commands: demo, dataset → train → identify → report, and motion, each through `main` as a user would."""
 
+import contextlib
 import html
+import io
 import json
 import re
+import shutil
 
 import numpy as np
 import pytest
 
 from armload.app.cli import main
+from armload.app.cli import report as report_command
 from armload.arms import arm
 from armload.lab.dataset import open_dataset
-from armload.lab.demo import run_demo
+from armload.lab.demo import QUICK, _Clock, _made
+from armload.lab.evaluation import Comparison, contest
 from armload.motion import load_motion, taie2024
 from armload.payloads import container_loadings, franka_hand, write_payload
 from armload.payloads import test_payload as unseen_payload
@@ -34,13 +39,17 @@ def call(capsys):
 
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory):
-    return run_demo(tmp_path_factory.mktemp("demo") / "out", quick=True)
+    """What one quick demo wrote into its folder, and what it printed."""
+    folder, printed = tmp_path_factory.mktemp("demo") / "out", io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        assert main(["demo", "--quick", "--out", str(folder)]) == 0
+    comparison = Comparison.from_dict(json.loads((folder / "comparison.json").read_text()))
+    return folder, comparison, printed.getvalue()
 
 
 def test_demo_compares_every_kind_on_a_payload_nobody_trained_on(demo):
-    names = [row[0] for row in demo.table]
-    assert names == [
-        "truth",
+    _, comparison, printed = demo
+    names = [
         "rls",
         "rls-filter",
         "rls-filter, with tare",
@@ -55,37 +64,44 @@ def test_demo_compares_every_kind_on_a_payload_nobody_trained_on(demo):
         "training mean",
         "same-prior least squares",
     ]
+    assert list(comparison.methods) == names
     truth = unseen_payload().parameters
-    assert demo.comparison.truth[0] == pytest.approx(truth.phi)
+    assert comparison.truth[0] == pytest.approx(truth.phi)
     assert all(np.any(p.parameters.phi != truth.phi) for p in container_loadings())
-    assert "by payload" in demo.table.note
-    assert "seed 2024" in demo.table.note
-    best = demo.comparison.mae[names.index("hybrid, with tare") - 1, -1, 0]
-    assert best < demo.comparison.mae[names.index("map, with tare") - 1, -1, 0]
-    assert best < demo.comparison.mae[names.index("training mean") - 1, -1, 0]
+    assert "by payload" in comparison.split
+    assert "seed 2024" in comparison.split
+    best = comparison.mae[names.index("hybrid, with tare"), -1, 0]
+    assert best < comparison.mae[names.index("map, with tare"), -1, 0]
+    assert best < comparison.mae[names.index("training mean"), -1, 0]
+    lines = printed.splitlines()
+    for name, phi in zip(("truth", *names), (comparison.truth[0], *comparison.phi[:, 0, -1]), strict=True):
+        shown = f"{phi[0]:.3f}", ", ".join(f"{1e3 * x:+.1f}" for x in phi[1:4] / phi[0])
+        assert any(line.split("  ")[0].strip() == name and all(cell in line for cell in shown) for line in lines), name
 
 
 def test_demo_writes_what_it_found(demo):
-    found = json.loads((demo.folder / "identified.json").read_text())
-    assert found == demo.identification.to_dict()
+    folder, _, printed = demo
+    found = json.loads((folder / "identified.json").read_text())
     assert (found["method"], found["interval"]) == ("hybrid", "calibrated")
     assert found["relative_to"] == "tare"
     assert found["mass"] == pytest.approx(unseen_payload().parameters.mass, abs=0.05)
-    page = demo.report.read_text()
+    assert str(folder / "report.html") in printed
+    page = (folder / "report.html").read_text()
     assert "An unseen payload" in page
     assert page.count("data:image/svg+xml") >= 5
-    assert len(list((demo.folder / "models").glob("*.safetensors"))) == 4
+    assert len(list((folder / "models").glob("*.safetensors"))) == 4
 
 
-def test_demo_gives_the_same_numbers_again(demo, call):
-    # in the same folder: the data set is used again, everything else made anew
-    printed = call("demo", "--quick", "--out", demo.folder).out
-    again = json.loads((demo.folder / "comparison.json").read_text())
-    first = demo.comparison.to_dict()
-    assert again["phi"] == first["phi"]
-    assert again["methods"] == first["methods"]
-    for row in demo.table:  # all but the time per sample
-        assert any(all(cell in line for cell in row[:-1]) for line in printed.splitlines())
+def test_the_same_seed_makes_the_demo_s_logs_and_models_again(demo, tmp_path):
+    folder, comparison, _ = demo
+    shutil.copytree(folder / "dataset", tmp_path / "dataset")  # used again; everything else is made anew
+    made = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "dataset").iterdir()}
+    *_, run, _, learned = _made(tmp_path, arm("panda"), QUICK, 2024, False, _Clock(lambda _: None))
+    assert {path.name: path.stat().st_mtime_ns for path in (tmp_path / "dataset").iterdir()} == made
+    for name in ("run.csv", "tare.csv"):
+        assert (tmp_path / name).read_bytes() == (folder / name).read_bytes()
+    for name, make in learned.items():
+        assert make(None).run(run).phi == pytest.approx(comparison.phi[comparison.methods.index(name), 0, -1])
 
 
 def test_demo_replaces_the_data_set_of_an_older_demo_and_nothing_else(call, tmp_path):
@@ -95,13 +111,12 @@ def test_demo_replaces_the_data_set_of_an_older_demo_and_nothing_else(call, tmp_
     assert (tmp_path / "dataset" / "mine.txt").read_text() == "keep"
 
 
-def test_demo_logs_are_read_by_identify(demo, call):
-    out = call(
-        *("identify", demo.folder / "run.csv", "--robot", "panda", "--tare", demo.folder / "tare.csv", "--json")
-    ).out
-    found = json.loads(out)
-    assert found["phi"] == pytest.approx(demo.identification.phi)
-    assert found["phi_high"] == pytest.approx(demo.identification.phi_high)
+def test_demo_s_logs_are_identified_again_as_the_demo_did(demo, call):
+    folder = demo[0]
+    argv = ("identify", folder / "run.csv", "--robot", "panda", "--tare", folder / "tare.csv", "--json")
+    again, first = json.loads(call(*argv).out), json.loads((folder / "identified.json").read_text())
+    assert again["phi"] == pytest.approx(first["phi"])
+    assert again["phi_high"] == pytest.approx(first["phi_high"])
 
 
 # ---------------------------------------------------------------------- dataset, train, identify, report
@@ -207,6 +222,14 @@ def test_a_trained_model_identifies_its_motion_and_refuses_another(work, call, t
     assert "other.csv" in said.err
 
 
+@pytest.fixture
+def few_points(monkeypatch):
+    """Reports whose curves have few points: each is an estimate of every method."""
+    monkeypatch.setattr(contest, "_POINTS", 5)
+    monkeypatch.setattr(report_command, "_POINTS", 4)
+
+
+@pytest.mark.usefixtures("few_points")
 def test_report_of_a_log_shows_motion_torques_and_every_method(call, work, tmp_path):
     panda = arm("panda")
     write_recording(tmp_path / "log.csv", simulate(panda, taie2024(), franka_hand(), rate=100.0))
@@ -227,6 +250,7 @@ def test_report_of_a_log_shows_motion_torques_and_every_method(call, work, tmp_p
     assert "truth" not in page.replace("No truth is known", "")
 
 
+@pytest.mark.usefixtures("few_points")
 def test_report_with_truth_shows_errors_and_baselines(call, tmp_path):
     panda = arm("panda")
     write_recording(tmp_path / "log.npz", simulate(panda, taie2024(), franka_hand(), rate=100.0))
@@ -247,6 +271,7 @@ def test_report_with_truth_shows_errors_and_baselines(call, tmp_path):
     assert float(row[1]) < 10.0  # g
 
 
+@pytest.mark.usefixtures("few_points")
 def test_report_of_a_data_set_takes_held_out_payloads_only(call, work):
     argv = ("report", "--dataset", work / "data", "--seed", "5", "--runs", "2", "--out", work / "r.html")
     call(*argv, "--model", work / "trees.safetensors")

@@ -10,12 +10,7 @@ from pyarrow import parquet
 from armload.arms import arm
 from armload.errors import DatasetError
 from armload.inertia import InertialParameters
-from armload.lab.dataset import (
-    build,
-    build_dataset,
-    open_dataset,
-    table_columns,
-)
+from armload.lab.dataset import build, build_dataset, open_dataset, table_columns
 from armload.motion import random_motion
 from armload.payloads import Payload, container_loadings, random_payloads
 from armload.simulation import Sensors, World, simulate

@@ -8,13 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from armload.errors import DatasetError
-from armload.lab.dataset import (
-    Dataset,
-    split_motions,
-    split_payloads,
-    split_rows,
-    split_worlds,
-)
+from armload.lab.dataset import Dataset, split_motions, split_payloads, split_rows, split_worlds
 
 GROUPED = {split_payloads: "payload", split_motions: "motion", split_worlds: "world"}
 

@@ -50,11 +50,13 @@ class Says(Identifier):
     def reset(self):
         self._start, self._count = None, 0
 
-    def update(self, sample):
-        self._start = sample.t if self._start is None else self._start
-        self._count += 1
-        phi = np.asarray(self.answer(sample.t - self._start))
-        return Estimate(sample.t, phi, np.diag(np.full(10, self.std**2)), self._count, str(self.arm.frame))
+    def _take(self, t, *_):
+        self._start = t[0] if self._start is None else self._start
+        self._count += len(t)
+
+    def _estimate(self, t):
+        phi = np.asarray(self.answer(t - self._start))
+        return Estimate(t, phi, np.diag(np.full(10, self.std**2)), self._count, str(self.arm.frame))
 
 
 def still(arm, duration=2.0, rate=50.0, start=0.0, source="still"):
@@ -125,9 +127,9 @@ def test_every_method_gets_the_same_samples(panda):
             self.heard = []
             super().reset()
 
-        def update(self, sample):
-            self.heard.append(sample.t)
-            return super().update(sample)
+        def _take(self, t, *rest):
+            self.heard += t.tolist()
+            super()._take(t, *rest)
 
     methods = {name: Hears(panda, lambda _: CAMERA.phi) for name in "ab"}
     log = still(panda)
@@ -165,7 +167,7 @@ def test_baselines_of_the_caller_are_not_doubled(panda):
 
 
 def test_a_tare_reaches_factories_and_is_subtracted_for_identifiers(panda):
-    loaded, empty = still(panda, source="loaded"), still(panda, source="empty")
+    loaded, empty = still(panda, start=10.0, source="loaded"), still(panda, source="empty")
     phantom = np.full(10, 0.5)
     asked = []
 
@@ -174,9 +176,9 @@ def test_a_tare_reaches_factories_and_is_subtracted_for_identifiers(panda):
         return Says(panda, lambda _: TOOL.phi)
 
     class Haunted(Says):
-        def trace(self, recording, every=1):
-            self.answer = lambda _: phantom + (CAMERA.phi if recording is loaded else 0.0)
-            return super().trace(recording, every)
+        def _take(self, t, *rest):
+            super()._take(t, *rest)
+            self.answer = lambda _: phantom + (CAMERA.phi if self._start == loaded.t[0] else 0.0)
 
     c = compare(
         {"plain": Haunted(panda, None, std=0.3), "knows": factory},

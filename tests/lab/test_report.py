@@ -13,15 +13,9 @@ import pytest
 
 from armload.inertia import NAMES, InertialParameters
 from armload.lab.evaluation import Comparison, EvaluationRun, Table
-from armload.lab.report import (
-    ReportError,
-    Section,
-    default_report,
-    figures,
-    recordings,
-    render,
-    write_report,
-)
+from armload.lab.report import ReportError, Section, default_report, render, write_report
+from armload.lab.report import comparison_figures as figures
+from armload.lab.report import recording_figures as recordings
 from armload.lab.report.style import method_styles
 from armload.regression import first_order_lag
 

@@ -7,24 +7,8 @@ import numpy as np
 import pytest
 
 from armload.inertia import NAMES
-from armload.lab.study.claims import (
-    CONFIRMED,
-    DEPENDS,
-    NOT_CONFIRMED,
-    NOT_MEASURED,
-    VERDICTS,
-    evaluate,
-    load_claims,
-)
-from armload.lab.study.numbers import (
-    Ensemble,
-    at_end,
-    benchmark,
-    improvement,
-    matched,
-    mean_ratio,
-    spread,
-)
+from armload.lab.study.claims import CONFIRMED, DEPENDS, NOT_CONFIRMED, NOT_MEASURED, VERDICTS, evaluate, load_claims
+from armload.lab.study.numbers import Ensemble, at_end, benchmark, improvement, matched, mean_ratio, spread
 from armload.lab.study.statements import RULES
 
 RUNS = {"test_payload_nominal": 3, "test_payload_real_like": 4, "off_family": 5, "other_motion": 2}

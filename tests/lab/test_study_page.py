@@ -12,30 +12,13 @@ from armload.lab.evaluation import Table
 from armload.lab.report import markdown
 from armload.lab.study.ablations import ABLATIONS, ablation_table, single_or_mean_table
 from armload.lab.study.claims import evaluate
-from armload.lab.study.counterparts import (
-    benchmark_rows,
-    first_table,
-    izz_table,
-    ratio_table,
-)
-from armload.lab.study.figures import figures
+from armload.lab.study.counterparts import benchmark_rows, first_table, izz_table, ratio_table
 from armload.lab.study.numbers import both_stages
-from armload.lab.study.page import (
-    html_report,
-    sections,
-    summary_json,
-    write_page,
-)
+from armload.lab.study.paper_figures import figures
 from armload.lab.study.plain import against_table, in_plain_words
+from armload.lab.study.study_page import html_report, sections, summary_json, write_page
+from armload.lab.study.study_tables import COMMAND, PROTOCOLS, claims_table, epochs_table, main_tables, value
 from armload.lab.study.summary import paragraphs
-from armload.lab.study.tables import (
-    COMMAND,
-    PROTOCOLS,
-    claims_table,
-    epochs_table,
-    main_tables,
-    value,
-)
 
 
 def page_of(cells, folder):

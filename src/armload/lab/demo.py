@@ -10,51 +10,44 @@ This shows the way, not the paper's figures: ten times fewer rows, fewer epochs,
 
 from __future__ import annotations
 
-import json
 import shutil
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from armload.arms import Arm, arm
-from armload.atomic import replacing
 from armload.errors import DatasetError
-from armload.estimators import FilteredRecursiveLeastSquares, Identifier, RecursiveLeastSquares
-from armload.identification import METHODS, Identification, default_for, identify
+from armload.estimators import Identifier
+from armload.identification import Identification, default_for, identify
 from armload.inertia import InertialParameters
-from armload.lab.dataset import (
-    Dataset,
-    Split,
-    build_dataset,
-    split_payloads,
-)
-from armload.lab.evaluation import (
-    Comparison,
-    EvaluationRun,
-    Table,
-    compare,
-)
+from armload.lab.dataset import Dataset, Split, build_dataset, split_payloads
+from armload.lab.evaluation import Comparison, EvaluationRun, Table, catalogued, compare
+from armload.lab.evaluation.contest import WITH_TARE
+from armload.lab.experiment import write_json
 from armload.motion import Motion, random_motion, taie2024
 from armload.payloads import container_loadings, test_payload
-from armload.posterior import PosteriorLeastSquares
 from armload.recording import Recording, write_recording
 from armload.simulation import Sensors, World, simulate
 
 if TYPE_CHECKING:
     from armload.ensembles import BaggingEnsemble, LearnedModel, TwoStage
-    from armload.lab.evaluation.compare import Method
+    from armload.lab.evaluation.contest import Method
 
+PHYSICAL = ("rls", "rls-filter", f"rls-filter{WITH_TARE}", "map", f"map{WITH_TARE}")
 HELD_OUT = 0.15  # of the loadings, for validation
 TARE_DURATION, TARE_HARMONICS = 20.0, 10  # [s]
 
 
 class Size(NamedTuple):
-    """How much is done: every n-th loading, rows per run, members, hidden units, epochs, rate of the logs [Hz]."""
+    """How much is done.
+
+    Every n-th loading, rows per run, members, hidden units, epochs, rate of the logs [Hz], times compared at.
+    """
 
     every: int
     rows: int
@@ -62,10 +55,11 @@ class Size(NamedTuple):
     hidden: int
     epochs: int
     rate: float
+    points: int
 
 
-FULL = Size(every=1, rows=300, members=5, hidden=500, epochs=60, rate=1000.0)
-QUICK = Size(every=7, rows=100, members=2, hidden=64, epochs=8, rate=200.0)
+FULL = Size(every=1, rows=300, members=5, hidden=500, epochs=60, rate=1000.0, points=49)
+QUICK = Size(every=7, rows=100, members=2, hidden=64, epochs=8, rate=200.0, points=9)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,34 +100,19 @@ def run_demo(
     Raises:
         ArmloadError: a file cannot be written.
     """
-    size = QUICK if quick else FULL
-    folder = Path(out)
-    folder.mkdir(parents=True, exist_ok=True)
-    robot, motion = arm("panda"), taie2024()
-    nominal, real, sensors = World.nominal(robot), World.real_like(robot, seed), Sensors.panda(robot)
-    clock = _Clock(say)
-
-    loadings = container_loadings()[:: size.every]
-    clock.start("simulating", f"{len(loadings)} loadings on {motion.name} and a nominal {robot.name}")
-    dataset = _dataset(folder / "dataset", robot, motion, loadings, nominal, sensors, size.rows, seed, progress)
-    clock.start("recording", f"a real-like {robot.name} (seed {seed}): a tare on another motion, then the payload")
-    run = _log(folder / "run.csv", robot, motion, test_payload().parameters, real, sensors, size.rate, seed + 1)
-    other = random_motion(robot, seed, duration=TARE_DURATION, harmonics=TARE_HARMONICS)
-    tare = _log(folder / "tare.csv", robot, other, None, real, sensors, size.rate, seed + 2)
-
-    split = split_payloads(dataset, seed, (1.0 - HELD_OUT, HELD_OUT, 0.0))
-    learned = _train(folder / "models", dataset, split, robot, motion, size, seed, progress, clock)
-
+    size, folder, robot, clock = QUICK if quick else FULL, Path(out), arm("panda"), _Clock(say)
+    dataset, split, run, tare, learned = _made(folder, robot, size, seed, progress, clock)
     clock.start("identifying", f"{test_payload().name} ({test_payload().parameters.mass:.3f} kg), outside the loadings")
-    answer = identify(run, robot, tare=tare)
-    _write_json(folder / "identified.json", answer.to_dict())
+    answer, default = identify(run, robot, tare=tare), default_for(robot)
+    write_json(folder / "identified.json", answer.to_dict())
     truth = InertialParameters(test_payload().parameters.phi, robot.frame)
     runs = [EvaluationRun(run, truth, test_payload().name, tare, seed + 1)]
     training = [dataset.truth(k) for k in np.unique(dataset.run[split.train])]
     validation = len(np.unique(dataset.run[split.validation]))
     comparison = compare(
-        _physical(robot) | learned,
+        catalogued(robot, *PHYSICAL, default, f"{default}{WITH_TARE}") | learned,
         runs,
+        np.linspace(0.0, run.duration, size.points),
         training=training,
         split=f"by payload: {len(training)} loadings for training, {validation} for validation, the test payload is in "
         f"neither; trained on the nominal arm, tested on a real-like one (seed {seed}); tare on another motion",
@@ -142,59 +121,46 @@ def run_demo(
     clock.start("reporting", "tables and figures")
     table = _table(comparison)
     report = _report(folder / "report.html", comparison, runs, robot, table)
-    _write_json(folder / "comparison.json", comparison.to_dict())
+    write_json(folder / "comparison.json", comparison.to_dict())
     clock.stop()
     return DemoResult(table, comparison, answer, folder, report, clock.seconds)
 
 
-def _dataset(
-    path: Path,
-    robot: Arm,
-    motion: Motion,
-    loadings: list,
-    world: World,
-    sensors: Sensors,
-    rows: int,
-    seed: int,
-    progress: bool,
-) -> Dataset:
+def _made(
+    folder: Path, robot: Arm, size: Size, seed: int, progress: bool, clock: _Clock
+) -> tuple[Dataset, Split, Recording, Recording, dict[str, Method]]:
+    """What is compared: the data set and its split, the run, the tare, the trained ensembles; all in the folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    motion = taie2024()
+    nominal, real, sensors = World.nominal(robot), World.real_like(robot, seed), Sensors.panda(robot)
+
+    def log(name: str, motion: Motion, payload: InertialParameters | None, noise: int) -> Recording:
+        found = simulate(robot, motion, payload, world=real, sensors=sensors, rate=size.rate, seed=noise)
+        write_recording(folder / name, found)
+        return found
+
+    loadings = container_loadings()[:: size.every]
+    clock.start("simulating", f"{len(loadings)} loadings on {motion.name} and a nominal {robot.name}")
+    given: dict[str, Any] = {"worlds": [nominal], "sensors": sensors, "rows_per_run": size.rows, "seed": seed}
+    dataset = _dataset(folder / "dataset", robot, [motion], loadings, progress=progress, **given)
+    clock.start("recording", f"a real-like {robot.name} (seed {seed}): a tare on another motion, then the payload")
+    run = log("run.csv", motion, test_payload().parameters, seed + 1)
+    tare = log("tare.csv", random_motion(robot, seed, duration=TARE_DURATION, harmonics=TARE_HARMONICS), None, seed + 2)
+
+    split = split_payloads(dataset, seed, (1.0 - HELD_OUT, HELD_OUT, 0.0))
+    learned = _train(folder / "models", dataset, split, robot, motion, size, seed, progress, clock)
+    return dataset, split, run, tare, learned
+
+
+def _dataset(path: Path, *what: Any, **how: Any) -> Dataset:
     """The data set; one that an earlier demo left is used again if it is the same, and replaced if it is not."""
-
-    def build() -> Dataset:
-        return build_dataset(
-            path,
-            robot,
-            [motion],
-            loadings,
-            worlds=[world],
-            sensors=sensors,
-            rows_per_run=rows,
-            seed=seed,
-            progress=progress,
-        )
-
     try:
-        return build()
+        return build_dataset(path, *what, **how)
     except DatasetError:
         if not (path / "provenance.json").exists():
             raise
         shutil.rmtree(path)
-        return build()
-
-
-def _log(
-    path: Path,
-    robot: Arm,
-    motion: Motion,
-    payload: InertialParameters | None,
-    world: World,
-    sensors: Sensors,
-    rate: float,
-    seed: int,
-) -> Recording:
-    log = simulate(robot, motion, payload, world=world, sensors=sensors, rate=rate, seed=seed)
-    write_recording(path, log)
-    return log
+        return build_dataset(path, *what, **how)
 
 
 def _train(
@@ -209,12 +175,7 @@ def _train(
     clock: _Clock,
 ) -> dict[str, Method]:
     """One ensemble of each kind, single-stage and two-stage, saved and read back as a stream identifier."""
-    from armload.ensembles import (
-        BaggingEnsemble,
-        NetworkLearner,
-        TwoStage,
-        save_model,
-    )
+    from armload.ensembles import BaggingEnsemble, NetworkLearner, TwoStage, save_model
     from armload.lab.evaluation import held_out_error
 
     network = NetworkLearner(hidden=size.hidden, max_epochs=size.epochs)
@@ -241,20 +202,6 @@ def _learned(model: LearnedModel, robot: Arm, _: Recording | None) -> Identifier
     from armload.ensembles import LearnedIdentifier
 
     return LearnedIdentifier(model, robot)
-
-
-def _physical(robot: Arm) -> dict[str, Method]:
-    """The physical methods; those given as functions of the tare do not use it, or in their own way."""
-    default = METHODS[default_for(robot)]
-    return {
-        "rls": lambda _: RecursiveLeastSquares(robot),
-        "rls-filter": lambda _: FilteredRecursiveLeastSquares(robot),
-        "rls-filter, with tare": FilteredRecursiveLeastSquares(robot),
-        "map": lambda _: PosteriorLeastSquares(robot),
-        "map, with tare": lambda tare: PosteriorLeastSquares(robot, tare),
-        default.name: lambda _: default.make(robot),
-        f"{default.name}, with tare": lambda tare: default.make(robot, tare),
-    }
 
 
 def _table(c: Comparison) -> Table:
@@ -288,11 +235,6 @@ def _table(c: Comparison) -> Table:
     note = f"Inertia error: mean of six, about the origin of {c.frame}. {c.conditions}"
     baselines = tuple(1 + c.methods.index(name) for name in c.baselines)
     return Table("An unseen payload, identified after one motion", columns, tuple(rows), note, baselines)
-
-
-def _write_json(path: Path, content: dict) -> None:
-    with replacing(path) as temporary:
-        temporary.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def _millimetres(vector: np.ndarray) -> str:

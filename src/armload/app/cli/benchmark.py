@@ -46,14 +46,8 @@ def parser() -> Parser:
 
 def run(options: argparse.Namespace) -> None:
     """Measure what is missing, then write the page, the summary and the report."""
-    from armload.lab.benchmark import (
-        QUICK,
-        Size,
-        gather,
-        run_benchmark,
-        write_results,
-    )
-    from armload.lab.benchmark.tables import losses_table
+    from armload.lab.benchmark import QUICK, Size, gather, run_benchmark, write_results
+    from armload.lab.benchmark.benchmark_tables import losses_table
     from armload.lab.benchmark.targets import targets_table
 
     asked = {

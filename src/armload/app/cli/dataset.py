@@ -5,15 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from armload.app.cli.arguments import (
-    Parser,
-    add_arm_arguments,
-    arm_of,
-    at_least,
-    file_name,
-    motion_of,
-    whole_number,
-)
+from armload.app.cli.arguments import Parser, add_arm_arguments, arm_of, at_least, file_name, motion_of, whole_number
 from armload.errors import UsageError
 
 _EXAMPLES = """\

@@ -8,15 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armload.app.cli.arguments import (
-    Parser,
-    add_arm_arguments,
-    arm_of,
-    arm_of_dataset,
-    at_least,
-    file_name,
-    payload_of,
-)
+from armload.app.cli.arguments import Parser, add_arm_arguments, arm_of, arm_of_dataset, at_least, file_name, payload_of
 from armload.app.cli.printing import print_note, print_table, working
 from armload.errors import UsageError
 
@@ -139,17 +131,11 @@ def _of_dataset(options: argparse.Namespace, say: Callable[[str], None]) -> tupl
 def _methods(arm: Arm, log: Recording, models: list[str]) -> dict[str, Callable[[Recording | None], Identifier]]:
     """Every method by name, each to be told of the tare."""
     from armload.ensembles import load_model
-    from armload.estimators import FilteredRecursiveLeastSquares, RecursiveLeastSquares
     from armload.identification import METHODS, default_for
-    from armload.posterior import HybridIdentifier, HybridModel, PosteriorLeastSquares
+    from armload.posterior import HybridIdentifier, HybridModel
 
-    default = METHODS[default_for(arm)]
-    methods: dict[str, Callable[[Recording | None], Identifier]] = {
-        default.name: partial(default.make, arm),
-        "map": partial(PosteriorLeastSquares, arm),
-        "rls": partial(_tared, RecursiveLeastSquares, arm),
-        "rls-filter": partial(_tared, FilteredRecursiveLeastSquares, arm),
-    }
+    names = dict.fromkeys((default_for(arm), "map", "rls", "rls-filter"))
+    methods: dict[str, Callable[[Recording | None], Identifier]] = {n: partial(METHODS[n].make, arm) for n in names}
     for path in models:
         if HybridModel.wrote(path):
             methods[Path(path).stem] = partial(HybridIdentifier, arm, model=HybridModel.load(path))
@@ -158,12 +144,6 @@ def _methods(arm: Arm, log: Recording, models: list[str]) -> dict[str, Callable[
         model.check(arm, log)
         methods[Path(path).stem] = partial(_learned, model, arm)
     return methods
-
-
-def _tared(kind: Callable[..., Identifier], arm: Arm, tare: Recording | None) -> Identifier:
-    from armload.estimators import Tared
-
-    return kind(arm) if tare is None else Tared(kind(arm), tare)
 
 
 def _learned(model: LearnedModel, arm: Arm, _: Recording | None) -> Identifier:

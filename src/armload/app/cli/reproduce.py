@@ -7,7 +7,7 @@ import os
 import sys
 from pathlib import Path
 
-from armload.app.cli.arguments import Parser
+from armload.app.cli.arguments import Parser, at_least
 from armload.app.cli.printing import print_note
 from armload.errors import UsageError
 
@@ -37,13 +37,9 @@ def parser() -> Parser:
     parser.add_argument("--results", metavar="DIR", help="finished cells (default: benchmarks/results/taie2024)")
     parser.add_argument("--page", metavar="FILE", help="the page to write (default: docs/paper.md)")
     parser.add_argument(
-        "--jobs",
-        type=int,
-        default=1,
-        metavar="N",
-        help="cells measured at once, each on one core (default: 1); the numbers do not depend on it",
+        "--jobs", type=at_least(1), default=1, metavar="N", help="cells at once (default: 1); same numbers"
     )
-    parser.add_argument("--hours", type=float, metavar="H", help="begin no further cell after so many hours")
+    parser.add_argument("--hours", type=at_least(0.0, float), metavar="H", help="begin nothing after so many hours")
     parser.add_argument(
         "--real-log",
         metavar="FILE",
@@ -54,18 +50,8 @@ def parser() -> Parser:
 
 def run(options: argparse.Namespace) -> None:
     """Measure what is missing, then write the page, the summary and the report."""
-    from armload.lab.study import (
-        FULL,
-        QUICK,
-        Basis,
-        run_study,
-        write_results,
-    )
+    from armload.lab.study import FULL, QUICK, Basis, run_study, write_results
 
-    if options.hours is not None and not options.hours >= 0:
-        raise UsageError(f"--hours is {options.hours}: expected a number of hours, 0 or more")
-    if options.jobs < 1:
-        raise UsageError(f"--jobs is {options.jobs}: expected a number of processes, 1 or more")
     out = Path(options.out or ("out/taie2024-quick" if options.quick else "out/taie2024"))
     results = Path(options.results or (out / "cells" if options.quick else "benchmarks/results/taie2024"))
     page = Path(options.page or (out / "paper.md" if options.quick else "docs/paper.md"))

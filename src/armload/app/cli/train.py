@@ -232,7 +232,7 @@ def _motions(dataset: Dataset, arm: Arm, names: list[str]) -> list[Motion]:
 def _errors(split: str, model: Ensemble, mean: NDArray, X: NDArray, y: NDArray) -> list[tuple[str, ...]]:
     """Rows of the table: the model and the training mean, on rows held out by this split."""
     from armload.lab.evaluation import mean_absolute_error
-    from armload.lab.evaluation.table import SHOWN_SCALE, short
+    from armload.lab.report.shown import SHOWN_SCALE, short
 
     guesses = {f"{model.kind_name}, by {split}": model.predict(X), f"training mean, by {split}": mean}
     return [
@@ -243,7 +243,7 @@ def _errors(split: str, model: Ensemble, mean: NDArray, X: NDArray, y: NDArray) 
 
 def _table(kind: str, rows: list[tuple[str, ...]], options: argparse.Namespace) -> Table:
     from armload.lab.evaluation import Table
-    from armload.lab.evaluation.table import parameter_columns
+    from armload.lab.report.shown import parameter_columns
 
     note = (
         f"Mean absolute error of single samples held out for testing (15 %); seed {options.seed}. By payload is what "

@@ -1,10 +1,10 @@
 """The benchmark: every method of the catalogue on every population, with baselines, intervals and repeatability."""
 
+from armload.lab.benchmark.benchmark_results import write_results
+from armload.lab.benchmark.benchmark_run import QUICK, Size, run_benchmark
 from armload.lab.benchmark.measured import Measured, gather
 from armload.lab.benchmark.populations import ALL, Population
-from armload.lab.benchmark.results import write_results
 from armload.lab.benchmark.rows import default_names, left_out
-from armload.lab.benchmark.run import QUICK, Size, run_benchmark
 
 __all__ = [
     "ALL",

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armload.lab.benchmark.benchmark_tables import MISSING, SUBJECTS
 from armload.lab.benchmark.populations import ALL, REPEAT
 from armload.lab.benchmark.rows import BASELINES, TARED
-from armload.lab.benchmark.tables import MISSING, SUBJECTS
 from armload.lab.benchmark.targets import MISSED, NOT_CLEAR, REACHED
 from armload.lab.evaluation import Table
-from armload.lab.evaluation.table import GROUPS, SHOWN_SCALE, SHOWN_UNITS
 from armload.lab.report import Section
+from armload.lab.report.shown import GROUPS, SHOWN_SCALE, SHOWN_UNITS
 from armload.lab.report.style import look, new_figure, styles_of
 
 if TYPE_CHECKING:

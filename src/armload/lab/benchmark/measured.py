@@ -11,16 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import arm
-from armload.lab.benchmark.populations import (
-    ALL,
-    PRIOR,
-    Population,
-    population,
-)
+from armload.lab.benchmark.benchmark_run import Size
+from armload.lab.benchmark.populations import ALL, PRIOR, Population, population
 from armload.lab.benchmark.rows import BASELINES, BOUND, TARED
-from armload.lab.benchmark.run import Size
 from armload.lab.evaluation import Comparison, half_width
-from armload.lab.evaluation.table import GROUPS
+from armload.lab.report.shown import GROUPS
 
 
 @dataclass(frozen=True, eq=False)

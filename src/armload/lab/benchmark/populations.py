@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -10,15 +11,7 @@ from armload.arms import Arm, rated_mass
 from armload.errors import ArmError
 from armload.inertia import InertialParameters
 from armload.lab.cells import key_of
-from armload.lab.episodes import (
-    LIGHTEST,
-    POPULATIONS,
-    TOOL_SHARE,
-    Episode,
-    Recipe,
-    draw_episodes,
-    simulate_episodes,
-)
+from armload.lab.episodes import LIGHTEST, POPULATIONS, TOOL_SHARE, Episode, Recipe, draw_episodes, simulate_episodes
 from armload.payloads import draw_payload
 from armload.regression import GaussianPrior
 
@@ -105,6 +98,7 @@ def population(name: str) -> Population:
     return ALL[name]
 
 
+@cache
 def prior_of(recipe: Recipe, arm: Arm) -> GaussianPrior:
     """What the baselines know: mean and covariance of 400 payloads of a recipe, none of which is in an episode."""
     rng, rated, drawn = np.random.default_rng(_PRIOR_SEED), rated_mass(arm), []

@@ -16,12 +16,7 @@ from armload.estimators import Identifier
 from armload.identification import METHODS
 from armload.lab.benchmark.populations import Population
 from armload.lab.cells import key_of
-from armload.lab.episodes import (
-    EpisodeLogs,
-    Recipe,
-    draw_episodes,
-    simulate_episodes,
-)
+from armload.lab.episodes import EpisodeLogs, Recipe, draw_episodes, simulate_episodes
 from armload.lab.evaluation import PriorLeastSquares, TrainingMean
 from armload.recording import Recording
 from armload.regression import GaussianPrior

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from armload.lab.benchmark.tables import Results, with_error
-from armload.lab.evaluation import Table
-from armload.lab.evaluation.table import GROUPS, SHOWN_UNITS, short
+from armload.lab.benchmark.benchmark_tables import Results, with_error
+from armload.lab.report.shown import GROUPS, SHOWN_UNITS, Table, short
 
 REACHED, NOT_CLEAR, MISSED = "reached", "not clear", "missed"
 _ERRORS = 2.0  # standard errors

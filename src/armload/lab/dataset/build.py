@@ -18,6 +18,7 @@ import numpy as np
 from armload.arms import Arm
 from armload.atomic import replacing
 from armload.errors import DatasetError
+from armload.lab.dataset.parquet_table import IDENTITIES, Dataset, content_hash, open_dataset, read_table, table_columns
 from armload.lab.dataset.provenance import (
     PROVENANCE_FILE,
     TABLE_FILE,
@@ -26,23 +27,10 @@ from armload.lab.dataset.provenance import (
     read_provenance,
     write_provenance,
 )
-from armload.lab.dataset.table import (
-    IDENTITIES,
-    Dataset,
-    content_hash,
-    open_dataset,
-    read_table,
-    table_columns,
-)
 from armload.motion import Motion
 from armload.payloads import Payload
 from armload.recording import Recording
-from armload.simulation import (
-    Run,
-    Sensors,
-    World,
-    simulate_many,
-)
+from armload.simulation import Run, Sensors, World, simulate_many
 
 if TYPE_CHECKING:
     import pyarrow as pa

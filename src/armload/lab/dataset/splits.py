@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.errors import DatasetError
-from armload.lab.dataset.table import Dataset
+from armload.lab.dataset.parquet_table import Dataset
 
 PAPER_FRACTIONS = (0.7, 0.15, 0.15)
 

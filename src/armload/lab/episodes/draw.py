@@ -10,20 +10,11 @@ from numpy.typing import NDArray
 from armload.arms import Arm, rated_mass
 from armload.errors import ArmError
 from armload.lab.episodes.episode import Episode
-from armload.lab.episodes.motions import MotionSource
-from armload.lab.episodes.recipes import (
-    LIGHTEST,
-    POPULATIONS,
-    TOOL_SHARE,
-    Recipe,
-)
+from armload.lab.episodes.motion_kinds import MotionSource
+from armload.lab.episodes.recipes import LIGHTEST, POPULATIONS, TOOL_SHARE, Recipe
 from armload.motion import Motion
 from armload.payloads import draw_payload
-from armload.simulation import (
-    Gains,
-    Sensors,
-    World,
-)
+from armload.simulation import Gains, Sensors, World
 
 POOL = 200  # motions drawn for one seed; beyond, they are used again
 _JITTER = (1e-5, 5e-4)  # [s]

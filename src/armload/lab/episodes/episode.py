@@ -12,14 +12,7 @@ from armload.inertia import InertialParameters
 from armload.motion import Motion
 from armload.payloads import Payload
 from armload.recording import Recording
-from armload.simulation import (
-    Gains,
-    Resolution,
-    Run,
-    Sensors,
-    World,
-    simulate_many,
-)
+from armload.simulation import Gains, Resolution, Run, Sensors, World, simulate_many
 from armload.simulation.resolution import COARSE
 
 _TARE_NOISE = 1 << 30  # the tare's sensor noise is another than the run's

@@ -27,7 +27,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from armload.errors import ArmError
-from armload.lab.episodes.motions import KINDS
+from armload.lab.episodes.motion_kinds import KINDS
 from armload.payloads import FAMILIES
 
 WORLDS = ("real_like", "beyond")

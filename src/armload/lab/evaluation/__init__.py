@@ -1,8 +1,8 @@
 """Evaluation: the same runs through every method, errors over time and at the end, honest baselines in every table."""
 
 from armload.lab.evaluation.baselines import PriorLeastSquares, TrainingMean
-from armload.lab.evaluation.compare import EvaluationRun, compare
 from armload.lab.evaluation.comparison import Comparison
+from armload.lab.evaluation.contest import EvaluationRun, catalogued, compare
 from armload.lab.evaluation.held_out import held_out_error
 from armload.lab.evaluation.metrics import (
     absolute_error,
@@ -12,7 +12,7 @@ from armload.lab.evaluation.metrics import (
     settling_time,
     spread,
 )
-from armload.lab.evaluation.table import Table
+from armload.lab.report.shown import Table
 
 __all__ = [
     "Comparison",
@@ -21,6 +21,7 @@ __all__ = [
     "Table",
     "TrainingMean",
     "absolute_error",
+    "catalogued",
     "compare",
     "coverage",
     "half_width",

@@ -11,14 +11,7 @@ from numpy.typing import NDArray
 from armload.errors import IdentificationError
 from armload.inertia import NAMES, UNITS
 from armload.lab.evaluation import metrics
-from armload.lab.evaluation.table import (
-    GROUPS,
-    SHOWN_SCALE,
-    SHOWN_UNITS,
-    Table,
-    parameter_columns,
-    short,
-)
+from armload.lab.report.shown import GROUPS, SHOWN_SCALE, SHOWN_UNITS, Table, parameter_columns, short
 
 SETTLED = 0.05  # the mass has settled when it stays within this fraction of the true mass
 _ARRAYS = ("times", "truth", "phi", "std", "samples", "wall", "lengths")

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from armload.atomic import replacing
 from armload.errors import ReportError
-from armload.lab.evaluation import Table
+from armload.lab.report.shown import Table
 from armload.lab.report.style import look
 
 if TYPE_CHECKING:
@@ -49,13 +49,18 @@ def write_report(path: str | Path, sections: Sequence[Section], title: str = "ar
     Raises:
         ReportError: the file cannot be written.
     """
-    text, path = render(sections, title), Path(path)
+    return write_whole(path, render(sections, title), "the report")
+
+
+def write_whole(path: str | Path, text: str, what: str) -> Path:
+    """Write a file that appears whole or not at all; raises `ReportError` where it cannot be written."""
+    path = Path(path)
     try:
         with replacing(path) as temporary:
             temporary.write_text(text, encoding="utf-8")
     except OSError as error:
         raise ReportError(
-            f"the report cannot be written to {path}: {error.strerror}; name a file in a folder you can write to"
+            f"{what} cannot be written to {path}: {error.strerror}; name a file in a folder you can write to"
         ) from None
     return path
 

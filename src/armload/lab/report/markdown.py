@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from armload.atomic import replacing
-from armload.errors import ReportError
-from armload.lab.evaluation import Table
-from armload.lab.report.html import Section
+from armload.lab.report.html import Section, write_whole
+from armload.lab.report.shown import Table
 
 
 def write_markdown(path: str | Path, sections: Sequence[Section], title: str, note: str = "") -> Path:
@@ -26,12 +24,7 @@ def write_markdown(path: str | Path, sections: Sequence[Section], title: str, no
     for section in sections:
         lines += [f"## {section.title}", "", section.text.strip(), ""]
         lines += [markdown(table) for table in section.tables]
-    try:
-        with replacing(path) as temporary:
-            temporary.write_text("\n".join(lines).rstrip() + "\n", encoding="utf-8")
-    except OSError as error:
-        raise ReportError(f"the page cannot be written to {path}: {error.strerror}; name a file elsewhere") from None
-    return Path(path)
+    return write_whole(path, "\n".join(lines).rstrip() + "\n", "the page")
 
 
 def markdown(table: Table) -> str:

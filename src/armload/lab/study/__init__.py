@@ -1,10 +1,10 @@
 """The study of Taie et al., RA-L 2024, measured again: cells, protocols, claims, and the page made of them."""
 
 from armload.lab.study.basis import FULL, QUICK, Basis, Size
-from armload.lab.study.cells import Spec
 from armload.lab.study.plan import plan
-from armload.lab.study.results import write_results
-from armload.lab.study.run import run_study
+from armload.lab.study.spec import Spec
+from armload.lab.study.study_results import write_results
+from armload.lab.study.study_run import run_study
 
 __all__ = [
     "FULL",

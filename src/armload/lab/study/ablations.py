@@ -7,18 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from armload.lab.evaluation import Table
-from armload.lab.evaluation.table import GROUPS, SHOWN_UNITS
-from armload.lab.study.numbers import (
-    Cell,
-    Cells,
-    Ensemble,
-    at_end,
-    benchmark,
-    cap,
-    matched,
-)
-from armload.lab.study.tables import (
+from armload.lab.report.shown import GROUPS, SHOWN_UNITS, Table
+from armload.lab.study.numbers import Cell, Cells, Ensemble, at_end, benchmark, cap, matched
+from armload.lab.study.study_tables import (
     COMMAND,
     MISSING,
     NOMINAL,

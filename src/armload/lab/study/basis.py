@@ -16,12 +16,7 @@ from armload.lab.evaluation import EvaluationRun
 from armload.motion import Motion, random_motion, taie2024
 from armload.payloads import Payload, container_loadings, random_payloads, test_payload
 from armload.recording import Recording, read_recording
-from armload.simulation import (
-    Run,
-    Sensors,
-    World,
-    simulate_many,
-)
+from armload.simulation import Run, Sensors, World, simulate_many
 
 # Seeds of what is drawn: kept apart, so that no run shares its noise with the training data.
 NOISE, WORLDS, FAMILY, MOTIONS, TARE = 5000, 100, 7000, 300, 900

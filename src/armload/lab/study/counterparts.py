@@ -7,14 +7,7 @@ from typing import Any
 import numpy as np
 
 from armload.inertia import NAMES
-from armload.lab.evaluation import Table
-from armload.lab.evaluation.table import (
-    GROUPS,
-    SHOWN_SCALE,
-    SHOWN_UNITS,
-    parameter_columns,
-    short,
-)
+from armload.lab.report.shown import GROUPS, SHOWN_SCALE, SHOWN_UNITS, Table, parameter_columns, short
 from armload.lab.study.numbers import (
     EXACT,
     Answers,
@@ -29,7 +22,7 @@ from armload.lab.study.numbers import (
     mean_ratio,
 )
 from armload.lab.study.statements import izz
-from armload.lab.study.tables import (
+from armload.lab.study.study_tables import (
     BASELINES,
     COMMAND,
     LEAST_SQUARES,

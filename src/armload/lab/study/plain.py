@@ -9,14 +9,9 @@ from typing import Any
 from numpy.typing import NDArray
 
 from armload.lab.evaluation import Table
-from armload.lab.evaluation.table import SHOWN_SCALE, SHOWN_UNITS, short
+from armload.lab.report.shown import SHOWN_SCALE, SHOWN_UNITS, short
 from armload.lab.study.ablations import compared
-from armload.lab.study.claims import (
-    CONFIRMED,
-    DEPENDS,
-    NOT_CONFIRMED,
-    NOT_MEASURED,
-)
+from armload.lab.study.claims import CONFIRMED, DEPENDS, NOT_CONFIRMED, NOT_MEASURED
 from armload.lab.study.numbers import (
     Cells,
     Ensemble,
@@ -28,15 +23,7 @@ from armload.lab.study.numbers import (
     matched,
     mean_ratio,
 )
-from armload.lab.study.tables import (
-    COMMAND,
-    LEARNERS,
-    LEAST_SQUARES,
-    MISSING,
-    NOT_YET,
-    REAL,
-    TRAINING_MEAN,
-)
+from armload.lab.study.study_tables import COMMAND, LEARNERS, LEAST_SQUARES, MISSING, NOT_YET, REAL, TRAINING_MEAN
 
 _KINDS = ("tree", "network")
 _RIVALS = ("rls", "rls-filter", "rls-filter-calibrated", "same-prior")

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from armload.estimators import Identifier
 from armload.lab.evaluation import EvaluationRun
+from armload.lab.experiment import listed
 from armload.recording import Recording
 
 Predict = Callable[[NDArray[np.float64]], NDArray[np.float64]]  # rows of (t, q, dq, tau) → phi (N, 10)
@@ -36,9 +37,9 @@ def measure_learned(predict: Predict, runs: dict[str, list[EvaluationRun]]) -> d
                 average = np.cumsum(answers[:, 9]) / np.arange(1, len(answers) + 1)
                 izz[protocol] = _curve(run, answers[:, 9], average)
         protocols[protocol] = {
-            "running": _listed(running),
-            "first": _listed(first),
-            "single": _listed(np.mean(single, axis=0)),
+            "running": listed(running),
+            "first": listed(first),
+            "single": listed(np.mean(single, axis=0)),
             "labels": [run.label for run in members],
         }
     return {"protocols": protocols, "izz": izz}
@@ -70,10 +71,10 @@ def measure_stream(make: Callable[[EvaluationRun], Identifier], runs: dict[str, 
                 curve = _curve(run, phi[:, 9], phi[:, 9], np.array([e.t for e in trace]) - run.recording.t[0])
                 izz[protocol] = curve
         protocols[protocol] = {
-            "running": _listed(running),
-            "first": _listed(first),
-            "second_half": _listed(half),
-            "single": _listed(np.mean(single, axis=0)),
+            "running": listed(running),
+            "first": listed(first),
+            "second_half": listed(half),
+            "single": listed(np.mean(single, axis=0)),
             "labels": [run.label for run in members],
         }
     return {"protocols": protocols, "izz": izz}
@@ -89,13 +90,8 @@ def _curve(run: EvaluationRun, single: NDArray, running: NDArray, t: NDArray | N
     times = run.recording.t - run.recording.t[0] if t is None else t
     keep = np.unique(np.linspace(0, len(times) - 1, _POINTS).round().astype(int))
     return {
-        "t": _listed(times[keep]),
-        "single": _listed(single[keep]),
-        "running": _listed(running[keep]),
+        "t": listed(times[keep]),
+        "single": listed(single[keep]),
+        "running": listed(running[keep]),
         "truth": float(run.truth.phi[9]),
     }
-
-
-def _listed(values: Any) -> list:
-    """Seven digits are more than any of this means."""
-    return np.array([float(f"{x:.7g}") for x in np.ravel(values)]).reshape(np.shape(values)).tolist()

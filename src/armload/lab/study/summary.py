@@ -10,19 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.inertia import NAMES
-from armload.lab.evaluation.table import (
-    GROUPS,
-    SHOWN_SCALE,
-    SHOWN_UNITS,
-    short,
-)
+from armload.lab.report.shown import GROUPS, SHOWN_SCALE, SHOWN_UNITS, short
 from armload.lab.study.ablations import compared
-from armload.lab.study.claims import (
-    CONFIRMED,
-    DEPENDS,
-    NOT_MEASURED,
-    VERDICTS,
-)
+from armload.lab.study.claims import CONFIRMED, DEPENDS, NOT_MEASURED, VERDICTS
 from armload.lab.study.counterparts import RIVALS, SHOWN_ENSEMBLES
 from armload.lab.study.numbers import (
     Answers,
@@ -38,7 +28,7 @@ from armload.lab.study.numbers import (
     matched,
     mean_ratio,
 )
-from armload.lab.study.tables import (
+from armload.lab.study.study_tables import (
     COMMAND,
     LEARNERS,
     LEAST_SQUARES,

@@ -14,13 +14,7 @@ from numpy.typing import NDArray
 from armload.arms import Arm, kinship, rated_mass
 from armload.errors import ModelError
 from armload.lab.cells import key_of
-from armload.lab.episodes import (
-    LIGHTEST,
-    POPULATIONS,
-    TOOL_SHARE,
-    Episode,
-    draw_episodes,
-)
+from armload.lab.episodes import LIGHTEST, POPULATIONS, TOOL_SHARE, Episode, draw_episodes
 from armload.lab.training.calibrating import fit_calibration
 from armload.lab.training.coverage import FOLDS, Coverage, cross_validated
 from armload.lab.training.records import TIMES, Records, measure_episodes

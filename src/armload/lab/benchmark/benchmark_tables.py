@@ -10,14 +10,7 @@ from armload.inertia import NAMES
 from armload.lab.benchmark.measured import Measured
 from armload.lab.benchmark.populations import REPEAT
 from armload.lab.benchmark.rows import BASELINES
-from armload.lab.evaluation import Table
-from armload.lab.evaluation.table import (
-    GROUPS,
-    SHOWN_SCALE,
-    SHOWN_UNITS,
-    parameter_columns,
-    short,
-)
+from armload.lab.report.shown import GROUPS, SHOWN_SCALE, SHOWN_UNITS, Table, parameter_columns, short
 
 Results = Mapping[str, Measured]  # by population
 SUBJECTS = ("hybrid", "map-gp", "map")  # the first that is measured is what the tables judge

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from armload.lab.benchmark import tables
+from armload.lab.benchmark import benchmark_tables as tables
+from armload.lab.benchmark.benchmark_run import Size
+from armload.lab.benchmark.benchmark_tables import Results, subject
 from armload.lab.benchmark.populations import PRIOR, REPEAT
 from armload.lab.benchmark.rows import BOUND, left_out
-from armload.lab.benchmark.run import Size
-from armload.lab.benchmark.tables import Results, subject
 from armload.lab.benchmark.targets import targets_table
-from armload.lab.evaluation import Table
-from armload.lab.evaluation.table import GROUPS
 from armload.lab.report import Section
+from armload.lab.report.shown import GROUPS, Table
 
 if TYPE_CHECKING:
     from armload.lab.report.style import Figure

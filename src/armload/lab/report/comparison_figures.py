@@ -2,82 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armload.inertia import NAMES
-from armload.lab.evaluation import Comparison, half_width
-from armload.lab.evaluation.table import GROUPS, SHOWN_SCALE, SHOWN_UNITS
-from armload.lab.report.style import (
-    TRUTH,
-    look,
-    method_styles,
-    new_figure,
-)
+from armload.inertia import NAMES, Z95
+from armload.lab.report.panels import bars_of_errors, legend, parameters, three_panels
+from armload.lab.report.shown import SHOWN_SCALE, SHOWN_UNITS
+from armload.lab.report.style import TRUTH, look, method_styles, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_TITLES = ("mass", "first moment", "inertia about the frame's origin")
-_LOG_FROM = 30.0  # ratio of largest to smallest error from which an axis becomes logarithmic
+    from armload.lab.evaluation import Comparison
 
 
 def error_bars(comparison: Comparison, at: int = -1) -> Figure:
     """Mean absolute error of every method and parameter at times[at], as in Fig. 4-7 of Taie et al. 2024."""
-    styles = method_styles(comparison)
-    mae, spread = SHOWN_SCALE * comparison.mae[:, at], SHOWN_SCALE * comparison.spread[:, at]
-    with look():
-        figure, axes = _three_axes()
-        for ax, part, unit, title in _groups(axes):
-            values = mae[:, part]
-            positive = values[(values > 0) & np.isfinite(values)]
-            log = positive.size > 0 and positive.max() > _LOG_FROM * positive.min()
-            floor = 0.5 * positive.min() if log else 0.0
-            width = 0.8 / len(comparison.methods)
-            for m, name in enumerate(comparison.methods):
-                x = np.arange(values.shape[1]) + (m - 0.5 * (len(comparison.methods) - 1)) * width
-                height = np.maximum(values[m], floor)
-                down = np.minimum(spread[m, part], height - floor)  # an error bar ends where the axis does
-                ax.bar(
-                    x,
-                    height - floor,
-                    0.92 * width,
-                    bottom=floor,
-                    color=styles[name]["color"],
-                    label=name if ax is axes[0] else "_nolegend_",
-                    hatch="////" if name in comparison.baselines else None,
-                    edgecolor="white",
-                    linewidth=0.0,
-                    yerr=None if len(comparison.labels) == 1 else np.stack([down, spread[m, part]]),
-                    error_kw={"elinewidth": 0.9, "ecolor": "#222222", "capsize": 1.5},
-                )
-            if log:
-                ax.set_yscale("log")
-                ax.set_ylim(bottom=floor)
-            ax.set_xticks(np.arange(values.shape[1]), NAMES[part])
-            ax.grid(axis="x", visible=False)
-            ax.set_title(title + (", logarithmic" if log else ""))
-            ax.set_ylabel(f"mean absolute error [{unit}]")
-        _legend(figure, axes[0])
-    return figure
+    styles = {
+        name: {"color": style["color"], "edgecolor": "white", "linewidth": 0.0}
+        | ({"hatch": "////"} if name in comparison.baselines else {})
+        for name, style in method_styles(comparison).items()
+    }
+    spread = [None] * len(styles) if len(comparison.labels) == 1 else comparison.spread[:, at]
+    return bars_of_errors(
+        dict(zip(comparison.methods, zip(comparison.mae[:, at], spread, strict=True), strict=True)), styles
+    )
 
 
-def estimates(comparison: Comparison, run: int = 0, level: float = 0.95) -> Figure:
-    """Estimates of one run at the end, with the methods' own intervals, beside the truth."""
+def estimates(comparison: Comparison, run: int = 0) -> Figure:
+    """Estimates of one run at the end, with the methods' own 95 % intervals, beside the truth."""
     styles = method_styles(comparison)
     with look():
-        figure, axes = _three_axes()
+        figure, panels = three_panels()
         count = len(comparison.methods)
-        for ax, part, unit, title in _groups(axes):
+        for ax, title, part, unit in panels:
             truth = SHOWN_SCALE * comparison.truth[run, part]
             places = np.arange(len(truth))
             ax.hlines(truth, places - 0.45, places + 0.45, color=TRUTH, linewidth=1.6, label="truth", zorder=3)
             for m, name in enumerate(comparison.methods):
                 phi = SHOWN_SCALE * comparison.phi[m, run, -1, part]
-                half = SHOWN_SCALE * half_width(comparison.std[m, run, -1, part], level)
+                half = SHOWN_SCALE * Z95 * comparison.std[m, run, -1, part]
                 ax.errorbar(
                     places + (m - 0.5 * (count - 1)) * 0.8 / count,
                     phi,
@@ -90,11 +56,10 @@ def estimates(comparison: Comparison, run: int = 0, level: float = 0.95) -> Figu
                 )
             _limit(ax, SHOWN_SCALE * comparison.phi[:, run, -1, part], truth)
             _mark_cut_off(ax, comparison, run, part, styles)
-            ax.set_xticks(places, NAMES[part])
-            ax.grid(axis="x", visible=False)
+            parameters(ax, part)
             ax.set_title(title)
             ax.set_ylabel(f"estimate [{unit}]")
-        _legend(figure, axes[0])
+        legend(figure, panels[0][0])
     return figure
 
 
@@ -115,7 +80,7 @@ def error_over_time(comparison: Comparison, parameter: int = 0) -> Figure:
             ax.set_yscale("log")
         _time_axis(ax, comparison)
         ax.set_ylabel(f"mean absolute error of {NAMES[parameter]} [{unit}]")
-        _legend(figure, ax)
+        legend(figure, ax)
     return figure
 
 
@@ -148,21 +113,8 @@ def parameter_over_time(comparison: Comparison, run: int = 0, parameter: int = 9
                 ax.plot(middle, single, ".", markersize=4, color=styles[name]["color"], alpha=0.6)
         _time_axis(ax, comparison)
         ax.set_ylabel(f"{NAMES[parameter]} [{unit}]")
-        _legend(figure, ax)
+        legend(figure, ax)
     return figure
-
-
-def _three_axes() -> tuple[Figure, list[Axes]]:
-    """Mass and first moments above, inertia below: the three have their own unit."""
-    figure = new_figure(6.2)
-    grid: Any = figure.add_gridspec(2, 2, width_ratios=(1, 2.6))
-    return figure, [figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, :])]
-
-
-def _groups(axes: list[Axes]) -> Iterator[tuple[Axes, slice, str, str]]:
-    """Axes, parameters, unit and title of the three groups."""
-    for ax, part, title in zip(axes, GROUPS.values(), _TITLES, strict=True):
-        yield ax, part, SHOWN_UNITS[part][0], title
 
 
 def _limit(ax: Axes, values: np.ndarray, truth: np.ndarray) -> None:
@@ -191,13 +143,3 @@ def _time_axis(ax: Axes, comparison: Comparison) -> None:
         for line in ax.lines:
             line.set_marker("o")
     ax.set_xlabel("time since the start of the motion [s]")
-
-
-def _legend(figure: Figure, ax: Axes) -> None:
-    handles, labels = ax.get_legend_handles_labels()
-    room = 120  # characters of legend text that fit beside each other, 7 of them for each line and gap
-    ncols = len(labels)
-    while ncols > 1 and ncols * (7 + max(map(len, labels))) > room and sum(len(x) + 7 for x in labels) > room:
-        ncols -= 1
-    ncols = -(-len(labels) // -(-len(labels) // ncols))  # rows of equal length
-    figure.legend(handles, labels, loc="outside upper center", ncols=ncols)

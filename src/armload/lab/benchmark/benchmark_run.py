@@ -10,31 +10,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armload.arms import Arm, arm
 from armload.errors import ArmloadError, IdentificationError
 from armload.estimators import Estimate
 from armload.identification import METHODS
-from armload.lab import load_cells, save_cell
-from armload.lab.benchmark.populations import (
-    ALL,
-    REPEAT,
-    Population,
-    population,
-    prior_of,
-)
-from armload.lab.benchmark.rows import (
-    BOUND,
-    Row,
-    bound_std,
-    default_names,
-    fingerprint,
-    rows_for,
-    trained_on,
-)
-from armload.lab.cells import finished_cell, key_of
+from armload.lab.benchmark.populations import ALL, REPEAT, Population, population, prior_of
+from armload.lab.benchmark.rows import BOUND, Row, bound_std, default_names, fingerprint, rows_for, trained_on
+from armload.lab.cells import key_of, load_cells
 from armload.lab.episodes import Episode, EpisodeLogs, simulate_episodes
+from armload.lab.experiment import Cells, Task, listed, run_tasks
 
 FORMAT = 1  # of a cell; a change makes every cell unfinished
 TIMES = (0.02, 0.1, 0.5, 1.0, 3.0, 6.0)  # [s] since the run began
@@ -89,16 +74,6 @@ QUICK = Size(
 )
 
 
-@dataclass(frozen=True)
-class Task:
-    """What one process measures at a time: some rows on the episodes of one seed, each with the key of its cell."""
-
-    population: str
-    seed: int
-    count: int
-    rows: tuple[tuple[Row, str], ...]
-
-
 def cell_name(population: str, seed: int, row: str) -> str:
     """Unique and readable; the file's stem."""
     return f"{population}-{seed}-{row.replace(' ', '-')}"
@@ -133,44 +108,25 @@ def run_benchmark(
     jobs: int = 1,
     until: float | None = None,
     say: Callable[[str], None] = lambda _: None,
-) -> dict[str, dict[str, Any]]:
+) -> Cells:
     """Measure what is not finished yet and return all cells of the benchmark that hold, by name.
 
     Args:
         size: how much is measured.
         folder: of the cells' files. Cells of other populations and methods of the same size are returned too: the
             tables show all there is.
-        jobs: processes; the numbers do not depend on it.
-        until: begin nothing after so many seconds.
-        say: told what is next.
+        jobs, until, say: see `run_tasks`.
     """
-    from joblib import Parallel, delayed
-
-    folder, started, robot = Path(folder), time.monotonic(), arm(size.robot)
+    robot = arm(size.robot)
     cells = load_cells(folder)
     say("checking what is finished")
     wanted = {name: rows_for(population(name), size.methods) for name in size.populations}
     valid = keys(size, robot, _with_finished(cells, wanted))
-    cells = {name: cell for name, cell in cells.items() if cell["key"] == valid.get(name)}
-
-    def unfinished() -> Iterator[Task]:
-        todo = _tasks(size, wanted, valid, cells)
-        for number, task in enumerate(todo, start=1):
-            if until is not None and time.monotonic() - started > until:
-                say(f"stopped before part {number} of {len(todo)}: run it again to go on")
-                return
-            rows = f"{len(task.rows)} row" + ("" if len(task.rows) == 1 else "s")
-            say(f"part {number} of {len(todo)}: {task.population}, seed {task.seed}, {rows}")
-            yield task
-
-    one_by_one: dict[str, Any] = {"pre_dispatch": jobs, "batch_size": 1, "return_as": "generator_unordered"}
-    finished: Any = Parallel(n_jobs=jobs, **one_by_one)(delayed(_measured)(t, size, folder) for t in unfinished())
-    for measured in finished:
-        cells |= {cell["name"]: cell for cell in measured}
-    return cells
+    others = {name: cell for name, cell in cells.items() if cell["key"] == valid.get(name)}
+    return others | run_tasks(_tasks(size, wanted, valid), folder, jobs=jobs, until=until, say=say)
 
 
-def _with_finished(cells: dict[str, dict[str, Any]], wanted: dict[str, list[Row]]) -> dict[str, list[Row]]:
+def _with_finished(cells: Cells, wanted: dict[str, list[Row]]) -> dict[str, list[Row]]:
     """The rows wanted and those that there are cells of, by population."""
     rows = {name: {row.name: row for row in members} for name, members in wanted.items()}
     for cell in cells.values():
@@ -180,17 +136,14 @@ def _with_finished(cells: dict[str, dict[str, Any]], wanted: dict[str, list[Row]
     return {name: list(members.values()) for name, members in rows.items()}
 
 
-def _tasks(
-    size: Size, wanted: dict[str, list[Row]], valid: dict[str, str], cells: dict[str, dict[str, Any]]
-) -> list[Task]:
-    """What is left to do, the first seed of every population first."""
+def _tasks(size: Size, wanted: dict[str, list[Row]], valid: dict[str, str]) -> list[Task]:
+    """All rows on the episodes of one seed are a task; the first seed of every population comes first."""
     tasks = []
     for name, rows in wanted.items():
         for k, (seed, count) in enumerate(size.seeds(population(name))):
-            named = [(row, cell_name(name, seed, row.name)) for row in rows]
-            missing = tuple((row, valid[cell]) for row, cell in named if cell not in cells)
-            if missing:
-                tasks.append((k, Task(name, seed, count, missing)))
+            named = {cell_name(name, seed, row.name): row for row in rows}
+            own = {cell: valid[cell] for cell in named}
+            tasks.append((k, Task(f"{name}, seed {seed}", own, _measured, (named, name, seed, count, size), "row")))
     return [task for _, task in sorted(tasks, key=lambda numbered: numbered[0])]
 
 
@@ -199,30 +152,21 @@ def _arm_of_process(robot: str) -> Arm:
     return arm(robot)
 
 
-def _measured(task: Task, size: Size, folder: Path) -> list[dict[str, Any]]:
-    """Simulate the episodes once and put every missing row through them; each cell is written when it is done."""
-    robot, of, cells, missing = _arm_of_process(size.robot), population(task.population), [], []
-    for row, key in task.rows:  # another run may have finished it meanwhile
-        cell = finished_cell(folder, cell_name(task.population, task.seed, row.name), key)
-        cells += [] if cell is None else [cell]
-        missing += [(row, key)] if cell is None else []
-    if not missing:
-        return cells
-    episodes = of.episodes(robot, task.seed, task.count)
-    logs, prior = list(simulate_episodes(episodes, rate=size.rate)), prior_of(of.recipe, robot)
-    for row, key in missing:
-        cell = {
-            "name": cell_name(task.population, task.seed, row.name),
-            "key": key,
-            "population": task.population,
-            "seed": task.seed,
+def _measured(
+    missing: Sequence[str], rows: dict[str, Row], name: str, seed: int, count: int, size: Size
+) -> Iterator[dict[str, Any]]:
+    """Simulate the episodes once and put every missing row through them."""
+    of = population(name)
+    episodes = of.episodes(_arm_of_process(size.robot), seed, count)
+    logs, prior = list(simulate_episodes(episodes, rate=size.rate)), prior_of(of.recipe, _arm_of_process(size.robot))
+    for row in (rows[cell] for cell in missing):
+        yield {
+            "population": name,
+            "seed": seed,
             "row": {"name": row.name, "method": row.method, "tared": row.tared},
             "times": list(size.times),
             **measure(row, episodes, logs, prior, size.times),
         }
-        save_cell(folder, cell, indent=None)
-        cells.append(cell)
-    return cells
 
 
 def measure(
@@ -258,16 +202,9 @@ def measure(
         wall.append(round(time.perf_counter() - begun, 4))
     return {
         "truth": [log.truth.phi.tolist() for log in logs],
-        "phi": _listed(np.array(phi)),
-        "std": _listed(np.array(std)),
+        "phi": listed(np.array(phi)),
+        "std": listed(np.array(std)),
         "wall_s": wall,
         "refused": refused,
         "trained": trained,
     }
-
-
-def _listed(values: NDArray[np.float64]) -> Any:
-    """For JSON: seven digits, None for what is not finite."""
-    if values.ndim > 1:
-        return [_listed(part) for part in values]
-    return [float(f"{x:.7g}") if np.isfinite(x) else None for x in values.tolist()]

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import json
+import re
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import asdict
 from functools import lru_cache
 from pathlib import Path
@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from armload.estimators import FilteredRecursiveLeastSquares, Identifier, RecursiveLeastSquares, Tared
-from armload.lab import load_cells, save_cell
+from armload.estimators import Identifier
+from armload.identification import METHODS
 from armload.lab.dataset import Split, split_payloads, split_rows
 from armload.lab.evaluation import EvaluationRun, PriorLeastSquares, mean_absolute_error
+from armload.lab.experiment import Cells, Task, run_tasks, versions
 from armload.lab.study.basis import Basis, Size
-from armload.lab.study.cells import Spec
 from armload.lab.study.plan import plan
 from armload.lab.study.protocols import measure_learned, measure_stream
-from armload.posterior import PosteriorLeastSquares
+from armload.lab.study.spec import Spec
 from armload.regression import GaussianPrior
 
 if TYPE_CHECKING:
@@ -38,61 +38,36 @@ def run_study(
     jobs: int = 1,
     progress: bool = False,
     say: Callable[[str], None] = lambda _: None,
-) -> dict[str, dict[str, Any]]:
+) -> Cells:
     """Measure what is not finished yet and return all finished cells by name.
 
     Args:
         basis: what it rests on.
         results: folder of the cells' files; those with the right key are not measured again.
-        jobs: cells measured at once, each in a process of its own; the numbers do not depend on it.
+        jobs, until, say: see `run_tasks`.
         progress: bars on stderr, for one job.
-        say: told which cell is next.
     """
-    from joblib import Parallel, delayed
-
-    folder, started, fingerprint = Path(results), time.monotonic(), basis.fingerprint
-    cells, todo = load_cells(folder), plan(basis.size)
-
-    def unfinished() -> Iterator[Spec]:
-        for number, spec in enumerate(todo, start=1):
-            if cells.get(spec.name, {}).get("key") == spec.key(fingerprint):
-                continue
-            if until is not None and time.monotonic() - started > until:
-                say(f"stopped before cell {number} of {len(todo)}: run it again to go on")
-                return
-            say(f"cell {number} of {len(todo)}: {spec.name}")
-            yield spec
-
+    todo = plan(basis.size)
     if jobs > 1:  # or each process would build them
         for sensors in sorted({spec.sensors for spec in todo}):
             basis.dataset(sensors, progress)
-    rests_on = (basis.folder, basis.size, basis.real_log)
-    tasks = (delayed(_measured)(spec, rests_on, folder, progress and jobs == 1) for spec in unfinished())
-    one_by_one: dict[str, Any] = {"pre_dispatch": jobs, "batch_size": 1, "return_as": "generator_unordered"}
-    finished: Any = Parallel(n_jobs=jobs, **one_by_one)(tasks)
-    for cell in finished:
-        cells[cell["name"]] = cell
-    names = {spec.name for spec in todo}
-    return {name: cell for name, cell in cells.items() if name in names}
+    rests_on, bars, fingerprint = (basis.folder, basis.size, basis.real_log), progress and jobs == 1, basis.fingerprint
+    tasks = [Task.of_one(spec.name, spec.key(fingerprint), _measured, spec, rests_on, bars) for spec in todo]
+    return run_tasks(tasks, results, jobs=jobs, until=until, say=say, part="cell", indent=1)
 
 
-def _measured(spec: Spec, rests_on: tuple[Path, Size, Path | None], folder: Path, progress: bool) -> dict[str, Any]:
-    """Measure one cell and keep it: its file is written where it was measured, whatever becomes of the others."""
-    basis = _basis_of_process(*rests_on)
-    begun = time.perf_counter()
+def _measured(spec: Spec, rests_on: tuple[Path, Size, Path | None], progress: bool) -> dict[str, Any]:
+    """The numbers of one cell."""
+    basis, begun = _basis_of_process(*rests_on), time.perf_counter()
     measured = _benchmark(spec, basis) if spec.kind == "benchmark" else _learned(spec, basis, progress)
-    cell = {
-        "name": spec.name,
-        "key": spec.key(basis.fingerprint),
+    return {
         "spec": asdict(spec),
         "wall_s": round(time.perf_counter() - begun, 1),
         "rows": basis.size.rows * len(basis.loadings),
         "payloads": len(basis.loadings),
-        "versions": _versions(),
+        "versions": versions("armload", "numpy", "scikit-learn", "jax", "pin", "mujoco"),
         **measured,
     }
-    save_cell(folder, cell)
-    return json.loads(json.dumps(cell))
 
 
 @lru_cache(maxsize=1)
@@ -134,13 +109,7 @@ def _learned(spec: Spec, basis: Basis, progress: bool) -> dict[str, Any]:
 
 
 def _untrained(spec: Spec) -> BaggingEnsemble | TwoStage | MixedEnsemble:
-    from armload.ensembles import (
-        BaggingEnsemble,
-        MixedEnsemble,
-        NetworkLearner,
-        TreeLearner,
-        TwoStage,
-    )
+    from armload.ensembles import BaggingEnsemble, MixedEnsemble, NetworkLearner, TreeLearner, TwoStage
 
     network = NetworkLearner(
         hidden=spec.hidden, batch=spec.batch, max_epochs=spec.max_epochs, learning_rate=spec.learning_rate
@@ -168,22 +137,10 @@ def _benchmark(spec: Spec, basis: Basis) -> dict[str, Any]:
     prior = GaussianPrior.of([p.parameters for p in basis.loadings], "the training payloads")
 
     def make(run: EvaluationRun) -> Identifier:
-        if spec.method == "rls":
-            return RecursiveLeastSquares(robot)
-        if spec.method == "rls-filter":
-            return FilteredRecursiveLeastSquares(robot)
-        if spec.method.startswith("rls-filter-calibrated"):
-            assert run.tare is not None
-            return Tared(FilteredRecursiveLeastSquares(robot), run.tare)
         if spec.method == "same-prior":
             return PriorLeastSquares(robot, prior.mean, prior.covariance)
-        return PosteriorLeastSquares(robot, run.tare if spec.method == "map-tare" else None)
+        name = re.sub("-(tare|calibrated.*)$", "", spec.method)
+        return METHODS[name].make(robot, None if name == spec.method else run.tare)
 
     runs = basis.runs_with_own_motion_tared if spec.method == "rls-filter-calibrated" else basis.runs
     return {"epochs": None, "file_bytes": None, **measure_stream(make, runs)}
-
-
-def _versions() -> dict[str, str]:
-    from importlib.metadata import version
-
-    return {name: version(name) for name in ("armload", "numpy", "scikit-learn", "jax", "pin", "mujoco")}

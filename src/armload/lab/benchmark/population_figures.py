@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from armload.lab.benchmark.benchmark_tables import Results, row_names
 from armload.lab.benchmark.measured import Measured
-from armload.lab.benchmark.tables import Results, row_names
-from armload.lab.evaluation.table import GROUPS, SHOWN_SCALE, SHOWN_UNITS
-from armload.lab.report.style import look, new_figure, styles_of
+from armload.lab.report.panels import legend, three_in_a_row
+from armload.lab.report.shown import SHOWN_SCALE
+from armload.lab.report.style import look, styles_of
 
 if TYPE_CHECKING:
     from armload.lab.report.style import Figure
@@ -39,46 +40,36 @@ def error_over_time(m: Measured, styles: dict[str, dict]) -> Figure:
     """Mean absolute error by group of parameters, log-log."""
     error = SHOWN_SCALE * m.standard_error(m.grouped)
     with look():
-        figure = new_figure(4.6)
-        axes: Any = [figure.add_subplot(1, 3, k + 1) for k in range(3)]
-        for k, (ax, (group, part)) in enumerate(zip(axes, GROUPS.items(), strict=True)):
+        figure, panels = three_in_a_row()
+        for ax, group, k, _, unit in panels:
             for i, row in enumerate(m.rows):
                 mean = SHOWN_SCALE * m.grouped[i, :, :, k].mean(axis=0)
                 bar = np.minimum(np.nan_to_num(error[i, :, k]), 0.9 * mean)
-                ax.errorbar(m.times, mean, yerr=bar, label=row if k == 0 else "_", elinewidth=0.8, **styles[row])
-            _time_axis(ax, m)
+                ax.errorbar(m.times, mean, yerr=bar, label=row, elinewidth=0.8, **styles[row])
+            _over_time(ax, m, group, f"mean absolute error [{unit}]")
             ax.set_yscale("log")
-            ax.set_title(group)
-            ax.set_ylabel(f"mean absolute error [{SHOWN_UNITS[part][0]}]")
-        _legend(figure, axes[0])
+        legend(figure, figure.axes[0])
     return figure
 
 
 def coverage_over_time(m: Measured, styles: dict[str, dict]) -> Figure:
     """Share of the intervals that hold the truth, by group of parameters."""
     with look():
-        figure = new_figure(4.6)
-        axes: Any = [figure.add_subplot(1, 3, k + 1) for k in range(3)]
-        for k, (ax, (group, part)) in enumerate(zip(axes, GROUPS.items(), strict=True)):
+        figure, panels = three_in_a_row()
+        for ax, group, _, part, _ in panels:
             for i, row in enumerate(m.rows):
-                share = m.coverage[i, :, part].mean(axis=-1)
-                ax.plot(m.times, 100.0 * share, label=row if k == 0 else "_", marker=".", **styles[row])
+                ax.plot(m.times, 100.0 * m.coverage[i, :, part].mean(axis=-1), label=row, marker=".", **styles[row])
             ax.axhline(95.0, color="#000000", linewidth=0.8, linestyle="--")
-            _time_axis(ax, m)
+            _over_time(ax, m, group, "inside the 95 % interval [%]")
             ax.set_ylim(0.0, 102.0)
-            ax.set_title(group)
-            ax.set_ylabel("inside the 95 % interval [%]")
-        _legend(figure, axes[0])
+        legend(figure, figure.axes[0])
     return figure
 
 
-def _time_axis(ax: Any, m: Measured) -> None:
+def _over_time(ax: Any, m: Measured, title: str, label: str) -> None:
     ax.set_xscale("log")
     ax.set_xticks(m.times, [f"{time:g}" for time in m.times])
     ax.set_xticks([], minor=True)
     ax.set_xlabel("time [s]")
-
-
-def _legend(figure: Figure, ax: Any) -> None:
-    handles, labels = ax.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=min(4, len(labels)))
+    ax.set_ylabel(label)
+    ax.set_title(title)

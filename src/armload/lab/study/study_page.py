@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from armload.lab.evaluation import Table
 from armload.lab.report import Section, write_markdown, write_report
+from armload.lab.report.shown import Table
 from armload.lab.study import summary
 from armload.lab.study.ablations import ABLATIONS, ablation_table, single_or_mean_table
 from armload.lab.study.claims import RULE
@@ -20,23 +20,10 @@ from armload.lab.study.counterparts import (
     test_payload_table,
     training_rows,
 )
-from armload.lab.study.numbers import (
-    PAPER_EPOCHS,
-    Cells,
-    at_end,
-    cap,
-    held_out,
-)
+from armload.lab.study.numbers import PAPER_EPOCHS, Cells, at_end, cap, held_out
 from armload.lab.study.plain import against_table, in_plain_words
 from armload.lab.study.statements import RULES
-from armload.lab.study.tables import (
-    COMMAND,
-    PROTOCOLS,
-    claims_table,
-    epochs_table,
-    main_tables,
-    parameter_table,
-)
+from armload.lab.study.study_tables import COMMAND, PROTOCOLS, claims_table, epochs_table, main_tables, parameter_table
 
 if TYPE_CHECKING:
     from armload.lab.report.style import Figure
@@ -108,7 +95,7 @@ def write_page(cells: Cells, claims: Sequence[dict[str, Any]], path: str | Path)
 
 def html_report(cells: Cells, claims: Sequence[dict[str, Any]], path: str | Path) -> Path:
     """Write the study as one HTML file with Fig. 4 to 8; raises `ReportError` if it cannot be written."""
-    from armload.lab.study.figures import figures
+    from armload.lab.study.paper_figures import figures
 
     return write_report(path, sections(cells, claims, figures(cells)), TITLE)
 

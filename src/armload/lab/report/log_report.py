@@ -9,10 +9,10 @@ import numpy as np
 
 from armload.arms import Arm
 from armload.estimators import Estimate
-from armload.inertia import NAMES, UNITS
-from armload.lab.evaluation import Table, half_width
-from armload.lab.report import recordings
+from armload.inertia import NAMES, UNITS, Z95
+from armload.lab.report import recording_figures as recordings
 from armload.lab.report.html import Section
+from armload.lab.report.shown import Table
 from armload.lab.report.style import COLOURS, look, new_figure
 from armload.recording import Recording
 
@@ -73,7 +73,7 @@ def over_time(traces: Mapping[str, Sequence[Estimate]], part: slice) -> Figure:
             for (method, trace), colour in zip(traces.items(), COLOURS, strict=False):
                 t = np.array([e.t for e in trace]) - start
                 value = np.array([e.phi[p] for e in trace])
-                half = half_width(np.array([e.std[p] for e in trace]))
+                half = Z95 * np.array([e.std[p] for e in trace])
                 half = np.where(np.isfinite(half), half, 0.0)
                 ax.plot(t, value, color=colour, label=method)
                 ax.fill_between(t, value - half, value + half, color=colour, alpha=0.12, linewidth=0)
@@ -93,7 +93,7 @@ def _table(traces: Mapping[str, Sequence[Estimate]], where: str) -> Table:
     rows = []
     for method, trace in traces.items():
         last = trace[-1]
-        half = half_width(last.std)
+        half = Z95 * last.std
         cells = (f"{v:+.4f} ± {h:.4f}" if np.isfinite(h) else f"{v:+.4f}" for v, h in zip(last.phi, half, strict=True))
         rows.append((method, *cells))
     columns = ("method", *(f"{name} [{unit}]" for name, unit in zip(NAMES, UNITS, strict=True)))

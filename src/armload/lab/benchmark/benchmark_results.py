@@ -2,38 +2,32 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armload.atomic import replacing
 from armload.errors import ReportError
 from armload.inertia import NAMES, UNITS
-from armload.lab.benchmark.figures import figures
+from armload.lab.benchmark.benchmark_page import APPENDIX, COMMAND, PAIRS, TITLE, sections
+from armload.lab.benchmark.benchmark_run import Size
+from armload.lab.benchmark.benchmark_tables import Results, losses
 from armload.lab.benchmark.front import front, picture
 from armload.lab.benchmark.measured import Measured, gather
-from armload.lab.benchmark.page import (
-    APPENDIX,
-    COMMAND,
-    PAIRS,
-    TITLE,
-    sections,
-)
+from armload.lab.benchmark.population_figures import figures
 from armload.lab.benchmark.populations import REPEAT
-from armload.lab.benchmark.run import Size
-from armload.lab.benchmark.tables import Results, losses
 from armload.lab.benchmark.targets import verdicts
-from armload.lab.evaluation.table import GROUPS
+from armload.lab.experiment import listed, write_json
 from armload.lab.report import write_markdown, write_report
+from armload.lab.report.shown import GROUPS
 from armload.lab.report.style import look
 
-_DIGITS = 4
 _NOTE = f"Written by `{COMMAND}`; every number on this page comes from its cells."
+_rounded = partial(listed, digits=4)
 
 
 def write_results(
@@ -63,9 +57,7 @@ def write_results(
     for path in written.values():
         path.parent.mkdir(parents=True, exist_ok=True)
     numbers = summary_json(results, size)
-    with replacing(written["summary"]) as temporary:
-        text = json.dumps(numbers, allow_nan=False, separators=(",", ":"))
-        temporary.write_text(text + "\n", encoding="utf-8")
+    write_json(written["summary"], numbers, indent=None)
     write_front(numbers, written["page"])
     write_markdown(written["tables"], sections(results, size), APPENDIX, _NOTE)
     first = front(numbers)
@@ -118,9 +110,9 @@ def summary_json(results: Results, size: Size) -> dict[str, Any]:
             "a": a,
             "b": b,
             "population": name,
-            "ratio": _listed(m.ratio(a, b)),
-            "difference": _listed(m.paired(a, b)[0]),
-            "standard_error": _listed(m.paired(a, b)[1]),
+            "ratio": _rounded(m.ratio(a, b)),
+            "difference": _rounded(m.paired(a, b)[0]),
+            "standard_error": _rounded(m.paired(a, b)[1]),
         }
         for a, b in PAIRS
         for name, m in results.items()
@@ -136,8 +128,8 @@ def summary_json(results: Results, size: Size) -> dict[str, Any]:
         "groups": list(GROUPS),
         "populations": {name: _population(m) for name, m in results.items()},
         "paired": paired,
-        "targets": [_rounded(target) for target in verdicts(results)],
-        "losses": [_rounded(loss) for loss in losses(results)],
+        "targets": [_plain(target) for target in verdicts(results)],
+        "losses": [_plain(loss) for loss in losses(results)],
     }
 
 
@@ -155,20 +147,12 @@ def _population(m: Measured) -> dict[str, Any]:
         numbers["repeatability"] = m.repeatability
     methods = {}
     for i, row in enumerate(m.rows):
-        methods[row] = {name: _listed(values[i]) for name, values in numbers.items()}
-        methods[row]["wall_s"] = _number(float(np.median(m.comparison.wall[i])))
+        methods[row] = {name: _rounded(values[i]) for name, values in numbers.items()}
+        methods[row]["wall_s"] = _rounded(float(np.median(m.comparison.wall[i])))
         methods[row] |= {"refused": m.refused[row]} if row in m.refused else {}
         methods[row] |= {"trained": m.trained[row]} if row in m.trained else {}
     return {"episodes": m.runs, "seeds": list(m.comparison.seeds), "prior": m.comparison.prior, "methods": methods}
 
 
-def _rounded(numbers: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: _number(value) if isinstance(value, float) else value for name, value in numbers.items()}
-
-
-def _listed(values: NDArray[np.float64]) -> Any:
-    return [_listed(part) for part in values] if values.ndim > 1 else [_number(x) for x in values.tolist()]
-
-
-def _number(value: float) -> float | None:
-    return float(f"{value:.{_DIGITS}g}") if np.isfinite(value) else None
+def _plain(numbers: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: _rounded(value) if isinstance(value, float) else value for name, value in numbers.items()}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from armload.arms import Arm
 from armload.errors import IdentificationError
 from armload.estimators import Estimate, Identifier, Tared
+from armload.identification import METHODS
 from armload.inertia import InertialParameters
 from armload.lab.evaluation.baselines import PriorLeastSquares, TrainingMean
 from armload.lab.evaluation.comparison import Comparison
@@ -20,6 +22,7 @@ from armload.regression import GaussianPrior
 
 # A method is an identifier, or how to make one that knows the run's tare.
 Method = Identifier | Callable[[Recording | None], Identifier]
+WITH_TARE = ", with tare"
 _POINTS = 49  # default number of times: one per 125 ms of a 6 s motion
 _STEP = 0.125  # [s] estimates are collected at least so often, unless the times are even
 
@@ -129,6 +132,16 @@ def compare(
         seeds=seeds,
         prior=prior.source,
     )
+
+
+def catalogued(arm: Arm, *names: str) -> dict[str, Method]:
+    """Methods of the catalogue by name: NAME ignores a run's tare, `NAME, with tare` uses it as the method does."""
+
+    def one(name: str) -> Method:
+        method = METHODS[name.removesuffix(WITH_TARE)]
+        return partial(method.make, arm) if name.endswith(WITH_TARE) else lambda _: method.make(arm)
+
+    return {name: one(name) for name in names}
 
 
 def _arm(identifiers: Mapping[str, Method], runs: Sequence[EvaluationRun]) -> Arm:

@@ -7,34 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from armload.inertia import NAMES
-from armload.lab.evaluation.table import GROUPS, SHOWN_SCALE, SHOWN_UNITS
-from armload.lab.report.style import (
-    COLOURS,
-    TRUTH,
-    look,
-    new_figure,
-)
-from armload.lab.study.counterparts import (
-    benchmark_rows,
-    curves,
-    real_rows,
-    training_rows,
-)
+from armload.lab.report.panels import bars_of_errors, legend
+from armload.lab.report.shown import SHOWN_SCALE, SHOWN_UNITS
+from armload.lab.report.style import COLOURS, TRUTH, look, new_figure
+from armload.lab.study.counterparts import benchmark_rows, curves, real_rows, training_rows
 from armload.lab.study.numbers import Cells
-from armload.lab.study.tables import (
-    BASELINES,
-    LEARNERS,
-    LEAST_SQUARES,
-    TRAINING_MEAN,
-    Row,
-    ensemble_shown,
-)
+from armload.lab.study.study_tables import BASELINES, LEARNERS, LEAST_SQUARES, TRAINING_MEAN, Row, ensemble_shown
 
 if TYPE_CHECKING:
     from armload.lab.report.style import Figure
 
-_LOG_FROM = 30.0  # ratio of largest to smallest error from which an axis becomes logarithmic
 _METHODS = (
     LEARNERS["network"],
     LEARNERS["tree"],
@@ -61,42 +43,9 @@ def figures(cells: Cells) -> dict[int, Figure]:
 
 def error_bars(rows: Sequence[Row]) -> Figure:
     """Mean absolute error of each parameter with its spread, a colour per method; the three units apart."""
-    shown = [(label, SHOWN_SCALE * errors) for label, errors in rows if errors is not None]
-    width = 0.8 / len(shown)
-    with look():
-        figure = new_figure(6.2)
-        grid: Any = figure.add_gridspec(2, 2, width_ratios=(1, 2.6))
-        axes = [figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, :])]
-        for ax, (group, part) in zip(axes, GROUPS.items(), strict=True):
-            means = np.array([errors[:, part].mean(axis=0) for _, errors in shown])
-            seen = means[means > 1e-6]
-            log = seen.size > 0 and seen.max() > _LOG_FROM * seen.min()
-            floor = 0.5 * float(seen.min()) if log else 0.0
-            for m, (label, errors) in enumerate(shown):
-                height = np.maximum(means[m], floor)
-                bar = None
-                if len(errors) > 1:
-                    deviation = errors[:, part].std(axis=0, ddof=1)
-                    bar = np.stack([np.minimum(deviation, height - floor), deviation])
-                ax.bar(
-                    np.arange(means.shape[1]) + (m - 0.5 * (len(shown) - 1)) * width,
-                    height - floor,
-                    0.92 * width,
-                    bottom=floor,
-                    label=label if ax is axes[0] else "_nolegend_",
-                    yerr=bar,
-                    error_kw={"elinewidth": 0.9, "ecolor": "#222222", "capsize": 1.5},
-                    **_style(label),
-                )
-            if log:
-                ax.set_yscale("log")
-                ax.set_ylim(bottom=floor)
-            ax.set_xticks(np.arange(means.shape[1]), NAMES[part])
-            ax.grid(axis="x", visible=False)
-            ax.set_title(group + (", logarithmic" if log else ""))
-            ax.set_ylabel(f"mean absolute error [{SHOWN_UNITS[part][0]}]")
-        _legend(figure, axes[0])
-    return figure
+    shown = [(label, errors) for label, errors in rows if errors is not None]
+    found = {label: (e.mean(axis=0), e.std(axis=0, ddof=1) if len(e) > 1 else None) for label, e in shown}
+    return bars_of_errors(found, {label: _style(label) for label in found})
 
 
 def over_time(shown: dict[str, dict[str, Any]]) -> Figure:
@@ -116,7 +65,7 @@ def over_time(shown: dict[str, dict[str, Any]]) -> Figure:
         ax.set_xlim(0.0, max(float(curve["t"][-1]) for curve in shown.values()))
         ax.set_xlabel("time since the start of the motion [s]")
         ax.set_ylabel(f"Izz [{SHOWN_UNITS[-1]}]")
-        _legend(figure, ax)
+        legend(figure, ax)
     return figure
 
 
@@ -130,8 +79,3 @@ def _style(label: str) -> dict[str, Any]:
     if label.startswith(TRAINING_MEAN):
         hatch = "////"
     return {"color": colour} | ({"hatch": hatch, "edgecolor": "white", "linewidth": 0.0} if hatch else {})
-
-
-def _legend(figure: Figure, ax: Any) -> None:
-    handles, labels = ax.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=min(3, len(labels)))

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Any
 
-from armload.atomic import replacing
+from armload.lab.experiment import Cells, write_json
 from armload.lab.study.claims import evaluate
-from armload.lab.study.page import html_report, summary_json, write_page
+from armload.lab.study.study_page import html_report, summary_json, write_page
 
 
-def write_results(
-    cells: dict[str, dict[str, Any]], summary: str | Path, page: str | Path, report: str | Path
-) -> dict[str, Path]:
+def write_results(cells: Cells, summary: str | Path, page: str | Path, report: str | Path) -> dict[str, Path]:
     """Write the summary (JSON), the page (Markdown) and the report (HTML); each appears whole or not at all.
 
     Args:
@@ -27,8 +23,7 @@ def write_results(
     for path in written.values():
         path.parent.mkdir(parents=True, exist_ok=True)
     claims = evaluate(cells)
-    with replacing(written["summary"]) as temporary:
-        temporary.write_text(json.dumps(summary_json(cells, claims), indent=1, allow_nan=False) + "\n", "utf-8")
+    write_json(written["summary"], summary_json(cells, claims))
     write_page(cells, claims, written["page"])
     html_report(cells, claims, written["report"])
     return written

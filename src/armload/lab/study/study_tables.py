@@ -8,25 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.lab.evaluation import Table
-from armload.lab.evaluation.table import (
-    GROUPS,
-    SHOWN_SCALE,
-    SHOWN_UNITS,
-    parameter_columns,
-    short,
-)
-from armload.lab.study.numbers import (
-    EXACT,
-    PAPER_EPOCHS,
-    Cell,
-    Cells,
-    Ensemble,
-    at_end,
-    benchmark,
-    held_out,
-    matched,
-)
+from armload.lab.report.shown import GROUPS, SHOWN_SCALE, SHOWN_UNITS, Table, parameter_columns, short
+from armload.lab.study.numbers import EXACT, PAPER_EPOCHS, Cell, Cells, Ensemble, at_end, benchmark, held_out, matched
 
 COMMAND = "armload reproduce taie2024"
 MISSING = "–"

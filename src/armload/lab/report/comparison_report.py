@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from armload.arms import Arm
 from armload.inertia import NAMES
-from armload.lab.evaluation import Comparison, EvaluationRun
-from armload.lab.evaluation.table import (
-    GROUPS,
-    SHOWN_SCALE,
-    SHOWN_UNITS,
-    short,
-)
-from armload.lab.report import figures, recordings
+from armload.lab.report import comparison_figures as figures
+from armload.lab.report import recording_figures as recordings
 from armload.lab.report.html import Section
+from armload.lab.report.shown import GROUPS, SHOWN_SCALE, SHOWN_UNITS, short
+
+if TYPE_CHECKING:
+    from armload.lab.evaluation import Comparison, EvaluationRun
 
 _IZZ = NAMES.index("Izz")
 

@@ -1,0 +1,81 @@
+"""What the scripts of this folder share: their options, the file of a result with what it rests on, tables on pages."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from armload.lab.experiment import provenance, write_json
+
+ROOT = Path(__file__).resolve().parents[1]
+RESULTS = ROOT / "benchmarks" / "results"
+
+
+def options(about: str | None, **defaults: Any) -> argparse.Namespace:
+    """The options of a script, --name for each default, whose type it takes.
+
+    False is a flag that is not set; a tuple stands for as many values as it has.
+    """
+    parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for name, default in defaults.items():
+        flag = f"--{name.replace('_', '-')}"
+        if default is False:
+            parser.add_argument(flag, action="store_true")
+        elif isinstance(default, tuple):
+            parser.add_argument(flag, type=type(default[0]), nargs=len(default), default=default)
+        else:
+            parser.add_argument(flag, type=type(default), default=default, help=f"(default: {default})")
+    return parser.parse_args()
+
+
+def write(name: str, result: dict[str, Any], indent: int | None = 1) -> None:
+    """Write results/NAME.json, first what it rests on, with the command as it was typed; without indent one line."""
+    command = " ".join(["python", f"benchmarks/{Path(sys.argv[0]).name}", *sys.argv[1:]])
+    content = provenance(command) | result
+    path = write_json(RESULTS / f"{name}.json", content, indent)
+    if indent is not None:
+        print(json.dumps(content, indent=indent))
+    print(f"wrote {path.relative_to(ROOT)}")
+
+
+def say(text: str) -> None:
+    """What is being done, at once."""
+    print(text, flush=True)
+
+
+def mean_and_spread(values: Any) -> list[float]:
+    """Mean and standard deviation; 0 for a single value."""
+    values = np.asarray(values, dtype=float)
+    return [float(values.mean()), float(values.std(ddof=1)) if len(values) > 1 else 0.0]
+
+
+def rounded(mean: float, spread: float) -> str:
+    """Mean ± spread, to two digits of the spread."""
+    places = 2 if spread <= 0.0 else max(0, 1 - int(np.floor(np.log10(spread))))
+    return f"{mean:.{places}f} ± {spread:.{places}f}"
+
+
+def markdown_table(columns: Sequence[str], align: str, rows: Sequence[Sequence[str]]) -> str:
+    """Rows as Markdown; align: a letter for each column, l or r."""
+    rule = "|" + "".join({"l": "---|", "r": "---:|"}[letter] for letter in align)
+    first, *rest = (f"| {' | '.join(row)} |" for row in (columns, *rows))
+    return "\n".join([first, rule, *rest])
+
+
+def write_table(page: Path, name: str, text: str) -> None:
+    """Put a table between its marks on a page."""
+    marks = f"<!-- {name} -->", f"<!-- /{name} -->"
+    old = page.read_text(encoding="utf-8")
+    new, count = re.subn(
+        f"{re.escape(marks[0])}.*?{re.escape(marks[1])}", f"{marks[0]}\n{text}\n{marks[1]}", old, flags=re.DOTALL
+    )
+    if count != 1:
+        raise SystemExit(f"{page} has {count} places {marks[0]} … {marks[1]}: expected one")
+    page.write_text(new, encoding="utf-8")

@@ -1,0 +1,99 @@
+"""The runner of all experiments: nothing is measured twice or lost once finished, and processes change no number."""
+
+import json
+
+import pytest
+
+from armload.lab.cells import key_of, load_cells
+from armload.lab.experiment import Task, provenance, run_tasks, source_key, write_json
+
+
+def square(folder, x):
+    """Counts its calls in a file: it may run in another process."""
+    with (folder / "calls.txt").open("a", encoding="utf-8") as file:
+        file.write(f"{x}\n")
+    return {"square": x * x}
+
+
+def powers(names, folder, x):
+    """One number for each name; the third power cannot be had."""
+    for name in names:
+        if name.endswith("-3"):
+            raise ArithmeticError(name)
+        yield square(folder, x)
+
+
+def tasks(folder, count, version=0):
+    return [Task.of_one(f"of-{x}", key_of(x, version), square, folder, x) for x in range(count)]
+
+
+def calls(folder):
+    file = folder / "calls.txt"
+    return file.read_text(encoding="utf-8").split() if file.exists() else []
+
+
+def test_what_is_finished_is_not_measured_again_and_another_key_is(tmp_path):
+    first = run_tasks(tasks(tmp_path, 2), tmp_path / "cells")
+    assert run_tasks(tasks(tmp_path, 3), tmp_path / "cells") == first | {
+        "of-2": {"name": "of-2", "key": key_of(2, 0), "square": 4}
+    }
+    assert calls(tmp_path) == ["0", "1", "2"]
+    again = run_tasks(tasks(tmp_path, 2, version=1), tmp_path / "cells")
+    assert calls(tmp_path) == ["0", "1", "2", "0", "1"]
+    assert [cell["key"] for cell in again.values()] == [key_of(0, 1), key_of(1, 1)]
+
+
+def test_a_cell_of_another_key_is_not_among_the_finished_ones(tmp_path):
+    run_tasks(tasks(tmp_path, 2), tmp_path / "cells")
+    assert run_tasks(tasks(tmp_path, 2, version=1), tmp_path / "cells", until=-1.0) == {}
+
+
+def test_a_task_that_fails_keeps_the_cells_it_had_finished(tmp_path):
+    task = Task("powers", {"x-2": "a", "x-3": "b", "x-4": "c"}, powers, (tmp_path, 5), "power")
+    with pytest.raises(ArithmeticError):
+        run_tasks([task], tmp_path / "cells")
+    assert list(load_cells(tmp_path / "cells")) == ["x-2"]
+    said = []
+    with pytest.raises(ArithmeticError):
+        run_tasks([task], tmp_path / "cells", say=said.append)
+    assert said == ["part 1 of 1: powers, 2 powers"]
+    assert calls(tmp_path) == ["5"]
+
+
+def test_processes_give_the_cells_of_one_process_in_the_order_of_the_tasks(tmp_path):
+    one, two = (run_tasks(tasks(tmp_path, 6), tmp_path / f"{jobs}", jobs=jobs) for jobs in (1, 2))
+    assert list(one.items()) == list(two.items())
+    for file in (tmp_path / "1").iterdir():
+        assert file.read_bytes() == (tmp_path / "2" / file.name).read_bytes()
+
+
+def test_a_run_that_is_out_of_time_says_where_it_stopped(tmp_path):
+    run_tasks(tasks(tmp_path, 1), tmp_path / "cells")
+    said = []
+    cells = run_tasks(tasks(tmp_path, 3), tmp_path / "cells", until=-1.0, say=said.append, part="cell")
+    assert said == ["stopped before cell 2 of 3: run it again to go on"]
+    assert list(cells) == ["of-0"]
+
+
+def test_a_result_that_is_no_json_leaves_the_old_file_alone(tmp_path):
+    path = write_json(tmp_path / "new" / "r.json", {"a": 1})
+    with pytest.raises(ValueError, match="nan"):
+        write_json(path, {"a": float("nan")})
+    assert json.loads(path.read_text(encoding="utf-8")) == {"a": 1}
+
+
+def test_the_key_of_source_follows_its_text_and_the_names_of_its_files(tmp_path):
+    (tmp_path / "a.py").write_text("x = 1\n")
+    keys = [source_key(tmp_path), source_key(tmp_path / "a.py")]
+    (tmp_path / "a.py").rename(tmp_path / "b.py")
+    keys.append(source_key(tmp_path))
+    (tmp_path / "b.py").write_text("x = 2\n")
+    keys.append(source_key(tmp_path))
+    assert keys[0] == keys[1]
+    assert len(set(keys)) == 3
+
+
+def test_a_result_says_the_command_and_the_versions_it_rests_on():
+    said = provenance("python benchmarks/x.py --seeds 3")
+    assert said["command"] == "python benchmarks/x.py --seeds 3"
+    assert {"python", "numpy", "pin", "mujoco"} <= set(said["versions"])
