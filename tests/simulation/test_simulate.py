@@ -5,7 +5,6 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
-from armload.regression.filtered import Lag, filtered_regressor
 from scipy.interpolate import CubicSpline
 
 from armload.arms import arm, full_arm_regressor
