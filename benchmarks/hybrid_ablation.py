@@ -19,7 +19,7 @@ from script import options, say, write
 from armload import arm
 from armload.inertia import Z95
 from armload.lab.training import Records, payload_mixture
-from armload.lab.training.calibrating import fit_calibration, nearest
+from armload.lab.training.calibrating import TREES, fit_calibration, nearest
 from armload.lab.training.coverage import FOLDS
 from armload.lab.training.hybrid import EPISODES, episode_records
 from armload.lab.training.records import TIMES
@@ -51,14 +51,15 @@ def main() -> None:
     panda = arm("panda")
     records = episode_records(panda, episodes=asked.episodes, folder=asked.work, jobs=asked.jobs)
     prior = payload_mixture(panda)
+    networks = (NetworkLearner(hidden=32, batch=256, max_epochs=60),)
     rows = {
         "predict the training mean": None,
         "same-prior least squares": (gaussian(prior), "trusted"),
         "mixture prior": (prior, "trusted"),
         "mixture prior, one kappa": (prior, ()),
-        "mixture prior, kappa by trees": (prior, ("tree",)),
-        "mixture prior, kappa by networks": (prior, ("network",)),
-        "hybrid: both": (prior, ("tree", "network")),
+        "hybrid: kappa by trees": (prior, TREES),
+        "mixture prior, kappa by networks": (prior, networks),
+        "mixture prior, kappa by both": (prior, (*TREES, *networks)),
     }
     episodes = np.random.default_rng([0, 8]).permutation(np.unique(records.episode))
     out = []
@@ -73,10 +74,10 @@ def main() -> None:
                 mean, std = train.truth.mean(axis=0), train.truth.std(axis=0)
                 error[held], half[held] = np.abs(mean - records.truth[held]), Z95 * std
                 continue
-            used, learned = how
+            used, learners = how
             # "trusted": the evidence is taken at its word; its widths are calibrated all the same
-            kinds = () if learned == "trusted" else learned
-            calibration = fit_calibration(train, used, learned=kinds, trusted=learned == "trusted", seed=k)
+            trusted = learners == "trusted"
+            calibration = fit_calibration(train, used, learners=() if trusted else learners, trusted=trusted, seed=k)
             for row in np.flatnonzero(held):
                 found = calibration.answer(records.evidence(int(row)), used)
                 error[row] = np.abs(found.mean - records.truth[row])

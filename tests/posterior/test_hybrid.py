@@ -17,7 +17,7 @@ from armload.identification import identify
 from armload.inertia import Z95, InertialParameters, is_consistent
 from armload.lab.episodes import draw_episodes, simulate_episodes
 from armload.lab.training import Records, cross_validated, measure_episodes
-from armload.lab.training.calibrating import fit_calibration, overrating
+from armload.lab.training.calibrating import TREES, fit_calibration, overrating
 from armload.motion import random_motion
 from armload.payloads import draw_payload, random_payloads
 from armload.posterior import (
@@ -210,10 +210,10 @@ def half_widths(calibration, records, prior):
     return half, np.abs([a.mean for a in answers] - records.truth)
 
 
-@pytest.mark.parametrize("learned", [("tree", "network"), ()])
-def test_intervals_hold_on_episodes_that_were_not_trained_on(synthetic, mixture, learned):
+@pytest.mark.parametrize("learners", [TREES, ()])
+def test_intervals_hold_on_episodes_that_were_not_trained_on(synthetic, mixture, learners):
     train, test = synthetic.select(synthetic.episode < 500), synthetic.select(synthetic.episode >= 500)
-    half, error = half_widths(fit_calibration(train, mixture, learned=learned), test, mixture)
+    half, error = half_widths(fit_calibration(train, mixture, learners=learners), test, mixture)
     assert np.mean(error <= half) == pytest.approx(0.95, abs=0.025)
 
 
@@ -236,7 +236,7 @@ def test_intervals_hold_and_are_no_wider_than_they_must_where_only_the_gain_is_w
         gain_std=np.full(len(synthetic), 0.02),
     )
     train, test = rows.select(rows.episode < 500), rows.select(rows.episode >= 500)
-    half, error = half_widths(fit_calibration(train, mixture, learned=()), test, mixture)
+    half, error = half_widths(fit_calibration(train, mixture, learners=()), test, mixture)
     assert np.mean(error <= half) > 0.93
     assert np.mean(half[:, 0]) < 0.05 * np.mean(np.abs(test.truth[:, 0]))
 
@@ -244,8 +244,7 @@ def test_intervals_hold_and_are_no_wider_than_they_must_where_only_the_gain_is_w
 def test_learning_how_far_evidence_is_overrated_makes_answers_and_intervals_better(synthetic, mixture):
     train, test = synthetic.select(synthetic.episode < 500), synthetic.select(synthetic.episode >= 500)
     (with_bag, error), (without, plain) = (
-        half_widths(fit_calibration(train, mixture, learned=learned), test, mixture)
-        for learned in (("tree", "network"), ())
+        half_widths(fit_calibration(train, mixture, learners=learners), test, mixture) for learners in (TREES, ())
     )
     assert np.mean(error / UNIT) < 0.99 * np.mean(plain / UNIT)
     assert np.mean(with_bag / UNIT) < 0.95 * np.mean(without / UNIT)
@@ -279,9 +278,9 @@ def test_kappa_follows_the_trait_that_carries_it(synthetic, mixture):
 def test_widths_belong_to_the_times_asked_for_however_samples_are_jittered(synthetic, mixture):
     rng = np.random.default_rng(7)
     jittered = replace(synthetic, t=synthetic.t * rng.uniform(0.9, 1.0, len(synthetic)))
-    calibration = fit_calibration(jittered, mixture, learned=())
+    calibration = fit_calibration(jittered, mixture, learners=())
     assert calibration.times == pytest.approx([0.095, 0.95], rel=0.01)
-    assert calibration.widths == pytest.approx(fit_calibration(synthetic, mixture, learned=()).widths)
+    assert calibration.widths == pytest.approx(fit_calibration(synthetic, mixture, learners=()).widths)
 
 
 def test_cross_validation_covers_every_episode(synthetic, mixture):

@@ -1,7 +1,7 @@
 """Error bars that hold: how far evidence can be trusted, learned, and a factor on every width, calibrated.
 
-    1. a bag of trees and networks reads from the traits of a log by which factor kappa the physics overrates its
-       evidence; the evidence is taken as Λ/kappa, h/kappa
+    1. a bag of decision trees reads from the traits of a log by which factor kappa the physics overrates its evidence;
+       the evidence is taken as Λ/kappa, h/kappa
     2. the half-width h_i of parameter i has h_i² = (c_i(t)·std_i)² + (1.96·gain·phi_i)², gain being how well the
        torque's scale is known; c_i is such that 95 % of the episodes lie inside, each answered by a bag that has not
        seen it (cross-conformal prediction), one per time and with or without a tare
