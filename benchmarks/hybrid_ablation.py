@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from script import options, say, write
 
 from armload import arm
+from armload.ensembles import NetworkLearner
 from armload.inertia import Z95
 from armload.lab.training import Records, payload_mixture
 from armload.lab.training.calibrating import TREES, fit_calibration, nearest
