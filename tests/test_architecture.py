@@ -90,6 +90,31 @@ def test_imports_go_one_way(path):
             assert parts[1] in above, f"{path}:{line} imports armload.{parts[1]}, which is below {room}"
 
 
+def test_no_modules_import_each_other_in_a_circle():
+    """Imports inside functions count too; those for type checkers alone do not."""
+    names = {dotted(path): path for path in MODULES}
+    graph = {name: {d for d in imported_modules(path, names) if d != name} for name, path in names.items()}
+    while free := [name for name, needs in graph.items() if not needs & graph.keys()]:
+        for name in free:
+            del graph[name]
+    needed = set().union(*graph.values()) if graph else set()
+    assert not (graph.keys() & needed), f"these import each other: {sorted(graph.keys() & needed)}"
+
+
+def dotted(path):
+    return ".".join(("armload", *path.relative_to(SOURCE).with_suffix("").parts)).removesuffix(".__init__")
+
+
+def imported_modules(path, names):
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+            node.body = [ast.Pass()]
+    found = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module and not node.level]
+    pairs = [(node.module, alias.name) for node in found for alias in node.names]
+    return {f"{m}.{n}" if f"{m}.{n}" in names else m for m, n in pairs} & names.keys()
+
+
 @pytest.mark.parametrize("path", MODULES, ids=lambda p: str(p.relative_to(SOURCE)))
 def test_heavy_packages_stay_in_their_rooms_and_nothing_is_pickled(path):
     for module, line in imports(path):

@@ -55,6 +55,7 @@ class Detached(Source):
         arm: whose samples they are.
         record: a `.csv` file to keep every sample in (`Recorder`), written by the reader's process.
         capacity: samples the ring holds.
+        twin: the same source, opened here and never run, where it knows the truth (a simulator).
         options: of `open_source`, as JSON can hold them.
 
     Attributes:
@@ -71,6 +72,7 @@ class Detached(Source):
         *,
         record: str | Path | None = None,
         capacity: int = 8192,
+        twin: Source | None = None,
         **options: Any,
     ) -> None:
         if options.get("speed", 1.0) is None:
@@ -80,7 +82,7 @@ class Detached(Source):
             )
         self.name = spec
         self._closed = False
-        self._twin: Source | None = None
+        self._twin = twin
         self._waiting = threading.Lock()  # held while the ring and the pipes are in use
         self._ring = Ring.create(2 + 3 * arm.n, capacity)  # the last column: when the sample arrived
         self._reader = RingReader(self._ring)
@@ -123,10 +125,6 @@ class Detached(Source):
             self.close()
             raise
         self.name, self.n, self.rate, self.speed = event["name"], event["n"], event["rate"], event["speed"]
-        if spec == "sim":
-            from armload.devices.opening import open_source
-
-            self._twin = open_source(spec, arm, detached=False, **options)  # never run: it knows the truth
 
     @property
     def lost(self) -> int:

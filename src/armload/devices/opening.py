@@ -85,9 +85,13 @@ def open_source(
             "path of a recording"
         )
     if detached or (detached is None and scheme in _ALONE):
+        simulated = None  # the same simulator, never run here: it knows the truth
+        if name == "sim":
+            simulated = _simulator(arm, payloads, world, sensors, rate=rate, speed=speed, duration=duration, seed=seed)
         return Detached(
             name,
             arm,
+            twin=simulated,
             record=record,
             speed=speed,
             loop=loop,

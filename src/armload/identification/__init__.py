@@ -1,6 +1,7 @@
 """One log in, one answer out: plausibility, choice of method, answer."""
 
 from armload.identification.answer import Identification
+from armload.identification.choice import Choice, choose
 from armload.identification.identify_log import identify, plausible_tool
 from armload.identification.methods import DEFAULT, LEFT_OUT, METHODS, Method, default_for
 from armload.identification.plausibility import check_plausible
@@ -9,9 +10,11 @@ __all__ = [
     "DEFAULT",
     "LEFT_OUT",
     "METHODS",
+    "Choice",
     "Identification",
     "Method",
     "check_plausible",
+    "choose",
     "default_for",
     "identify",
     "plausible_tool",
