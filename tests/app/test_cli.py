@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -128,8 +129,16 @@ def destructor():
     raise AssertionError("the interruption was lost")
 
 
+@pytest.fixture
+def hears_ctrl_c():
+    """A test runner's worker may ignore the signal."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.mark.parametrize("how", [cause, context, destructor])
-def test_an_interruption_that_others_made_something_else_of_is_one_all_the_same(capfd, monkeypatch, how):
+def test_an_interruption_that_others_made_something_else_of_is_one_all_the_same(capfd, monkeypatch, how, hears_ctrl_c):
     monkeypatch.setattr("armload.arms.arm", lambda *_, **__: how())
     assert refused(capfd, ["identify", "log.csv", "--robot", "panda"], code=130) == "armload: interrupted"
 
