@@ -137,8 +137,9 @@ def hears_ctrl_c():
     signal.signal(signal.SIGINT, before)
 
 
+@pytest.mark.usefixtures("hears_ctrl_c")
 @pytest.mark.parametrize("how", [cause, context, destructor])
-def test_an_interruption_that_others_made_something_else_of_is_one_all_the_same(capfd, monkeypatch, how, hears_ctrl_c):
+def test_an_interruption_that_others_made_something_else_of_is_one_all_the_same(capfd, monkeypatch, how):
     monkeypatch.setattr("armload.arms.arm", lambda *_, **__: how())
     assert refused(capfd, ["identify", "log.csv", "--robot", "panda"], code=130) == "armload: interrupted"
 
