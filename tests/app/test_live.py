@@ -15,60 +15,21 @@ from scipy.spatial import KDTree
 
 from armload.app.cli import main
 from armload.app.cli.headless import lines
-from armload.app.page import (
-    History,
-    Session,
-    com_region,
-    equivalent_box,
-    equivalent_ellipsoid,
-)
-from armload.app.page.curves import (
-    AXES,
-    GROUPS,
-    HEIGHT,
-    PADDING,
-    data_of,
-    series_of,
-)
+from armload.app.page import History, Session, com_region, equivalent_box, equivalent_ellipsoid
+from armload.app.page.curves import AXES, GROUPS, HEIGHT, PADDING, data_of, series_of
 from armload.app.page.download import ENDINGS, file_of
-from armload.app.page.drawing import (
-    arm_parts,
-    capsule,
-    drum,
-    edges,
-    frame_poses,
-)
+from armload.app.page.drawing import arm_parts, capsule, drum, edges, frame_poses
 from armload.app.page.page import Page, methods_for
 from armload.app.page.recent import Recent
-from armload.app.page.tables import (
-    com_std,
-    events,
-    headline,
-    parameters,
-    stream,
-)
+from armload.app.page.tables import com_std, events, headline, parameters, stream
 from armload.arms import arm as arm_named
-from armload.devices import (
-    FORMS,
-    Detached,
-    Recorded,
-    Replay,
-    Simulator,
-    Source,
-    open_source,
-    read_load,
-)
+from armload.devices import FORMS, Detached, Recorded, Replay, Simulator, Source, open_source, read_load
 from armload.errors import ArmloadError, SinkError, SourceError, UsageError
 from armload.identification import check_plausible
 from armload.inertia import InertialParameters
 from armload.online import OnlineIdentifier
 from armload.payloads import random_payload, solids, test_payload
-from armload.recording import (
-    Recording,
-    Sample,
-    read_recording,
-    write_recording,
-)
+from armload.recording import Recording, Sample, read_recording, write_recording
 
 HELD = test_payload().parameters
 # what was started in the background of a shell is deaf to Ctrl-C, and so are its children

@@ -13,15 +13,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from armload.arms import (
-    ARMS,
-    Arm,
-    arm,
-    full_arm_regressor,
-    momentum_regressor,
-    payload_regressor,
-    rated_effort,
-)
+from armload.arms import ARMS, Arm, arm, full_arm_regressor, momentum_regressor, payload_regressor, rated_effort
 from armload.errors import ArmError, ArmloadError, PayloadError
 from armload.inertia import InertialParameters, is_consistent, to_order
 from armload.payloads import franka_hand, hand_on

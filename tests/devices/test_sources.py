@@ -15,16 +15,7 @@ import numpy as np
 import pytest
 
 from armload.arms import arm
-from armload.devices import (
-    Detached,
-    Recorded,
-    Recorder,
-    Replay,
-    Ring,
-    RingReader,
-    Simulator,
-    open_source,
-)
+from armload.devices import Detached, Recorded, Recorder, Replay, Ring, RingReader, Simulator, open_source
 from armload.devices.order import arm_from_json, arm_to_json
 from armload.errors import ArmloadError, MotionError, PayloadError, RecordingError, SourceError
 from armload.inertia import InertialParameters

@@ -6,23 +6,12 @@ from sklearn.base import clone
 from sklearn.tree import DecisionTreeRegressor
 from sklearn.utils.estimator_checks import check_estimator, estimator_checks_generator
 
-from armload.ensembles import (
-    BaggingEnsemble,
-    MixedEnsemble,
-    NetworkLearner,
-    TreeLearner,
-    TwoStage,
-)
+from armload.ensembles import BaggingEnsemble, MixedEnsemble, NetworkLearner, TreeLearner, TwoStage
 from armload.ensembles.checkpoint import Weights
 from armload.ensembles.compiled import CompiledNetworks
 from armload.ensembles.network import _fold, plateaued
 from armload.ensembles.tree import compile_trees
-from armload.ensembles.weak_learner import (
-    INITIAL_WEIGHTS,
-    SHUFFLE,
-    Scaling,
-    draw_bag,
-)
+from armload.ensembles.weak_learner import INITIAL_WEIGHTS, SHUFFLE, Scaling, draw_bag
 from armload.errors import ModelError
 
 UNITS = np.array([1.0, 0.1, 0.1, 0.1] + [1e-3] * 6)  # the sizes of kg, kg·m and kg·m² in a payload

@@ -16,12 +16,7 @@ from armload.estimators import (
     Tared,
     WeightedLeastSquares,
 )
-from armload.estimators.constrained import (
-    _CHART_MEAN,
-    _CHART_STD,
-    entropic_pull,
-    fit_chart,
-)
+from armload.estimators.constrained import _CHART_MEAN, _CHART_STD, entropic_pull, fit_chart
 from armload.inertia import (
     InertialParameters,
     from_log_cholesky,

@@ -15,11 +15,7 @@ from armload.identification import METHODS
 from armload.inertia import InertialParameters
 from armload.lab.evaluation import PriorLeastSquares, TrainingMean
 from armload.motion import taie2024
-from armload.posterior import (
-    HybridIdentifier,
-    PosteriorLeastSquares,
-    SmoothPosteriorLeastSquares,
-)
+from armload.posterior import HybridIdentifier, PosteriorLeastSquares, SmoothPosteriorLeastSquares
 from armload.recording import Recording
 from armload.regression import GaussianPrior, JointFeatures
 from armload.simulation import simulate

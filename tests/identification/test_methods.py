@@ -20,13 +20,7 @@ from armload.estimators import (
     Tared,
     WeightedLeastSquares,
 )
-from armload.identification import (
-    DEFAULT,
-    LEFT_OUT,
-    METHODS,
-    Method,
-    identify,
-)
+from armload.identification import DEFAULT, LEFT_OUT, METHODS, Method, identify
 from armload.inertia import InertialParameters
 from armload.motion import random_motion, taie2024
 from armload.recording import Recording, write_recording

@@ -14,12 +14,7 @@ from armload.inertia import InertialParameters
 from armload.motion import random_motion, taie2024
 from armload.recording import Recording, read_recording
 from armload.recording.windows import integrals, windows
-from armload.simulation import (
-    Run,
-    Sensors,
-    World,
-    simulate_many,
-)
+from armload.simulation import Run, Sensors, World, simulate_many
 
 DEGREE = 180.0 / np.pi
 

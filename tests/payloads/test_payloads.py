@@ -16,15 +16,7 @@ from scipy.spatial.transform import Rotation
 from armload import payloads
 from armload.errors import InertiaError, PayloadError
 from armload.inertia import InertialParameters, from_order, is_consistent, to_order
-from armload.payloads import (
-    Box,
-    Payload,
-    container,
-    container_loadings,
-    franka_hand,
-    random_payloads,
-    solids,
-)
+from armload.payloads import Box, Payload, container, container_loadings, franka_hand, random_payloads, solids
 from armload.payloads.container import EMPTY_MASS, POSITIONS, WEIGHT_MASS, position_centre
 from armload.payloads.loadings import choose_loadings
 

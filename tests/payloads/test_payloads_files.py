@@ -10,14 +10,7 @@ import pytest
 from armload.atomic import replacing
 from armload.errors import PayloadError
 from armload.inertia import InertialParameters
-from armload.payloads import (
-    Payload,
-    container_loadings,
-    franka_hand,
-    random_payload,
-    read_payload,
-    write_payload,
-)
+from armload.payloads import Payload, container_loadings, franka_hand, random_payload, read_payload, write_payload
 
 HAND = franka_hand().parameters
 

@@ -10,21 +10,11 @@ from armload.app.cli import main
 from armload.arms import arm
 from armload.errors import IdentificationError
 from armload.motion import random_motion, taie2024
-from armload.posterior import (
-    advise,
-    bound,
-    efficiency,
-    scales_of,
-)
+from armload.posterior import advise, bound, efficiency, scales_of
 from armload.posterior.problem import Scales
 from armload.posterior.solve import solve
 from armload.recording import Recording, write_recording
-from armload.regression import (
-    Correction,
-    GaussianPrior,
-    JointFeatures,
-    payload_prior_std,
-)
+from armload.regression import Correction, GaussianPrior, JointFeatures, payload_prior_std
 from armload.regression.information import RegressionData
 from armload.regression.noise import RIGID, SMOOTH
 from armload.simulation import Sensors, World

@@ -12,14 +12,7 @@ from armload.errors import ArmError, MotionError
 from armload.inertia import InertialParameters
 from armload.motion import FourierMotion, random_motion
 from armload.regression import FilteredRegression
-from armload.simulation import (
-    Drift,
-    GravityCompensation,
-    JointImpedance,
-    World,
-    moderate_stiffness,
-    torque_controlled,
-)
+from armload.simulation import Drift, GravityCompensation, JointImpedance, World, moderate_stiffness, torque_controlled
 
 PAYLOAD = InertialParameters.from_com(2.0, (0.02, -0.03, 0.08), np.diag([8e-3, 9e-3, 6e-3]))
 

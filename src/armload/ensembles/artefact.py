@@ -20,13 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
 from armload.atomic import replacing
-from armload.ensembles.compiled import (
-    Beside,
-    Compiled,
-    CompiledNetworks,
-    CompiledTrees,
-    Together,
-)
+from armload.ensembles.compiled import Beside, Compiled, CompiledNetworks, CompiledTrees, Together
 from armload.ensembles.trained_model import LearnedModel
 from armload.errors import ArmloadError, ModelError
 from armload.inertia import NAMES

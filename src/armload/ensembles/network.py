@@ -17,14 +17,7 @@ from numpy.typing import NDArray
 from armload.ensembles.checkpoint import Training, TrainingState, Weights
 from armload.ensembles.compiled import CompiledNetworks
 from armload.ensembles.progress import Progress, Report
-from armload.ensembles.weak_learner import (
-    INITIAL_WEIGHTS,
-    SHUFFLE,
-    Bag,
-    Fitted,
-    Learner,
-    Scaling,
-)
+from armload.ensembles.weak_learner import INITIAL_WEIGHTS, SHUFFLE, Bag, Fitted, Learner, Scaling
 from armload.errors import ModelError
 
 _CHUNK = 2000  # validation rows evaluated at once: bounds the memory of the hidden layers

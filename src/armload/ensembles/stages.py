@@ -7,13 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from armload.ensembles.bagging import (
-    BaggingEnsemble,
-    Ensemble,
-    OneKind,
-    Rows,
-    as_learner,
-)
+from armload.ensembles.bagging import BaggingEnsemble, Ensemble, OneKind, Rows, as_learner
 from armload.ensembles.compiled import Beside, Together
 from armload.ensembles.progress import Report
 from armload.ensembles.weak_learner import Learner

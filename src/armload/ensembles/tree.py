@@ -10,12 +10,7 @@ from numpy.typing import NDArray
 
 from armload.ensembles.compiled import CompiledTrees
 from armload.ensembles.progress import Progress, Report
-from armload.ensembles.weak_learner import (
-    TIES,
-    Bag,
-    Fitted,
-    Learner,
-)
+from armload.ensembles.weak_learner import TIES, Bag, Fitted, Learner
 
 
 class TreeLearner(Learner):

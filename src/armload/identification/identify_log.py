@@ -17,15 +17,7 @@ from armload.identification.answer import Identification, body_of, is_removal
 from armload.identification.choice import Choice, choose
 from armload.identification.plausibility import check_plausible
 from armload.identification.thresholds import DECISIVE, LARGEST_OFFSETS, LEANS, LOWEST_RATE, MISFIT, MOVES
-from armload.inertia import (
-    NAMES,
-    Z95,
-    InertialParameters,
-    distance_to_body,
-    held,
-    is_consistent,
-    phi_to_com,
-)
+from armload.inertia import NAMES, Z95, InertialParameters, distance_to_body, held, is_consistent, phi_to_com
 from armload.inertia import determined as determined_by
 from armload.recording import Recording, check_own_measurements
 from armload.regression import payload_prior_std

@@ -4,20 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from armload.app.cli.arguments import (
-    Parser,
-    add_arm_arguments,
-    add_identifier_arguments,
-    arm_of,
-    file_name,
-    payload_of,
-)
-from armload.app.cli.printing import (
-    print_identification,
-    print_json,
-    print_note,
-    working,
-)
+from armload.app.cli.arguments import Parser, add_arm_arguments, add_identifier_arguments, arm_of, file_name, payload_of
+from armload.app.cli.printing import print_identification, print_json, print_note, working
 
 _EXAMPLES = """\
 examples:

@@ -6,13 +6,7 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
-from armload.app.cli.arguments import (
-    Parser,
-    arm_of_dataset,
-    at_least,
-    file_name,
-    motion_of,
-)
+from armload.app.cli.arguments import Parser, arm_of_dataset, at_least, file_name, motion_of
 from armload.app.cli.printing import print_note, print_table
 from armload.errors import UsageError
 
@@ -192,12 +186,7 @@ def _run_ensemble(options: argparse.Namespace) -> None:
 
 
 def _untrained(options: argparse.Namespace) -> BaggingEnsemble | TwoStage | MixedEnsemble:
-    from armload.ensembles import (
-        BaggingEnsemble,
-        MixedEnsemble,
-        NetworkLearner,
-        TwoStage,
-    )
+    from armload.ensembles import BaggingEnsemble, MixedEnsemble, NetworkLearner, TwoStage
 
     network = NetworkLearner(max_epochs=options.epochs)
     if options.kind == "mixed":

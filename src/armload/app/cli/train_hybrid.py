@@ -12,12 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from armload.app.cli.printing import (
-    console,
-    print_json,
-    print_note,
-    table,
-)
+from armload.app.cli.printing import console, print_json, print_note, table
 
 if TYPE_CHECKING:
     from rich.table import Table as RichTable

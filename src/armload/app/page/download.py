@@ -6,12 +6,7 @@ import json
 
 from armload.app.cli.headless import line_of
 from armload.arms import ARMS, Arm
-from armload.devices import (
-    CONTROLLERS,
-    Load,
-    export_load,
-    flange_of,
-)
+from armload.devices import CONTROLLERS, Load, export_load, flange_of
 from armload.errors import SinkError
 from armload.online import OnlineEstimate
 

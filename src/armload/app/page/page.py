@@ -14,16 +14,7 @@ import time
 from typing import Any
 
 from armload.app.page import tables
-from armload.app.page.curves import (
-    AXES,
-    GROUPS,
-    HEIGHT,
-    PADDING,
-    bands_of,
-    data_of,
-    legend_of,
-    series_of,
-)
+from armload.app.page.curves import AXES, GROUPS, HEIGHT, PADDING, bands_of, data_of, legend_of, series_of
 from armload.app.page.download import ENDINGS, file_of
 from armload.app.page.scene import Scene
 from armload.app.page.session import Session

@@ -9,15 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from armload.app.page.drawing import (
-    Box,
-    arm_parts,
-    com_region,
-    edges,
-    ellipsoid,
-    equivalent_box,
-    frame_poses,
-)
+from armload.app.page.drawing import Box, arm_parts, com_region, edges, ellipsoid, equivalent_box, frame_poses
 from armload.arms import Arm
 from armload.inertia import InertialParameters
 from armload.online import OnlineEstimate
