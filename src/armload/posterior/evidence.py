@@ -71,42 +71,31 @@ class Evidence:
         """
         Λ = 0.5 * (information + information.T)
         ratios = np.array([posterior.ratios[name] for name in _RATIOS])
-        known = np.array([t, tare_time, float(posterior.torque == "motor"), speed, float(same_motion)])
+        motor, same = float(posterior.torque == "motor"), float(same_motion)
+        traits = _traits(Λ, weak, ratios, float(t), float(tare_time), motor, speed, same)
         kind = 2 if same_motion else int(tare_time > 0)
-        return cls(Λ, vector, posterior.gain_std, _traits(Λ, weak, ratios, known), float(t), kind)
+        return cls(Λ, vector, posterior.gain_std, traits, float(t), kind)
 
 
 @njit(cache=True, nogil=True)
-def _traits(information, weak, ratios, known):  # pragma: no cover - compiled
-    """`TRAITS`; known: time, tare's time, motor side, speed, same motion."""
-    out, A = np.empty(18), np.empty((10, 10))
-    out[0], out[1], out[2], out[3] = np.log10(max(known[0], 1e-2)), 1.0, np.log10(1.0 + known[1]), known[2]
-    if known[1] <= 0.0:
-        out[1] = 0.0
-    for k in range(4):
-        total, largest = 0.0, -np.inf
-        for x in ratios[k]:
-            log = np.log10(max(x, 1e-6))
-            total += log
-            largest = max(largest, log)
-        out[4 + 2 * k], out[5 + 2 * k] = total / ratios.shape[1], largest
-    out[12] = known[3]
-    out[13:16] = 0.0
+def _traits(information, weak, ratios, time, tare_time, motor, speed, same):  # pragma: no cover - compiled
+    """The numbers that `TRAITS` names, in its order."""
+    tared = 1.0 if tare_time > 0.0 else 0.0
+    of_ratios = np.empty(2 * len(ratios))  # mean and largest of each one's logarithm
+    for k in range(len(ratios)):
+        logs = np.log10(np.maximum(ratios[k], 1e-6))
+        of_ratios[2 * k], of_ratios[2 * k + 1] = logs.mean(), logs.max()
+    scaled, gains = np.empty((10, 10)), np.empty(10)
     for i in range(10):
         for j in range(i + 1):
-            A[i, j] = weak[i] * information[i, j] * weak[j]
-        gain = np.log10(1.0 + max(A[i, i], 0.0))
-        if i == 0:
-            out[13] = gain
-        elif i < 4:
-            out[14] += gain / 3.0
-        else:
-            out[15] += gain / 6.0
-        A[i, i] += 1.0
-    L = np.empty((10, 10))
-    factor(A, L, 1.0)  # an eigenvalue of the information below nothing is rounding
-    out[16] = 0.0
+            scaled[i, j] = weak[i] * information[i, j] * weak[j]
+        gains[i] = np.log10(1.0 + max(scaled[i, i], 0.0))
+        scaled[i, i] += 1.0
+    root = np.empty((10, 10))
+    factor(scaled, root, 1.0)  # an eigenvalue of the information below nothing is rounding
+    volume = 0.0
     for i in range(10):  # a tenth of log10 det(1 + Λ), in units
-        out[16] += 0.2 * np.log10(L[i, i])
-    out[17] = known[4]
-    return out
+        volume += 0.2 * np.log10(root[i, i])
+    before = np.array([np.log10(max(time, 1e-2)), tared, np.log10(1.0 + tare_time), motor])
+    informed = np.array([gains[0], gains[1:4].mean(), gains[4:].mean()])
+    return np.concatenate((before, of_ratios, np.array([speed]), informed, np.array([volume, same])))
