@@ -20,7 +20,7 @@ from armload.posterior.model_file import HybridModel
 from armload.posterior.payload_prior import MixturePrior
 from armload.posterior.same_motion import SameMotion
 from armload.recording import Recording
-from armload.regression import JointFeatures, payload_prior_std, solution_prior_std
+from armload.regression import JointFeatures, solution_prior_std
 from armload.regression.noise import SMOOTH
 
 _REMOVED = 0.1  # how likely it is, beforehand, that something was taken off
@@ -60,7 +60,6 @@ class HybridIdentifier(PosteriorLeastSquares):
         self.calibrated = self.model.calibrated
         self.payload_prior = (self._payloads.mean, self._payloads.std)
         self.features = features or JointFeatures(arm.n)
-        self._weak = payload_prior_std(arm)
         super().__init__(arm, tare)
         if tare is not None:
             self._same_motion = SameMotion(arm, tare, self.gain)

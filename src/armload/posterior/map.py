@@ -57,6 +57,7 @@ class PosteriorLeastSquares(Identifier):
         self, arm: Arm, tare: Recording | None = None, gain: float = 20.0, prior: GaussianPrior | None = None
     ) -> None:
         self.arm, self.gain, self.prior = arm, gain, prior
+        self._weak = payload_prior_std(arm)
         self._correction = Correction(arm, rated_effort(arm))
         self.reference: PosteriorLeastSquares | None = None
         self._stream: StreamingPosterior | None = None
@@ -83,7 +84,7 @@ class PosteriorLeastSquares(Identifier):
         """Scales found from the tare once, for all later solutions to begin with; without features those stated."""
         if not self._features.size:
             return None
-        return solve([tare], payload_prior_std(self.arm), None, self._noise, self._iterations).scales
+        return solve([tare], self._weak, None, self._noise, self._iterations).scales
 
     # ------------------------------------------------------------------ samples in, estimates out
 
@@ -145,7 +146,7 @@ class PosteriorLeastSquares(Identifier):
         """phi and covariance before the first row."""
         if self.prior is not None:
             return self.prior.mean, self.prior.covariance
-        return np.zeros(10), np.diag(payload_prior_std(self.arm) ** 2)
+        return np.zeros(10), np.diag(self._weak**2)
 
     def _answer(
         self,
@@ -200,7 +201,7 @@ class PosteriorLeastSquares(Identifier):
         stream, now = self.stream, self._elapsed if elapsed is None else elapsed
         said = stream if stream.difference is None else stream.difference
         earlier = 0.0 if self.reference is None else self.reference.stream.seconds
-        speed, weak = float(np.sqrt(self._squares / self._values)), payload_prior_std(self.arm)
+        speed, weak = float(np.sqrt(self._squares / self._values)), self._weak
         difference = stream.difference is not None
         tare_time = self._tare_time + earlier
         return Evidence.of(said.information, said.vector, stream.posterior, now, tare_time, speed, weak, difference)

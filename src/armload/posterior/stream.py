@@ -96,6 +96,8 @@ class StreamingPosterior:
     ) -> None:
         self.correction, self.features, self.noise = correction, features, noise
         self.prior_std, self.prior, self.iterations = prior_std, prior, iterations
+        mean, root = (np.zeros(10), np.diag(prior_std)) if prior is None else (prior.mean.copy(), prior.root)
+        self._gaussian = mean, np.ascontiguousarray(root), np.ascontiguousarray(root.T)
         self.tares, self.gain, self.start = tuple(tares), gain, start
         self._regression = FilteredRegression(correction.arm, gain, correction, features, REGRESSOR_RATE, noise.block)
         self._same_motion = same_motion
@@ -193,10 +195,7 @@ class StreamingPosterior:
     def answer(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """phi (10,) and its covariance (10, 10) under the Gaussian prior, as `solve` gives them."""
         state, gain = self._current, self.posterior.gain_std**2
-        mean, root = np.zeros(10), np.diag(self.prior_std)
-        if self.prior is not None:
-            mean, root = self.prior.mean, self.prior.root
-        return _answer(state.information, state.vector, mean, root, self.noise.overrated, gain)
+        return _answer(state.information, state.vector, *self._gaussian, self.noise.overrated, gain)
 
     @property
     def _current(self) -> SequentialPosterior:
@@ -355,11 +354,10 @@ class StreamingPosterior:
 
 
 @njit(cache=True, nogil=True)
-def _answer(information, vector, mean, root, overrated, gain):  # pragma: no cover - compiled
+def _answer(information, vector, mean, root, turned, overrated, gain):  # pragma: no cover - compiled
     """The Gaussian posterior under N(mean, root·rootᵀ), its covariance widened as stated."""
     if not np.isfinite(information.sum() + vector.sum()):
-        return mean.copy(), root @ root.T
-    turned = np.ascontiguousarray(root.T)
+        return mean.copy(), root @ turned
     covariance = root @ np.linalg.inv(np.eye(10) + turned @ information @ root) @ turned
     phi = mean + covariance @ (vector - information @ mean)
     out = np.empty((10, 10))

@@ -103,7 +103,8 @@ class FilteredRegression:
     def reset(self) -> None:
         """Forget the past: the next sample is the first."""
         n, pose, velocity = self.arm.n, 2 * len(self._waves), 2 * len(self._velocity_waves)
-        self._clock = np.full(3, -np.inf)  # times of the last sample, of the last row, and since when the arm rests
+        # times of the last sample, of the last row, since when the arm rests; what the last row stands for
+        self._clock = np.full(4, -np.inf)
         self._joints = np.full((5, n), np.nan)  # lagged torque, last torque; of the bare arm; the pose of rest
         self._regressor = np.zeros((2, n, self._wide))  # states of the lags, their last inputs
         self._pose, self._velocity = np.zeros((2, pose)), np.zeros((2, n, velocity))
@@ -112,14 +113,19 @@ class FilteredRegression:
         """The rows that the next N samples complete: t (N,) rising [s]; q, dq, tau (N, n) [rad, rad/s, N·m]."""
         times = np.require(np.atleast_1d(t), float, ["C", "W"])
         poses, dq, tau = (np.require(np.atleast_2d(x), float, ["C", "W"]) for x in (q, dq, tau))
-        index, *rows = self._advance(times, poses, dq, tau)
-        return Rows(times[index], poses[index], *rows)
+        index, steps, fresh, torque = _lag_torques(times, tau, self._settings, self._clock, self._joints)
+        times, poses = times[index], poses[index]
+        return Rows(times, poses, *self._made(times, poses, dq[index], torque, steps, fresh))
 
     def row(self, t: float, q: NDArray, dq: NDArray, tau: NDArray) -> Row | None:
         """The row that a sample completes, if it does; q, dq, tau (n,)."""
-        q, dq, tau = (x if x.flags.writeable else x.copy() for x in (q, dq, tau))  # one type of array: one compilation
-        index, h, X, r, weights = self._advance(np.array([t]), q[None], dq[None], tau[None])
-        return Row(t, q, h[0], X[0], r[0], weights[0]) if len(index) else None
+        done = _lag_torque(t, _writable(tau), self._settings, self._clock, self._joints)
+        if not done:
+            return None
+        q, dq = _writable(q), _writable(dq)
+        step, fresh = self._clock[3:], np.array([done == _FRESH])
+        h, X, r, weights = self._made(np.array([t]), q[None], dq[None], self._joints[:1], step, fresh)
+        return Row(t, q, h[0], X[0], r[0], weights[0])
 
     def __call__(
         self, t: ArrayLike, q: ArrayLike, dq: ArrayLike, tau: ArrayLike
@@ -128,18 +134,63 @@ class FilteredRegression:
         rows = self.rows(t, q, dq, tau)
         return rows.r, rows.X
 
-    def _advance(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> tuple:
+    def _made(self, t: NDArray, q: NDArray, dq: NDArray, torque: NDArray, steps: NDArray, fresh: NDArray) -> tuple:
         states = (self._clock, self._joints, self._regressor, self._pose, self._velocity)
-        waves = (self._waves, self._velocity_waves)
-        return _advance(t, q, dq, tau, self._settings, *self._momentum.chain, self._links, *waves, *states)
+        arm = (*self._momentum.chain, self._links, self._waves, self._velocity_waves)
+        return _make(t, q, dq, torque, steps, fresh, self._settings, *arm, *states)
+
+
+def _writable(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Compiled code is compiled once: for arrays that can be written."""
+    return x if x.flags.writeable else x.copy()
+
+
+_FRESH = (
+    2  # what `_lag_torque` says of a sample at which the lags start; 1: of another that completes a row, 0: of others
+)
 
 
 @njit(cache=True, nogil=True)
-def _advance(
+def _lag_torque(t, tau, settings, clock, joints):  # pragma: no cover - compiled
+    """Take one sample's torque (n,) into its lag; whether a row is due, and in clock[3] what it stands for [s]."""
+    gain, apart = settings[0], settings[1]
+    fresh = t - clock[0] > GAP
+    if fresh:
+        joints[0] = 0.0
+    else:
+        x = gain * (t - clock[0])
+        for j in range(tau.shape[0]):
+            joints[0, j] += x / (2.0 + x) * (tau[j] + joints[1, j] - 2.0 * joints[0, j])
+    joints[1] = tau
+    clock[0] = t
+    if not fresh and t - clock[1] < apart:
+        return 0
+    clock[3] = 0.0 if fresh else t - clock[1]
+    clock[1] = t
+    return _FRESH if fresh else 1
+
+
+@njit(cache=True, nogil=True)
+def _lag_torques(t, tau, settings, clock, joints):  # pragma: no cover - compiled
+    """The same of N samples: index, step, whether the lags start, and lagged torque of those that complete a row."""
+    index, steps, fresh, torque = np.empty(len(t), np.int64), np.empty(len(t)), np.empty(len(t), np.bool_), tau.copy()
+    count = 0
+    for k in range(len(t)):
+        done = _lag_torque(t[k], tau[k], settings, clock, joints)
+        if done:
+            index[count], steps[count], fresh[count], torque[count] = k, clock[3], done == _FRESH, joints[0]
+            count += 1
+    return index[:count], steps[:count], fresh[:count], torque[:count]
+
+
+@njit(cache=True, nogil=True)
+def _make(
     t,
     q,
     dq,
-    tau,
+    torque,
+    steps,
+    fresh,
     settings,
     rotations,
     translations,
@@ -155,58 +206,35 @@ def _advance(
     pose_lag,
     velocity_lag,
 ):  # pragma: no cover - compiled
-    gain, apart, settling, excess = settings
-    count, before, at = 0, clock[0], clock[1]
-    for now in t:
-        if now - before > GAP or now - at >= apart:
-            at = now
-            count += 1
-        before = now
-    n, wide = q.shape[1], regressor.shape[2]
-    size = wide + pose_lag.shape[1] + velocity_lag.shape[2]
-    h, X, r = np.empty(count), np.empty((count, n, size)), np.empty((count, n))
-    weights, index = np.empty((count, n)), np.empty(count, np.int64)
-    m = 0
-    for k in range(t.shape[0]):
-        now = t[k]
-        fresh = now - clock[0] > GAP
-        if fresh:
-            joints[0] = 0.0
-        else:
-            x = gain * (now - clock[0])
-            for j in range(n):
-                joints[0, j] += x / (2.0 + x) * (tau[k, j] + joints[1, j] - 2.0 * joints[0, j])
-        joints[1] = tau[k]
-        clock[0] = now
-        if not fresh and now - clock[1] < apart:
-            continue
-        step = 0.0 if fresh else now - clock[1]
-        clock[1] = now
-        momentum, drift = momentum_rows(rotations, translations, axes, turning, gravity, q[k], dq[k])
-        pose, velocity = features_of_sample(q[k], dq[k], waves, velocity_waves)
-        inputs = (momentum, drift, links, dq[k], pose, velocity)
-        _lagged(inputs, gain, step, fresh, joints, regressor, pose_lag, velocity_lag, X[m], r[m])
+    """M rows from the samples that complete them: h, X, r and weights."""
+    gain, settling, excess = settings[0], settings[2], settings[3]
+    count, n = q.shape
+    size = regressor.shape[2] + pose_lag.shape[1] + velocity_lag.shape[2]
+    h, X, r, weights = np.empty(count), np.empty((count, n, size)), np.empty((count, n)), np.empty((count, n))
+    for m in range(count):
+        momentum, drift = momentum_rows(rotations, translations, axes, turning, gravity, q[m], dq[m])
+        pose, velocity = features_of_sample(q[m], dq[m], waves, velocity_waves)
+        inputs = (momentum, drift, links, dq[m], torque[m], pose, velocity)
+        _lagged(inputs, gain, steps[m], fresh[m], joints, regressor, pose_lag, velocity_lag, X[m], r[m])
         for j in range(n):
-            weights[m, j] = 1.0 / (1.0 + excess * (1.0 - np.tanh(abs(dq[k, j]) / FRICTION_WIDTH) ** 2))
+            weights[m, j] = 1.0 / (1.0 + excess * (1.0 - np.tanh(abs(dq[m, j]) / FRICTION_WIDTH) ** 2))
         moved = not np.isfinite(clock[2])
         for j in range(n):
-            moved |= abs(q[k, j] - joints[4, j]) > _STILL
+            moved |= abs(q[m, j] - joints[4, j]) > _STILL
         if moved:
-            clock[2] = now
-            joints[4] = q[k]
-        h[m] = 0.0 if now - clock[2] > settling else step
-        index[m] = k
-        m += 1
-    return index, h, X, r, weights
+            clock[2] = t[m]
+            joints[4] = q[m]
+        h[m] = 0.0 if t[m] - clock[2] > settling else steps[m]
+    return h, X, r, weights
 
 
 @njit(cache=True, nogil=True)
 def _lagged(inputs, gain, h, fresh, joints, regressor, pose_lag, velocity_lag, X, r):  # pragma: no cover - compiled
     """One row from what goes into its lags, h seconds after the last; `fresh`: the lags start here."""
-    momentum, drift, links, dq, pose, velocity = inputs
+    momentum, drift, links, dq, torque, pose, velocity = inputs
     n, few, many, wide = dq.shape[0], velocity.shape[1], pose.shape[0], regressor.shape[2]
     S, U, P, UP, V, UV = regressor[0], regressor[1], pose_lag[0], pose_lag[1], velocity_lag[0], velocity_lag[1]
-    torque, B, UB = joints[0], joints[2], joints[3]
+    B, UB = joints[2], joints[3]
     x = gain * h
     keep, mix = (2.0 - x) / (2.0 + x), x / (2.0 + x)
     for k in range(many):
