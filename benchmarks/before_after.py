@@ -39,9 +39,11 @@ from before_after_logs import (
     write_episodes,
     write_streams,
 )
+from before_after_table import table
 
-from armload import __version__
+from armload import __version__, read_recording
 from armload.inertia import Z95
+from armload.recording import GAP
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULT = ROOT / "benchmarks" / "results" / "before_after.json"
@@ -132,7 +134,9 @@ def real_logs(folder: Path, sources: Sources) -> list[dict[str, Any]]:
         print(f"real logs not found in {data}: set ARMLOAD_REAL_DATA to their folder", file=sys.stderr)
         return out
     for name, words in real_commands(data, folder).items():
-        line: dict[str, Any] = {"log": name, "mass_kg": [], "half_width_kg": []}
+        steps = np.diff(read_recording(words[0]).t)
+        line: dict[str, Any] = {"log": name, "pauses_s": round(float(steps[steps > GAP].sum()), 3)}
+        line |= {"mass_kg": [], "half_width_kg": []}
         phi = []
         for source in sources.values():
             command = (sys.executable, "-m", "armload", "identify", *words, "--json")
@@ -155,10 +159,14 @@ def streams(folder: Path, sources: Sources, rounds: int) -> dict[str, Any]:
     out = {}
     for name in STREAMS:
         before, after = (said[version][name] for version in sources)
+        apart = np.abs(np.array(after["phi"]) - before["phi"]).max(axis=1) > ROUNDING
+        told = [[(event["kind"], event["t"]) for event in x["events"]] for x in (before, after)]
         out[name] = {
             "largest_change": largest(before["phi"], after["phi"]),
+            "differs_from_s": after["t"][int(np.argmax(apart))] if apart.any() else None,
+            "doubted_from_s": [before["doubted_from_s"], after["doubted_from_s"]],
             "events": [before["events"], after["events"]],
-            "events_equal": before["events"] == after["events"],
+            "events_equal": told[0] == told[1],
             **{clock: costs([[r[name][clock] for r in times[v]] for v in sources]) for clock in ("thread", "wall")},
             "process_s": [round(min(r[name]["process_s"] for r in times[v]), 3) for v in sources],
         }
@@ -178,39 +186,8 @@ def costs(ns: list[Any]) -> dict[str, Any]:
         rounds = np.percentile(b, q, axis=1) / np.percentile(a, q, axis=1)
         out[name] = {"us": np.round(pair, 1).tolist(), "ratio": round(pair[1] / pair[0], 3)}
         out[name]["ratio_by_round"] = np.round(rounds, 3).tolist()
-    return out | {"mean_ratio": round(float(b.min(axis=0).mean() / a.min(axis=0).mean()), 3)}
-
-
-def table(result: dict[str, Any]) -> str:
-    """The same as Markdown."""
-
-    def changed(change: dict[str, float]) -> str:
-        return " | ".join(f"{x:.1g}" for x in change.values())
-
-    out = ["| largest change of | logs | kg | kg·m | kg·m² |", "|---|---|---|---|---|"]
-    for name, line in result["answers"]["methods"].items():
-        out.append(f"| {name} | {line['logs']} | {changed(line['largest_change'])} |")
-    for line in result["real_logs"]:
-        (m, n), (v, w) = line["mass_kg"], line["half_width_kg"]
-        out.append(f"| {line['log']}: {m} ± {v} → {n} ± {w} kg | 1 | {changed(line['largest_change'])} |")
-    for name, line in result["online"]["streams"].items():
-        events = "same events" if line["events_equal"] else "other events"
-        out.append(f"| stream {name}, {events} | 1 | {changed(line['largest_change'])} |")
-    heads = ("t", "mass [g]", "first moments [g·m]", "inertia [g·m²]", "inside 95 %", "not worse")
-    out += ["", f"| hybrid, before → after | {' | '.join(heads)} |", "|---" * 7 + "|"]
-    for line in result["answers"]["hybrid"]:
-        cells = []
-        for score in (*GROUPS, "coverage"):
-            (before, after), more, se = line[score], line[f"{score}_more"], line[f"{score}_more_se"]
-            cells.append(f"{before:.4g} → {after:.4g} ({more:+.1g} ± {se:.1g})")
-        out.append(f"| {line['what']} | {line['t']:g} s | {' | '.join(cells)} | {line['not_worse']} |")
-    out += ["", "| update, before → after [µs] | p50 | p99 | p99.9 |", "|---|---|---|---|"]
-    online = result["online"]
-    lines = {"all": online["thread"]} | {name: line["thread"] for name, line in online["streams"].items()}
-    for name, line in lines.items():
-        cells = (f"{line[q]['us'][0]} → {line[q]['us'][1]}: {line[q]['ratio']}" for q in ("p50", "p99", "p99.9"))
-        out.append(f"| {name} | {' | '.join(cells)} |")
-    return "\n".join(out)
+    mean = [float(x.min(axis=0).mean()) for x in (a, b)]
+    return out | {"mean": {"us": np.round(mean, 1).tolist(), "ratio": round(mean[1] / mean[0], 3)}}
 
 
 def main() -> None:

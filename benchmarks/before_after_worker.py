@@ -20,6 +20,7 @@ import armload
 from armload import METHODS, ArmloadError, OnlineIdentifier, Recording, arm, read_recording
 
 EVERY = 10  # samples of a stream
+DOUBT = "samples that do not fit are left out"
 
 
 def logs(folder: Path, name: str, robot: Any) -> tuple[Recording, Recording | None]:
@@ -56,19 +57,22 @@ def stream(folder: Path, name: str, which: str) -> tuple[OnlineIdentifier, Recor
 
 
 def follow(folder: Path) -> dict[str, Any]:
-    """phi (N / EVERY, 10) along every stream, and the changes of payload that were noticed."""
+    """t (N/EVERY,) and phi (N/EVERY, 10) along every stream, the changes noticed, when samples were first left out."""
     found: dict[str, Any] = {}
     for name, which in json.loads((folder / "streams.json").read_text()).items():
         identifier, run = stream(folder, name, which)
-        phi, events = [], []
+        t, phi, events, doubted = [], [], [], None
         for k, sample in enumerate(run, start=1):
             estimate = identifier.update(*sample)
             if k % EVERY == 0:
                 phi.append(estimate.phi.tolist())
+                t.append(float(sample.t))
+            if doubted is None and any(DOUBT in note for note in estimate.notes):
+                doubted = float(sample.t)
             if estimate.event is not None and (told := estimate.event.to_dict()) not in events[-1:]:
                 events.append(told)
         identifier.close()
-        found[name] = {"phi": phi, "events": events}
+        found[name] = {"t": t, "phi": phi, "events": events, "doubted_from_s": doubted}
     return found
 
 
