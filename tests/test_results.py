@@ -327,3 +327,31 @@ def test_the_tables_of_the_live_form_are_those_of_the_committed_benchmarks(name,
     page = (ROOT / "docs" / "online.md").read_text(encoding="utf-8")
     for row in rows(json.loads((RESULTS / f"{name}.json").read_text())):
         assert row in page
+
+
+def test_the_rebuilt_estimator_says_what_the_one_before_it_said():
+    found = json.loads((RESULTS / "before_after.json").read_text())
+    rounding = 1e-9  # [kg, kg·m, kg·m²]
+    methods = found["answers"]["methods"]
+    assert {"hybrid, tare", "map-gp", "map", "difference", "joint", "ols", "rls-filter", "lmi", "ekf"} <= set(methods)
+    for line in methods.values():
+        assert line["answered_by_one"] == 0
+        assert max(line["largest_change"].values()) <= rounding
+    for line in found["answers"]["hybrid"]:
+        for score in ("mass_g", "first_moment_g_m", "inertia_g_m2"):
+            assert line[f"{score}_more"] <= 2.0 * line[f"{score}_more_se"] + 1e3 * rounding
+        assert -line["coverage_more"] <= 2.0 * line["coverage_more_se"]
+    for line in found["real_logs"]:  # the time without samples does not count any more
+        assert max(line["largest_change"].values()) <= (2e-5 if line["pauses_s"] else rounding)
+    for line in found["online"]["streams"].values():  # nor does that of samples that are left out
+        assert line["events_equal"]
+        if line["differs_from_s"] is not None:
+            assert line["differs_from_s"] > line["doubted_from_s"][1]
+
+
+def test_an_update_costs_what_was_measured_beside_the_version_before():
+    cost = json.loads((RESULTS / "before_after.json").read_text())["online"]["thread"]
+    for score, most in {"p50": 1.35, "p99": 1.0, "p99.9": 1.05, "mean": 1.07}.items():
+        before, after = cost[score]["us"]
+        assert after / before <= most
+        assert cost[score]["ratio"] == pytest.approx(after / before, abs=0.01)
