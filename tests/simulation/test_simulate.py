@@ -5,6 +5,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
+from armload.regression.filtered import Lag, filtered_regressor
 from scipy.interpolate import CubicSpline
 
 from armload.arms import arm, full_arm_regressor
@@ -13,7 +14,6 @@ from armload.inertia import InertialParameters, is_consistent
 from armload.motion import FourierMotion, taie2024
 from armload.posterior import PosteriorLeastSquares
 from armload.regression import FilteredRegression, first_order_lag
-from armload.regression.filtered import Lag, filtered_regressor
 from armload.simulation import (
     Command,
     Friction,

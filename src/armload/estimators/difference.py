@@ -28,6 +28,7 @@ from armload.estimators.normal import NormalLeastSquares
 from armload.recording import GAP, Recording
 from armload.recording.alignment import LEAST, TOLERANCE, Aligned, MotionTracker, align
 from armload.regression import FilteredRegression
+from armload.regression.lag import GAIN
 from armload.regression.rows import REGRESSOR_RATE, Rows
 
 _SETTLED = 7.99  # time constants after which a lag has forgotten where it started
@@ -61,7 +62,7 @@ class DifferenceLeastSquares(NormalLeastSquares):
 
     name = "difference"
 
-    def __init__(self, arm: Arm, tare: Recording, gain: float = 20.0) -> None:
+    def __init__(self, arm: Arm, tare: Recording, gain: float = GAIN) -> None:
         self.arm, self.gain, self.tare = arm, gain, tare
         super()._check(tare)
         self._tracker = MotionTracker(tare)

@@ -24,7 +24,7 @@ from armload.inertia import is_consistent, nearest_consistent
 from armload.recording import GAP, Sample
 from armload.regression import solution_prior_std
 from armload.regression.mismatch import FRICTION_WIDTH
-from armload.regression.rows import REGRESSOR_RATE
+from armload.regression.rows import SPACING
 
 # as fractions of the effort limit: √S of the unmodelled torque per √Hz; first spread of offset and Coulomb friction
 _TORQUE, _OFFSET, _COULOMB = 4e-3, 4e-3, 1e-2
@@ -104,7 +104,7 @@ class ExtendedKalmanFilter(Identifier):
             self._dq, self._ddq = now.dq, np.zeros(n)
         else:
             self._input = self._input + 0.5 * (now.t - last.t) * (_input(last) + _input(now))
-            if now.t - self._since >= 0.9 / REGRESSOR_RATE:
+            if now.t - self._since >= SPACING:
                 h = now.t - self._since
                 tau, moving = np.split(self._input / h, 2)
                 self._step(h, tau, moving, np.concatenate([now.q, now.dq]))

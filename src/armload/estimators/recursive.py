@@ -21,7 +21,7 @@ from armload.arms import Arm, payload_regressor
 from armload.estimators.contract import Estimate, Identifier
 from armload.recording import GAP
 from armload.regression import BlockMeans
-from armload.regression.lag import Lag
+from armload.regression.lag import GAIN, Lag
 
 _AT_REST = 0.01  # [rad/s]
 _TRANSIENT = 5.0  # time constants after which an observer started in motion has settled
@@ -158,7 +158,7 @@ class FilteredRecursiveLeastSquares(_Recursive):
     def __init__(
         self,
         arm: Arm,
-        gain: float = 20.0,
+        gain: float = GAIN,
         forgetting: float = 1.0,
     ) -> None:
         self.gain = gain

@@ -23,6 +23,7 @@ from armload.posterior.stream import StreamingPosterior
 from armload.recording import GAP, Recording, Sample
 from armload.regression import Correction, GaussianPrior, JointFeatures, payload_prior_std, solution_prior_std
 from armload.regression.information import RegressionData
+from armload.regression.lag import GAIN
 from armload.regression.noise import RIGID, SMOOTH, NoiseModel
 
 PUBLISH = 0.01  # [s] a live answer is at most so old: faster than a controller takes up a new payload
@@ -54,7 +55,7 @@ class PosteriorLeastSquares(Identifier):
     _same_motion: SameMotion | None = None
 
     def __init__(
-        self, arm: Arm, tare: Recording | None = None, gain: float = 20.0, prior: GaussianPrior | None = None
+        self, arm: Arm, tare: Recording | None = None, gain: float = GAIN, prior: GaussianPrior | None = None
     ) -> None:
         self.arm, self.gain, self.prior = arm, gain, prior
         self._correction = Correction(arm, rated_effort(arm))
@@ -255,7 +256,7 @@ class SmoothPosteriorLeastSquares(PosteriorLeastSquares):
         self,
         arm: Arm,
         tare: Recording | None = None,
-        gain: float = 20.0,
+        gain: float = GAIN,
         prior: GaussianPrior | None = None,
         features: JointFeatures | None = None,
         same_motion: bool = False,

@@ -16,10 +16,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armload.recording.recording import GAP, Recording
+from armload.recording.recording import GAP, JITTERED, Recording
 
 TOLERANCE = 0.1  # distance in q, relative to the motion's amplitude, below which two motions are the same
-LEAST = 0.5  # share of the run's path that has to be found in the other log
+# share of a run that a tare along the same motion has to show: with less the posterior, which takes all of the run, has
+# seen more than the difference
+LEAST = 0.5
 _RATE = 50.0  # [Hz] at which positions are compared
 _WINDOWS = (0.5, 1.0, 2.0, 4.0)  # [s] the shortest of these in which the arm moves is looked up
 _MOVES = 0.05  # [rad] rms amplitude of a window that can be looked up
@@ -173,7 +175,7 @@ def align(run: Recording, tare: Recording, tolerance: float = TOLERANCE) -> Alig
     """
     rows, last = [], -np.inf
     for k, now in enumerate(run.t):
-        if now - last >= 0.9 / _RATE:
+        if now - last >= JITTERED / _RATE:
             rows.append(k)
             last = now
     tracker = MotionTracker(tare, tolerance)

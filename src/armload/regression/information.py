@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.regression.block_means import BlockMeans
+from armload.regression.block_means import BLOCK, BlockMeans
 from armload.regression.features import JointFeatures
 from armload.regression.mismatch import Correction
 from armload.regression.rows import REGRESSOR_RATE, FilteredRegression, Rows
@@ -33,7 +33,7 @@ class RegressionData:
     """
 
     def __init__(
-        self, correction: Correction, gain: float, features: JointFeatures | None = None, block: float = 1.0
+        self, correction: Correction, gain: float, features: JointFeatures | None = None, block: float = BLOCK
     ) -> None:
         self.correction, self.gain = correction, gain
         arm = correction.arm

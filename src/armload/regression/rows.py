@@ -27,12 +27,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
 from armload.arms.momentum_row import MomentumRow, momentum_rows
-from armload.recording import GAP
+from armload.recording import GAP, JITTERED
 from armload.regression.features import JointFeatures, features_of_sample
+from armload.regression.lag import GAIN
 from armload.regression.mismatch import FRICTION_WIDTH, Correction
 
 REGRESSOR_RATE = 200.0  # [Hz] rows are made no more often where a rate is set: they hold nothing above a few hertz
-SPACING = 0.9 / REGRESSOR_RATE  # [s] between rows at least: clocks jitter
+SPACING = JITTERED / REGRESSOR_RATE  # [s] between rows at least
 _STILL = 1e-3  # [rad] an arm that stays so near shows one value of its stiction: more of it tells nothing new
 
 
@@ -83,7 +84,7 @@ class FilteredRegression:
     def __init__(
         self,
         arm: Arm,
-        gain: float = 20.0,
+        gain: float = GAIN,
         mismatch: Correction | None = None,
         features: JointFeatures | None = None,
         rate: float | None = None,
