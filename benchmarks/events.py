@@ -21,9 +21,9 @@ A change counts as noticed with its first event within 1 s. Every other event is
 event 1 to 3 s after a change not noticed before is a late one. The time in which a false alarm can happen is all but
 the first second after each change; 95 % bounds are Poisson's, one-sided above.
 
-Scenes are cells in out/events: what was measured once is not measured again while `online/watch.py` and
-`online/changes.py` stay as they are. Written to benchmarks/results/events.json, where a part that was not asked for
-keeps what was measured of it before. In full about 50 minutes of CPU time.
+Scenes are cells in out/events: what was measured once is not measured again while `online/watch.py`,
+`online/changes.py` and `online/thresholds.py` stay as they are. Written to benchmarks/results/events.json, where a part
+that was not asked for keeps what was measured of it before. In full about 50 minutes of CPU time.
 """
 
 from __future__ import annotations
@@ -488,7 +488,7 @@ def of_real(cell: dict) -> dict[str, Any]:
 def code() -> str:
     """Of what decides when something is noticed."""
     folder = Path(armload.online.__path__[0])
-    return key_of(*((folder / name).read_text() for name in ("changes.py", "watch.py")))
+    return key_of(*((folder / name).read_text() for name in ("changes.py", "watch.py", "thresholds.py")))
 
 
 def summary(cells: dict[str, list[dict]]) -> dict[str, Any]:

@@ -22,10 +22,13 @@ from armload.recording import GAP
 from armload.regression import BlockMeans, FilteredRegression
 from armload.regression.lag import GAIN
 
-# what a payload may be before anything is known: standard deviations in kg, kg·m, kg·m²
+# [kg, kg·m, kg·m²] standard deviations of what a payload may be before anything is known: far beyond what any arm
+# carries: the first samples stay finite, and nothing is drawn (test_ols_is_the_batch_solution_of_the_filtered_rows)
 UNKNOWN = np.array([100.0] + [10.0] * 3 + [3.0] * 6)
-RESOLUTION = 1e-3  # [N·m] no joint's torque is known better
-_PASSES = 2  # solutions after the first, each with the weights of the one before
+# [N·m] no joint's torque is known better; of exact logs the weights stay finite
+RESOLUTION = 1e-3
+# solutions after the first, each with the weights of the one before: the weights need phi to a few per cent only
+_PASSES = 2
 
 
 class NormalLeastSquares(Identifier):

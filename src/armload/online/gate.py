@@ -27,16 +27,18 @@ REASONS = (
 )
 _NOTHING, _NOT_FINITE, _IMPLAUSIBLE, _REPEATED, _LATE, _JUMPED = range(6)  # into them; sizes are looked at before
 # A stream cannot be mended and sent again: only what no arm can do is left out, wider than `identification.thresholds`
-_SLACK_POSITION = 0.5  # [rad] beyond a joint's limits: descriptions of live robots may be of another variant
+_SLACK_POSITION = 0.5  # [rad] beyond a joint's limits
 _TIMES_VELOCITY = 3.0  # times a joint's limit: a single sample may be a spike of a differentiated encoder
-_ANY_VELOCITY, _ANY_EFFORT = 50.0, 1e4  # [rad/s], [N·m] where limits are unknown: ten times any arm of the catalogue
+_ANY_VELOCITY, _ANY_EFFORT = 50.0, 1e4  # [rad/s], [N·m] where limits are unknown: ten times the catalogue's and more
 # [rad] and, times the largest velocity, what a joint may move between two samples: stamps jitter by milliseconds
 # (test_swapped_joints_are_left_out). Compiled code holds most of these: change them in this file
 _JUMP, _JUMP_TIMES = 0.05, 1.5
 # [s] after which an arm that stays where it jumped to is believed: longer than a glitch of an encoder
 # (test_an_arm_that_is_elsewhere_after_a_pause_is_believed)
 _BELIEVED = 0.1
-_CLOCK = 1.0  # [s] a time so far back is a clock that was set: networks deliver no sample so late
+# [s] a time so far back is a clock that was set, not a late sample
+# (test_a_clock_that_is_set_anew_costs_nothing_but_a_pause)
+_CLOCK = 1.0
 _PAUSE = 2.0 * GAP  # [s] what a jump or a longer pause counts as: more than a gap, so the filters start anew
 ANY_TIME = 1e12  # [s] no clock shows more: 30 000 years
 

@@ -10,7 +10,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import chi2
 
+from armload.estimators.recursive import AT_REST
 from armload.regression.lag import GAIN
+from armload.regression.noise import SMOOTH
 
 # ---------------------------------------------------------------------- the detector, `changes.py`
 
@@ -95,13 +97,12 @@ STEP_STD = 0.1
 
 # ---------------------------------------------------------------------- notes, `online_identifier.py`, `listening.py`
 
-# [rad/s] of any joint: slower ones are noise of the velocity, and tell nothing of an inertia
-# (test_a_standing_arm_says_so_and_claims_no_inertia)
-MOVING = 0.01
+# [rad/s] of any joint: an arm that is slower stands (test_a_standing_arm_says_so_and_claims_no_inertia)
+MOVING = AT_REST
 # [s] within which the arm was seen to move: a motion that turns round stands for less
 RECENT = 0.5
-# [s] of rows that count for nothing: with the quarter of a second that one pose counts, half a second at rest, `RECENT`
-STANDS = 0.25
+# [s] of rows that count for nothing: with the time that one pose counts, as long at rest as `RECENT`
+STANDS = RECENT - SMOOTH.block
 # [s] without a usable sample that are told: a pause of this length (`recording.GAP`) ends the filters' memory
 # (test_an_answer_ages_and_says_why_while_no_sample_can_be_used)
 SILENT = 0.1

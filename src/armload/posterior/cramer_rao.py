@@ -35,7 +35,7 @@ from armload.regression.noise import SMOOTH, NoiseModel
 from armload.regression.prior import REACH
 from armload.regression.rows import REGRESSOR_RATE
 
-TIMES = (1.0, 3.0)  # [s] and the whole run
+TIMES = (1.0, 3.0)  # [s] and the whole run: those that tables of errors have
 _EARLIER = 0.95  # of the whole run: a time that is not worth a column of its own
 
 _CHUNK = 4096  # samples at a time

@@ -26,8 +26,11 @@ from armload.regression.information import RegressionData
 from armload.regression.lag import GAIN
 from armload.regression.noise import RIGID, SMOOTH, NoiseModel
 
-PUBLISH = 0.01  # [s] a live answer is at most so old: faster than a controller takes up a new payload
-FAST = 2.5e-3  # [s] samples that come closer than this share the work of a row and of an answer between them
+# [s] a live answer is at most so old, and judged so often: faster than a controller takes up a new payload
+# (test_an_answer_is_at_most_ten_milliseconds_old)
+PUBLISH = 0.01
+# [s] samples that come closer than this share the work of a row and of an answer between them: half of a row's spacing
+FAST = 2.5e-3
 
 
 class PosteriorLeastSquares(Identifier):

@@ -33,11 +33,12 @@ from armload.regression.lag import GAIN
 from armload.regression.noise import MOMENT, NoiseModel, share_of_noise, whole_noise
 from armload.regression.rows import REGRESSOR_RATE, FilteredRegression, Row, Rows
 
-# rows after which the scales are found anew (0.1, 0.3, … 12 s), then every so many; and how many later they are adopted
+# [rows] after which the scales are found anew (0.1, 0.3, … 12 s): they change with the logarithm of the time. Then
+# every so many, 10 s, and how many later they are adopted, 0.1 s: the second thread takes 2 % of a core
 _REFITS = (20, 60, 100, 150, 200, 300, 400, 600, 800, 1200, 1600, 2400)
 _REFIT_EVERY, _ADOPTED = 2000, 20
-_CHUNK = 50  # rows handed over at once in between
-_LATE = 50  # rows that can be taken back, a quarter of a second: more than a change takes to be noticed
+_CHUNK = 50  # [rows] handed over at once in between: one matrix product of 0.25 s
+_LATE = 50  # [rows] that can be taken back, 0.25 s: those that `online.thresholds.LONGEST` asks for, and two more
 
 
 class Worker:

@@ -16,7 +16,7 @@ from armload.arms import Arm, rated_mass
 from armload.errors import IdentificationError
 from armload.inertia import InertialParameters
 
-_SHRINK = 0.05  # share of the diagonal in the covariance: few payloads say little about correlations
+_SHRINK = 0.05  # share of the diagonal in the covariance: few payloads say little about correlations. A stated prior
 _FLOOR = np.array([5e-3] + [5e-4] * 3 + [5e-5] * 6)  # [kg, kg·m, kg·m²] no family is known better than this
 # standard deviations of the weak prior, of what the arm is rated for and [m] from the flange: a rated payload at the
 # length of a gripper and a box. Stated priors

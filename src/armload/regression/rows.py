@@ -34,7 +34,9 @@ from armload.regression.mismatch import FRICTION_WIDTH, Correction
 
 REGRESSOR_RATE = 200.0  # [Hz] rows are made no more often where a rate is set: they hold nothing above a few hertz
 SPACING = JITTERED / REGRESSOR_RATE  # [s] between rows at least
-_STILL = 1e-3  # [rad] an arm that stays so near shows one value of its stiction: more of it tells nothing new
+# [rad] an arm that stays so near shows one value of its stiction: more of it tells nothing new. Above what encoders and
+# a controller at rest show (test_a_pose_of_a_standing_arm_counts_no_longer_than_it_settles)
+_STILL = 1e-3
 
 
 class Row(NamedTuple):
