@@ -1,6 +1,6 @@
 """What half and twice each tuned constant would do to streams with changes of payload, and to sound and wrong logs.
 
-    python benchmarks/sensitivity.py [--only ALARM,TRANSIENT] [--page]
+    python benchmarks/sensitivity.py [--only ALARM,TRANSIENT] [--parts streams,logs] [--page]
 
 The constants are those of `online/thresholds.py` that decide about changes, of `identification/thresholds.py`, and
 three of the posterior. Each is set to half and to double, all others as they are; CALM, which is 0, to −3 and 3.
@@ -11,8 +11,9 @@ streams    10 scenes of 7–12 s at 250 and 500 Hz with the hybrid: payloads gra
 logs       16 sound logs of 4 s, and 8 that something is wrong with: a base tilted by 30°, the torque sign of a joint
            turned, a tool taken off since the tare, motor torque of an arm that nobody knows. All go through `identify`.
 
-"nothing" means that all answers are the same bit for bit. Written to benchmarks/results/sensitivity.json and
-docs/constants.md; --page writes the page alone, from the committed result. `cpu_s` says what a run took.
+"nothing" means that all answers are the same bit for bit, notes included. Written to docs/constants.md and
+benchmarks/results/sensitivity.json, where a part that was not asked for keeps what was measured of it before; --page
+writes the page alone, from the committed result. `cpu_s` says what a run of which parts took.
 """
 
 from __future__ import annotations
@@ -308,7 +309,7 @@ def on_logs(all_logs: list[Log]) -> tuple[dict[str, Any], list[bytes]]:
     for one in all_logs:
         try:
             answer: Any = identify(one.log, one.robot, **one.told)
-            answers.append(json.dumps(answer.to_dict()).encode())
+            answers.append(json.dumps([answer.to_dict(), answer.notes]).encode())
         except ArmloadError as error:
             answer = None
             answers.append(str(error).encode())
@@ -390,22 +391,26 @@ def plain(value: Any) -> Any:
     return value if isinstance(value, int) else round(float(value), 6)
 
 
-def measured(only: list[str]) -> dict[str, Any]:
+def measured(only: list[str], parts: list[str]) -> dict[str, Any]:
     """All settings of all constants."""
     started = time.process_time()
-    with tempfile.TemporaryDirectory() as folder:
-        material: dict[str, Any] = {"streams": (on_streams, streams()), "logs": (on_logs, logs(Path(folder)))}
+    material: dict[str, Any] = {}
+    if "streams" in parts:
+        material["streams"] = on_streams, streams()
+    if "logs" in parts:
+        with tempfile.TemporaryDirectory() as folder:
+            material["logs"] = on_logs, logs(Path(folder))
     base = {on: of(what) for on, (of, what) in material.items()}
     print({on: found[0] for on, found in base.items()}, round(time.process_time() - started, 1), flush=True)
     out: dict[str, Any] = {}
     for constant in constants():
-        if only and constant.name not in only:
+        if (only and constant.name not in only) or not set(constant.on) & set(parts):
             continue
         out[constant.name] = {"home": constant.home, "value": plain(constant.value)}
         for word, factor in (("half", 0.5), ("double", 2.0)):
             tried = {}
             with set_to(constant, constant.times(factor)):
-                for on in constant.on:
+                for on in (on for on in constant.on if on in parts):
                     of, what = material[on]
                     measures, answers = of(what)
                     changed = sum(a != b for a, b in zip(answers, base[on][1], strict=True))
@@ -417,24 +422,39 @@ def measured(only: list[str]) -> dict[str, Any]:
         "command": "python benchmarks/sensitivity.py",
         "version": __version__,
         "seeds_from": SEED,
-        "scenes": len(material["streams"][1]),
-        "logs": {"sound": 16, "wrong": 8},
-        "cpu_s": round(time.process_time() - started, 1),
+        "cpu_s": {" and ".join(parts): round(time.process_time() - started, 1)},
         "as they are": {on: found[0] for on, found in base.items()},
         "constants": out,
     }
 
 
+def with_what_was_measured_before(result: dict[str, Any], before: dict[str, Any]) -> dict[str, Any]:
+    """Parts and constants that were not asked for, as they were."""
+    known = {constant.name: constant for constant in constants()}
+    merged = {}
+    for name, constant in known.items():
+        now, then = result["constants"].get(name, {}), before["constants"].get(name, {})
+        merged[name] = {"home": constant.home, "value": plain(constant.value)}
+        for word in ("half", "double"):
+            both = then.get(word, {}) | now.get(word, {})
+            merged[name][word] = {on: both[on] for on in constant.on}
+    kept = {key: before[key] | result[key] for key in ("cpu_s", "as they are")}
+    return result | kept | {"constants": merged}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", default="", help="some constants, printed and not written")
+    parser.add_argument("--parts", default="streams,logs")
     parser.add_argument("--page", action="store_true", help="write the page from the committed result")
     asked = parser.parse_args()
     if not asked.page:
         with threadpool_limits(1):
-            result = measured([name for name in asked.only.split(",") if name])
+            result = measured([name for name in asked.only.split(",") if name], asked.parts.split(","))
         if asked.only:
             return
+        if asked.parts != parser.get_default("parts"):
+            result = with_what_was_measured_before(result, json.loads(RESULT.read_text()))
         RESULT.write_text(json.dumps(result, indent=1) + "\n")
     write_page(json.loads(RESULT.read_text()))
 

@@ -47,7 +47,8 @@ LEVEL = 2.0
 LOWEST_LEVEL = 1.0
 # share of a new window in the mean level: it follows within twenty windows, 5 s
 LEVEL_SHARE = 0.05
-# [levels] that one window counts at most: a light change must not raise the level and hide itself
+# [levels] that one window counts at most: a light change must not raise the level and hide itself. A stated guard for
+# streams of minutes, no scene or test depends on it
 LEVEL_OUTLIER = 8.0
 
 # ---------------------------------------------------------------------- the phases of a run, `watch.py`
@@ -61,13 +62,15 @@ TRANSIENT = 4.0 / GAIN
 # [s] of a run not judged yet, below which it may have been a push: the run before it may come back. Pushes last up to
 # 3 s (`benchmarks/events.py`)
 PASSING = 3.0
-# [runs] in a row that may pass: a person who pushes on and on must not keep the watch from the present
+# [runs] in a row that may pass: a person who pushes on and on must not keep the watch from the present. A stated guard,
+# no scene or test pushes so often
 MOST_PASSING = 4
 # [s] of a new run from which its kind is told: before, the prior alone says whether something is held
 KIND_FROM = 0.25
 # [s] of a new run after which its kind is told, however little is known of the mass
 KIND_LATEST = 1.5
 # [s] of a new run within which it may be recognised as an earlier one: twice the longest push
+# (test_what_is_put_down_is_gone_and_what_is_taken_up_again_is_recognised)
 RETURN_UNTIL = 6.0
 # [payloads] standard deviation of the mass with which a kind is told: 50 g of a Panda, a light payload held or not
 KIND_STD = 0.033
@@ -76,10 +79,13 @@ RETURN_STD = 0.01
 # [s] of rows that do not fit, within which a change of payload shows: two and a half long windows
 DECIDED = 0.6
 # [s] of such rows shortly after a change, after which it may be over, as a push is: one lag of the regression
+# (test_a_push_that_ends_gives_the_estimate_back)
 BACK_AFTER = 1.0 / GAIN
 # [nat] of what was held before over what is held now: as sure as a payload has to be over a push
+# (test_a_push_that_ends_gives_the_estimate_back)
 BACK = 6.0
-# [s] of a run that knows its arm as if it had a tare: what does not fit is then not the arm for longer
+# [s] of a run that knows its arm as if it had a tare: what does not fit is then not the arm for longer.
+# A stated guard: the scenes are shorter
 LEARNT = 10.0
 # [s] that such a run leaves out at most (any other: `DECIDED`), longer than a push. Then what does not fit is believed
 # (test_a_pose_first_seen_shortly_after_a_change_is_not_another_change)
@@ -88,6 +94,7 @@ PATIENCE = 4.0
 # ---------------------------------------------------------------------- which run is which, `runs.py` and `step.py`
 
 # [squared standard deviations] of mass and first moments: nine of ten runs of the same payload lie within
+# (test_another_payload_of_another_mass_is_no_return)
 SAME_RUN = float(chi2.ppf(0.9, 4))
 # [s] an empty run must have lasted to be a tare: with less it knows the arm no better than the prior
 TARE_FROM = 3.0
