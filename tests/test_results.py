@@ -1,5 +1,6 @@
 """Numbers in the README come from committed results, to the digit."""
 
+import importlib
 import json
 import re
 from pathlib import Path
@@ -355,3 +356,44 @@ def test_an_update_costs_what_was_measured_beside_the_version_before():
         before, after = cost[score]["us"]
         assert after / before <= most
         assert cost[score]["ratio"] == pytest.approx(after / before, abs=0.01)
+
+
+@pytest.fixture
+def sensitivity(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    return importlib.import_module("sensitivity")
+
+
+def test_the_page_of_constants_is_the_table_of_the_committed_result(sensitivity):
+    result = json.loads((RESULTS / "sensitivity.json").read_text())
+    page = (ROOT / "docs" / "constants.md").read_text(encoding="utf-8")
+    assert page.split(sensitivity.MARKS[0])[1].split(sensitivity.MARKS[1])[0].strip() == sensitivity.table(result)
+
+
+def test_the_constants_that_were_varied_are_those_of_the_code(sensitivity):
+    varied = json.loads((RESULTS / "sensitivity.json").read_text())["constants"]
+    now = {constant.name: constant for constant in sensitivity.constants()}
+    assert {name: sensitivity.plain(constant.value) for name, constant in now.items()} == {
+        name: found["value"] for name, found in varied.items()
+    }
+    assert all(len(constant.reason) > 20 for constant in now.values())
+
+
+def test_no_constant_of_the_thresholds_stands_without_its_reason(sensitivity):
+    """The study finds constants by the comment above them: none may be there that it does not find."""
+    known = {constant.name for constant in sensitivity.constants()} | set(sensitivity.NOT_VARIED)
+    for home in ("online.thresholds", "identification.thresholds"):
+        text = (ROOT / "src" / "armload" / f"{home.replace('.', '/')}.py").read_text(encoding="utf-8")
+        lines = text.split("# ---------------------------------------------------------------------- notes")[
+            0
+        ].splitlines()
+        assert {line.split(" = ")[0] for line in lines if re.match(r"[A-Z_]+ = ", line)} <= known
+
+
+def test_a_constant_is_set_wherever_it_is_used_and_put_back(sensitivity):
+    from armload.online import changes, thresholds, watch
+
+    (windows,) = (constant for constant in sensitivity.constants() if constant.name == "WINDOWS")
+    with sensitivity.set_to(windows, windows.times(2.0)):
+        assert (thresholds.WINDOWS, changes.WINDOWS, watch.LONGEST) == ((32, 96), (32, 96), 96)
+    assert (thresholds.WINDOWS, changes.WINDOWS, watch.LONGEST) == ((16, 48), (16, 48), 48)

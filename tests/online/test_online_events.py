@@ -11,6 +11,8 @@ from armload.devices import Simulator
 from armload.inertia import InertialParameters
 from armload.motion import random_motion, taie2024
 from armload.online import OnlineIdentifier
+from armload.online.thresholds import LONGEST
+from armload.posterior.stream import _LATE
 from armload.simulation import Sensors, World, simulate
 
 
@@ -233,3 +235,8 @@ def test_the_run_of_the_empty_arm_counts_beside_a_tare_that_was_given():
         assert identifier.relative_to == ("before" if tare is None else "tare")
         assert covers(found[name], HALF_KILO.phi)[:4].all()
     assert np.all(found["with"].std[:4] < 1.1 * found["without"].std[:4])
+
+
+def test_all_rows_that_a_change_takes_back_are_still_to_be_had():
+    """The posterior holds back the rows that the watch may find to have belonged to the next payload."""
+    assert _LATE >= LONGEST

@@ -21,7 +21,7 @@ from armload.errors import IdentificationError
 from armload.estimators.normal import NormalLeastSquares
 from armload.motion import Motion
 from armload.recording import Recording
-from armload.regression.rows import REGRESSOR_RATE
+from armload.regression.rows import SPACING
 
 _DEGREE = 4
 _NEIGHBOURS = 4  # samples on either side that a polynomial needs at least
@@ -66,7 +66,7 @@ class PolynomialLeastSquares(NormalLeastSquares):
         stop = np.maximum(np.searchsorted(t, t + self.half, side="right"), index + _NEIGHBOURS + 1)
         times, fits, k = [], [], self._next
         while k + _NEIGHBOURS < len(t) and t[-1] >= t[k] + self.half:
-            if t[k] - self.half >= self._begin and t[k] - self._fitted_at >= 0.9 / REGRESSOR_RATE:
+            if t[k] - self.half >= self._begin and t[k] - self._fitted_at >= SPACING:
                 window = slice(first[k], stop[k])
                 fits.append(_derivatives((t[window] - t[k]) / self.half, self._signal[window]))
                 times.append(t[k])

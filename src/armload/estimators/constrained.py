@@ -34,6 +34,7 @@ from armload.inertia import (
     pseudo_inertia,
 )
 from armload.recording import Recording
+from armload.regression.lag import GAIN
 
 _CORRELATION = (
     1.0  # [s] after which the residual counts as new: sets the information against a pull or the chart's prior
@@ -51,7 +52,7 @@ _CHART_STD = np.array([2.0] + [1.5] * 3 + [0.1] * 3 + [0.3] * 3)
 class _ConsistentLeastSquares(Identifier):
     """Weighted least squares, less the tare's, handed to a subclass that makes a body of it."""
 
-    def __init__(self, arm: Arm, tare: Recording | None = None, gain: float = 20.0) -> None:
+    def __init__(self, arm: Arm, tare: Recording | None = None, gain: float = GAIN) -> None:
         self.arm, self._free = arm, WeightedLeastSquares(arm, gain)
         self.before = None if tare is None else Tared(WeightedLeastSquares(arm, gain), tare).before
         self.reset()
@@ -117,7 +118,7 @@ class ConsistentLeastSquares(_ConsistentLeastSquares):
         self,
         arm: Arm,
         tare: Recording | None = None,
-        gain: float = 20.0,
+        gain: float = GAIN,
         reference: InertialParameters | None = None,
         pull: float = 1.0,
     ) -> None:

@@ -28,11 +28,17 @@ from armload.estimators.normal import NormalLeastSquares
 from armload.recording import GAP, Recording
 from armload.recording.alignment import LEAST, TOLERANCE, Aligned, MotionTracker, align
 from armload.regression import FilteredRegression
+from armload.regression.lag import GAIN
 from armload.regression.rows import REGRESSOR_RATE, Rows
 
-_SETTLED = 7.99  # time constants after which a lag has forgotten where it started
-_RESOLUTION = 1e-5  # of the effort limit: two logs differ by so much at least
-_PRIOR_BLOCKS = 8.0  # weight of the rows' own variance, in blocks
+# [time constants] after which a lag has forgotten where it started: 3e-4 of it is left; 0.4 s at the default gain
+_SETTLED = 7.99
+# [effort limits] two logs differ by so much at least: a log that is compared with a copy of itself
+# (test_two_copies_of_one_log_say_no_more_than_the_torque_is_known)
+_RESOLUTION = 1e-5
+# [blocks] weight of the rows' own variance, which says how the joints compare while there are few blocks
+# (test_the_intervals_of_the_difference_cover_the_truth_under_correlated_noise)
+_PRIOR_BLOCKS = 8.0
 
 
 class DifferenceLeastSquares(NormalLeastSquares):
@@ -61,7 +67,7 @@ class DifferenceLeastSquares(NormalLeastSquares):
 
     name = "difference"
 
-    def __init__(self, arm: Arm, tare: Recording, gain: float = 20.0) -> None:
+    def __init__(self, arm: Arm, tare: Recording, gain: float = GAIN) -> None:
         self.arm, self.gain, self.tare = arm, gain, tare
         super()._check(tare)
         self._tracker = MotionTracker(tare)

@@ -26,11 +26,12 @@ from armload.estimators.normal import UNKNOWN
 from armload.recording import Recording, Sample
 from armload.regression import Correction, payload_prior_std
 from armload.regression.information import RegressionData
+from armload.regression.lag import GAIN
+from armload.regression.noise import RIGID
 
 _STATES = 200  # random states that show which directions of eta ever act
 _STRUCTURAL = 1e-8  # of the largest singular value: below it a direction never acts
 _UNSEEN = 1e-8  # of the largest information: as much is added to every direction, so that none is without any
-_ROW_STD = 4e-3  # prior standard deviation of the residual's one-second mean, as a fraction of the effort limit
 _PASSES = 2  # solutions, the first with the residual as expected before
 
 
@@ -53,7 +54,7 @@ class JointLeastSquares(Identifier):
 
     name = "joint"
 
-    def __init__(self, arm: Arm, tare: Recording, gain: float = 20.0, refresh: float = 0.02) -> None:
+    def __init__(self, arm: Arm, tare: Recording, gain: float = GAIN, refresh: float = 0.02) -> None:
         self.arm, self.gain, self.refresh = arm, gain, refresh
         self._check(tare)
         self._correction = Correction(arm, rated_effort(arm))
@@ -102,7 +103,7 @@ class JointLeastSquares(Identifier):
         without = with_payload.copy()
         without[:10] = 0.0
         parts = [(self._tare, without), (self._run, with_payload)]
-        expected = (_ROW_STD * self._correction.effort) ** 2 * self._tare.blocks.block
+        expected = (RIGID.residual * self._correction.effort) ** 2 * self._tare.blocks.block
         S = [expected for _ in parts]
         z, C = np.zeros(10 + b), np.eye(10 + b)
         for _ in range(_PASSES):

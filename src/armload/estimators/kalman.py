@@ -23,11 +23,10 @@ from armload.estimators.contract import Estimate, Identifier
 from armload.inertia import is_consistent, nearest_consistent
 from armload.recording import GAP, Sample
 from armload.regression import solution_prior_std
-from armload.regression.mismatch import FRICTION_WIDTH
-from armload.regression.rows import REGRESSOR_RATE
+from armload.regression.mismatch import FRICTION_WIDTH, PER_JOINT
+from armload.regression.noise import RIGID
+from armload.regression.rows import SPACING
 
-# as fractions of the effort limit: √S of the unmodelled torque per √Hz; first spread of offset and Coulomb friction
-_TORQUE, _OFFSET, _COULOMB = 4e-3, 4e-3, 1e-2
 _MARGIN = 1e-3  # [kg] how far inside the cone of bodies (lengths in units of 0.1 m) the model is linearised
 _ITERATIONS = 6
 _SMOOTH = 0.02  # [s] lag of the acceleration at which f is linearised
@@ -104,7 +103,7 @@ class ExtendedKalmanFilter(Identifier):
             self._dq, self._ddq = now.dq, np.zeros(n)
         else:
             self._input = self._input + 0.5 * (now.t - last.t) * (_input(last) + _input(now))
-            if now.t - self._since >= 0.9 / REGRESSOR_RATE:
+            if now.t - self._since >= SPACING:
                 h = now.t - self._since
                 tau, moving = np.split(self._input / h, 2)
                 self._step(h, tau, moving, np.concatenate([now.q, now.dq]))
@@ -116,9 +115,11 @@ class ExtendedKalmanFilter(Identifier):
 
     def _begin(self) -> None:
         n, effort = self.arm.n, rated_effort(self.arm)
-        first = np.concatenate([np.zeros(2 * n), self._unit, _OFFSET * effort, _COULOMB * effort])
+        first = np.concatenate(
+            [np.zeros(2 * n), self._unit, PER_JOINT["offset"] * effort, PER_JOINT["coulomb"] * effort]
+        )
         self._P = np.diag(first**2)
-        density = _TORQUE * effort if self.torque_density is None else self.torque_density
+        density = RIGID.residual * np.sqrt(RIGID.block) * effort if self.torque_density is None else self.torque_density
         self._root_S = np.broadcast_to(np.asarray(density, dtype=float), (n,))
 
     def _step(self, h: float, tau: NDArray, moving: NDArray, measured: NDArray) -> None:

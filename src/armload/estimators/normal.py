@@ -20,11 +20,15 @@ from armload.arms import Arm
 from armload.estimators.contract import Estimate, Identifier
 from armload.recording import GAP
 from armload.regression import BlockMeans, FilteredRegression
+from armload.regression.lag import GAIN
 
-# what a payload may be before anything is known: standard deviations in kg, kg·m, kg·m²
+# [kg, kg·m, kg·m²] standard deviations of what a payload may be before anything is known: far beyond what any arm
+# carries: the first samples stay finite, and nothing is drawn (test_ols_is_the_batch_solution_of_the_filtered_rows)
 UNKNOWN = np.array([100.0] + [10.0] * 3 + [3.0] * 6)
-_RESOLUTION = 1e-3  # [N·m] no joint's torque is known better
-_PASSES = 2  # solutions after the first, each with the weights of the one before
+# [N·m] no joint's torque is known better; of exact logs the weights stay finite
+RESOLUTION = 1e-3
+# solutions after the first, each with the weights of the one before: the weights need phi to a few per cent only
+_PASSES = 2
 
 
 class NormalLeastSquares(Identifier):
@@ -108,7 +112,7 @@ class NormalLeastSquares(Identifier):
     def _residual_variance(self, phi: NDArray) -> NDArray[np.float64]:
         """s_j² (n,) [N²·m²]: mean square of each joint's residual at phi."""
         square = self._c - 2.0 * self._b @ phi + np.einsum("a,jab,b->j", phi, self._A, phi)
-        return np.maximum(square / self._rows_seen, _RESOLUTION**2)
+        return np.maximum(square / self._rows_seen, RESOLUTION**2)
 
     def _covariance(self, phi: NDArray, G: NDArray, w: NDArray) -> NDArray[np.float64]:
         means, times = self._blocks.means()
@@ -117,7 +121,7 @@ class NormalLeastSquares(Identifier):
         residual = means[..., 10] - means[..., :10] @ phi
         freedom = max(1.0 - 10.0 / residual.size, 0.2)  # ten of the residual's degrees of freedom went into phi
         S = np.mean(residual**2 * times[:, None], axis=0) / freedom * self._blocks.rate
-        S = np.maximum(S, _RESOLUTION**2)  # two copies of one log leave no residual at all
+        S = np.maximum(S, RESOLUTION**2)  # two copies of one log leave no residual at all
         noise = np.einsum("j,jab->ab", w**2 * S, self._A) + np.diag(UNKNOWN**-2)
         C = G @ noise @ G
         return 0.5 * (C + C.T)
@@ -138,7 +142,7 @@ class OrdinaryLeastSquares(NormalLeastSquares):
 
     name = "ols"
 
-    def __init__(self, arm: Arm, gain: float = 20.0, weighted: bool = False) -> None:
+    def __init__(self, arm: Arm, gain: float = GAIN, weighted: bool = False) -> None:
         self._regression = FilteredRegression(arm, gain)
         super().__init__(arm, weighted)
 
@@ -163,7 +167,7 @@ class WeightedLeastSquares(NormalLeastSquares):
 
     name = "wls"
 
-    def __init__(self, arm: Arm, gain: float = 20.0) -> None:
+    def __init__(self, arm: Arm, gain: float = GAIN) -> None:
         self._regression = FilteredRegression(arm, gain)
         super().__init__(arm, weighted=True)
 

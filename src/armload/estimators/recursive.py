@@ -21,9 +21,9 @@ from armload.arms import Arm, payload_regressor
 from armload.estimators.contract import Estimate, Identifier
 from armload.recording import GAP
 from armload.regression import BlockMeans
-from armload.regression.lag import Lag
+from armload.regression.lag import GAIN, Lag
 
-_AT_REST = 0.01  # [rad/s]
+AT_REST = 0.01  # [rad/s] of any joint: slower is noise of the velocity, and tells nothing of an inertia
 _TRANSIENT = 5.0  # time constants after which an observer started in motion has settled
 # Initial P: standard deviations of 10 kg, 1 kg·m and 0.3 kg·m², so that the columns' units do not mix.
 _INITIAL_STD = np.array([10.0] + [1.0] * 3 + [0.3] * 6)
@@ -158,7 +158,7 @@ class FilteredRecursiveLeastSquares(_Recursive):
     def __init__(
         self,
         arm: Arm,
-        gain: float = 20.0,
+        gain: float = GAIN,
         forgetting: float = 1.0,
     ) -> None:
         self.gain = gain
@@ -172,7 +172,7 @@ class FilteredRecursiveLeastSquares(_Recursive):
         p, drift = self.arm.momentum(q, dq)
         # both lags start at their first input: exact from rest; after a start in motion the transient is left out
         if self._from is None:
-            self._from = t[0] + (_TRANSIENT / self.gain if np.abs(dq[0]).max() > _AT_REST else 0.0)
+            self._from = t[0] + (_TRANSIENT / self.gain if np.abs(dq[0]).max() > AT_REST else 0.0)
         u = tau - drift + self.gain * p
         r = self._observer(t, u, initial=u[0]) - self.gain * p
         signal = np.stack([q, dq], axis=1)  # (N, 2, n)

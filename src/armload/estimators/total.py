@@ -29,7 +29,7 @@ from scipy.linalg import eigh
 
 from armload.arms import Arm, momentum_regressor, payload_regressor
 from armload.estimators.contract import Estimate
-from armload.estimators.normal import UNKNOWN, NormalLeastSquares
+from armload.estimators.normal import RESOLUTION, UNKNOWN, NormalLeastSquares
 
 _FOURTH = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # the fourth difference: what it leaves of a smooth motion is noise
 _APART = 2  # rows between its terms: differences of a white velocity are uncorrelated from there on
@@ -38,7 +38,6 @@ _LEAST_TORQUE = 0.02  # of the residual's variance is the torque's at least
 # Share of a direction of A that may be the regressor's error: beyond it the problem is nongeneric, and the little that
 # is left would be blown up
 _MOST_ERROR = 0.9
-_RESOLUTION = 1e-3  # [N·m] no joint's torque is known better
 
 
 class RecursiveTotalLeastSquares(NormalLeastSquares):
@@ -113,7 +112,7 @@ class RecursiveTotalLeastSquares(NormalLeastSquares):
         error = np.einsum("i,ijab->jab", variance, self._D) * np.outer(scale, scale)
         A = np.einsum("j,jab->ab", w, self._moments()) * np.outer(scale, scale)
         A[:10, :10] += np.eye(10)
-        A[10, 10] += self._rows_seen * np.sum(w) * _RESOLUTION**2
+        A[10, 10] += self._rows_seen * np.sum(w) * RESOLUTION**2
         x = phi / UNKNOWN
         G = np.eye(10)
         for _ in range(_PASSES):

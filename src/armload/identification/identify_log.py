@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm
+from armload.arms import Arm, rated_mass
 from armload.errors import IdentificationError
 from armload.estimators import ArmMismatch, Estimate
 from armload.identification.answer import Identification, body_of, is_removal
 from armload.identification.choice import Choice, choose
 from armload.identification.plausibility import check_plausible
-from armload.identification.thresholds import DECISIVE, LARGEST_OFFSETS, LEANS, LOWEST_RATE, MISFIT, MOVES
+from armload.identification.thresholds import DECISIVE, HEAVIEST, LARGEST_OFFSETS, LEANS, LOWEST_RATE, MISFIT, MOVES
 from armload.inertia import NAMES, Z95, InertialParameters, distance_to_body, held, is_consistent, phi_to_com
 from armload.inertia import determined as determined_by
 from armload.recording import Recording, check_own_measurements
@@ -86,11 +86,11 @@ def plausible_tool(tool: InertialParameters, arm: Arm) -> InertialParameters:
     Raises:
         IdentificationError: it weighs more than three times the rated payload: in grams, say.
     """
-    most = 6.0 * float(payload_prior_std(arm)[0])  # three times the rated payload
+    most = HEAVIEST * rated_mass(arm)
     if not abs(tool.mass) <= most:
         raise IdentificationError(
-            f"the tool weighs {tool.mass:.4g} kg: expected at most {most:.3g} kg, three times what {arm.name} is rated "
-            "for; give kilograms and metres"
+            f"the tool weighs {tool.mass:.4g} kg: expected at most {most:.3g} kg, {HEAVIEST:g} times what "
+            f"{arm.name} is rated for; give kilograms and metres"
         )
     return tool
 

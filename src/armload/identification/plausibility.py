@@ -11,24 +11,29 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.errors import RecordingError
+from armload.identification.thresholds import (
+    ANY_SPEED,
+    DEGREES_FROM,
+    EFFORT,
+    EFFORT_EVER,
+    EFFORT_SHARE,
+    FROZEN_MOTION,
+    FROZEN_TIME,
+    JUMP,
+    MODEL_MISFIT,
+    NO_TORQUE,
+    NOT_DERIVATIVE,
+    POSITION_TOLERANCE,
+    SPEED,
+    WINDOW_MOVES,
+)
 from armload.identification.torque_scale import torque_scale
 from armload.recording import Recording
 from armload.recording.columns import check_joint_count
 from armload.recording.windows import integrals, windows
 
 _DEGREE = 180.0 / np.pi
-POSITION_TOLERANCE = 0.05  # [rad] beyond the limits
 _FULL_TURN = 2.0 * np.pi
-_JUMP = 0.1  # [rad] beyond what twice the velocity limit allows
-_UNLIMITED_SPEED = 10.0  # [rad/s] taken where the limit is not known
-_SPEED = 2.0  # times the velocity limit
-_MOVES = 0.005  # [rad] rms per window, below which a joint counts as standing still
-_NOT_DERIVATIVE = 0.5  # relative rms difference between ∫dq dt and the change of q
-# A payload of twice the rated mass, far off the flange, asks up to 2.4 times the rated torque of the wrist
-_EFFORT, _EFFORT_SHARE = 3.0, 0.01  # times the effort limit, in more than this share of the samples
-_NO_TORQUE = 1e-3  # [N·m]
-_FROZEN_TIME, _FROZEN_MOTION = 0.25, 0.1  # [s], [rad] without any change of torque: no sound sensor is so calm
-_MISFIT = 2.5  # plausible model errors
 
 
 def check_plausible(recording: Recording, arm: Arm) -> None:
@@ -68,7 +73,7 @@ def _check_radians(recording: Recording, arm: Arm) -> None:
     """Most rows outside the limits, several angles beyond a full turn, and none outside once taken as degrees."""
     q, beyond = recording.q, _beyond(recording.q, arm) > POSITION_TOLERANCE
     mostly_outside = np.mean(np.any(beyond, axis=1)) > 0.5
-    turns = np.sum(np.abs(q).max(axis=0) > _FULL_TURN + 0.5)
+    turns = np.sum(np.abs(q).max(axis=0) > DEGREES_FROM)
     if mostly_outside and turns >= min(2, arm.n) and np.all(_beyond(q / _DEGREE, arm) <= POSITION_TOLERANCE):
         k, j = np.unravel_index(int(np.argmax(np.abs(q))), q.shape)
         raise RecordingError(
@@ -96,9 +101,9 @@ def _beyond(q: NDArray[np.float64], arm: Arm) -> NDArray[np.float64]:
 
 def _check_jumps(recording: Recording, arm: Arm) -> None:
     step = np.diff(recording.t)[:, None]
-    speed = np.where(np.isfinite(arm.limits.velocity), arm.limits.velocity, _UNLIMITED_SPEED)
+    speed = np.where(np.isfinite(arm.limits.velocity), arm.limits.velocity, ANY_SPEED)
     jump = np.abs(np.diff(recording.q, axis=0))
-    bad = np.argwhere(jump > 2.0 * speed * step + _JUMP)
+    bad = np.argwhere(jump > SPEED * speed * step + JUMP)
     if len(bad):
         k, j = bad[0]
         wrap = " (a full turn: unwrap the angle)" if abs(jump[k, j] - _FULL_TURN) < 0.3 else ""
@@ -116,9 +121,9 @@ def _check_velocity_is_derivative(recording: Recording) -> None:
     change = recording.q[parts.last] - recording.q[parts.first]
     integral = integrals(recording, recording.dq, parts)
     size_q, size_dq = _rms(change), _rms(integral)
-    moves = np.maximum(size_q, size_dq) > _MOVES
-    difference = _rms(change - integral) / np.maximum(np.maximum(size_q, size_dq), _MOVES)
-    wrong = np.flatnonzero(moves & (difference > _NOT_DERIVATIVE))
+    moves = np.maximum(size_q, size_dq) > WINDOW_MOVES
+    difference = _rms(change - integral) / np.maximum(np.maximum(size_q, size_dq), WINDOW_MOVES)
+    wrong = np.flatnonzero(moves & (difference > NOT_DERIVATIVE))
     if len(wrong) == 0:
         return
     j = int(wrong[0])
@@ -157,30 +162,30 @@ def _why_not_derivative(change: NDArray, integral: NDArray, wrong: NDArray) -> s
 
 def _check_speed(recording: Recording, arm: Arm) -> None:
     limit = arm.limits.velocity
-    bad = np.argwhere(np.abs(recording.dq) > _SPEED * limit)
+    bad = np.argwhere(np.abs(recording.dq) > SPEED * limit)
     if len(bad):
         k, j = bad[0]
         degrees = np.all(np.percentile(np.abs(recording.dq), 99, axis=0) / _DEGREE < limit)
         unit = "; q and dq look like degrees" if degrees and len(bad) > 0.05 * len(recording) else ""
         raise RecordingError(
             f"{recording.source}: dq{j + 1} = {recording.dq[k, j]:.4g} rad/s at {_row(recording, k)} is more than "
-            f"{_SPEED:g} times the limit of {arm.joint_names[j]} ({limit[j]:.4g} rad/s): expected rad/s of "
+            f"{SPEED:g} times the limit of {arm.joint_names[j]} ({limit[j]:.4g} rad/s): expected rad/s of "
             f"{arm.name}{unit}"
         )
 
 
 def _check_effort(recording: Recording, arm: Arm) -> None:
     size = np.abs(recording.tau)
-    if recording.channel == "measured" and size.max() < _NO_TORQUE:
+    if recording.channel == "measured" and size.max() < NO_TORQUE:
         rows = np.linspace(0, len(recording) - 1, 20).round().astype(int)
         if np.abs(arm.torque(recording.q[rows])).max() > 1.0:
             raise RecordingError(
                 f"{recording.source}: tau is zero in all joints and rows although {arm.name} has weight to hold: "
                 "expected the measured joint torque in N·m, gravity included"
             )
-    beyond = size / arm.limits.effort > _EFFORT
+    beyond = size / arm.limits.effort > EFFORT
     share = beyond.mean(axis=0)
-    if np.any(share > _EFFORT_SHARE) or np.any(size > 10.0 * arm.limits.effort):
+    if np.any(share > EFFORT_SHARE) or np.any(size > EFFORT_EVER * arm.limits.effort):
         j = int(np.argmax((size / arm.limits.effort).max(axis=0)))
         k = int(np.argmax(size[:, j]))
         raise RecordingError(
@@ -196,7 +201,7 @@ def _check_torque_goes_on(recording: Recording) -> None:
     edges = np.diff(same.astype(int))
     for first, last in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
         time = recording.t[last] - recording.t[first]
-        if time > _FROZEN_TIME and np.any(np.ptp(recording.q[first : last + 1], axis=0) > _FROZEN_MOTION):
+        if time > FROZEN_TIME and np.any(np.ptp(recording.q[first : last + 1], axis=0) > FROZEN_MOTION):
             raise RecordingError(
                 f"{recording.source}: tau stays exactly the same in all joints from {_row(recording, first)} for "
                 f"{time:.2f} s although the arm moves: expected the torque of every moment; remove the rows"
@@ -206,7 +211,7 @@ def _check_torque_goes_on(recording: Recording) -> None:
 def _check_no_torque_is_dead(recording: Recording) -> None:
     """Refuse a torque that is exactly the same in all rows although its joint moves, beside others that are alive."""
     dead = np.ptp(recording.tau, axis=0) == 0.0
-    moves = np.ptp(recording.q, axis=0) > _FROZEN_MOTION
+    moves = np.ptp(recording.q, axis=0) > FROZEN_MOTION
     if np.any(dead & moves) and not np.all(dead):
         j = int(np.flatnonzero(dead & moves)[0])
         raise RecordingError(
@@ -230,7 +235,7 @@ def _check_torque_is_the_arms(recording: Recording, arm: Arm) -> None:
             f"{recording.source}: tau {what} the torque {arm.name} needs to carry itself: expected the measured joint "
             "torque in N·m, gravity included; check the robot, the unit, the torque channel and the base (--gravity)"
         )
-    if fit.misfit > _MISFIT:
+    if fit.misfit > MODEL_MISFIT:
         raise RecordingError(
             f"{recording.source}: tau does not fit {arm.name} with any payload (misfit {fit.misfit:.1f} times a sound "
             "robot's): expected a log of this robot; check the robot, the order of the joints and the base (--gravity)"

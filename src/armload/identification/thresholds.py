@@ -1,21 +1,91 @@
-"""The numbers that decide what is said of a log, each with its unit, its reason and where the evidence is."""
+"""The numbers that decide what is said of a log, each with its unit, its reason and where the evidence is.
+
+What half and twice each one would do to sound and to wrong logs: docs/constants.md.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.stats import chi2
 
-LOWEST_RATE = 20.0  # [Hz] of a log: below, a lag of 50 ms passes between two samples
-# standard deviations between what the log says and the nearest body: the truth of one sound log in a thousand lies
-# farther from what is found (`inertia.distance_to_body`)
+from armload.inertia import SHRINK
+from armload.regression.lag import GAIN
+
+# ---------------------------------------------------------------------- the answer, `identify_log.py`
+
+# [Hz] of a log: below, a whole lag of the regression passes between two samples
+# (test_only_measured_torque_at_a_useful_rate_is_taken)
+LOWEST_RATE = GAIN
+# [standard deviations] between what the log says and the nearest body: the truth of one sound log in a thousand lies
+# farther from what is found (`inertia.distance_to_body`; test_sound_logs_have_a_body_within_the_error_bars)
 MISFIT = float(np.sqrt(chi2.ppf(0.999, 10)))
-# rms of torque offsets over what is expected of an arm, by the side the torque is measured on: about 1 of most
-# simulated arms, more where friction holds the joints (motor currents). A base tilted by 30° is seen in 26 of 28
-# simulated logs, none of 138 sound ones (tests/identification/test_identify.py has one of each)
+# [of the expected offsets, rms] by the side the torque is measured on: about 1 of most simulated arms, more where
+# friction holds the joints (motor currents). A base tilted by 30° is seen in 26 of 28 simulated logs, none of 138 sound
+# ones (tests/identification/test_identify.py has one of each)
 LARGEST_OFFSETS = {"link": 5.0, "motor": 8.0}
-MOVES = 0.05  # [rad] a joint that stays within so much stands: friction below stiction holds it
-# a log that tells a parameter so many times worse under the weak prior leaves it to the learned one: the same factor by
-# which a parameter's interval must shrink to count as determined (`inertia.SHRINK`)
-LEANS = 3.0
-# between two squared distances, whether a tool was mounted at a tare: odds of 90 to 1, exp(9 / 2)
+# [rad] a joint that stays within so much stands: friction below stiction holds it
+MOVES = 0.05
+# times that a log tells a parameter worse under the weak prior: beyond, it leaves it to the learned one. The factor by
+# which a parameter's interval must shrink to count as determined
+LEANS = SHRINK
+# [squared standard deviations] between two distances, whether a tool was mounted at a tare: odds of 90 to 1, exp(9 / 2)
+# (test_where_the_tare_does_not_tell_of_the_tool_the_intervals_hold_both_cases)
 DECISIVE = 9.0
+# [rated payloads] a tool that weighs more is in grams, a payload that weighs more is none. Sound logs hold up to twice
+# the rated payload (test_simulated_logs_up_to_twice_the_rated_payload_pass)
+HEAVIEST = 3.0
+
+# ---------------------------------------------------------------------- units, columns and limits, `plausibility.py`
+
+# [rad] beyond the limits: descriptions round them (test_positions_outside_the_limits_are_refused_by_joint_and_row)
+POSITION_TOLERANCE = 0.05
+# [rad] hardly any joint goes beyond a full turn and a half radian: degrees
+DEGREES_FROM = 2.0 * np.pi + 0.5
+# [velocity limits] controllers stop an arm at one, degrees per second are 57 times too many
+# (test_too_fast_is_refused_by_joint_and_row)
+SPEED = 2.0
+# [rad/s] taken for the limit of a joint that has none: about twice the fastest joint of the catalogue's arms
+ANY_SPEED = 10.0
+# [rad] beyond what `SPEED` allows between two samples: a stamp that came late (test_poor_real_logs_pass)
+JUMP = 0.1
+# [rad] rms of a joint's motion within a window of 0.25 s: below, the joint stands, and what dq says is noise
+WINDOW_MOVES = 0.005
+# relative rms difference of ∫dq dt and the change of q: a lag of dq by 50 ms leaves 0.3 at 1 Hz
+# (test_wrong_units_and_columns_are_refused_by_name)
+NOT_DERIVATIVE = 0.5
+# [effort limits] in more than `EFFORT_SHARE` of the samples, or in one of a stream: a payload of twice the rated mass,
+# far off the flange, asks up to 2.4 times the rated torque of the wrist
+EFFORT = 3.0
+# share of the samples: single ones may be spikes of a sensor
+EFFORT_SHARE = 0.01
+# [effort limits] in any sample: no spike is so large, a torque in another unit is
+# (test_torque_in_wrong_units_or_of_a_wrong_channel_is_refused)
+EFFORT_EVER = 10.0
+# [N·m] in all joints and rows: no sensor is so calm
+NO_TORQUE = 1e-3
+# [s] without any change of torque: no sound sensor is so calm
+# (test_torque_that_stands_still_while_the_arm_moves_is_refused_by_row)
+FROZEN_TIME = 0.25
+# [rad] that a joint moves meanwhile: a standing arm's torque may well repeat where it is rounded
+FROZEN_MOTION = 0.1
+
+# ---------------------------------------------------------------------- the arm's own torque, `torque_scale.py`
+
+# [rated torques] rms of a model error. This and the next three are stated priors, wide enough for sound logs, simulated
+# and real, to pass (test_real_logs_pass)
+MODEL_ERROR = 0.03
+# [rated torques] standard deviation of an offset
+OFFSET = 0.05
+# [rated torques] standard deviation of gear friction, as motor currents show it
+FRICTION = 0.2
+# [rated torques] rms of what holds a joint at rest (test_friction_that_keeps_hold_of_resting_joints_is_no_wrong_robot)
+STICTION = 0.1
+# of the arm's own torque, what a sound log may show at least: 1 is a factor of 1.7 away
+# (test_the_torque_scale_is_one_for_the_arm_itself_and_the_factor_for_another)
+SCALE_LOW = 0.6
+# of the arm's own torque, what a sound log may show at most: the same factor (test_the_wrong_arm_or_base_is_refused)
+SCALE_HIGH = 1.7
+# [standard deviations] that the scale must be beyond either: one side of a normal 95 % interval
+SCALE_SURE = 2.0
+# [model errors] rms of what the arm's own torque leaves: a sound log's is about 1 by the meaning of `MODEL_ERROR`
+MODEL_MISFIT = 2.5

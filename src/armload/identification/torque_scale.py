@@ -20,17 +20,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import FRICTION_WIDTH, Arm, momentum_regressor, rated_effort, rated_mass
+from armload.identification.thresholds import (
+    FRICTION,
+    HEAVIEST,
+    MODEL_ERROR,
+    OFFSET,
+    SCALE_HIGH,
+    SCALE_LOW,
+    SCALE_SURE,
+    STICTION,
+)
 from armload.recording import Recording
 from armload.recording.windows import Windows, integrals, windows
+from armload.regression.prior import REACH
 
-_MOST_WINDOWS = 120
-_POINTS = 9  # model evaluations per window
-_MODEL_ERROR = 0.03  # of the rated torque, rms
-_OFFSET = 0.05  # of the rated torque
-_FRICTION = 0.2  # of the rated torque: gear friction as motor currents show it
-_STICTION = 0.1  # of the rated torque, of a joint at rest
-_LEVER = 0.15  # [m] of the payload's centre of mass and radius of gyration
-_LOW, _HIGH, _SURE = 0.6, 1.7, 2.0  # of the arm's own torque; standard deviations
+_MOST_WINDOWS = 120  # spread over the log: one factor needs no more, whatever the log's length
+_POINTS = 9  # model evaluations per window of 0.25 s: the trapezoidal rule errs by 0.3 % at 1 Hz
 
 
 class TorqueScale(NamedTuple):
@@ -43,16 +48,16 @@ class TorqueScale(NamedTuple):
     @property
     def is_wrong(self) -> bool:
         """Whether s is surely beyond what a sound log of the arm shows."""
-        return self.scale + _SURE * self.std < _LOW or self.scale - _SURE * self.std > _HIGH
+        return self.scale + SCALE_SURE * self.std < SCALE_LOW or self.scale - SCALE_SURE * self.std > SCALE_HIGH
 
     @property
     def is_negative(self) -> bool:
         """Whether s is surely below 0."""
-        return self.scale + _SURE * self.std < 0
+        return self.scale + SCALE_SURE * self.std < 0
 
     def contradicts(self, wrong: TorqueScale) -> bool:
         """Whether s is that of a sound log, and surely another than a wrong one that was seen before."""
-        return _LOW <= self.scale <= _HIGH and abs(self.scale - wrong.scale) > _SURE * float(
+        return SCALE_LOW <= self.scale <= SCALE_HIGH and abs(self.scale - wrong.scale) > SCALE_SURE * float(
             np.hypot(self.std, wrong.std)
         )
 
@@ -69,12 +74,12 @@ def torque_scale(recording: Recording, arm: Arm) -> TorqueScale | None:
     offset = np.broadcast_to(np.eye(n), (W, n, n))
     level = friction[:, :, None] * np.eye(n)
     A = np.concatenate([payload, offset, level], axis=2)  # (W, n, 10 + 2n)
-    mass = 3.0 * rated_mass(arm)
+    mass = HEAVIEST * rated_mass(arm)
     prior = np.concatenate(
-        [mass * np.r_[1.0, [_LEVER] * 3, [_LEVER**2] * 6], _OFFSET * rated, _FRICTION * rated]
+        [mass * np.r_[1.0, [REACH] * 3, [REACH**2] * 6], OFFSET * rated, FRICTION * rated]
     )  # standard deviations
     # a joint at rest is held by any friction below stiction: tanh knows nothing of it
-    noise = (rated * np.hypot(_MODEL_ERROR, _STICTION * (1.0 - np.minimum(moving, 1.0)))).ravel()
+    noise = (rated * np.hypot(MODEL_ERROR, STICTION * (1.0 - np.minimum(moving, 1.0)))).ravel()
     A = A.reshape(W * n, -1) * prior / noise[:, None]
     b, y = own.ravel() / noise, tau.ravel() / noise
 

@@ -6,10 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 Z95 = 1.959963984540054  # half-width of a normal 95 % interval, in standard deviations
-SHRINK = 3.0  # a parameter counts as determined if its half-width shrinks at least so much
-# for a method without a prior: 95 % half-width below 50 g, 5 g·m, 5e-3 kg·m²
+# times that a parameter's half-width must shrink to count as determined: nine tenths of what is known then come from
+# the log. A convention (test_undetermined_parameters_carry_the_interval_of_what_was_known_before)
+SHRINK = 3.0
+# [kg, kg·m, kg·m²] largest 95 % half-widths of what counts as determined, for a method without a prior: what a
+# controller needs of a payload. A convention
 SMALL = np.array([0.05] + [0.005] * 3 + [0.005] * 6)
-HELD = 3.0  # standard deviations of mass above zero before something counts as held
+# [standard deviations] of mass above zero before something counts as held: one empty arm in a thousand holds something
+# (test_an_empty_arm_holds_nothing_and_a_light_payload_is_held_with_a_tare)
+HELD = 3.0
 LIGHTEST_HELD = 1e-3  # [kg] less is nothing: a log that is compared with itself leaves so much of rounding
 
 

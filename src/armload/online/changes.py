@@ -24,17 +24,22 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-_WINDOWS = (16, 48)  # rows: 0.08 and 0.24 s
-LONGEST = max(_WINDOWS)
-_ALARM = 12.0  # ln of a payload's likelihood ratio over nothing, in either window
-_OVER_PUSH, _LATELY = 6.0, 3.0  # and over a push, there and in the short window
-_ROWS = 6  # in a row
-_CALM = 0.0  # ln of either ratio in the short window, where nothing is the matter any more
-_BODIES = np.array([0.2, 0.53, 1.33])  # sizes of a change, in a payload's own
-_PUSHES = np.array([0.02, 0.06, 0.2])  # of a push, in a joint's effort limit
-_COM, _GYRATION = 0.085, 0.06  # [m] of a body: its CoM's distance along each axis, radius of gyration; standard
-_LEVEL, _LOWEST, _FORGET = 2.0, 1.0, 0.05  # of the noise: to begin with, at least; share of a new window in its mean
-_OUTLIER = 8.0  # one window counts no more than so many times the level
+from armload.online.thresholds import (
+    ALARM,
+    ALARM_ROWS,
+    BODY_COM,
+    BODY_GYRATION,
+    BODY_SIZES,
+    CALM,
+    LEVEL,
+    LEVEL_OUTLIER,
+    LEVEL_SHARE,
+    LOWEST_LEVEL,
+    OVER_PUSH,
+    OVER_PUSH_LATELY,
+    PUSH_SIZES,
+    WINDOWS,
+)
 
 
 class Weighed(NamedTuple):
@@ -54,7 +59,7 @@ _NOTHING = Weighed(0.0, 0.0, np.zeros(10), 0)
 
 def body_root() -> NDArray[np.float64]:
     """R (10, 10) with R·Rᵀ = E[phi·phiᵀ] of a body of 1 kg somewhere about the flange, turned any way."""
-    c, k = _COM**2, 2.0 * _COM**2 + _GYRATION**2
+    c, k = BODY_COM**2, 2.0 * BODY_COM**2 + BODY_GYRATION**2
     mean = np.array([1.0, 0.0, 0.0, 0.0, k, 0.0, 0.0, k, 0.0, k])
     P = np.outer(mean, mean) + np.diag([0.0, c, c, c, *(c * c * np.array([4.0, 1.0, 1.0, 4.0, 1.0, 4.0]))])
     moments = [4, 7, 9]
@@ -74,10 +79,10 @@ class ChangeDetector:
 
     def __init__(self, mass: float, effort: NDArray[np.float64]) -> None:
         self.root, self.effort = mass * body_root(), effort
-        n, longest = len(effort), max(_WINDOWS)
+        n, longest = len(effort), max(WINDOWS)
         self._A, self._b = np.zeros((longest, 10, 10)), np.zeros((longest, 10))
         self._N, self._B, self._h = np.zeros((longest, n)), np.zeros((longest, n)), np.zeros(longest)
-        self.level = _LEVEL
+        self.level = LEVEL
         self.reset()
 
     def reset(self) -> None:
@@ -100,7 +105,7 @@ class ChangeDetector:
             h: what the row stands for [s]. seen: (n, 12) as in `SequentialPosterior`. X: (n, ≥ 10) the row's regressor,
                 payload first. scale: (n,) what the row was multiplied by. mean, covariance: of phi before the row.
         """
-        longest = max(_WINDOWS)
+        longest = max(WINDOWS)
         k = self._count % longest
         sums = (self._A, self._b, self._N, self._B)
         _parts(seen, X, scale, self.root, mean, covariance, *(x[k] for x in sums))
@@ -108,28 +113,28 @@ class ChangeDetector:
         self._count += 1
         if self._count % longest == 0 and not self.suspicious:
             ratio = _loudness(self._N, self._B)
-            self.level += _FORGET * (min(ratio, _OUTLIER * self.level) - self.level)
-            self.level = max(self.level, _LOWEST)
+            self.level += LEVEL_SHARE * (min(ratio, LEVEL_OUTLIER * self.level) - self.level)
+            self.level = max(self.level, LOWEST_LEVEL)
         best, alarm, lately = None, False, False
         most = [-np.inf, -np.inf]  # of either ratio, in the short window and in all
-        for rows in _WINDOWS:
+        for rows in WINDOWS:
             if self._count < rows:
                 break
             delta = np.empty(10)
-            payload, push = _weigh(*sums, self._count, rows, self.level, self.effort, _BODIES, _PUSHES, delta)
-            alarm |= payload > max(_ALARM, push + _OVER_PUSH)
-            lately |= rows == _WINDOWS[0] and payload > push + _LATELY
-            most = [max(payload, push) if rows == _WINDOWS[0] else most[0], max(most[1], payload, push)]
+            payload, push = _weigh(*sums, self._count, rows, self.level, self.effort, BODY_SIZES, PUSH_SIZES, delta)
+            alarm |= payload > max(ALARM, push + OVER_PUSH)
+            lately |= rows == WINDOWS[0] and payload > push + OVER_PUSH_LATELY
+            most = [max(payload, push) if rows == WINDOWS[0] else most[0], max(most[1], payload, push)]
             if best is None or payload > best.payload:
                 best = Weighed(payload, push, self.root @ delta, rows)
         self._alarmed = self._alarmed + 1 if alarm and lately else 0
         self.last = best or _NOTHING
-        self.suspicious = most[1] > _ALARM or (self.suspicious and most[0] > _CALM)
-        return best if self._alarmed >= _ROWS else None
+        self.suspicious = most[1] > ALARM or (self.suspicious and most[0] > CALM)
+        return best if self._alarmed >= ALARM_ROWS else None
 
     def ratio(self, shift: NDArray[np.float64]) -> float:
         """ln of the likelihood ratio, over nothing, of phi having changed by just this (10,), in the short window."""
-        rows = min(self._count, _WINDOWS[0])
+        rows = min(self._count, WINDOWS[0])
         last = self._window(rows)
         x = np.linalg.solve(self.root, shift)
         return float(self._b[last].sum(axis=0) @ x - 0.5 * x @ self._A[last].sum(axis=0) @ x) / self.level
@@ -140,7 +145,7 @@ class ChangeDetector:
 
     def _window(self, rows: int) -> NDArray[np.intp]:
         """Where the last so many rows are kept."""
-        return (self._count - 1 - np.arange(rows)) % max(_WINDOWS)
+        return (self._count - 1 - np.arange(rows)) % max(WINDOWS)
 
 
 @njit(cache=True, nogil=True)

@@ -14,6 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from armload.arms import Arm
+from armload.identification.thresholds import DEGREES_FROM, EFFORT
 from armload.recording import GAP, Sample
 
 REASONS = (
@@ -25,15 +26,21 @@ REASONS = (
     "jump",  # joint angles that cannot have been reached since: swapped joints, a glitch of an encoder
 )
 _NOTHING, _NOT_FINITE, _IMPLAUSIBLE, _REPEATED, _LATE, _JUMPED = range(6)  # into them; sizes are looked at before
+# A stream cannot be mended and sent again: only what no arm can do is left out, wider than `identification.thresholds`
 _SLACK_POSITION = 0.5  # [rad] beyond a joint's limits
-_TIMES_VELOCITY, _TIMES_EFFORT = 3.0, 3.0  # beyond a joint's limits
-_ANY_VELOCITY, _ANY_EFFORT = 50.0, 1e4  # [rad/s], [N·m] where limits are unknown
-_JUMP, _JUMP_TIMES = 0.05, 1.5  # [rad] and, times the largest velocity, what a joint may move between two samples
-_BELIEVED = 0.1  # [s] after which an arm that stays where it jumped to is believed
-_CLOCK = 1.0  # [s] a time so far back is a clock that was set, not a late sample
-_PAUSE = 0.2  # [s] what a jump or a longer pause counts as: the filters start anew
-_TURN = 2.0 * np.pi + 0.5  # [rad] hardly any joint is beyond it: degrees
-ANY_TIME = 1e12  # [s] no clock shows more
+_TIMES_VELOCITY = 3.0  # times a joint's limit: a single sample may be a spike of a differentiated encoder
+_ANY_VELOCITY, _ANY_EFFORT = 50.0, 1e4  # [rad/s], [N·m] where limits are unknown: ten times the catalogue's and more
+# [rad] and, times the largest velocity, what a joint may move between two samples: stamps jitter by milliseconds
+# (test_swapped_joints_are_left_out). Compiled code holds most of these: change them in this file
+_JUMP, _JUMP_TIMES = 0.05, 1.5
+# [s] after which an arm that stays where it jumped to is believed: longer than a glitch of an encoder
+# (test_an_arm_that_is_elsewhere_after_a_pause_is_believed)
+_BELIEVED = 0.1
+# [s] a time so far back is a clock that was set, not a late sample
+# (test_a_clock_that_is_set_anew_costs_nothing_but_a_pause)
+_CLOCK = 1.0
+_PAUSE = 2.0 * GAP  # [s] what a jump or a longer pause counts as: more than a gap, so the filters start anew
+ANY_TIME = 1e12  # [s] no clock shows more: 30 000 years
 
 
 @dataclass
@@ -75,7 +82,7 @@ class Gate:
                 limits.position_low - _SLACK_POSITION,
                 limits.position_high + _SLACK_POSITION,
                 np.where(known, _TIMES_VELOCITY * limits.velocity, _ANY_VELOCITY),
-                np.where(bounded, _TIMES_EFFORT * limits.effort, _ANY_EFFORT),
+                np.where(bounded, EFFORT * limits.effort, _ANY_EFFORT),
                 np.where(known, _JUMP_TIMES * limits.velocity, _ANY_VELOCITY),
             ]
         )
@@ -166,7 +173,7 @@ class Gate:
         if abs(t) > ANY_TIME:
             return f"the time is {t:.3g} s"
         for k in np.flatnonzero((q < low) | (q > high)):
-            degrees = "; is it in degrees?" if np.abs(q).max() > _TURN else ""
+            degrees = "; is it in degrees?" if np.abs(q).max() > DEGREES_FROM else ""
             return f"position of joint {k + 1} is {q[k]:.4g} rad, beyond its limits{degrees}"
         for name, unit, x, most in (("velocity", "rad/s", dq, velocity), ("torque", "N·m", tau, effort)):
             for k in np.flatnonzero(np.abs(x) > most):

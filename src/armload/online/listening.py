@@ -6,11 +6,9 @@ import math
 from typing import Any
 
 from armload.online.gate import ANY_TIME, REASONS, Gate
+from armload.online.thresholds import BAD_IN_A_ROW, PAUSES_IN_A_ROW, SILENT
 
 UNUSED = "no sample could be used"  # how `trouble` begins while samples are left out one after the other
-_SILENT = 0.1  # [s] without a usable sample that are told,
-_IN_A_ROW = 50  # and bad samples, where their times are bad too
-_APART = 5  # pauses in a row, no two samples between them that belong together
 
 
 class Listening:
@@ -44,7 +42,7 @@ class Listening:
         if gate.health.pauses > self._pauses:
             self._pauses, self._apart = gate.health.pauses, self._apart + 1
             self._number, self.trouble = 0, None
-            if self._apart >= _APART and self._used is not None:
+            if self._apart >= PAUSES_IN_A_ROW and self._used is not None:
                 self.trouble = (
                     f"samples come {t - self._used:.3g} s apart: those farther apart than {gate.gap:g} s tell nothing; "
                     "are their times in seconds?"
@@ -71,8 +69,8 @@ class Listening:
             own = REASONS.index(gate.reason)
             self._before, self._told = tuple(c - (k == own) for k, c in enumerate(counts)), 0
         self._number += 1
-        tenths = int(self.ahead / _SILENT)
-        if tenths > self._told or self._number % _IN_A_ROW == 0:
+        tenths = int(self.ahead / SILENT)
+        if tenths > self._told or self._number % BAD_IN_A_ROW == 0:
             self._told = tenths
             most = max(range(len(REASONS)), key=lambda k: counts[k] - self._before[k])
             since = f" for {self.ahead:.1f} s" if tenths else ""

@@ -29,15 +29,13 @@ from armload.online.gate import Gate, Health, all_finite
 from armload.online.listening import Listening
 from armload.online.state import load_state, model_fingerprint, save_state
 from armload.online.step import MassStep
+from armload.online.thresholds import MOVING, RECENT, STANDS
 from armload.online.watch import PayloadWatch
 from armload.posterior import PosteriorLeastSquares
+from armload.posterior.map import PUBLISH
 from armload.recording import Recording, Sample
 from armload.regression import payload_prior_std
 
-_MOVING = 0.01  # [rad/s] of any joint, within the last so many seconds
-_RECENT = 0.5  # [s]
-_PUBLISH = 0.01  # [s] intervals and judgements are made anew at most this often
-_STANDS = 0.25  # [s] of rows that count for nothing: with what one pose counts, half a second at rest
 _STANDING = "standing: a change of payload is noticed only when the arm moves"
 _DOUBT = "samples that do not fit are left out: something pulls at the arm, or the payload is changing"
 
@@ -144,7 +142,7 @@ class OnlineIdentifier:
         self._stream.used(self._gate, float(t))
         if self._since is None:
             self._since = self._stream.clock
-        if sample.t - self._moved > 0.1 * _RECENT and np.abs(sample.dq).max() > _MOVING:
+        if sample.t - self._moved > 0.1 * RECENT and np.abs(sample.dq).max() > MOVING:
             self._moved = sample.t
         self._identify(sample)
         return self._said()
@@ -235,14 +233,14 @@ class OnlineIdentifier:
     def _identify(self, sample: Sample) -> None:
         run: Identifier = self._engine
         if self._watch is None:
-            estimate, fresh = run.update(sample), not 0.0 <= sample.t - self._published < _PUBLISH
+            estimate, fresh = run.update(sample), not 0.0 <= sample.t - self._published < PUBLISH
         else:
             known = self._watch.event
             estimate = self._watch.update(sample, self._held)
             if self._watch.event is not known:
                 self._noticed(sample.t)
             if estimate is None or self._watch.settling:
-                if self._watch.doubting and sample.t - self._published > _PUBLISH and _DOUBT not in self._notes:
+                if self._watch.doubting and sample.t - self._published > PUBLISH and _DOUBT not in self._notes:
                     self._notes = (*self._notes, _DOUBT)
                 return
             run = self._watch.answered
@@ -264,7 +262,7 @@ class OnlineIdentifier:
         elif run.fresh:
             row = run.stream.row
             if row is not None and row.h <= 0.0 and run is self._source and self._told > -np.inf:
-                return run.data_t - self._told > _STANDS
+                return run.data_t - self._told > STANDS
             self._told = run.data_t
         elif run is self._source:
             return False
@@ -306,7 +304,7 @@ class OnlineIdentifier:
 
     @property
     def _moving(self) -> bool:
-        return self._internal + self._stream.ahead - self._moved < _RECENT
+        return self._internal + self._stream.ahead - self._moved < RECENT
 
     def _said(self) -> OnlineEstimate:
         engine, watch, stream = self.engine, self._watch, self._stream

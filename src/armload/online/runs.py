@@ -6,13 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from armload.estimators import Estimate
+from armload.online.thresholds import SAME_RUN, TARE_FROM
 from armload.posterior import PosteriorLeastSquares
-
-_SAME = float(chi2.ppf(0.9, 4))  # of mass and first moments: nine of ten runs of the same payload lie within
-_REFERENCE = 3.0  # [s] an empty run must have lasted to be a tare: with less it knows the arm no better than the prior
 
 Gaussian = tuple[NDArray[np.float64], NDArray[np.float64]]
 
@@ -66,7 +63,7 @@ class Runs:
     def reference_for_next(self, held: bool) -> PosteriorLeastSquares | None:
         """The run that the next one takes for a tare: the empty arm's, if there was one for long enough."""
         run = self.current
-        if run.reference is None and not held and run.stream.seconds >= _REFERENCE:
+        if run.reference is None and not held and run.stream.seconds >= TARE_FROM:
             return run
         return run.reference
 
@@ -86,4 +83,4 @@ class Runs:
         if then is None:
             return False
         phi, covariance = (estimate.phi - then[0])[:4], (estimate.covariance + then[1])[:4, :4]
-        return bool(phi @ np.linalg.solve(covariance, phi) < _SAME)
+        return bool(phi @ np.linalg.solve(covariance, phi) < SAME_RUN)

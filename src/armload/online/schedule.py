@@ -5,7 +5,7 @@ from __future__ import annotations
 from armload.posterior.map import FAST
 from armload.regression.rows import SPACING
 
-_LATER = 2  # samples after a row: the row, the answer and the look at the innovations then fall on three samples
+_LATER = 2  # [samples] after a row: the row, the answer and the look at the innovations then fall on three samples
 
 
 class Deferred:

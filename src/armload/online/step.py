@@ -6,9 +6,8 @@ import numpy as np
 
 from armload.estimators import Identifier
 from armload.online.event import Event
+from armload.online.thresholds import STEP_STD
 from armload.posterior import PosteriorLeastSquares
-
-_KNOWN = 0.1  # standard deviation of the two masses, in a payload's own, below which a first guess is made better
 
 
 class MassStep:
@@ -46,7 +45,7 @@ class MassStep:
         if before is None:
             return None
         now, then = run.last, before.last
-        if float(np.hypot(now.std[0], then.std[0])) > _KNOWN * self._spread:
+        if float(np.hypot(now.std[0], then.std[0])) > STEP_STD * self._spread:
             return None
         if run.reference is before:
             return float(now.phi[0])

@@ -27,26 +27,32 @@ from typing import Any, Literal
 import numpy as np
 
 from armload.estimators import Estimate
-from armload.online.changes import LONGEST, ChangeDetector, Weighed
+from armload.online.changes import ChangeDetector, Weighed
 from armload.online.event import Event
 from armload.online.runs import Gaussian, Runs
 from armload.online.schedule import Deferred
+from armload.online.thresholds import (
+    BACK,
+    BACK_AFTER,
+    DECIDED,
+    FIRST_TARED,
+    FIRST_UNTARED,
+    KIND_FROM,
+    KIND_LATEST,
+    KIND_STD,
+    LEARNT,
+    LONGEST,
+    MOST_PASSING,
+    PASSING,
+    PATIENCE,
+    RETURN_STD,
+    RETURN_UNTIL,
+    TRANSIENT,
+)
 from armload.posterior import PosteriorLeastSquares
 from armload.posterior.stream import Worker
 from armload.recording import Sample
 from armload.regression import payload_prior_std
-
-_FIRST = (0.5, 2.0)  # [s] of a run before which no change is looked for, with a tare and without
-_TRANSIENT = 0.2  # [s] left out after a change: four times the lag of the regression
-_PASSING = 3.0  # [s] of a run not judged yet, below which it may have been a push: the run before it may come back
-_MOST_SHORT = 4  # of those in a row
-_JUDGED = (0.25, 1.5, 6.0)  # [s] of a new run: kinds are told from, at the latest; an old run comes back until
-_KNOWN, _SURE = 0.033, 0.01  # standard deviation of the mass, in a payload's own, for a kind and for an old run
-_DECIDED = 0.6  # [s] of rows that do not fit, in which a change shows
-_AGAIN = 0.05  # [s] of such rows shortly after a change, after which it may be over: a push has ended,
-_BACK = 6.0  # if ln of the likelihood ratio of what was held before, over what is held now, is above this
-_LEARNT, _PATIENCE = 10.0, 4.0  # [s] of a run that knows its arm; what it leaves out at most, others leave _DECIDED out
-
 
 Phase = Literal["following", "doubting", "settling"]
 FOLLOWING: Phase = "following"
@@ -161,7 +167,7 @@ class PayloadWatch:
             state.predict(row)  # loaded now, not in the middle of a change
         found = self._detector.take(row.h, state.seen, row.X, state.scale, *self._before_row)
         self._gaussian = (self.run, stream.answer())
-        if stream.seconds <= _FIRST[not stream.tares]:
+        if stream.seconds <= (FIRST_TARED if stream.tares else FIRST_UNTARED):
             return
         self._gave_up = self._gave_up and self._detector.suspicious
         if found is not None:
@@ -189,12 +195,12 @@ class PayloadWatch:
         seen, scale = stream.state.predict(row)
         found = detector.take(row.h, seen, row.X, scale, *self._before_row)
         since = sample.t - self._doubted_at
-        if found is not None and since < _DECIDED:
+        if found is not None and since < DECIDED:
             self._begin_change(sample, found, held)
-        elif self._judging and self._short_runs < _MOST_SHORT and since > _AGAIN and self._earlier_explains():
+        elif self._judging and self._short_runs < MOST_PASSING and since > BACK_AFTER and self._earlier_explains():
             self._begin_change(sample, detector.last, held)
-        knows_its_arm = bool(stream.tares) or stream.seconds > _LEARNT
-        self._gave_up = since > (_PATIENCE if knows_its_arm else _DECIDED)
+        knows_its_arm = bool(stream.tares) or stream.seconds > LEARNT
+        self._gave_up = since > (PATIENCE if knows_its_arm else DECIDED)
         if self.phase == DOUBTING and (self._gave_up or not detector.suspicious):
             self.phase = FOLLOWING
 
@@ -202,7 +208,7 @@ class PayloadWatch:
         """Whether what was held before the last change explains the last rows better than what is held now."""
         before = self._runs.payload_of(self._runs.previous)
         assert self._detector is not None
-        return before is not None and self._detector.ratio(before[0] - self._before_row[0]) > _BACK
+        return before is not None and self._detector.ratio(before[0] - self._before_row[0]) > BACK
 
     # ------------------------------------------------------------------ a change, and the run after it
 
@@ -210,12 +216,12 @@ class PayloadWatch:
         """A change: the next run is made beside the stream while the transient lasts."""
         assert self._detector is not None
         run = self.run
-        passing = self._judging and run.stream.seconds < _PASSING
+        passing = self._judging and run.stream.seconds < PASSING
         self._short_runs = self._short_runs + 1 if passing else 0
         self.event = Event("change", sample.t, sample.t - self._detector.seconds(found.rows), float(found.delta[0]))
         self._held_before, self._judging = held, False
         following = self._beside(self._made, run, self._runs.reference_for_next(held))
-        self._change, self.phase = _Change(sample.t + _TRANSIENT, passing, following), SETTLING
+        self._change, self.phase = _Change(sample.t + TRANSIENT, passing, following), SETTLING
 
     @staticmethod
     def _made(run: PosteriorLeastSquares, reference: PosteriorLeastSquares | None) -> PosteriorLeastSquares:
@@ -237,14 +243,14 @@ class PayloadWatch:
         """Say what the change was once the new run can tell, and take up the earlier run where it fits."""
         assert self.event is not None
         seconds, std = self.run.stream.seconds, float(estimate.std[0]) / self._unit
-        if seconds < _JUDGED[0]:
+        if seconds < KIND_FROM:
             return
-        self._judging = seconds <= _JUDGED[2]
-        if std <= _SURE and self._runs.is_earlier(estimate):
+        self._judging = seconds <= RETURN_UNTIL
+        if std <= RETURN_STD and self._runs.is_earlier(estimate):
             self._watch_anew(self._runs.go_back())
             self._judging = False
             self.event = replace(self.event, kind="return")
-        elif self.event.kind == "change" and (std <= _KNOWN or seconds > _JUDGED[1]):
+        elif self.event.kind == "change" and (std <= KIND_STD or seconds > KIND_LATEST):
             known = {(False, True): "grasp", (True, False): "release", (True, True): "swap"}
             kind = known.get((self._held_before, held))
             self.event = replace(self.event, kind=kind or ("grasp" if self.event.mass > 0 else "release"))

@@ -27,8 +27,9 @@ from armload.inertia import Z95
 from armload.posterior.evidence import Evidence
 from armload.posterior.payload_prior import MixturePosterior, MixturePrior
 
-COVERAGE = 0.95
-_KAPPA = (0.1, 1e3)  # range of the factor
+COVERAGE = 0.95  # share of intervals that hold: the convention of the field
+# range of the factor: a guard, where the bag is asked about traits unlike all it has seen
+_KAPPA = (0.1, 1e3)
 
 
 @dataclass(frozen=True, eq=False)

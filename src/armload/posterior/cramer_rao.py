@@ -30,13 +30,14 @@ from armload.posterior.solve import solve
 from armload.recording import Recording
 from armload.regression import Correction, GaussianPrior, JointFeatures, payload_prior_std
 from armload.regression.information import RegressionData
+from armload.regression.lag import GAIN
 from armload.regression.noise import SMOOTH, NoiseModel
+from armload.regression.prior import REACH
 from armload.regression.rows import REGRESSOR_RATE
 
-TIMES = (1.0, 3.0)  # [s] and the whole run
+TIMES = (1.0, 3.0)  # [s] and the whole run: those that tables of errors have
 _EARLIER = 0.95  # of the whole run: a time that is not worth a column of its own
 
-_LENGTH = 0.15  # [m] L of the condition number: the payload prior's reach
 _CHUNK = 4096  # samples at a time
 
 
@@ -120,7 +121,7 @@ def bound(
     features: JointFeatures | None = None,
     prior: GaussianPrior | None = None,
     mounted: ArrayLike | None = None,
-    gain: float = 20.0,
+    gain: float = GAIN,
     times: Sequence[float] | None = None,
 ) -> Bound:
     """The Bayesian Cramér–Rao bound of the ten parameters along a run.
@@ -281,7 +282,7 @@ def _add(data: RegressionData, log: Recording, rows: slice) -> None:
 
 def _condition(A: NDArray[np.float64], S: NDArray[np.float64]) -> float:
     """Condition number of the payload's regressor, from its information (n, 10, 10) and the noise (n,)."""
-    scale = np.array([1.0] + [_LENGTH] * 3 + [_LENGTH**2] * 6)
+    scale = np.array([1.0] + [REACH] * 3 + [REACH**2] * 6)
     values = np.linalg.eigvalsh(np.einsum("jab,j->ab", A, 1.0 / S) * np.outer(scale, scale))
     least = len(scale) * np.finfo(float).eps * values[-1]
     return float(np.sqrt(values[-1] / values[0])) if values[0] > least else np.inf

@@ -23,7 +23,9 @@ from armload.recording import Recording
 from armload.regression import JointFeatures, solution_prior_std
 from armload.regression.noise import SMOOTH
 
-_REMOVED = 0.1  # how likely it is, beforehand, that something was taken off
+# how likely it is, beforehand, that something was taken off since the tare: one log in ten. A stated prior; a removal
+# of some standard deviations says so by itself (test_what_was_taken_off_since_the_tare_is_negative)
+_REMOVED = 0.1
 
 
 class HybridIdentifier(PosteriorLeastSquares):

@@ -23,10 +23,14 @@ from armload.posterior.stream import StreamingPosterior
 from armload.recording import GAP, Recording, Sample
 from armload.regression import Correction, GaussianPrior, JointFeatures, payload_prior_std, solution_prior_std
 from armload.regression.information import RegressionData
+from armload.regression.lag import GAIN
 from armload.regression.noise import RIGID, SMOOTH, NoiseModel
 
-PUBLISH = 0.01  # [s] a live answer is at most so old: faster than a controller takes up a new payload
-FAST = 2.5e-3  # [s] samples that come closer than this share the work of a row and of an answer between them
+# [s] a live answer is at most so old, and judged so often: faster than a controller takes up a new payload
+# (test_an_answer_is_at_most_ten_milliseconds_old)
+PUBLISH = 0.01
+# [s] samples that come closer than this share the work of a row and of an answer between them: half of a row's spacing
+FAST = 2.5e-3
 
 
 class PosteriorLeastSquares(Identifier):
@@ -54,7 +58,7 @@ class PosteriorLeastSquares(Identifier):
     _same_motion: SameMotion | None = None
 
     def __init__(
-        self, arm: Arm, tare: Recording | None = None, gain: float = 20.0, prior: GaussianPrior | None = None
+        self, arm: Arm, tare: Recording | None = None, gain: float = GAIN, prior: GaussianPrior | None = None
     ) -> None:
         self.arm, self.gain, self.prior = arm, gain, prior
         self._weak = payload_prior_std(arm)
@@ -256,7 +260,7 @@ class SmoothPosteriorLeastSquares(PosteriorLeastSquares):
         self,
         arm: Arm,
         tare: Recording | None = None,
-        gain: float = 20.0,
+        gain: float = GAIN,
         prior: GaussianPrior | None = None,
         features: JointFeatures | None = None,
         same_motion: bool = False,

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armload.errors import ModelError
 
-_COMPONENTS = 12  # per family
+_COMPONENTS = 12  # per family: a container's loadings, a box's sizes and places; trained models hold them
 _FLOOR = np.array([2e-3] + [2e-4] * 3 + [2e-5] * 6)  # [kg, kg·m, kg·m²] no component is narrower than this
 
 

@@ -19,13 +19,19 @@ from armload.regression import GaussianPrior
 from armload.regression.information import RegressionData
 from armload.regression.noise import NoiseModel, share_of_noise, whole_noise
 
-# standard deviation of first moments and inertia per kilogram: bodies within about 20 cm of the frame's origin
-_REACH = np.array([0.2] * 3 + [0.2**2] * 6)  # [m, m²]
-_LIGHTEST = 0.02  # [kg]
-# Coulomb friction above this fraction of the effort limit: the torque is the motor's, not the link's
+# [m, m²] standard deviation of first moments and inertia per kilogram of what was mounted at a tare, so that its
+# moments follow from its mass: bodies within about 20 cm of the frame's origin, a gripper. A stated prior
+_REACH = np.array([0.2] * 3 + [0.2**2] * 6)
+_LIGHTEST = 0.02  # [kg] of it: an arm that is said to hold nothing has cables and screws
+# [effort limits] Coulomb friction, median over the joints, above which the torque is the motor's and not the link's:
+# the prior standard deviation of a link's (`regression.mismatch`), a UR10e's motor currents show five times as much
+# (test_gear_friction_in_the_torques_of_an_arm_that_nobody_knows_is_found_from_the_log)
 _MOTOR_SIDE = 0.01
-_GAIN_STD = {"link": 0.005, "motor": 0.02}  # torque calibration, 1 sigma; motor constants are known to a few per cent
-# prior rms of a joint's smooth functions, as fractions of its effort limit, and the weight of these figures
+# of the torque, standard deviation of its calibration by its side: sensors are calibrated to half a per cent, motor
+# constants known to a few per cent. Stated priors (test_the_torques_gain_widens_an_interval_by_its_own_share)
+_GAIN_STD = {"link": 0.005, "motor": 0.02}
+# [effort limits] prior rms of a joint's smooth functions of pose and of velocity: 0.2–0.6 % of two Pandas is left after
+# links, offsets and friction (`regression.features`); and the weight of these figures, in observations
 _POSE, _VELOCITY, _FEATURE_COUNT = 3e-3, 2e-3, 20.0
 
 

@@ -15,10 +15,8 @@ from numpy.typing import NDArray
 from armload.arms import Arm
 from armload.estimators import DifferenceLeastSquares
 from armload.recording import Recording
+from armload.recording.alignment import LEAST
 from armload.regression.rows import Rows
-
-# share of the run that a tare along the same motion has to show: with less the posterior has seen more than it
-_SHOWN = 0.5
 
 
 class Difference(NamedTuple):
@@ -64,7 +62,7 @@ class SameMotion:
             covariance: of the posterior (10, 10), to compare with.
         """
         elapsed = 0.0 if self._began is None else self._last - self._began
-        if not self._difference.seconds >= _SHOWN * elapsed > 0.0:
+        if not self._difference.seconds >= LEAST * elapsed > 0.0:
             return None
         found = self._difference._estimate(self._last)
         if np.any(np.diag(found.covariance) > np.diag(covariance)):

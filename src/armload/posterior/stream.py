@@ -29,15 +29,16 @@ from armload.posterior.sequential import SequentialPosterior
 from armload.posterior.solve import Solution, solve_to_go_on
 from armload.regression import Correction, GaussianPrior, JointFeatures
 from armload.regression.information import RegressionData
-from armload.regression.noise import NoiseModel, share_of_noise, whole_noise
+from armload.regression.lag import GAIN
+from armload.regression.noise import MOMENT, NoiseModel, share_of_noise, whole_noise
 from armload.regression.rows import REGRESSOR_RATE, FilteredRegression, Row, Rows
 
-_EARLY = 0.1  # [s] until then a slow residual shows one value: the posterior is made of all rows anew
-# rows after which the scales are found anew (0.1, 0.3, … 12 s), then every so many; and how many later they are adopted
+# [rows] after which the scales are found anew (0.1, 0.3, … 12 s): they change with the logarithm of the time. Then
+# every so many, 10 s, and how many later they are adopted, 0.1 s: the second thread takes 2 % of a core
 _REFITS = (20, 60, 100, 150, 200, 300, 400, 600, 800, 1200, 1600, 2400)
 _REFIT_EVERY, _ADOPTED = 2000, 20
-_CHUNK = 50  # rows handed over at once in between
-_LATE = 50  # rows that can be taken back, a quarter of a second: more than a change takes to be noticed
+_CHUNK = 50  # [rows] handed over at once in between: one matrix product of 0.25 s
+_LATE = 50  # [rows] that can be taken back, 0.25 s: those that `online.thresholds.LONGEST` asks for, and two more
 
 
 class Worker:
@@ -90,7 +91,7 @@ class StreamingPosterior:
         prior: GaussianPrior | None = None,
         tares: Sequence[RegressionData] = (),
         start: Scales | None = None,
-        gain: float = 20.0,
+        gain: float = GAIN,
         iterations: int = 5,
         same_motion: SameMotion | None = None,
     ) -> None:
@@ -153,7 +154,7 @@ class StreamingPosterior:
         if self._early is not None:
             self._early.append(row)
             self._early_is_old = True
-            if self.seconds >= _EARLY:
+            if self.seconds >= MOMENT:
                 self._from_early()
                 self._early = None
         else:

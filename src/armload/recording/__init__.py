@@ -3,11 +3,12 @@
 from armload.recording.alignment import Alignment, same_motion
 from armload.recording.copies import check_own_measurements, shared_samples
 from armload.recording.files import has_topics, read_recording, write_recording
-from armload.recording.recording import CHANNELS, GAP, Recording, Sample
+from armload.recording.recording import CHANNELS, GAP, JITTERED, Recording, Sample
 
 __all__ = [
     "CHANNELS",
     "GAP",
+    "JITTERED",
     "Alignment",
     "Recording",
     "Sample",

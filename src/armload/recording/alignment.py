@@ -16,16 +16,22 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armload.recording.recording import GAP, Recording
+from armload.recording.recording import GAP, JITTERED, Recording
 
-TOLERANCE = 0.1  # distance in q, relative to the motion's amplitude, below which two motions are the same
-LEAST = 0.5  # share of the run's path that has to be found in the other log
-_RATE = 50.0  # [Hz] at which positions are compared
-_WINDOWS = (0.5, 1.0, 2.0, 4.0)  # [s] the shortest of these in which the arm moves is looked up
-_MOVES = 0.05  # [rad] rms amplitude of a window that can be looked up
-_EVERY = 0.09  # [s] between two searches
+# of the motion's amplitude, distance in q below which two motions are the same: controllers under a payload part by
+# milliradians, other motions by their amplitude
+# (test_another_motion_standing_still_and_another_arm_are_not_the_same_motion)
+TOLERANCE = 0.1
+# share of a run that a tare along the same motion has to show: with less the posterior, which takes all of the run, has
+# seen more than the difference
+LEAST = 0.5
+_RATE = 50.0  # [Hz] at which positions are compared: they hold nothing above a few hertz
+# [s] the shortest of these in which the arm moves is looked up: the shorter, the sooner a live run is found
+_WINDOWS = (0.5, 1.0, 2.0, 4.0)
+_MOVES = 0.05  # [rad] rms amplitude of a window that can be looked up: with `TOLERANCE`, 5 mrad, a controller's error
+_EVERY = 0.09  # [s] between two searches, one in ten a second on clocks that jitter: each costs a correlation
 _TIE = 2e-3  # [rad] lags whose rms distances differ by no more are equally good: the earliest has most to follow
-_EDGE = 1e-3  # [s] by which a sample may lie beyond the other log's ends
+_EDGE = 1e-3  # [s] by which a sample may lie beyond the other log's ends: shifts are found to 0.1 ms, clocks jitter
 
 
 class Piece(NamedTuple):
@@ -173,7 +179,7 @@ def align(run: Recording, tare: Recording, tolerance: float = TOLERANCE) -> Alig
     """
     rows, last = [], -np.inf
     for k, now in enumerate(run.t):
-        if now - last >= 0.9 / _RATE:
+        if now - last >= JITTERED / _RATE:
             rows.append(k)
             last = now
     tracker = MotionTracker(tare, tolerance)

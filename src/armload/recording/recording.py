@@ -14,6 +14,7 @@ from armload.errors import RecordingError
 # What a torque column can mean; "measured" is the contract: rigid body + friction, gravity included.
 CHANNELS = ("measured", "desired", "external")
 GAP = 0.1  # [s] a longer pause between samples ends whatever has a memory of those before it
+JITTERED = 0.9  # of a rate's sample time, after which the next sample of that rate is due: clocks jitter
 
 
 class Sample(NamedTuple):

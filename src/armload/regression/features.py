@@ -20,10 +20,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-_LENGTH_SCALES = (0.7, 0.9, 1.1, 1.3, 1.5)  # [rad]
-_SLOW = 0.03  # [rad/s] where the stretched velocity turns from linear to logarithmic
-_VELOCITY_SCALE = 1.0  # length scale over the stretched velocity
-_SEED = 2024
+# [rad] of the pose, mixed, as nobody knows the one of an arm. Stated priors
+# (test_pose_features_have_the_kernel_of_a_gaussian_process)
+_LENGTH_SCALES = (0.7, 0.9, 1.1, 1.3, 1.5)
+_SLOW = 0.03  # [rad/s] where the stretched velocity turns from linear to logarithmic: half of the friction's width
+# length scale over the stretched velocity: friction bends once within a factor of e in speed
+# (test_velocity_features_span_friction_of_any_shape)
+_VELOCITY_SCALE = 1.0
+_SEED = 2024  # of the waves, which a trained model's widths were calibrated with: never another
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,15 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.regression.block_means import BlockMeans
+from armload.regression.block_means import BLOCK, BlockMeans
 from armload.regression.features import JointFeatures
 from armload.regression.mismatch import Correction
 from armload.regression.rows import REGRESSOR_RATE, FilteredRegression, Rows
 
-_PRIOR_COUNT = 4.0  # weight of the prior long-run variance, in blocks
-# [s] a mismatch that is a function of the configuration does not average away on similar motions
+# [blocks] weight of the prior long-run variance: of so few values a variance is known to 70 % only
+_PRIOR_COUNT = 4.0
+# [s] beyond which more time counts no more: a mismatch that is a function of the configuration does not average away on
+# similar motions (real logs; test_a_mismatch_that_repeats_does_not_average_out_in_the_rigid_model)
 NOVELTY = 10.0
 
 
@@ -33,7 +35,7 @@ class RegressionData:
     """
 
     def __init__(
-        self, correction: Correction, gain: float, features: JointFeatures | None = None, block: float = 1.0
+        self, correction: Correction, gain: float, features: JointFeatures | None = None, block: float = BLOCK
     ) -> None:
         self.correction, self.gain = correction, gain
         arm = correction.arm

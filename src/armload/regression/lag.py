@@ -6,6 +6,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+# λ [1/s], a lag of 50 ms: slow against the joints' vibration (15 Hz and more) and the sensors' skew, fast against the
+# motion and a change of payload. What the lag takes from r it takes from W, exactly: the choice costs noise, no bias
+GAIN = 20.0
+
 
 @njit(cache=True)
 def _lag(u: NDArray, h: NDArray, gain: float, state: NDArray, last: NDArray) -> NDArray:

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from armload.regression.block_means import BLOCK
 from armload.regression.information import NOVELTY
 from armload.regression.mismatch import Correction
 from armload.regression.rows import REGRESSOR_RATE
 
-# [s] a run shorter than this sees one value of a residual that changes slowly: its mean does not grow with 1/T
-_MOMENT = 0.1
+# [s] a run shorter than this sees one value of a residual that changes slowly: its mean does not grow with 1/T. Two
+# lags; until then a stream's posterior is made of all rows anew
+MOMENT = 0.1
 
 
 @dataclass(frozen=True)
@@ -37,18 +39,19 @@ class NoiseModel:
     overrated: float = 1.0
 
 
-# without features, the smooth mismatch is in the residual: it is large and repeats
-RIGID = NoiseModel(residual=4e-3, block=1.0, floor=False, novelty=NOVELTY)
+# without features, the smooth mismatch is in the residual: it is large and repeats: 0.2–0.6 % of the effort limit of
+# two Pandas over a block
+RIGID = NoiseModel(residual=4e-3, block=BLOCK, floor=False, novelty=NOVELTY)
 # what is left repeats all the same: errors hardly fall after half a minute (`benchmarks/long_logs.py`), nor may the
 # information grow for days, until its digits are gone
 SMOOTH = NoiseModel(residual=1e-3, block=0.25, floor=True, novelty=60.0, overrated=2.25)
 
 
 def whole_noise(correction: Correction, noise: NoiseModel) -> NDArray[np.float64]:
-    """S (n,) that is expected of a run of `_MOMENT` or more, before anything is seen [N²·m²·s]."""
+    """S (n,) that is expected of a run of `MOMENT` or more, before anything is seen [N²·m²·s]."""
     return (noise.residual * correction.effort) ** 2 * noise.block
 
 
 def share_of_noise(seconds: float) -> float:
     """The fraction of `whole_noise` that a run of so many seconds shows."""
-    return min(1.0, max(seconds, 1.0 / REGRESSOR_RATE) / _MOMENT)
+    return min(1.0, max(seconds, 1.0 / REGRESSOR_RATE) / MOMENT)

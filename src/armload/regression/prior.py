@@ -16,14 +16,19 @@ from armload.arms import Arm, rated_mass
 from armload.errors import IdentificationError
 from armload.inertia import InertialParameters
 
-_SHRINK = 0.05  # share of the diagonal in the covariance: few payloads say little about correlations
+_SHRINK = 0.05  # share of the diagonal in the covariance: few payloads say little about correlations. A stated prior
 _FLOOR = np.array([5e-3] + [5e-4] * 3 + [5e-5] * 6)  # [kg, kg·m, kg·m²] no family is known better than this
+# standard deviations of the weak prior, of what the arm is rated for and [m] from the flange: a rated payload at the
+# length of a gripper and a box. Stated priors
+_LOAD, REACH = 0.5, 0.15
+# times that, with which solutions are computed: a parameter that counts as determined (`inertia.SHRINK`) is then
+# drawn by 1 / (3 · 4)² of its value at most, 0.7 %
 _WIDE = 4.0
 
 
 def payload_prior_std(arm: Arm) -> NDArray[np.float64]:
     """Standard deviation (10,) of the weak payload prior: half of `rated_mass`, 15 cm from the flange."""
-    return 0.5 * rated_mass(arm) * np.array([1.0] + [0.15] * 3 + [0.15**2] * 6)
+    return _LOAD * rated_mass(arm) * np.array([1.0] + [REACH] * 3 + [REACH**2] * 6)
 
 
 def solution_prior_std(arm: Arm) -> NDArray[np.float64]:

@@ -27,13 +27,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
 from armload.arms.momentum_row import MomentumRow, momentum_rows
-from armload.recording import GAP
+from armload.recording import GAP, JITTERED
 from armload.regression.features import JointFeatures, features_of_sample
+from armload.regression.lag import GAIN
 from armload.regression.mismatch import FRICTION_WIDTH, Correction
 
 REGRESSOR_RATE = 200.0  # [Hz] rows are made no more often where a rate is set: they hold nothing above a few hertz
-SPACING = 0.9 / REGRESSOR_RATE  # [s] between rows at least: clocks jitter
-_STILL = 1e-3  # [rad] an arm that stays so near shows one value of its stiction: more of it tells nothing new
+SPACING = JITTERED / REGRESSOR_RATE  # [s] between rows at least
+# [rad] an arm that stays so near shows one value of its stiction: more of it tells nothing new. Above what encoders and
+# a controller at rest show (test_a_pose_of_a_standing_arm_counts_no_longer_than_it_settles)
+_STILL = 1e-3
 
 
 class Row(NamedTuple):
@@ -83,7 +86,7 @@ class FilteredRegression:
     def __init__(
         self,
         arm: Arm,
-        gain: float = 20.0,
+        gain: float = GAIN,
         mismatch: Correction | None = None,
         features: JointFeatures | None = None,
         rate: float | None = None,

@@ -1,0 +1,463 @@
+"""What half and twice each tuned constant would do to streams with changes of payload, and to sound and wrong logs.
+
+    python benchmarks/sensitivity.py [--only ALARM,TRANSIENT] [--parts streams,logs] [--page]
+
+The constants are those of `online/thresholds.py` that decide about changes, of `identification/thresholds.py`, and
+three of the posterior. Each is set to half and to double, all others as they are; CALM, which is 0, to −3 and 3.
+
+streams    10 scenes of 7–12 s at 250 and 500 Hz with the hybrid: payloads grasped, released, swapped, taken up again,
+           two of 0.2 kg, pushes at the flange, an arm that nothing happens to, a UR10e with motor torque. Real-like
+           arms (`World.real_like`). What is called a change, late or false is as in events.py.
+logs       16 sound logs of 4 s, and 8 that something is wrong with: a base tilted by 30°, the torque sign of a joint
+           turned, a tool taken off since the tare, motor torque of an arm that nobody knows. All go through `identify`.
+
+"nothing" means that all answers are the same bit for bit, notes included. Written to docs/constants.md and
+benchmarks/results/sensitivity.json, where a part that was not asked for keeps what was measured of it before; --page
+writes the page alone, from the committed result. `cpu_s` says what a run of which parts took.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import re
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from events import Push, _step, matched, watched
+from threadpoolctl import threadpool_limits
+
+import armload
+from armload import Recording, __version__, arm
+from armload.devices import Simulator
+from armload.errors import ArmloadError
+from armload.identification import identify
+from armload.inertia import InertialParameters
+from armload.motion import random_motion
+from armload.online import OnlineIdentifier
+from armload.payloads import Payload, draw_payload
+from armload.simulation import Sensors, World, simulate
+
+HERE = Path(__file__).resolve().parent
+RESULT, PAGE = HERE / "results" / "sensitivity.json", HERE.parent / "docs" / "constants.md"
+MARKS = "<!-- table: benchmarks/sensitivity.py -->", "<!-- end -->"
+SEED = 70_000
+GROUPS = {  # home → constants, None: all; what they are tried on
+    "online.thresholds": (r"(?s)# -+ the detector.*(?=# -+ notes)", ("streams",)),
+    "identification.thresholds": (r"(?s).*", ("logs",)),
+    "posterior.problem": (r"(?m)(^#.*\n)*^(_MOTOR_SIDE|_GAIN_STD) = .*\n", ("streams", "logs")),
+    "posterior.hybrid": (r"(?m)(^#.*\n)*^_REMOVED = .*\n", ("streams", "logs")),
+}
+NOT_VARIED = ("LONGEST", "STEP_STD")  # the largest of WINDOWS; decides on a word about a change that was noticed
+
+
+# ---------------------------------------------------------------------- the constants, and how to set them
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A constant of a module, its unit and its reason as the comment above it says."""
+
+    home: str
+    name: str
+    unit: str
+    reason: str
+    on: tuple[str, ...]
+
+    @property
+    def value(self) -> Any:
+        return getattr(importlib.import_module(f"armload.{self.home}"), self.name)
+
+    def times(self, factor: float) -> Any:
+        """Its value times 0.5 or 2; of 0, −3 or 3."""
+        return _times(self.value, factor)
+
+
+def _times(value: Any, factor: float) -> Any:
+    if isinstance(value, dict):
+        return {key: _times(x, factor) for key, x in value.items()}
+    if isinstance(value, tuple):
+        return tuple(_times(x, factor) for x in value)
+    if isinstance(value, int):
+        return max(int(value * factor), 1)
+    if isinstance(value, float) and value == 0.0:
+        return 3.0 if factor > 1.0 else -3.0
+    return value * factor
+
+
+def constants() -> list[Constant]:
+    """All of them, in the order of the source; the comment above each is its unit and reason."""
+    out = []
+    for home, (part, on) in GROUPS.items():
+        text = (Path(armload.__path__[0]) / f"{home.replace('.', '/')}.py").read_text(encoding="utf-8")
+        for found in re.finditer(part, text):
+            for block in re.finditer(r"((?:^#.*\n)+)^(\w+) = ", found[0], re.MULTILINE):
+                said = " ".join(line.lstrip("# ") for line in block[1].splitlines())
+                unit, reason = re.fullmatch(r"(?:\[(.*?)\] )?(.*)", said).groups()  # type: ignore[union-attr]
+                if block[2] not in NOT_VARIED:
+                    out.append(Constant(home, block[2], unit or "–", reason, on))
+    return out
+
+
+@contextmanager
+def set_to(constant: Constant, value: Any) -> Iterator[None]:
+    """Every module that took the constant from its home has another value of it for a while."""
+    before = constant.value
+    change = {constant.name: (before, value)}
+    if constant.name == "WINDOWS":
+        change["LONGEST"] = (max(before), max(value))
+    places = [
+        (module, name, old, new)
+        for name, (old, new) in change.items()
+        for key, module in list(sys.modules.items())
+        if key.startswith("armload.") and vars(module).get(name) is old
+    ]
+    for module, name, _, new in places:
+        setattr(module, name, new)
+    try:
+        yield
+    finally:
+        for module, name, old, _ in places:
+            setattr(module, name, old)
+
+
+# ---------------------------------------------------------------------- streams
+
+
+@dataclass(frozen=True)
+class Stream:
+    """The samples of a scene, what was held from when, the pushes, and a tare if there is one."""
+
+    name: str
+    robot: str
+    log: Recording
+    held: list[tuple[float, Any]]
+    pushes: list[Push]
+    tare: Recording | None
+
+
+def streams() -> list[Stream]:
+    """All scenes; each is another arm."""
+    light, box, other = (Payload(f"{m} kg", body(m, k)) for k, m in enumerate((0.2, 1.2, 0.7)))
+    flange = [Push(4.5, 5.5, "panda_link8", np.array([25.0, -20.0, 15.0]))]
+    long = [Push(4.0, 7.0, "panda_link8", np.array([-10.0, 30.0, 40.0]))]
+    return [
+        scene("release", 250, 8, [(-1, box), (4, None)]),
+        scene("swap", 250, 9, [(-1, None), (3.5, box), (6.5, other)]),
+        scene("grasp, release, the same again", 250, 12, [(-1, None), (3, box), (6, None), (9, box)], tared=True),
+        scene("grasp and release in a hurry", 250, 8, [(-1, None), (3.5, other), (5, None), (6, box)]),
+        scene("light", 250, 7, [(-1, None), (4, light)], tared=True),
+        scene("light, no tare", 500, 8, [(-1, None), (6, light)]),
+        scene("nothing happens", 250, 8, [(-1, None)]),
+        scene("push, loaded", 250, 8, [(-1, None), (2.5, other)], flange),
+        scene("long push, after a tare", 250, 9, [(-1, None)], long, tared=True),
+        scene("UR10e", 250, 8, [(-1, None), (4.5, Payload("4 kg", body(4.0, 3)))], robot="ur10e"),
+    ]
+
+
+def scene(
+    name: str,
+    rate: float,
+    seconds: float,
+    held: list[tuple[float, Any]],
+    pushes: list[Push] = [],  # noqa: B006 - never changed
+    tared: bool = False,
+    robot: str = "panda",
+) -> Stream:
+    """Simulate one."""
+    seed = SEED + int(np.frombuffer(name.encode(), np.uint8).sum())
+    known = arm(robot)
+    how = {"world": World.real_like(known, seed), "sensors": _sensors(known), "rate": float(rate)}
+    motion = random_motion(known, seed)
+    source = Simulator(known, motion, held, speed=None, duration=float(seconds), seed=seed, **how)
+    log = Recording(*map(np.array, zip(*source, strict=True)))  # type: ignore[arg-type]
+    tau = log.tau.copy()
+    for push in pushes:
+        part = (log.t >= push.start) & (log.t <= push.end)
+        tau[part] += push.torque(log.t[part], log.q[part])
+    tare = simulate(known, random_motion(known, seed + 1, duration=10.0, harmonics=8), None, seed=seed, **how)
+    return Stream(name, robot, Recording(log.t, log.q, log.dq, tau), held, pushes, tare if tared else None)
+
+
+def _sensors(known: Any) -> Sensors:
+    """As measured on a Panda, or of any arm."""
+    return Sensors.panda(known) if known.n == 7 else Sensors.generic(known)
+
+
+def body(mass: float, seed: int) -> InertialParameters:
+    """A body of that mass [kg]: a random one, made heavier or lighter."""
+    drawn = draw_payload("boxes", seed, 3.0).parameters
+    return InertialParameters(drawn.phi * (mass / drawn.mass))
+
+
+def on_streams(scenes: list[Stream]) -> tuple[dict[str, Any], list[bytes]]:
+    """What is measured over all scenes, and each scene's answers."""
+    steps, alarms, called, kept, answers = [], 0, 0, 0, []
+    for stream in scenes:
+        found = watched(OnlineIdentifier(arm(stream.robot), stream.tare), stream.log)
+        own, rest = matched([_step(k, stream.held, found) for k in range(1, len(stream.held))], found.events)
+        steps += own
+        for push in stream.pushes:
+            events = [e for e in rest if push.start <= e["t"] <= push.end + 3.0]
+            rest = [e for e in rest if e not in events]
+            called += bool(events)
+            kept += bool(events) and events[-1]["kind"] != "return"
+        alarms += len(rest)
+        answers.append(json.dumps(found.events).encode() + found.said.tobytes())
+    delays = np.array([np.inf if s["delay"] is None else s["delay"] for s in steps])
+    error, half = (np.array([s[key][1] for s in steps]) for key in ("error", "half_width"))
+    back = [s["said"] == s["kind"] or (s["back"] and s["said"] == "return") for s in steps]
+    return {
+        "missed": int(np.sum(delays > 1.0)),
+        "false": alarms,
+        "delay": round(float(np.median(delays)), 3),
+        "wrong kind": int(len(steps) - np.sum(back)),
+        "error": round(1e3 * float(np.mean(np.abs(error))), 1),
+        "half-width": round(1e3 * float(np.mean(half)), 1),
+        "outside": int(np.sum(np.abs(error) > half)),
+        "pushes called": called,
+        "pushes kept": kept,
+    }, answers
+
+
+# ---------------------------------------------------------------------- logs
+
+
+@dataclass(frozen=True)
+class Log:
+    """A log for `identify`, what it is told, and the truth; wrong: what an answer should not be sure of."""
+
+    robot: Any
+    log: Recording
+    told: dict[str, Any]
+    truth: np.ndarray
+    wrong: bool
+
+
+def logs(folder: Path) -> list[Log]:
+    """All logs; each is another arm."""
+    stranger = arm(_strange("panda", folder), "panda_link8"), arm(_strange("ur5e", folder), "tool0")
+    out = [logged("panda", k, mass) for k, mass in enumerate((0.0, 0.2, 0.7, 1.5, 6.0))]
+    out += [logged("panda", 5 + k, mass, tared=True) for k, mass in enumerate((0.0, 0.2, 0.7, 2.5))]
+    out += [logged("ur10e", 9 + k, mass, tared=k > 1) for k, mass in enumerate((0.0, 4.0, 3.0))]
+    out += [logged(stranger[0], 12 + k, mass) for k, mass in enumerate((0.5, 2.0))]
+    out += [logged("panda", 14 + k, 0.7, tared=True, tool=0.5, mounted=bool(k)) for k in range(2)]
+    for k, robot in enumerate(("panda", "ur10e")):
+        tilted = (0.0, 9.81 * np.sin(np.pi / 6.0), -9.81 * np.cos(np.pi / 6.0))
+        one = logged(robot, 16 + k, 1.0)
+        out.append(replace(one, robot=arm(robot, gravity=tilted), wrong=True))
+    for k, joint in enumerate((1, 4)):
+        one = logged("panda", 18 + k, 1.0)
+        sign = np.where(np.arange(one.log.n) == joint, -1.0, 1.0)
+        turned = Recording(one.log.t, one.log.q, one.log.dq, one.log.tau * sign)
+        out.append(replace(one, log=turned, wrong=True))
+    for k, mass in enumerate((0.3, 0.8)):
+        one = logged("panda", 20 + k, 0.0, tared=True, left=mass)
+        out.append(replace(one, wrong=True))
+    for k, mass in enumerate((1.0, 3.0)):
+        out.append(replace(logged(stranger[1], 22 + k, mass, motor=True), wrong=True))
+    return out
+
+
+def _strange(name: str, folder: Path) -> Path:
+    """The file of an arm that nobody knows: another's, all links 1 % heavier."""
+    text = re.sub(r'mass value="([\d.e+-]+)"', lambda m: f'mass value="{1.01 * float(m[1])}"', arm(name).urdf)
+    path = folder / f"like_{name}.urdf"
+    path.write_text(text)
+    return path
+
+
+def logged(
+    robot: Any,
+    k: int,
+    mass: float,
+    tared: bool = False,
+    tool: float = 0.0,
+    mounted: bool = False,
+    left: float = 0.0,
+    motor: bool = False,
+) -> Log:
+    """Simulate one; tool: known, in the tare too if `mounted`; left: mass [kg] of what only the tare holds."""
+    known, seed = arm(robot) if isinstance(robot, str) else robot, SEED + 500 + k
+    world = World.real_like(replace(known, motor_torque=True) if motor else known, seed)
+    how = {"world": world, "sensors": _sensors(known), "rate": 250.0}
+    carried, held = np.zeros(10) if mass == 0.0 else body(mass, k).phi, InertialParameters(np.zeros(10))
+    told: dict[str, Any] = {}
+    if tool:
+        told["tool"] = body(tool, 7)
+    with_tool = carried + (told["tool"].phi if tool else 0.0)
+    before = body(left, k) if left else told["tool"] if mounted else held
+    if tared:
+        other = random_motion(known, seed + 100, duration=6.0, harmonics=6)
+        told["tare"] = simulate(known, other, before if before.mass else None, seed=seed + 100, **how)
+    now = InertialParameters(with_tool) if np.any(with_tool) else None
+    log = simulate(known, random_motion(known, seed, duration=4.0), now, seed=seed, **how)
+    return Log(known, log, told, carried - (before.phi if left else 0.0), False)
+
+
+def on_logs(all_logs: list[Log]) -> tuple[dict[str, Any], list[bytes]]:
+    """What is measured over all logs, and each log's answer."""
+    answers, found = [], []
+    for one in all_logs:
+        try:
+            answer: Any = identify(one.log, one.robot, **one.told)
+            answers.append(json.dumps([answer.to_dict(), answer.notes]).encode())
+        except ArmloadError as error:
+            answer = None
+            answers.append(str(error).encode())
+        found.append((one, answer))
+    sound = [(one, a) for one, a in found if not one.wrong and a is not None]
+    wrong = [(one, a) for one, a in found if one.wrong]
+    doubts = ("no body fits", "as far off", "taken off", "mass is negative")
+    told = {id(a): any(word in note for note in a.notes for word in doubts) for _, a in found if a is not None}
+    inside = [(a.phi_low <= one.truth) & (one.truth <= a.phi_high) for one, a in _arrays(sound)]
+    return {
+        "refused": sum(not one.wrong and a is None for one, a in found),
+        "doubted": sum(told[id(a)] for _, a in sound),
+        "error": round(1e3 * float(np.median([abs(a.mass - one.truth[0]) for one, a in sound])), 1),
+        "half-width": round(1e3 * float(np.median([(a.phi_high[0] - a.phi_low[0]) / 2.0 for _, a in sound])), 1),
+        "inside": round(100.0 * float(np.mean(inside)), 1),
+        "calibrated": sum(a.interval == "calibrated" for _, a in sound),
+        "leaning": sum(any("rest on" in note for note in a.notes) for _, a in sound),
+        "wrong ones told": sum(a is None or told[id(a)] for _, a in wrong),
+        "wrong ones inside": sum(
+            bool(a is not None and a.phi_low[0] <= one.truth[0] <= a.phi_high[0]) for one, a in wrong
+        ),
+    }, answers
+
+
+def _arrays(found: list[tuple[Log, Any]]) -> Iterator[tuple[Log, Any]]:
+    for one, answer in found:
+        yield one, replace(answer, phi_low=np.array(answer.phi_low), phi_high=np.array(answer.phi_high))
+
+
+# ---------------------------------------------------------------------- the page
+
+
+def table(result: dict[str, Any]) -> str:
+    """The table, and what it is a difference to."""
+    base = result["as they are"]
+    lines = [
+        "As they are: "
+        + "; ".join(f"{on}: " + ", ".join(f"{k} {v:g}" for k, v in base[on].items()) for on in ("streams", "logs"))
+        + ".",
+        "",
+        "| constant | value | unit | reason | half | double |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    for constant in constants():
+        tried = result["constants"][constant.name]
+        cells = [_cell(tried[factor], base) for factor in ("half", "double")]
+        value = json.dumps(tried["value"], ensure_ascii=False).strip("{}[]").replace('"', "")
+        name = f"`{constant.home}` `{constant.name}`"
+        lines.append(f"| {' | '.join([name, value, constant.unit, constant.reason, *cells])} |")
+    return "\n".join(lines)
+
+
+def _cell(tried: dict[str, Any], base: dict[str, Any]) -> str:
+    """What one setting changes: the measures that are others, or how many answers are."""
+    out = []
+    for on, found in tried.items():
+        if found["changed"]:
+            other = [f"{k} {base[on][k]:g} → {v:g}" for k, v in found["measures"].items() if v != base[on][k]]
+            out.append(", ".join(other) or f"{found['changed']} {on} differ, no measure does")
+    return "; ".join(out) or "nothing"
+
+
+def write_page(result: dict[str, Any]) -> None:
+    """docs/constants.md, between its marks."""
+    text = PAGE.read_text(encoding="utf-8")
+    before, after = text.split(MARKS[0])[0], text.split(MARKS[1])[1]
+    PAGE.write_text(f"{before}{MARKS[0]}\n\n{table(result)}\n\n{MARKS[1]}{after}", encoding="utf-8")
+
+
+# ---------------------------------------------------------------------- the run
+
+
+def plain(value: Any) -> Any:
+    """A constant's value as JSON."""
+    if isinstance(value, dict):
+        return {key: plain(x) for key, x in value.items()}
+    if isinstance(value, tuple | np.ndarray):
+        return [plain(x) for x in value]
+    return value if isinstance(value, int) else round(float(value), 6)
+
+
+def measured(only: list[str], parts: list[str]) -> dict[str, Any]:
+    """All settings of all constants."""
+    started = time.process_time()
+    material: dict[str, Any] = {}
+    if "streams" in parts:
+        material["streams"] = on_streams, streams()
+    if "logs" in parts:
+        with tempfile.TemporaryDirectory() as folder:
+            material["logs"] = on_logs, logs(Path(folder))
+    base = {on: of(what) for on, (of, what) in material.items()}
+    print({on: found[0] for on, found in base.items()}, round(time.process_time() - started, 1), flush=True)
+    out: dict[str, Any] = {}
+    for constant in constants():
+        if (only and constant.name not in only) or not set(constant.on) & set(parts):
+            continue
+        out[constant.name] = {"home": constant.home, "value": plain(constant.value)}
+        for word, factor in (("half", 0.5), ("double", 2.0)):
+            tried = {}
+            with set_to(constant, constant.times(factor)):
+                for on in (on for on in constant.on if on in parts):
+                    of, what = material[on]
+                    measures, answers = of(what)
+                    changed = sum(a != b for a, b in zip(answers, base[on][1], strict=True))
+                    tried[on] = {"changed": changed, "measures": measures}
+            out[constant.name][word] = tried
+            shown = _cell(tried, {on: found[0] for on, found in base.items()})
+            print(constant.name, word, shown, round(time.process_time() - started, 1), flush=True)
+    return {
+        "command": "python benchmarks/sensitivity.py",
+        "version": __version__,
+        "seeds_from": SEED,
+        "cpu_s": {" and ".join(parts): round(time.process_time() - started, 1)},
+        "as they are": {on: found[0] for on, found in base.items()},
+        "constants": out,
+    }
+
+
+def with_what_was_measured_before(result: dict[str, Any], before: dict[str, Any]) -> dict[str, Any]:
+    """Parts and constants that were not asked for, as they were."""
+    known = {constant.name: constant for constant in constants()}
+    merged = {}
+    for name, constant in known.items():
+        now, then = result["constants"].get(name, {}), before["constants"].get(name, {})
+        merged[name] = {"home": constant.home, "value": plain(constant.value)}
+        for word in ("half", "double"):
+            both = then.get(word, {}) | now.get(word, {})
+            merged[name][word] = {on: both[on] for on in constant.on}
+    kept = {key: before[key] | result[key] for key in ("cpu_s", "as they are")}
+    return result | kept | {"constants": merged}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", default="", help="some constants, printed and not written")
+    parser.add_argument("--parts", default="streams,logs")
+    parser.add_argument("--page", action="store_true", help="write the page from the committed result")
+    asked = parser.parse_args()
+    if not asked.page:
+        with threadpool_limits(1):
+            result = measured([name for name in asked.only.split(",") if name], asked.parts.split(","))
+        if asked.only:
+            return
+        if asked.parts != parser.get_default("parts"):
+            result = with_what_was_measured_before(result, json.loads(RESULT.read_text()))
+        RESULT.write_text(json.dumps(result, indent=1) + "\n")
+    write_page(json.loads(RESULT.read_text()))
+
+
+if __name__ == "__main__":
+    main()
