@@ -505,7 +505,8 @@ def in_all(parts: dict[str, Any]) -> dict[str, Any]:
 
 def tasks(part: str, quick: bool, seed: int, most: int) -> list[Task]:
     """The cells of a part."""
-    code = source_key(*(Path(armload.online.__path__[0]) / name for name in ("changes.py", "watch.py", "thresholds.py")))
+    decides = ("changes.py", "watch.py", "thresholds.py")
+    code = source_key(*(Path(armload.online.__path__[0]) / name for name in decides))
     if part == "real":
         return [Task.of_one(f"real-{method}", key_of(method, code), real, method) for method in ("map-gp", "hybrid")]
     drawn = [replace(scene, seed=scene.seed + seed) for scene in scenes(quick, most) if scene.part == part]
