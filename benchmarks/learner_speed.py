@@ -19,7 +19,7 @@ from script import write
 from threadpoolctl import threadpool_limits
 
 from armload.ensembles import BaggingEnsemble, NetworkLearner
-from armload.lab.experiment import versions
+from armload.version import package_versions
 
 ROWS, PAYLOADS, MEMBERS = 20_000, 77, 5
 SEEDS = 3  # of the comparison of losses
@@ -140,7 +140,7 @@ def main() -> None:
         "rows": ROWS,
         "features": X.shape[1],
         "members": MEMBERS,
-        "learners": versions("numba", "scikit-learn", "jax"),
+        "learners": package_versions("numba", "scikit-learn", "jax"),
         "races": races,
         "validation_loss_after_20_epochs": {
             "what": "mean squared error on 3000 rows in scaled units, mean of the members; batch 200, equal epochs",

@@ -1,6 +1,11 @@
 """Every exception armload raises on purpose. Each message says what was found, what was expected and what to do."""
 
 
+def one_line(error: Exception) -> str:
+    """The message of another library's exception on one line; its type where it has no message."""
+    return " ".join(str(error).split()) or type(error).__name__
+
+
 class ArmloadError(Exception):
     """Base of all errors a user can cause or mend; the command line prints it as one sentence and exits with 2."""
 

@@ -1,3 +1,16 @@
-"""The version of armload, for files and messages that name it."""
+"""The version of armload and of installed packages, for files and messages that name them."""
+
+from importlib.metadata import PackageNotFoundError, version
 
 __version__ = "0.1.0"
+
+
+def package_versions(*packages: str) -> dict[str, str]:
+    """Versions by name of those of these packages that are installed."""
+    found = {}
+    for name in packages:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found

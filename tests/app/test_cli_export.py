@@ -117,17 +117,17 @@ def test_a_file_is_written_and_stdout_stays_empty(export, tmp_path):
 
 def test_minus_the_hand_in_the_hand_s_own_frame_or_the_flange_s(export, tmp_path):
     both = HELD + franka_hand().parameters
-    alone = mjcf_numbers(export(result_of(HELD), "--to", "mjcf")[0])
+    without_hand = mjcf_numbers(export(result_of(HELD), "--to", "mjcf")[0])
     np.testing.assert_allclose(
-        mjcf_numbers(export(result_of(both), "--to", "mjcf", "--minus", "franka-hand")[0]), alone, atol=1e-12
+        mjcf_numbers(export(result_of(both), "--to", "mjcf", "--minus", "franka-hand")[0]), without_hand, atol=1e-12
     )
     hand = franka_hand().parameters
     at_link7 = hand.moved(np.eye(3), [0, 0, 0.107], "panda_link7")
     write_payload(tmp_path / "hand.json", Payload("hand", at_link7))
     text, _ = export(result_of(both), "--to", "mjcf", "--minus", str(tmp_path / "hand.json"))
-    np.testing.assert_allclose(mjcf_numbers(text), alone, atol=1e-12)
+    np.testing.assert_allclose(mjcf_numbers(text), without_hand, atol=1e-12)
     text, _ = export(result_of(HELD), "--to", "mjcf", "--plus", "franka-hand", "--minus", str(tmp_path / "hand.json"))
-    np.testing.assert_allclose(mjcf_numbers(text), alone, atol=1e-12)
+    np.testing.assert_allclose(mjcf_numbers(text), without_hand, atol=1e-12)
 
 
 def test_a_controller_gets_its_flange_and_a_description_the_frame_of_the_result(export):
@@ -151,9 +151,9 @@ def renamed(path, name, prefix):
 def test_the_hand_is_taken_off_and_put_on_any_franka_whatever_its_flange_is_called(export, tmp_path, name, prefix):
     named = ["--robot", renamed(tmp_path / "cell.urdf", name, prefix)] if prefix != name else []
     robot, flange = "cell" if named else name, f"{prefix}_link8"
-    alone = InertialParameters(HELD.phi, flange)
-    with_hand = alone + InertialParameters(franka_hand().parameters.phi, flange)
-    for measured, wanted, part in ((with_hand, alone, "--minus"), (alone, with_hand, "--plus")):
+    without_hand = InertialParameters(HELD.phi, flange)
+    with_hand = without_hand + InertialParameters(franka_hand().parameters.phi, flange)
+    for measured, wanted, part in ((with_hand, without_hand, "--minus"), (without_hand, with_hand, "--plus")):
         for frame in ("link7", "link8"):
             moved = measured.moved(np.eye(3), [0, 0, 0.107 * (frame == "link7")], f"{prefix}_{frame}")
             text, _ = export(
@@ -267,8 +267,8 @@ def test_standard_output_can_be_named_as_the_file(export, tmp_path, into):
     arguments = ["export", str(tmp_path / "held.json"), "--to", "ur", "--out", name]
     code = f"from armload.app.cli import main; main({arguments!r})"
     if into == "pipe":
-        said = subprocess.run([sys.executable, "-c", code], stdout=subprocess.PIPE, check=True).stdout.decode()
-        assert (said, link.is_symlink()) == (filed, True)
+        text = subprocess.run([sys.executable, "-c", code], stdout=subprocess.PIPE, check=True).stdout.decode()
+        assert (text, link.is_symlink()) == (filed, True)
         return
     with (tmp_path / "out.txt").open("wb") as out:
         out.write(b"# before\n")

@@ -10,8 +10,8 @@ import pytest
 from rich.console import Console
 
 from armload.app.cli import main
-from armload.app.cli.train_hybrid import cells_table, said, summary
-from armload.arms import ARMS, arm, kinship
+from armload.app.cli.train_hybrid import cells_table, summary, summary_lines
+from armload.arms import ARMS, arm, link_fingerprint
 from armload.inertia import InertialParameters
 from armload.lab.training import Coverage, train_hybrid
 from armload.lab.training import hybrid as training
@@ -65,7 +65,7 @@ def small(tmp_path_factory):
     calibration = Calibration(None, 1.0, np.array([0.1, 6.0]), np.full((3, 2, 10), 1.96))
     for name, pooled, episodes in (("checked", 0.95, 2400), ("trial", 0.80, 2400), ("small", 0.95, 300)):
         checked = Training("broad", episodes, 0, pooled)
-        made = HybridModel(prior, calibration, two.name, kinship(two), str(two.frame), two.n, {}, checked)
+        made = HybridModel(prior, calibration, two.name, link_fingerprint(two), str(two.frame), two.n, {}, checked)
         made.save(folder / f"{name}.safetensors")
     return folder
 
@@ -166,7 +166,7 @@ def test_report_draws_a_hybrid_beside_the_others(call, small):
 
 
 def test_the_worst_cells_are_named(coverage):
-    pooled, lowest, widest = said(coverage)
+    pooled, lowest, widest = summary_lines(coverage)
     assert "95.1 % on 2400 episodes" in pooled
     assert lowest.startswith("lowest coverage: 91.0 % (Ixx, 0.05 s, no tare), 95.0 %")
     assert ": 4.0 (Izz, 0.1 s, tare), 2.5" in widest
@@ -228,9 +228,9 @@ def test_python_and_the_command_line_write_the_same_model(call, small, coverage,
     assert made.save(tmp_path / "made.safetensors").read_bytes() == asked.read_bytes()
     assert checked is coverage
     assert made.training == Training("broad", 40, 3, 0.9512)
-    report, said = json.loads((tmp_path / "report.json").read_text()), HybridModel.load(asked).provenance
-    assert {"cells", "ratio", "counts", "times", "parameters", "compared_with", "versions"} <= set(said)
-    assert {key: report[key] for key in said} == said
+    report, provenance = json.loads((tmp_path / "report.json").read_text()), HybridModel.load(asked).provenance
+    assert {"cells", "ratio", "counts", "times", "parameters", "compared_with", "versions"} <= set(provenance)
+    assert {key: report[key] for key in provenance} == provenance
 
 
 @pytest.mark.full

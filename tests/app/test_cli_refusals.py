@@ -92,18 +92,18 @@ def test_the_sound_log_is_answered(log_text, tmp_path, capsys):
 def test_a_bad_csv_is_refused_by_place(refused, log_text, tmp_path, change, named, json):
     path = tmp_path / "log.csv"
     path.write_text(change(log_text))
-    said = refused(path, *ROBOT, json=json)
-    assert "log.csv" in said
+    text = refused(path, *ROBOT, json=json)
+    assert "log.csv" in text
     for word in named:
-        assert word in said
+        assert word in text
 
 
 def test_a_log_of_another_arm_is_refused(refused, log_text, tmp_path):
     path = tmp_path / "log.csv"
     path.write_text(log_text)
-    said = refused(path, "--robot", "ur10e")
-    assert "7 joints" in said
-    assert "ur10e" in said
+    text = refused(path, "--robot", "ur10e")
+    assert "7 joints" in text
+    assert "ur10e" in text
 
 
 def test_a_log_of_another_arm_with_as_many_joints_is_refused(refused, log_text, tmp_path):
@@ -119,12 +119,12 @@ def test_a_log_of_another_arm_with_as_many_joints_is_refused(refused, log_text, 
 def test_an_unknown_robot_or_frame_is_refused_with_the_choices(refused, log_text, tmp_path):
     path = tmp_path / "log.csv"
     path.write_text(log_text)
-    said = refused(path, "--robot", "pandda")
-    assert "'pandda'" in said
-    assert "ur10e" in said
-    said = refused(path, *ROBOT, "--frame", "tool9")
-    assert "'tool9'" in said
-    assert "panda_link8" in said
+    text = refused(path, "--robot", "pandda")
+    assert "'pandda'" in text
+    assert "ur10e" in text
+    text = refused(path, *ROBOT, "--frame", "tool9")
+    assert "'tool9'" in text
+    assert "panda_link8" in text
 
 
 @pytest.mark.parametrize(
@@ -176,10 +176,10 @@ def test_a_log_under_another_name_is_no_tare_for_itself(capsys, panda, analytic_
     write_recording(tmp_path / "before.npz", log.select(slice(40)))
     argv = [command, str(tmp_path / "run.csv"), "--robot", "panda", "--tare", str(tmp_path / "before.npz")]
     assert main([*argv, *(["--headless"] if command == "live" else [])]) == 2
-    said = capsys.readouterr()
-    assert (said.out, said.err.count("\n")) == ("", 1)
-    assert "before.npz and the log" in said.err
-    assert "share 40 measured samples" in said.err
+    captured = capsys.readouterr()
+    assert (captured.out, captured.err.count("\n")) == ("", 1)
+    assert "before.npz and the log" in captured.err
+    assert "share 40 measured samples" in captured.err
 
 
 def test_a_bag_cut_off_in_the_middle_is_refused(refused, real_data, tmp_path):
@@ -190,17 +190,17 @@ def test_a_bag_cut_off_in_the_middle_is_refused(refused, real_data, tmp_path):
 
 
 def test_a_bag_of_another_arm_is_refused_by_its_joints(refused, real_data):
-    said = refused(real_data / "ur10_ros2_bag.db3", *ROBOT)
-    assert "panda_joint1" in said
+    text = refused(real_data / "ur10_ros2_bag.db3", *ROBOT)
+    assert "panda_joint1" in text
 
 
 def test_a_bad_tare_tool_or_method_is_refused_by_name(refused, log_text, tmp_path):
     path, tare, tool = tmp_path / "log.csv", tmp_path / "tare.csv", tmp_path / "tool.json"
     path.write_text(log_text)
     tare.write_text(with_cell(log_text, 5, "q3", "nan"))
-    said = refused(path, *ROBOT, "--tare", tare)
-    assert "tare.csv, line 5" in said
-    assert "q3" in said
+    text = refused(path, *ROBOT, "--tare", tare)
+    assert "tare.csv, line 5" in text
+    assert "q3" in text
     tool.write_text('{"mass": 1.0}')
     assert "tool.json" in refused(path, *ROBOT, "--tool", tool)
     assert "no_tool.json" in refused(path, *ROBOT, "--tool", tmp_path / "no_tool.json")

@@ -145,9 +145,9 @@ def test_dataset_built_again_is_the_same_and_another_is_refused(work, call):
     build = ["dataset", "--out", work / "data", "--rows", "150", "--world", "nominal", "real-like:2", "--seed", "5"]
     before = open_dataset(work / "data").hash
     assert before[:12] in call(*build, "--payloads", "random:14").out
-    said = call(*build, "--payloads", "random:15", code=2)
-    assert said.out == ""
-    assert "payloads" in said.err
+    captured = call(*build, "--payloads", "random:15", code=2)
+    assert captured.out == ""
+    assert "payloads" in captured.err
 
 
 def test_dataset_of_ideal_sensors_and_a_named_payload(call, tmp_path):
@@ -171,10 +171,10 @@ def test_dataset_of_ideal_sensors_and_a_named_payload(call, tmp_path):
     ],
 )
 def test_a_bad_data_set_is_refused(call, tmp_path, argv, named):
-    said = call("dataset", "--out", tmp_path / "d", *argv, code=2)
-    assert said.out == ""
-    assert named in said.err or "7 joints" in said.err
-    assert said.err.count("\n") == 1
+    captured = call("dataset", "--out", tmp_path / "d", *argv, code=2)
+    assert captured.out == ""
+    assert named in captured.err or "7 joints" in captured.err
+    assert captured.err.count("\n") == 1
 
 
 def test_train_prints_errors_by_payload_and_by_row_beside_the_mean(work, call):
@@ -194,17 +194,17 @@ def test_train_on_a_motion_of_a_file_needs_the_file(call, tmp_path):
     build = ("--motion", tmp_path / "mine.json", "--payloads", "random:4", "--rows", "20")
     call("dataset", "--out", tmp_path / "d", *build)
     train = ("train", "--dataset", tmp_path / "d", "--members", "1", "--out", tmp_path / "m.safetensors")
-    said = call(*train, code=2)
-    assert "'mine'" in said.err.splitlines()[-1]
-    assert "--motion" in said.err.splitlines()[-1]
+    captured = call(*train, code=2)
+    assert "'mine'" in captured.err.splitlines()[-1]
+    assert "--motion" in captured.err.splitlines()[-1]
     call(*train, "--motion", tmp_path / "mine.json")
 
 
 def test_train_refuses_what_is_no_data_set(call, tmp_path):
-    said = call("train", "--dataset", tmp_path, "--out", tmp_path / "m", code=2)
-    assert str(tmp_path) in said.err
-    said = call("train", "--dataset", tmp_path, "--kind", "mixed", "--stages", "2", "--out", tmp_path / "m", code=2)
-    assert "mixed" in said.err
+    captured = call("train", "--dataset", tmp_path, "--out", tmp_path / "m", code=2)
+    assert str(tmp_path) in captured.err
+    captured = call("train", "--dataset", tmp_path, "--kind", "mixed", "--stages", "2", "--out", tmp_path / "m", code=2)
+    assert "mixed" in captured.err
 
 
 def test_a_trained_model_identifies_its_motion_and_refuses_another(work, call, tmp_path):
@@ -216,10 +216,10 @@ def test_a_trained_model_identifies_its_motion_and_refuses_another(work, call, t
     found = json.loads(call("identify", tmp_path / "same.csv", *argv).out)
     assert found["method"] == "tree"
     assert found["n_samples"] == 600
-    said = call("identify", tmp_path / "other.csv", *argv, code=2)
-    assert said.out == ""
-    assert "taie2024" in said.err
-    assert "other.csv" in said.err
+    captured = call("identify", tmp_path / "other.csv", *argv, code=2)
+    assert captured.out == ""
+    assert "taie2024" in captured.err
+    assert "other.csv" in captured.err
 
 
 @pytest.fixture
@@ -292,9 +292,9 @@ def test_report_of_a_data_set_takes_held_out_payloads_only(call, work):
     ],
 )
 def test_a_bad_report_is_refused(call, argv, named):
-    said = call("report", *argv, code=2)
-    assert (said.out, said.err.count("\n")) == ("", 1)
-    assert named in said.err
+    captured = call("report", *argv, code=2)
+    assert (captured.out, captured.err.count("\n")) == ("", 1)
+    assert named in captured.err
 
 
 # ---------------------------------------------------------------------- motion

@@ -15,7 +15,7 @@ from scipy.spatial import KDTree
 
 from armload.app.cli import main
 from armload.app.cli.headless import lines
-from armload.app.page import History, Session, com_region, equivalent_box, equivalent_ellipsoid
+from armload.app.page import History, Session, com_region, equivalent_box
 from armload.app.page.curves import AXES, GROUPS, HEIGHT, PADDING, data_of, series_of
 from armload.app.page.download import ENDINGS, file_of
 from armload.app.page.drawing import arm_parts, capsule, drum, edges, frame_poses
@@ -66,42 +66,42 @@ def log(panda, analytic_log, tmp_path):
 
 def test_a_log_becomes_lines_of_finite_numbers_that_approach_the_payload(log, capsys):
     assert main(["live", str(log), "--robot", "panda", "--headless", "--speed", "max", "--every", "0.5"]) == 0
-    told = [finite_json(line) for line in capsys.readouterr().out.splitlines()]
-    times = [line["t"] for line in told]
+    records = [finite_json(line) for line in capsys.readouterr().out.splitlines()]
+    times = [line["t"] for line in records]
     assert np.allclose(np.diff(times[:-1]), 0.5, atol=0.006)
-    assert times[-1] == pytest.approx(3.995)  # the last sample is always told
-    assert {line["robot"] for line in told} == {"panda"}
-    assert told[-1]["mass"] == pytest.approx(HELD.mass, abs=0.05)
-    assert np.allclose(told[-1]["com"], HELD.com, atol=0.005)
-    assert all(np.shape(line["phi"]) == (10,) for line in told)
-    assert "truth" not in told[-1]  # a log does not know
+    assert times[-1] == pytest.approx(3.995)  # the last sample always has a line
+    assert {line["robot"] for line in records} == {"panda"}
+    assert records[-1]["mass"] == pytest.approx(HELD.mass, abs=0.05)
+    assert np.allclose(records[-1]["com"], HELD.com, atol=0.005)
+    assert all(np.shape(line["phi"]) == (10,) for line in records)
+    assert "truth" not in records[-1]  # a log does not know
 
 
 def test_the_simulator_is_identified_and_its_truth_told(panda):
     simulator = Simulator(panda, payloads=[(0.0, HELD)], speed=None, duration=5.0, rate=500.0)
     session = Session(simulator, panda)
-    told = [finite_json(line) for line in lines(session, every=1.0)]
+    records = [finite_json(line) for line in lines(session, every=1.0)]
     session.close()
-    assert all(line["truth"] == HELD.phi.tolist() for line in told)
-    assert told[-1]["mass"] == pytest.approx(HELD.mass, abs=0.03)
-    assert told[-1]["held"]
-    width = [line["phi_high"][0] - line["phi_low"][0] for line in told]
+    assert all(line["truth"] == HELD.phi.tolist() for line in records)
+    assert records[-1]["mass"] == pytest.approx(HELD.mass, abs=0.03)
+    assert records[-1]["held"]
+    width = [line["phi_high"][0] - line["phi_low"][0] for line in records]
     assert width[-1] < 0.5 * width[0]
 
 
 def test_sim_is_what_live_runs_by_itself(capsys):
     assert main(["live", "--headless", "--speed", "max", "--duration", "0.4", "--method", "map"]) == 0
-    told = [finite_json(line) for line in capsys.readouterr().out.splitlines()]
-    assert told[-1]["t"] == pytest.approx(0.4, abs=0.01)
-    assert told[-1]["method"] == "map"
+    records = [finite_json(line) for line in capsys.readouterr().out.splitlines()]
+    assert records[-1]["t"] == pytest.approx(0.4, abs=0.01)
+    assert records[-1]["method"] == "map"
 
 
 @pytest.mark.parametrize("method", ["ols", "rls", "map-gp"])
 def test_every_line_is_json_whatever_the_method_knows_at_first(panda, log, method):
     session = Session(Replay(log, panda, speed=None), panda, method=method)
-    told = [finite_json(line) for line in lines(session, every=0.0, duration=0.3)]
+    records = [finite_json(line) for line in lines(session, every=0.0, duration=0.3)]
     session.close()
-    assert len(told) > 20
+    assert len(records) > 20
 
 
 def test_a_log_needs_its_robot_named(log, capsys):
@@ -137,9 +137,9 @@ def test_ctrl_c_and_a_reader_that_has_gone_end_it_in_one_line(live):
     assert process.stdout is not None
     finite_json(process.stdout.readline())
     process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=60)
+    _, text = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert said.strip() == "armload: interrupted"
+    assert text.strip() == "armload: interrupted"
 
     process = live("--headless", "--method", "map", "--every", "0.01")
     process.stdout.readline()
@@ -321,20 +321,20 @@ def test_lines_go_on_and_say_why_while_no_sample_can_be_used(panda, analytic_log
     stream = [s if s.t < 2.0 else s._replace(tau=np.full(7, np.nan)) for s in samples]
     warned = []
     session = Session(Given(stream), panda, method="map", warn=warned.append)
-    told = [finite_json(line) for line in lines(session, every=0.1)]
+    records = [finite_json(line) for line in lines(session, every=0.1)]
     session.close()
-    assert np.diff([line["t"] for line in told]).max() < 0.1 + 1.5 * step
-    assert told[-1]["t"] == pytest.approx(samples[-1].t)
-    assert told[-1]["age"] == pytest.approx(samples[-1].t - 2.0, abs=0.05)
-    assert told[-1]["left_out_why"] == {"not finite": told[-1]["left_out"]}
-    assert "torque of joint 1 is not a number" in told[-1]["notes"][-1]
+    assert np.diff([line["t"] for line in records]).max() < 0.1 + 1.5 * step
+    assert records[-1]["t"] == pytest.approx(samples[-1].t)
+    assert records[-1]["age"] == pytest.approx(samples[-1].t - 2.0, abs=0.05)
+    assert records[-1]["left_out_why"] == {"not finite": records[-1]["left_out"]}
+    assert "torque of joint 1 is not a number" in records[-1]["notes"][-1]
     assert len(warned) == 1
     assert [entry.text for entry in session.log if entry.warning] == warned
     assert session.sample.t < 2.0  # what the page draws
 
 
 class Clock:
-    """A machine's monotonic clock that goes on when it is told to, in place of the module `time`."""
+    """A machine's monotonic clock that goes on only on command, in place of the module `time`."""
 
     def __init__(self, monkeypatch):
         self.now = 100.0
@@ -369,15 +369,15 @@ def test_lines_tell_what_was_lost_and_how_late_they_are(panda, log, tmp_path):
     kept = tmp_path / "record.csv"
     with Detached(str(log), panda, record=kept, capacity=100) as source:
         session = Session(source, panda, method="map")
-        told = lines(session, every=0.0)
-        next(told)  # and at most 99 more are on their way
+        records = lines(session, every=0.0)
+        next(records)  # and at most 99 more are on their way
         while kept.read_bytes().count(b"\n") < 500:
             sleep(0.02)
         newest = read_recording(kept).t[-1]
-        held_up = [finite_json(line) for line in told]
+        held_up = [finite_json(line) for line in records]
         session.close()
     assert held_up[-1]["lost"] >= 300
-    for line in held_up[:-1]:  # the last is told when the log has ended
+    for line in held_up[:-1]:  # the last comes when the log has ended
         assert line["lag"] >= newest - line["t"] - 1e-9
         assert line["age"] >= line["lag"]
 
@@ -393,23 +393,23 @@ def test_lines_come_by_the_machines_clock_where_the_streams_stands(panda, analyt
                 yield sample
 
     session = Session(Slow(samples), panda, method="map")
-    told = [finite_json(line) for line in lines(session, every=0.05)]
+    records = [finite_json(line) for line in lines(session, every=0.05)]
     session.close()
-    assert len(told) >= 4
-    assert "no sample could be used" in told[-1]["notes"][-1]
+    assert len(records) >= 4
+    assert "no sample could be used" in records[-1]["notes"][-1]
 
 
 def test_a_change_has_its_line_at_once_and_lines_go_on_while_it_settles(panda):
     simulator = Simulator(panda, payloads=[(3.0, HELD)], speed=None, duration=4.0, rate=200.0)
     session = Session(simulator, panda, method="map-gp")
-    told = [finite_json(line) for line in lines(session, every=0.05)]
+    records = [finite_json(line) for line in lines(session, every=0.05)]
     session.close()
-    settling = [line for line in told if line["settling"]]
-    first = next(line for line in told if line["event"] is not None)
+    settling = [line for line in records if line["settling"]]
+    first = next(line for line in records if line["event"] is not None)
     assert first is settling[0]
     assert first["t"] == first["event"]["t"]
     assert len(settling) >= 4
-    assert np.diff([line["t"] for line in told]).max() < 0.06
+    assert np.diff([line["t"] for line in records]).max() < 0.06
     assert not any(line["held"] for line in settling)
 
 
@@ -495,7 +495,7 @@ def test_a_doubt_is_taken_back_by_evidence_and_the_checks_go_on(panda, analytic_
 
 
 def test_a_lost_source_is_told_in_the_terminal_at_once(monkeypatch, capsys):
-    said = []
+    errors = []
 
     class Seen:
         url = "nowhere"
@@ -506,7 +506,7 @@ def test_a_lost_source_is_told_in_the_terminal_at_once(monkeypatch, capsys):
         def serve(self):
             while not self.session.ended:
                 sleep(0.01)
-            said.append(capsys.readouterr().err)
+            errors.append(capsys.readouterr().err)
             raise KeyboardInterrupt
 
         def close(self):
@@ -515,7 +515,7 @@ def test_a_lost_source_is_told_in_the_terminal_at_once(monkeypatch, capsys):
     monkeypatch.setattr("armload.app.page.page.Page", Seen)
     monkeypatch.setattr("armload.devices.open_source", lambda *_, **__: Broken())
     assert main(["live", "fr3://nowhere", "--method", "map"]) == 2
-    assert "the connection was lost" in said[0]
+    assert "the connection was lost" in errors[0]
     assert capsys.readouterr().err == ""  # once is enough
 
 
@@ -640,16 +640,12 @@ def test_links_reach_from_joint_to_joint_and_drums_stay_where_their_joint_turns(
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_the_equivalent_box_and_ellipsoid_weigh_and_turn_as_the_numbers_say(seed):
+def test_the_equivalent_box_has_the_inertial_parameters(seed):
     body = random_payload(seed).parameters
     box = equivalent_box(body)
     assert np.linalg.det(box.axes) == pytest.approx(1.0)
     same = solids.box(box.lengths, mass=body.mass, rotation=box.axes, translation=box.centre)
     assert np.allclose(same.phi, body.phi, atol=1e-12)
-    ball = equivalent_ellipsoid(body)
-    a, b, c = ball.lengths**2
-    inertia = ball.axes @ np.diag([b + c, a + c, a + b]) @ ball.axes.T * body.mass / 5.0  # of a solid ellipsoid
-    assert np.allclose(InertialParameters.from_com(body.mass, ball.centre, inertia).phi, body.phi, atol=1e-12)
 
 
 def test_numbers_no_body_can_have_are_drawn_flat():

@@ -58,7 +58,7 @@ def open_browser():
             with playwright.chromium.launch(executable_path=program, args=list(FLAGS)) as browser:
                 tab = browser.new_page(viewport=dict(zip(("width", "height"), size, strict=True)))
                 tab.set_default_timeout(PATIENCE)
-                tab.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
+                tab.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
                 tab.on("pageerror", lambda error: complaints.append(str(error)))
                 tab.on(
                     "request", lambda r: None if r.url.startswith((url, "data:", "blob:")) else strangers.append(r.url)
@@ -71,7 +71,7 @@ def open_browser():
 
 
 class Hesitant(Simulator):
-    """A simulator that stops before the payload is taken up until it is told to go on: browsers may be slow."""
+    """A simulator that stops before the payload is taken up until it may go on: browsers may be slow."""
 
     def __init__(self, *arguments, **settings):
         super().__init__(*arguments, **settings)
@@ -256,8 +256,8 @@ def test_killing_the_page_loses_nothing_of_the_record(tmp_path):
         stderr=subprocess.PIPE,
         text=True,
     )
-    said = process.stderr.readline()
-    url = re.search(r"http://127\.0\.0\.1:\d+", said).group()
+    message = process.stderr.readline()
+    url = re.search(r"http://127\.0\.0\.1:\d+", message).group()
     with urllib.request.urlopen(url, timeout=30) as answer:
         assert b"<html" in answer.read(2000).lower()
     until(lambda: record.stat().st_size > 100_000)

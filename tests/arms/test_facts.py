@@ -68,7 +68,7 @@ def test_an_arm_cut_short_by_its_frame_has_no_figures_per_joint():
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"),
+    ("wrong", "text"),
     [
         (SHEET.replace('joints = 2\nsource = "ours"', "joints = 2"), r"\[arm\] of the sheet of two has no source"),
         (SHEET.replace('"rated [kg]"', '"rated [lb]"'), r"has 'rated \[lb\]': expected 'rated \[kg\]'"),
@@ -79,9 +79,9 @@ def test_an_arm_cut_short_by_its_frame_has_no_figures_per_joint():
         ("[arm\n", "is not TOML"),
     ],
 )
-def test_a_sheet_that_is_not_whole_is_refused_in_a_sentence(wrong, said):
+def test_a_sheet_that_is_not_whole_is_refused_in_a_sentence(wrong, text):
     assert read_sheet("two", SHEET).joints == 2
-    with pytest.raises(ArmError, match=said):
+    with pytest.raises(ArmError, match=text):
         read_sheet("two", wrong)
 
 

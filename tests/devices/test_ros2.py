@@ -130,12 +130,12 @@ def test_time_is_the_stamps_to_the_nanosecond_and_else_the_time_of_receipt(panda
 def test_the_message_holds_com_in_the_frame_and_inertia_about_the_com():
     body = InertialParameters(example_payload().parameters.phi, "panda_link8")
     message = message_of(body, 12 * SECOND + 34, inertia_stamped)
-    said = message.inertia
+    inertia = message.inertia
     expected = pin.Inertia.FromDynamicParameters(to_order(body, "pinocchio"))
-    six = [said.ixx, said.ixy, said.ixz, said.iyy, said.iyz, said.izz]
+    six = [inertia.ixx, inertia.ixy, inertia.ixz, inertia.iyy, inertia.iyz, inertia.izz]
     assert (message.header.frame_id, message.header.stamp.sec, message.header.stamp.nanosec) == ("panda_link8", 12, 34)
-    assert said.m == pytest.approx(expected.mass, rel=1e-12)
-    assert np.allclose([said.com.x, said.com.y, said.com.z], expected.lever, rtol=0, atol=1e-12)
+    assert inertia.m == pytest.approx(expected.mass, rel=1e-12)
+    assert np.allclose([inertia.com.x, inertia.com.y, inertia.com.z], expected.lever, rtol=0, atol=1e-12)
     assert np.allclose(six, expected.inertia[np.triu_indices(3)], rtol=0, atol=1e-12)
     back = parameters_of(message)
     assert back.frame == body.frame
@@ -143,8 +143,8 @@ def test_the_message_holds_com_in_the_frame_and_inertia_about_the_com():
 
 
 def test_nothing_is_a_message_of_zeros():
-    said = message_of(InertialParameters.zero("tool0"), 0, inertia_stamped).inertia
-    assert [said.m, said.com.x, said.com.y, said.com.z, said.ixx, said.iyy, said.izz] == [0.0] * 7
+    inertia = message_of(InertialParameters.zero("tool0"), 0, inertia_stamped).inertia
+    assert [inertia.m, inertia.com.x, inertia.com.y, inertia.com.z, inertia.ixx, inertia.iyy, inertia.izz] == [0.0] * 7
 
 
 def estimate(phi, std):
@@ -158,11 +158,11 @@ BODY = example_payload().parameters.phi
 def test_only_a_body_that_can_exist_is_announced():
     assert np.array_equal(announced(estimate(BODY, SPREAD)).phi, BODY)
     impossible = BODY - np.array([0, 0, 0, 0, 0.012, 0, 0, 0, 0, 0])  # Ixx below 0
-    told = announced(estimate(impossible, SPREAD))
-    assert is_consistent(told.phi)
+    body = announced(estimate(impossible, SPREAD))
+    assert is_consistent(body.phi)
     assert not is_consistent(impossible)
-    assert told.mass == pytest.approx(BODY[0], abs=0.1)
-    assert told.frame == "panda_link8"
+    assert body.mass == pytest.approx(BODY[0], abs=0.1)
+    assert body.frame == "panda_link8"
 
 
 @pytest.mark.parametrize(
@@ -181,9 +181,9 @@ def test_what_is_not_known_is_not_announced(phi, std):
 
 
 def test_an_empty_hand_is_announced_as_nothing():
-    told = announced(estimate(0.02 * BODY, SPREAD))
-    assert told.mass == 0.0
-    assert not told.phi.any()
+    body = announced(estimate(0.02 * BODY, SPREAD))
+    assert body.mass == 0.0
+    assert not body.phi.any()
 
 
 # ------------------------------------------------------------------ trajectories
@@ -241,22 +241,22 @@ def test_a_trajectory_the_arm_cannot_run_is_refused(panda):
 
 def test_an_order_replaces_the_motion_without_a_jump_and_keeps_what_was_asked_for(panda):
     motion = taie2024()
-    told = CommandedMotion(motion)
-    before = told.position(np.linspace(0.0, 1.3, 14))
-    goal = told.state[0] - 0.1
-    new = read_trajectory(trajectory(panda.joint_names, [(1.0, goal, 0 * goal, [])]), panda, told.state)
-    assert told.order(new) == 1.3
-    assert np.allclose(told.position(np.linspace(0.0, 1.3, 14)), before, rtol=0, atol=1e-12)
-    q, dq, _ = told([1.3, 1.3 + 1e-6])
+    commanded = CommandedMotion(motion)
+    before = commanded.position(np.linspace(0.0, 1.3, 14))
+    goal = commanded.state[0] - 0.1
+    new = read_trajectory(trajectory(panda.joint_names, [(1.0, goal, 0 * goal, [])]), panda, commanded.state)
+    assert commanded.order(new) == 1.3
+    assert np.allclose(commanded.position(np.linspace(0.0, 1.3, 14)), before, rtol=0, atol=1e-12)
+    q, dq, _ = commanded([1.3, 1.3 + 1e-6])
     assert np.abs(np.diff(q, axis=0)).max() < 1e-5
     assert np.abs(np.diff(dq, axis=0)).max() < 1e-4
-    assert np.allclose(told.position([2.3, 99.0]), goal)
+    assert np.allclose(commanded.position([2.3, 99.0]), goal)
     # two orders before anybody asked: only the second one counts
-    told = CommandedMotion(motion)
+    commanded = CommandedMotion(motion)
     still = [TrajectoryMotion([0.0, 1.0], np.full((2, 7), x)) for x in (0.1, 0.2)]
     for order in still:
-        told.order(order)
-    assert np.allclose(told.position([0.0, 5.0]), 0.2)
+        commanded.order(order)
+    assert np.allclose(commanded.position([0.0, 5.0]), 0.2)
 
 
 # ------------------------------------------------------------------ without ROS, and with it
@@ -289,7 +289,7 @@ def ros_python():
 
 @pytest.fixture
 def ros(ros_python, tmp_path):
-    """Starts programs of the ROS 2 environment, on a network of this test alone, and ends them as Ctrl-C does."""
+    """Starts programs of the ROS 2 environment, on a network of this test only, and ends them as Ctrl-C does."""
     env = os.environ | {
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         "ROS_DOMAIN_ID": str(1 + os.getpid() % 100),
@@ -304,7 +304,7 @@ def ros(ros_python, tmp_path):
         with where.with_suffix(".out").open("w") as out, where.with_suffix(".err").open("w") as err:
             command = [*HEARS_CTRL_C, ros_python, *map(str, words)]
             process = subprocess.Popen(command, stdout=out, stderr=err, env=env)
-        process.said = lambda: where.with_suffix(".out").read_text().splitlines()
+        process.printed_lines = lambda: where.with_suffix(".out").read_text().splitlines()
         process.noted = lambda: where.with_suffix(".err").read_text()
         try:
             yield process
@@ -351,16 +351,16 @@ def test_joint_states_in_and_inertia_out_between_processes(ros, panda, tmp_path)
         ros(ROOT / "tests" / "devices" / "ros" / "publish_recording.py", file, "/arm/states", start) as driver,
     ):
         wait_until(lambda: driver.poll() is not None, 60, driver, identifier)
-        wait_until(listener.said, 5, identifier, listener)
+        wait_until(listener.printed_lines, 5, identifier, listener)
         time.sleep(0.5)
-        said = [json.loads(line) for line in listener.said()]
+        messages = [json.loads(line) for line in listener.printed_lines()]
         assert identifier.poll() is None, identifier.noted()
     assert identifier.returncode == 130  # interrupted, not broken
-    assert {message["frame"] for message in said} == {"panda_link8"}
+    assert {message["frame"] for message in messages} == {"panda_link8"}
     stamps = {start + round(t * 1e9) for t in log.t.tolist()}
-    assert {message["stamp"] for message in said} <= stamps
-    assert 20 <= len(said) <= 61  # ten in a second, once they mean something
-    last = said[-1]
+    assert {message["stamp"] for message in messages} <= stamps
+    assert 20 <= len(messages) <= 61  # ten in a second, once they mean something
+    last = messages[-1]
     assert last["stamp"] > start + 5.5e9
     expected = pin.Inertia.FromDynamicParameters(to_order(truth, "pinocchio"))
     assert last["m"] == pytest.approx(expected.mass, rel=0.01)
@@ -380,8 +380,8 @@ def test_the_default_method_identifies_the_simulated_robots_payload(ros):
         ros(*ARMLOAD, "node", "--robot", "panda") as identifier,
         ros(*robot) as simulator,
     ):
-        wait_until(lambda: len(listener.said()) > 100, 90, simulator, identifier, listener)
-        last = json.loads(listener.said()[-1])
+        wait_until(lambda: len(listener.printed_lines()) > 100, 90, simulator, identifier, listener)
+        last = json.loads(listener.printed_lines()[-1])
     assert last["frame"] == "panda_link8"
     assert last["m"] == pytest.approx(truth.mass, rel=0.04)
     assert np.allclose(last["com"], truth.com, rtol=0, atol=5e-3)
@@ -408,21 +408,21 @@ def test_the_simulated_robot_follows_a_trajectory_and_carries_its_payload(ros, p
         ros(ROOT / "tests" / "devices" / "ros" / "listen.py", "states", "/joint_states") as listener,
         ros(*ARMLOAD, "simulate", "--robot", "panda", "--payload", "test", "--no-noise") as robot,
     ):
-        wait_until(lambda: len(listener.said()) > 50, 60, robot, listener)
+        wait_until(lambda: len(listener.printed_lines()) > 50, 60, robot, listener)
         for wanted in (impossible, file):
             with ros(send, command, wanted) as sender:
                 wait_until(lambda sender=sender: sender.poll() is not None, 30, sender, robot)
         wait_until(lambda: "was accepted" in robot.noted(), 10, robot)
-        before = len(listener.said())
-        wait_until(lambda: len(listener.said()) > before + 700, 30, robot, listener)
+        before = len(listener.printed_lines())
+        wait_until(lambda: len(listener.printed_lines()) > before + 700, 30, robot, listener)
     assert "was refused" in robot.noted()
-    seen = [json.loads(line) for line in listener.said()[1:-1]]
+    seen = [json.loads(line) for line in listener.printed_lines()[1:-1]]
     assert {tuple(message["names"]) for message in seen} == {panda.joint_names}
     t = np.array([message["stamp"] for message in seen])
     assert np.median(np.diff(t)) == pytest.approx(5e6, abs=1e3)  # 200 Hz
     q, dq, tau = (np.array([message[key] for message in seen]) for key in ("q", "dq", "tau"))
 
-    # at both ends the arm stands, a few milliradians below where it is told to be, and bears arm and payload
+    # at both ends the arm stands, a few milliradians below where it is commanded to be, and bears arm and payload
     sag = 0.01
     for k, pose in ((0, start), (-1, goal)):
         assert np.abs(q[k] - pose).max() < sag

@@ -75,10 +75,10 @@ def six(xx, xy, xz, yy, yz, zz):
 
 
 def run_franka_text(text):
-    """What a robot is told by the Python that is exported."""
-    told = []
-    exec(text, {"robot": SimpleNamespace(set_load=lambda *a: told.append(a))})
-    (arguments,) = told
+    """What the exported Python sends to a robot."""
+    calls = []
+    exec(text, {"robot": SimpleNamespace(set_load=lambda *a: calls.append(a))})
+    (arguments,) = calls
     return arguments
 
 
@@ -125,9 +125,9 @@ def test_a_franka_load_measured_in_a_turned_frame_is_told_in_the_flange_s():
     tool = f'<link name="tool"/><joint name="tool_joint" type="fixed"><origin xyz="{p[0]} {p[1]} {p[2]}" '
     tool += f'rpy="{rpy[0]} {rpy[1]} {rpy[2]}"/><parent link="panda_link8"/><child link="tool"/></joint></robot>'
     panda = Arm("panda", arm("panda").urdf.replace("</robot>", tool), "tool", rated_payload=3.0, known_as="panda")
-    told = franka_load(check_writable(Load(skew_body("tool")), panda, moving=False, write=True))
-    np.testing.assert_allclose(told.com, R @ COM + p, atol=1e-12)
-    np.testing.assert_allclose(np.reshape(told.inertia, (3, 3)), R @ INERTIA @ R.T, atol=1e-12)
+    load = franka_load(check_writable(Load(skew_body("tool")), panda, moving=False, write=True))
+    np.testing.assert_allclose(load.com, R @ COM + p, atol=1e-12)
+    np.testing.assert_allclose(np.reshape(load.inertia, (3, 3)), R @ INERTIA @ R.T, atol=1e-12)
     assert np.abs(R @ INERTIA @ R.T - R.T @ INERTIA @ R).max() > 1e-3
 
 
@@ -571,10 +571,10 @@ def test_a_robot_moves_if_any_joint_does_or_nobody_knows(dq, moves):
 
 
 class Franka:
-    """A robot that keeps what it is told, with the signature of libfranka's Python clients."""
+    """A robot that keeps what is sent to it, with the signature of libfranka's Python clients."""
 
     def __init__(self, dq=(0.0,) * 7, m_ee=0.0, refuses=None):
-        self.state, self.refuses, self.told = SimpleNamespace(dq=list(dq), m_ee=m_ee), refuses, []
+        self.state, self.refuses, self.sent = SimpleNamespace(dq=list(dq), m_ee=m_ee), refuses, []
 
     def read_once(self):
         if self.state is None:
@@ -585,14 +585,14 @@ class Franka:
         if self.refuses:
             raise RuntimeError(self.refuses)
         assert (len(F_x_Cload), len(load_inertia)) == (3, 9)
-        self.told.append((load_mass, F_x_Cload, load_inertia))
+        self.sent.append((load_mass, F_x_Cload, load_inertia))
 
 
 class UR:
     """ur-rtde's two interfaces, as far as they are used."""
 
     def __init__(self, qd=(0.0,) * 6, answer=True, connected=True):
-        self.qd, self.answer, self.connected, self.told = list(qd), answer, connected, []
+        self.qd, self.answer, self.connected, self.sent = list(qd), answer, connected, []
 
     def isConnected(self):
         return self.connected
@@ -601,14 +601,14 @@ class UR:
         return self.qd
 
     def setTargetPayload(self, mass, cog=(), inertia=(0.0,) * 6):
-        self.told.append((mass, cog, inertia))
+        self.sent.append((mass, cog, inertia))
         return self.answer
 
 
 def test_a_franka_robot_is_told_the_load():
     robot = Franka()
     franka_robot.set_load(robot, identification(skew_body()), arm("panda"), write=True)
-    ((mass, com, nine),) = robot.told
+    ((mass, com, nine),) = robot.sent
     assert all(isinstance(x, float) for x in (mass, *com, *nine))
     assert_is_the_body(mass, com, np.reshape(nine, (3, 3), order="F"))
 
@@ -616,7 +616,7 @@ def test_a_franka_robot_is_told_the_load():
 def test_a_ur_is_told_the_payload():
     robot = UR()
     ur_robot.set_load(robot, robot, identification(skew_body("tool0"), "ur5e"), arm("ur5e"), write=True)
-    ((mass, cog, (xx, yy, zz, xy, xz, yz)),) = robot.told
+    ((mass, cog, (xx, yy, zz, xy, xz, yz)),) = robot.sent
     assert_is_the_body(mass, cog, six(xx, xy, xz, yy, yz, zz))
 
 
@@ -653,7 +653,7 @@ def test_a_ur_is_told_the_payload():
 def test_a_franka_robot_is_told_nothing_it_should_not_be(robot, result, settings, says):
     with pytest.raises(SinkError, match=says):
         franka_robot.set_load(robot, result, arm("panda"), **settings)
-    assert robot.told == []
+    assert robot.sent == []
 
 
 def test_a_franka_robot_with_its_hand_counted_is_told_the_rest():
@@ -661,7 +661,7 @@ def test_a_franka_robot_with_its_hand_counted_is_told_the_rest():
     hand = franka_hand().parameters
     result = identification(skew_body() + hand)
     franka_robot.set_load(robot, Load.of(result) - hand, arm("panda"), write=True)
-    assert_is_the_body(robot.told[0][0], robot.told[0][1], np.reshape(robot.told[0][2], (3, 3)))
+    assert_is_the_body(robot.sent[0][0], robot.sent[0][1], np.reshape(robot.sent[0][2], (3, 3)))
 
 
 def test_a_robot_that_turns_round_does_not_stand_still():
@@ -676,16 +676,16 @@ def test_a_robot_that_turns_round_does_not_stand_still():
     ur.getActualQd = lambda: [0.004 * next(again)] * 6
     with pytest.raises(SinkError, match="the robot moves"):
         ur_robot.set_load(ur, ur, identification(skew_body("tool0"), "ur5e"), arm("ur5e"), write=True)
-    assert franka.told == ur.told == []
+    assert franka.sent == ur.sent == []
 
 
 def test_a_ur_is_told_what_was_mounted_at_the_tare_and_what_was_added_since():
     gripper, robot = skew_body("tool0"), UR()
     result = identification(InertialParameters(0.5 * gripper.phi, "tool0"), "ur5e", relative_to="tare")
     ur_robot.set_load(robot, robot, Load.of(result) + gripper, arm("ur5e"), write=True)
-    assert robot.told[0][0] == pytest.approx(1.5 * gripper.mass, rel=1e-12)
+    assert robot.sent[0][0] == pytest.approx(1.5 * gripper.mass, rel=1e-12)
     ur_robot.set_load(robot, robot, Load.of(result) + InertialParameters.zero("tool0"), arm("ur5e"), write=True)
-    assert robot.told[1][0] == pytest.approx(0.5 * gripper.mass, rel=1e-12)
+    assert robot.sent[1][0] == pytest.approx(0.5 * gripper.mass, rel=1e-12)
 
 
 def test_a_robot_that_is_lost_is_told_nothing():
@@ -693,7 +693,7 @@ def test_a_robot_that_is_lost_is_told_nothing():
     robot.state = None
     with pytest.raises(SinkError, match="state cannot be read, so no load is written: connection lost"):
         franka_robot.set_load(robot, identification(skew_body()), arm("panda"), write=True)
-    assert robot.told == []
+    assert robot.sent == []
 
 
 def test_a_ur_is_told_nothing_it_should_not_be():
@@ -708,7 +708,7 @@ def test_a_ur_is_told_nothing_it_should_not_be():
     ]:
         with pytest.raises(SinkError, match=says):
             ur_robot.set_load(robot, robot, load, ur5e, **settings)
-        assert robot.told == []
+        assert robot.sent == []
     refusing = UR(answer=False)
     with pytest.raises(SinkError, match="setTargetPayload returned False"):
         ur_robot.set_load(refusing, refusing, result, ur5e, write=True)

@@ -37,7 +37,7 @@ def numbers(recording):
 
 
 def strict_json_lines(path):
-    """One object per line, read as any other program would: Python alone takes bare NaN and Infinity."""
+    """One object per line, read as any other program would: only Python takes bare NaN and Infinity."""
 
     def refuse(token):
         raise ValueError(f"{token} is no JSON")
@@ -113,7 +113,7 @@ def test_without_changes_the_simulator_is_simulate(panda):
 
 
 def test_the_torque_is_that_of_whatever_is_held_at_the_time(panda):
-    """Pinocchio, told the payload of each instant and the simulated motion, finds the simulated torque."""
+    """Pinocchio, with the payload of each instant and the simulated motion, finds the simulated torque."""
     schedule = [(0.4, heavy_payload()), (0.81, franka_hand()), (1.2, None)]
     source = Simulator(panda, payloads=schedule, rate=1000.0, speed=None, duration=1.6)
     samples = table(source)
@@ -294,9 +294,9 @@ except RecordingError as error:
     print(recorder.kept, error)
 """
     path = tmp_path / "run.csv"
-    said = subprocess.run([sys.executable, "-c", code, path], capture_output=True, text=True, check=True).stdout
-    kept = int(said.split()[0])
-    assert "full" in said or "cannot be written" in said
+    message = subprocess.run([sys.executable, "-c", code, path], capture_output=True, text=True, check=True).stdout
+    kept = int(message.split()[0])
+    assert "full" in message or "cannot be written" in message
     assert len(read_recording(path)) == kept > 2
     assert path.read_bytes().endswith(b"\n")
 
@@ -328,7 +328,7 @@ with Recorded(Replay(sys.argv[1], speed=None, loop=True), sys.argv[2]) as source
     seen = [float(line) for line in seen if line.endswith("\n")]
     kept = read_recording(record)
     assert kept.t[: len(seen)].tolist() == seen
-    # at most the sample in hand was kept and not told
+    # at most the sample in hand was kept and not handed on
     assert len(kept) - len(seen) <= 1
     laps = numbers(log)[np.arange(len(kept)) % len(log), 1:]
     np.testing.assert_array_equal(numbers(kept)[:, 1:], laps)
@@ -726,8 +726,8 @@ def test_a_bug_in_the_reader_still_says_where_it_is(client, capfd):
 
 
 def test_an_arm_goes_to_another_process_as_it_is(any_arm):
-    told = json.loads(json.dumps(arm_to_json(any_arm)))
-    assert arm_from_json(told).fingerprint == any_arm.fingerprint
+    content = json.loads(json.dumps(arm_to_json(any_arm)))
+    assert arm_from_json(content).fingerprint == any_arm.fingerprint
 
 
 def test_an_arm_with_a_tool_other_links_and_a_tilted_base_too(panda):
@@ -741,7 +741,7 @@ def test_an_arm_with_a_tool_other_links_and_a_tilted_base_too(panda):
 
 
 @pytest.mark.parametrize(
-    ("spec", "said"),
+    ("spec", "text"),
     [
         ("http://robot", "unknown kind of source 'http'"),
         ("fr3://", "names no robot"),
@@ -753,8 +753,8 @@ def test_an_arm_with_a_tool_other_links_and_a_tilted_base_too(panda):
         ("ur://127.0.0.1", "a UR arm has 6"),
     ],
 )
-def test_a_source_that_cannot_be_opened_says_why(panda, spec, said):
-    with pytest.raises(ArmloadError, match=said):
+def test_a_source_that_cannot_be_opened_says_why(panda, spec, text):
+    with pytest.raises(ArmloadError, match=text):
         open_source(spec, panda, detached=False)
 
 
@@ -800,5 +800,5 @@ def test_the_simulator_s_payloads_are_in_the_arm_s_frame(panda):
 def test_clients_and_engines_are_loaded_only_by_the_source_that_needs_them():
     heavy = ["pylibfranka", "panda_py", "rtde_receive", "rclpy", "mujoco"]
     code = f"import sys, armload.devices; print([name for name in {heavy!r} if name in sys.modules])"
-    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    assert said.strip() == "[]"
+    message = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert message.strip() == "[]"

@@ -79,7 +79,7 @@ def franka_urdf(robot):
 def franka(robot, version, address, tmp_path, *, seconds=2.5, motion=None, lose=(), rest=60.0, stand=False):
     """A simulated robot with a payload behind the Franka Control Interface; also its log, at whole milliseconds.
 
-    stand: it moves while it is told to, so that nothing of the motion is over before a client is there.
+    stand: it moves while it should, so that nothing of the motion is over before a client is there.
     """
     motion = motion or (taie2024() if robot.name == "panda" else random_motion(robot, 3))
     world = World.real_like(replace(robot, link_spread=1.0), 2)  # one whose links are as well known as a Panda's
@@ -99,7 +99,7 @@ def franka(robot, version, address, tmp_path, *, seconds=2.5, motion=None, lose=
 
 
 def collect(source, begin=lambda: None):
-    """All samples until the source is lost, (N, 1 + 3n), and what was said then; `begin` is called at the first."""
+    """All samples until the source is lost, (N, 1 + 3n), and the error then; `begin` is called at the first."""
     rows = []
 
     def states():
@@ -127,10 +127,10 @@ def test_every_state_arrives_as_the_robot_sent_it(system, address, tmp_path):
         record = tmp_path / "run.csv"
         with open_source(f"{name}://{address}", robot, record=record) as source:
             assert (source.n, source.rate, source.name) == (7, 1000.0, f"{name}://{address}")
-            rows, said = collect(source, lambda: tell(process, "go"))
+            rows, text = collect(source, lambda: tell(process, "go"))
             assert source.lost == 0
         stood = next(event for event in events if event["event"] == "moves")["tick"]
-    assert f"{name}://{address} was lost" in said  # the log was over: the server fell silent
+    assert f"{name}://{address} was lost" in text  # the log was over: the server fell silent
     t = rows[:, 0]
     assert np.all(np.diff(t) > 0)
     place = np.round(1000 * (t - log["t"][0])).astype(int) - stood
@@ -169,7 +169,7 @@ def test_a_load_arrives_as_mass_centre_and_inertia_column_by_column(system, addr
 
 
 def test_a_payload_goes_from_the_vendor_s_stream_into_the_robot_s_own_load(system, address, tmp_path):
-    """The whole way: the maker's client streams a simulated robot, armload identifies, the robot is told at rest."""
+    """The whole way: the maker's client streams a simulated robot, armload identifies, the load is sent at rest."""
     name, version = system
     robot = arm(name)
     with franka(robot, version, address, tmp_path, seconds=20.0, rest=0.0, stand=True) as (_, process, events):
@@ -188,10 +188,10 @@ def test_a_payload_goes_from_the_vendor_s_stream_into_the_robot_s_own_load(syste
             online.close()
             assert estimate.held
             load = Load.of(estimate, robot)
-            told = franka_robot.set_load(source, load, robot, write=True, allow_undetermined_inertia=name == "fr3")
+            sent = franka_robot.set_load(source, load, robot, write=True, allow_undetermined_inertia=name == "fr3")
         received = next(event for event in events if event["event"] == "load")["numbers"]
     truth = heavy_payload().parameters
-    assert received == pytest.approx([told.mass, *told.com, *told.inertia], rel=1e-12)
+    assert received == pytest.approx([sent.mass, *sent.com, *sent.inertia], rel=1e-12)
     assert received[0] == pytest.approx(truth.mass, abs=0.15)
     assert received[1:4] == pytest.approx(truth.com, abs=0.02)
     matrix = estimate.parameters.inertia_com
@@ -251,7 +251,7 @@ def test_a_server_that_dies_is_a_source_that_is_lost(system, address, tmp_path):
         open_source(f"{name}://{address}", arm(name))
 
 
-@pytest.mark.parametrize("backlog", [0, 8], ids=["packets are dropped", "nothing is said"])
+@pytest.mark.parametrize("backlog", [0, 8], ids=["packets are dropped", "no error"])
 @pytest.mark.parametrize(
     ("name", "package", "port"),
     [("panda", "panda_py", 1337), ("fr3", "pylibfranka", 1337), ("ur", "rtde_receive", 30004)],
@@ -266,8 +266,8 @@ def test_an_address_that_does_not_answer_is_given_up_before_the_client_does(name
                 waiting.setblocking(False)
                 waiting.connect_ex((address, port))
         # the FR3's client gives up an unanswered connection after a second itself
-        said = "Connection timeout" if name == "fr3" and not backlog else "it does not answer"
-        with pytest.raises(SourceError, match=rf"at {address} cannot be reached \(.*{said}.*\): check its address"):
+        text = "Connection timeout" if name == "fr3" and not backlog else "it does not answer"
+        with pytest.raises(SourceError, match=rf"at {address} cannot be reached \(.*{text}.*\): check its address"):
             open_source(f"{name}://{address}", arm("ur10e" if name == "ur" else name))
 
 
@@ -281,7 +281,7 @@ def test_the_wrong_client_for_a_robot_says_which_is_the_right_one(system, addres
 
 
 def test_the_maker_s_model_means_by_a_load_what_we_mean(address, tmp_path):
-    """libfranka's own rigid-body model, fed with our arm and told our load, needs the gravity torque we expect."""
+    """libfranka's own rigid-body model, fed with our arm and our load, needs the gravity torque we expect."""
     pytest.importorskip("pylibfranka", reason="pylibfranka has no wheel for this Python")
     robot = arm("fr3")
     mass, *rest = to_order(LOAD, "franka")
@@ -310,10 +310,10 @@ def test_a_ur_arm_gives_positions_velocities_and_currents_as_torque(address, tmp
     with serving("ur_server", log, address, tmp_path) as (_, events):
         with open_source(f"ur://{address}", robot, record=tmp_path / "run.csv") as source:
             assert (source.n, source.rate) == (6, 500.0)
-            rows, said = collect(source)
+            rows, text = collect(source)
         asked = next(event for event in events if event["event"] == "fields")
     assert asked["rate"] == 500.0
-    assert "was lost" in said
+    assert "was lost" in text
     with pytest.raises(SourceError, match="cannot be reached"):
         open_source(f"ur://{address}", robot)
     assert capfd.readouterr() == ("", "")  # the client prints a line of its own at either end

@@ -67,16 +67,16 @@ def test_mean_and_spread_are_those_of_the_members(fitted):
 def test_one_row_alone_equals_the_row_in_a_batch(fitted):
     X, _ = rows(2, 50)
     batch = fitted.predict(X)
-    alone = np.concatenate([fitted.predict(X[k : k + 1]) for k in range(len(X))])
-    np.testing.assert_allclose(alone, batch, rtol=1e-11, atol=1e-14)
+    single = np.concatenate([fitted.predict(X[k : k + 1]) for k in range(len(X))])
+    np.testing.assert_allclose(single, batch, rtol=1e-11, atol=1e-14)
 
 
 def test_the_path_for_one_row_equals_the_batch(fitted):
     """To rounding, for every learner, with any number of features and of units."""
     X, _ = rows(2, 9)
-    alone = np.stack([fitted.compiled_.row(x) for x in X], axis=1)
+    single = np.stack([fitted.compiled_.row(x) for x in X], axis=1)
     together = fitted.compiled_.members(X)
-    np.testing.assert_allclose(alone, together, rtol=0, atol=1e-12 * np.abs(together).max())
+    np.testing.assert_allclose(single, together, rtol=0, atol=1e-12 * np.abs(together).max())
 
 
 @pytest.mark.parametrize(("d", "h"), [(1, 1), (5, 8), (22, 13), (4, 500)])
@@ -116,7 +116,7 @@ def test_fit_leaves_its_input_alone(fitted):
 
 
 def test_predictions_carry_the_units_of_y(fitted):
-    """Scaled training must scale back: a kilogram told in grams gives the same kilogram."""
+    """Scaled training must scale back: a kilogram given in grams gives the same kilogram."""
     X, y = rows(0)
     Xv, yv = rows(1, 60)
     grams = clone(fitted).fit(X, 1024 * y, Xv, 1024 * yv)  # a power of two: the scaled data are the same to the bit

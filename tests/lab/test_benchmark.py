@@ -290,8 +290,8 @@ def test_what_is_measured_is_not_measured_again_and_a_further_method_is_all_that
     before = {path.name: path.stat().st_mtime_ns for path in (finished / "cells").iterdir()}
     assert len(before) == 2 * 4  # two seeds; the method, two baselines, the bound
     assert main([*ASKED, "--methods", "rls-filter,wls", "--out", str(finished)]) == 0
-    said = capsys.readouterr().err
-    assert "part 2 of 2: untared, seed 900002, 1 row" in said
+    text = capsys.readouterr().err
+    assert "part 2 of 2: untared, seed 900002, 1 row" in text
     after = {path.name: path.stat().st_mtime_ns for path in (finished / "cells").iterdir()}
     assert set(after) - set(before) == {"untared-900001-wls.json", "untared-900002-wls.json"}
     assert all(after[name] == at for name, at in before.items())

@@ -47,7 +47,7 @@ def test_an_episode_s_logs_are_the_simulations_of_its_parts(panda):
     for episode, (run, tare, truth) in zip(
         drawn, simulate_episodes(drawn, rate=100.0, resolution=Resolution()), strict=True
     ):
-        alone = simulate(
+        single = simulate(
             panda,
             episode.motion,
             episode.payload,
@@ -57,7 +57,7 @@ def test_an_episode_s_logs_are_the_simulations_of_its_parts(panda):
             duration=0.5,
             seed=episode.seed,
         )
-        np.testing.assert_allclose(run.tau, alone.tau, atol=1e-9)
+        np.testing.assert_allclose(run.tau, single.tau, atol=1e-9)
         np.testing.assert_array_equal(truth.phi, episode.payload.parameters.phi)
         assert truth.frame == panda.frame
         assert tare is not None
@@ -171,8 +171,8 @@ def test_a_mounted_tool_is_in_both_runs_and_not_in_the_answer(panda):
         found = np.linalg.lstsq(W.reshape(-1, 10), r.ravel(), rcond=None)[0]
         assert found[0] == pytest.approx(expected, rel=5e-3)
     np.testing.assert_array_equal(truth.phi, drawn.payload.parameters.phi)
-    alone = replace(drawn, tare_motion=None)
-    np.testing.assert_allclose(alone.truth.phi, drawn.payload.parameters.phi + drawn.tool.parameters.phi)
+    without_tare = replace(drawn, tare_motion=None)
+    np.testing.assert_allclose(without_tare.truth.phi, drawn.payload.parameters.phi + drawn.tool.parameters.phi)
 
 
 def test_the_reference_world_payload_and_sensors_are_the_ones_results_rest_on(panda):

@@ -53,10 +53,10 @@ def test_a_task_that_fails_keeps_the_cells_it_had_finished(tmp_path):
     with pytest.raises(ArithmeticError):
         run_tasks([task], tmp_path / "cells")
     assert list(load_cells(tmp_path / "cells")) == ["x-2"]
-    said = []
+    messages = []
     with pytest.raises(ArithmeticError):
-        run_tasks([task], tmp_path / "cells", say=said.append)
-    assert said == ["part 1 of 1: powers, 2 powers"]
+        run_tasks([task], tmp_path / "cells", say=messages.append)
+    assert messages == ["part 1 of 1: powers, 2 powers"]
     assert calls(tmp_path) == ["5"]
 
 
@@ -69,9 +69,9 @@ def test_processes_give_the_cells_of_one_process_in_the_order_of_the_tasks(tmp_p
 
 def test_a_run_that_is_out_of_time_says_where_it_stopped(tmp_path):
     run_tasks(tasks(tmp_path, 1), tmp_path / "cells")
-    said = []
-    cells = run_tasks(tasks(tmp_path, 3), tmp_path / "cells", until=-1.0, say=said.append, part="cell")
-    assert said == ["stopped before cell 2 of 3: run it again to go on"]
+    messages = []
+    cells = run_tasks(tasks(tmp_path, 3), tmp_path / "cells", until=-1.0, say=messages.append, part="cell")
+    assert messages == ["stopped before cell 2 of 3: run it again to go on"]
     assert list(cells) == ["of-0"]
 
 
@@ -94,6 +94,6 @@ def test_the_key_of_source_follows_its_text_and_the_names_of_its_files(tmp_path)
 
 
 def test_a_result_says_the_command_and_the_versions_it_rests_on():
-    said = provenance("python benchmarks/x.py --seeds 3")
-    assert said["command"] == "python benchmarks/x.py --seeds 3"
-    assert {"python", "numpy", "pin", "mujoco"} <= set(said["versions"])
+    content = provenance("python benchmarks/x.py --seeds 3")
+    assert content["command"] == "python benchmarks/x.py --seeds 3"
+    assert {"python", "numpy", "pin", "mujoco"} <= set(content["versions"])

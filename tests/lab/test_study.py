@@ -128,16 +128,16 @@ def small(tmp_path_factory):
     """A small study, stopped at once and then run to the end."""
     folder = tmp_path_factory.mktemp("study")
     basis = Basis(folder, SMALL)
-    said = []
-    first = run_study(basis, folder / "cells", until=0.0, say=said.append)
-    cells = run_study(basis, folder / "cells", say=said.append)
-    return folder, first, cells, said
+    messages = []
+    first = run_study(basis, folder / "cells", until=0.0, say=messages.append)
+    cells = run_study(basis, folder / "cells", say=messages.append)
+    return folder, first, cells, messages
 
 
 def test_a_study_that_was_stopped_goes_on_and_measures_nothing_twice(small):
-    folder, first, cells, said = small
+    folder, first, cells, messages = small
     assert len(first) < len(cells) == len(plan(SMALL))
-    assert len([line for line in said if line.startswith("cell")]) == len(cells)
+    assert len([line for line in messages if line.startswith("cell")]) == len(cells)
     again = []
     assert run_study(Basis(folder, SMALL), folder / "cells", say=again.append) == cells
     assert again == []
@@ -156,9 +156,9 @@ def test_the_numbers_do_not_depend_on_how_many_cells_are_measured_at_once(small)
     names = [next(name for name in cells if name.startswith(start)) for start in left]
     for name in names:
         (folder / "cells" / f"{name}.json").unlink()
-    said = []
-    again = run_study(Basis(folder, SMALL), folder / "cells", jobs=2, say=said.append)
-    assert len(said) == len(names)
+    messages = []
+    again = run_study(Basis(folder, SMALL), folder / "cells", jobs=2, say=messages.append)
+    assert len(messages) == len(names)
     for name in names:
         for field in ("key", "spec", "epochs", "file_bytes", "protocols", "izz"):
             assert again[name].get(field) == cells[name].get(field)
@@ -200,9 +200,9 @@ def test_page_summary_and_report_are_written_from_the_cells(small, tmp_path):
 
 
 def test_the_committed_page_and_summary_are_what_the_committed_cells_say(tmp_path):
-    results, said = ROOT / "benchmarks" / "results", []
-    cells = run_study(Basis(tmp_path, FULL), results / "taie2024", until=-1.0, say=said.append)
-    assert said == []  # no cell is left to measure
+    results, messages = ROOT / "benchmarks" / "results", []
+    cells = run_study(Basis(tmp_path, FULL), results / "taie2024", until=-1.0, say=messages.append)
+    assert messages == []  # no cell is left to measure
     claims = evaluate(cells)
     assert json.loads((results / "taie2024.json").read_text(encoding="utf-8")) == summary_json(cells, claims)
     page = write_page(cells, claims, tmp_path / "paper.md")

@@ -409,13 +409,11 @@ def test_ensembles_are_matched_seed_by_seed_under_one_cap():
 
 def test_a_benchmark_s_name_is_not_the_beginning_of_another_s():
     cells = study()
-    assert [c["name"] for c in benchmark(cells, "rls").values()] == ["benchmark-rls-s0"]
-    assert [c["name"] for c in benchmark(cells, "map").values()] == ["benchmark-map-s0"]
-    assert [c["name"] for c in benchmark(cells, "rls-filter-calibrated").values()] == [
-        "benchmark-rls-filter-calibrated-s0"
-    ]
-    assert list(benchmark(cells, "training-mean", "row")) == [0]
-    assert benchmark(cells, "training-mean") == {}
+    assert [c["name"] for c in benchmark(cells, "rls")] == ["benchmark-rls-s0"]
+    assert [c["name"] for c in benchmark(cells, "map")] == ["benchmark-map-s0"]
+    assert [c["name"] for c in benchmark(cells, "rls-filter-calibrated")] == ["benchmark-rls-filter-calibrated-s0"]
+    assert [c["spec"]["seed"] for c in benchmark(cells, "training-mean", "row")] == [0]
+    assert benchmark(cells, "training-mean") == []
     assert at_end([cells["benchmark-map-s0"]], "test_payload_real_like").mean(axis=0) == pytest.approx(UNIT)
     assert at_end([cells["benchmark-rls-s0"]], "test_payload_real_like").mean(axis=0) == pytest.approx(4 * UNIT)
     assert at_end([cells["benchmark-map-s0"]], "test_payload_semi_real") is None

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from armload.arms import arm
 from armload.devices import Load, Simulator
 from armload.devices.franka import writer as franka_robot
-from armload.ensembles.compiled import Together
+from armload.ensembles.compiled import AveragedMembers
 from armload.errors import IdentificationError
 from armload.identification import METHODS
 from armload.motion import random_motion, taie2024
@@ -397,7 +397,7 @@ def retrained(model, change):
         return replace(model, prior=replace(model.prior, means=means))
     if change == "bag":
         trees, *others = model.calibration.bag.parts
-        bag = Together((replace(trees, values=trees.values + 1e-9), *others))
+        bag = AveragedMembers((replace(trees, values=trees.values + 1e-9), *others))
         return replace(model, calibration=replace(model.calibration, bag=bag))
     return replace(model, calibration=replace(model.calibration, level=1.001 * model.calibration.level))
 

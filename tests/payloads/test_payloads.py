@@ -179,9 +179,9 @@ def test_each_loading_has_a_partner_of_its_mass_that_differs_in_one_component_of
     for k in range(1, 6):
         group = com[np.isclose(mass, EMPTY_MASS + k * WEIGHT_MASS)]
         differs = np.abs(group[:, None] - group[None]) > 1e-7  # (N, N, 3); steps are of millimetres
-        alone = differs & (differs.sum(axis=-1, keepdims=True) == 1)
-        assert np.all(alone.any(axis=(1, 2))), f"a loading with {k} weights has no partner"
-        assert np.all(alone.any(axis=(0, 1))), f"with {k} weights a component never changes alone"
+        single = differs & (differs.sum(axis=-1, keepdims=True) == 1)
+        assert np.all(single.any(axis=(1, 2))), f"a loading with {k} weights has no partner"
+        assert np.all(single.any(axis=(0, 1))), f"with {k} weights no component changes by itself"
 
 
 def test_the_loadings_of_one_mass_have_mirrored_and_turned_partners(loadings):

@@ -220,7 +220,7 @@ def test_a_bag_cut_off_is_refused(tmp_path, panda, kind, share):
 
 def test_a_bag_with_a_name_that_sqlite_would_misread_reads_and_nothing_is_left_beside_it(tmp_path, panda):
     path = storage(write_bag(tmp_path, "db3", {"/joint_states": samples()}))
-    odd = tmp_path / "alone" / "50% #1?.DB3"
+    odd = tmp_path / "single" / "50% #1?.DB3"
     odd.parent.mkdir()
     shutil.copy(path, odd)
     odd.parent.chmod(0o555)

@@ -42,13 +42,13 @@ def read_or_refuse(path, arm=None):
     try:
         recording = read_recording(path, arm)
     except RecordingError as error:
-        said = str(error)
+        text = str(error)
     else:
         assert isinstance(recording, Recording)
         assert np.isfinite(recording.q).all()
         return recording
-    assert "\n" not in said
-    assert str(path) in said
+    assert "\n" not in text
+    assert str(path) in text
     return None
 
 

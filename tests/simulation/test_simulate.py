@@ -315,10 +315,10 @@ def test_many_runs_are_the_same_as_one_by_one(panda):
     logs = many(panda, wanted, rate=100.0, progress=lambda done, total: seen.append((done, total)))
     assert seen[-1] == (5, 5)
     for run, log in zip(wanted, logs, strict=True):
-        alone = simulate(panda, run.motion, run.payload, world=run.world, rate=100.0)
-        assert len(log) == len(alone)
-        np.testing.assert_allclose(log.q, alone.q, rtol=0, atol=1e-12)
-        np.testing.assert_allclose(log.tau, alone.tau, rtol=0, atol=1e-9)
+        single = simulate(panda, run.motion, run.payload, world=run.world, rate=100.0)
+        assert len(log) == len(single)
+        np.testing.assert_allclose(log.q, single.q, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(log.tau, single.tau, rtol=0, atol=1e-9)
 
 
 def test_chunks_do_not_change_anything(panda, monkeypatch):

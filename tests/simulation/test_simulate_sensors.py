@@ -1,4 +1,4 @@
-"""Each sensor effect has its measured size, can be switched off alone, and repeats with its seed."""
+"""Each sensor effect has its measured size, can be switched off by itself, and repeats with its seed."""
 
 from dataclasses import fields, replace
 
@@ -118,9 +118,9 @@ def test_seed_repeats_and_switching_one_effect_off_leaves_the_others_alone(truth
     np.testing.assert_array_equal(still.dq, plain.dq)
     noisy = replace(panda_sensors.evenly(), torque_quantum=None).observe(truth, seed=4)
     vibration = noisy.tau - still.tau
-    alone = only(panda_sensors, "vibration", "command_lag").observe(truth, seed=4).tau
+    single = only(panda_sensors, "vibration", "command_lag").observe(truth, seed=4).tau
     lagged = only(panda_sensors, "command_lag").observe(truth).tau
-    np.testing.assert_allclose(vibration, alone - lagged, atol=1e-9)
+    np.testing.assert_allclose(vibration, single - lagged, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", [f.name for f in fields(Sensors)])

@@ -100,7 +100,7 @@ def test_the_sensors_show_inverse_dynamics_and_the_world_s_own_torque(panda):
     expected = world.measured(rigid + world.disturbance(log.q, log.dq, rigid), log.t)
     inner = slice(5, -5)  # off the spline's ends
     assert np.abs((log.tau - expected)[inner]).max() < 2e-3
-    assert rms(log.tau - run.command) < 0.02  # the joints' torque loop does what it is told
+    assert rms(log.tau - run.command) < 0.02  # the joints' torque loop follows the command
     assert rms(log.tau - rigid) > 0.2
 
 
@@ -130,10 +130,10 @@ def test_the_observer_s_residual_is_nothing_with_the_payload_declared_and_its_to
 # ---------------------------------------------------------------- guided by hand
 
 
-@pytest.mark.parametrize("told", [0.0, 0.5, 1.0], ids=["nothing", "half", "all"])
-def test_in_gravity_compensation_the_sensors_show_what_was_declared_whatever_is_held(panda, told):
+@pytest.mark.parametrize("declared", [0.0, 0.5, 1.0], ids=["nothing", "half", "all"])
+def test_in_gravity_compensation_the_sensors_show_what_was_declared_whatever_is_held(panda, declared):
     """The hand takes the difference: at rest the torque is the declared model's gravity."""
-    hold, model = held_pose(panda), panda.with_payload(InertialParameters(told * PAYLOAD.phi))
+    hold, model = held_pose(panda), panda.with_payload(InertialParameters(declared * PAYLOAD.phi))
     missing = panda.with_payload(PAYLOAD).torque(hold.offset) - model.torque(hold.offset)
     law = GravityCompensation(model)
     log = torque_controlled(panda, law, hold.offset, 0.5, PAYLOAD, external=lambda *_: missing).recording

@@ -1,4 +1,4 @@
-"""What a person meets: the command line (`cli`) and the page of a live robot (`page`)."""
+"""The command line (`cli`) and the page of a live robot (`page`)."""
 
 from armload.app.cli import main
 

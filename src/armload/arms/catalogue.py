@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from armload.arms.facts import ARMS, ArmFacts, description_of
-from armload.arms.kinship import kinship, namesake
+from armload.arms.matching import link_fingerprint, prefixed_frame
 from armload.arms.model import STANDARD_GRAVITY, Arm
 from armload.errors import ArmError
 from armload.inertia import is_consistent
@@ -68,18 +68,18 @@ def facts_of(arm: Arm) -> ArmFacts | None:
 def _as_known(found: Arm) -> Arm:
     """The arm with its sheet's facts, if it is one of `ARMS`; a tool in its file is then attached."""
     for name, facts in ARMS.items():
-        flange = namesake(found, facts.flange)
+        flange = prefixed_frame(found, facts.flange)
         if flange is None or facts.joints != found.n:
             continue
         known = arm(name)
-        named, bare, what = found, replace(found, frame=flange), kinship(known)
-        if kinship(bare) != what:
+        named, bare, wanted = found, replace(found, frame=flange), link_fingerprint(known)
+        if link_fingerprint(bare) != wanted:
             links = np.array([*bare.link_parameters[:-1], known.link_parameters[-1]])
             named = found.parted(links)
             tool = named.attached
             if tool is None or tool.mass < _LIGHTEST or not is_consistent(tool.phi):
                 continue
-            if kinship(bare.with_links(links)) != what:
+            if link_fingerprint(bare.with_links(links)) != wanted:
                 continue
         return replace(named, **facts.of_arm)
     return found

@@ -24,8 +24,8 @@ from armload.errors import ArmError
 _SHEETS = "descriptions"
 
 
-def _said(table: str, key: str, default: Any = MISSING) -> Any:
-    """A fact that stands in a table of the sheet under a key, its unit included; with a default it may be left out."""
+def _fact(table: str, key: str, default: Any = MISSING) -> Any:
+    """A fact of the sheet: its table, its key with the unit, and its default if it may be left out."""
     return field(default=default, metadata={"table": table, "key": key})
 
 
@@ -43,35 +43,35 @@ class ArmFacts:
     """One arm's sheet. Figures per joint are (n,), units stand in the keys; None: not known."""
 
     name: str  # of the arm, its sheet and its description
-    product: str = _said("arm", "product")
-    joints: int = _said("arm", "joints")
-    flange: str = _said("flange", "frame")  # what its maker counts payloads from
-    flange_ending: str = _said("flange", "ending")  # what every such flange is called behind a prefix
-    hand: str | None = _said("flange", "hand", None)  # the built-in tool that sits on it
-    rated_payload: float = _said("payload", "rated [kg]")
-    torque_side: str = _said("torque", "side")  # of the gear on which torque is measured: "link" or "motor"
-    link_spread: float = _said("links", "spread")  # see `Arm`
-    acceleration: tuple[float, ...] | None = _said("limits", "acceleration [rad/s²]", None)
-    jerk: tuple[float, ...] | None = _said("limits", "jerk [rad/s³]", None)
-    position_stiffness: tuple[float, ...] | None = _said("control", "position_stiffness [N·m/rad]", None)
-    impedance_stiffness: tuple[float, ...] | None = _said("control", "impedance_stiffness [N·m/rad]", None)
-    offset: tuple[float, ...] | None = _said("mismatch", "offset [N·m]", None)
-    friction: tuple[float, ...] | None = _said("mismatch", "friction [N·m]", None)
-    residual: tuple[float, ...] | None = _said("mismatch", "residual [N·m]", None)
-    torque_noise: tuple[float, ...] | None = _said("sensors", "torque_noise [N·m]", None)
-    velocity_noise: tuple[float, ...] | None = _said("sensors", "velocity_noise [rad/s]", None)
-    position_noise: tuple[float, ...] | None = _said("sensors", "position_noise [rad]", None)
-    vibration: tuple[float, ...] | None = _said("sensors", "vibration [N·m]", None)
-    torque_quantum: tuple[float, ...] | None = _said("sensors", "torque_quantum [N·m]", None)
-    command_lag: float | None = _said("sensors", "command_lag [s]", None)
-    torque_skew: float | None = _said("sensors", "torque_skew [s]", None)
-    jitter: float | None = _said("sensors", "jitter [s]", None)
-    lost: float | None = _said("sensors", "lost [1]", None)
-    capsules: tuple[Capsule, ...] | None = _said("collision", "capsules [m]", None)  # its outer size
-    excitation: str | None = _said("motion", "excitation", None)  # the shipped motion that was designed for it
-    scheme: str | None = _said("connection", "scheme", None)  # of its address as a live source
-    controller: str | None = _said("connection", "controller", None)  # whose forms of a load it takes
-    torque_constants: tuple[float, ...] | None = _said("current", "torque_constants [N·m/A]", None)
+    product: str = _fact("arm", "product")
+    joints: int = _fact("arm", "joints")
+    flange: str = _fact("flange", "frame")  # what its maker counts payloads from
+    flange_ending: str = _fact("flange", "ending")  # what every such flange is called behind a prefix
+    hand: str | None = _fact("flange", "hand", None)  # the built-in tool that sits on it
+    rated_payload: float = _fact("payload", "rated [kg]")
+    torque_side: str = _fact("torque", "side")  # of the gear on which torque is measured: "link" or "motor"
+    link_spread: float = _fact("links", "spread")  # see `Arm`
+    acceleration: tuple[float, ...] | None = _fact("limits", "acceleration [rad/s²]", None)
+    jerk: tuple[float, ...] | None = _fact("limits", "jerk [rad/s³]", None)
+    position_stiffness: tuple[float, ...] | None = _fact("control", "position_stiffness [N·m/rad]", None)
+    impedance_stiffness: tuple[float, ...] | None = _fact("control", "impedance_stiffness [N·m/rad]", None)
+    offset: tuple[float, ...] | None = _fact("mismatch", "offset [N·m]", None)
+    friction: tuple[float, ...] | None = _fact("mismatch", "friction [N·m]", None)
+    residual: tuple[float, ...] | None = _fact("mismatch", "residual [N·m]", None)
+    torque_noise: tuple[float, ...] | None = _fact("sensors", "torque_noise [N·m]", None)
+    velocity_noise: tuple[float, ...] | None = _fact("sensors", "velocity_noise [rad/s]", None)
+    position_noise: tuple[float, ...] | None = _fact("sensors", "position_noise [rad]", None)
+    vibration: tuple[float, ...] | None = _fact("sensors", "vibration [N·m]", None)
+    torque_quantum: tuple[float, ...] | None = _fact("sensors", "torque_quantum [N·m]", None)
+    command_lag: float | None = _fact("sensors", "command_lag [s]", None)
+    torque_skew: float | None = _fact("sensors", "torque_skew [s]", None)
+    jitter: float | None = _fact("sensors", "jitter [s]", None)
+    lost: float | None = _fact("sensors", "lost [1]", None)
+    capsules: tuple[Capsule, ...] | None = _fact("collision", "capsules [m]", None)  # its outer size
+    excitation: str | None = _fact("motion", "excitation", None)  # the shipped motion that was designed for it
+    scheme: str | None = _fact("connection", "scheme", None)  # of its address as a live source
+    controller: str | None = _fact("connection", "controller", None)  # whose forms of a load it takes
+    torque_constants: tuple[float, ...] | None = _fact("current", "torque_constants [N·m/A]", None)
 
     def __post_init__(self) -> None:
         for entry in fields(self):
@@ -129,7 +129,7 @@ def read_sheet(name: str, text: str) -> ArmFacts:
     required = [(table, key) for (table, key), f in places.items() if f.default is MISSING]
     missing = [f"{key!r} in [{table}]" for table, key in required if places[table, key].name not in facts]
     if missing:
-        raise ArmError(f"the sheet of {name} lacks {missing[0]}: every arm's sheet says it")
+        raise ArmError(f"the sheet of {name} lacks {missing[0]}: every sheet needs it")
     if "capsules" in facts:
         facts["capsules"] = tuple(Capsule(*capsule) for capsule in facts["capsules"])
     return ArmFacts(**facts)

@@ -12,7 +12,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from armload.arms.description import read_chain
-from armload.arms.parser_log import caught_complaints
+from armload.arms.parser_log import caught_parser_errors
 from armload.errors import ArmError
 from armload.inertia import InertialParameters, from_order, to_order
 
@@ -272,12 +272,12 @@ class Arm:
 
     @cached_property
     def _model(self) -> pin.Model:
-        said: list[str] = []
+        messages: list[str] = []
         try:
-            with caught_complaints() as said:
+            with caught_parser_errors() as messages:
                 model = pin.buildModelFromXML(self.urdf)
         except (ValueError, RuntimeError) as error:
-            reason = said[0] if said else " ".join(str(error).split())
+            reason = messages[0] if messages else " ".join(str(error).split())
             raise ArmError(f"the description of {self.name} cannot be used: {reason}") from None
         if model.nv != self.n or list(model.names[1:]) != list(self.joint_names):
             raise ArmError(f"{self.name} is not a serial chain of 1-axis joints to the frame {self.frame!r}")

@@ -1,8 +1,8 @@
-"""A source whose reader lives in its own process, so that neither can hold up or take down the other.
+"""A source whose reader lives in its own process, so that neither can delay or end the other.
 
 `read_once` of Franka's Python client holds the interpreter while it waits: next to a busy thread it falls to 655
-samples per second. So the reader is alone with the robot and puts samples into a ring in shared memory
-(`sources.ring`); it also writes the record, where one is asked for. A byte through a pipe wakes whoever waits for a
+samples per second. So the reader has a process of its own and puts samples into a ring in shared memory
+(`devices.ring`); it also writes the record, where one is asked for. A byte through a pipe wakes whoever waits for a
 sample; the pipe's end says that the reader is gone, at once and whatever ended it. The other way round the reader's
 standard input ends with this process. The shared memory has no name and needs no clearing away.
 """
@@ -88,14 +88,14 @@ class Detached(Source):
         self._reader = RingReader(self._ring)
         self._wake, wake = os.pipe()
         self._status, status = os.pipe()
-        self._heard = b""
+        self._received = b""
         self._listening = threading.Lock()  # held while events are read
         self._arrived: float | None = None
         self._last: dict[str, Any] | None = None  # how it ended
         self._calls = 0
         command = [sys.executable, "-P", "-m", "armload.devices.reader_process"]
         theirs = (self._ring.descriptor, wake, status)
-        # Ctrl-C goes to the whole group, and the one who started the reader decides: it never hears of it, not even
+        # Ctrl-C goes to the whole group, and the one who started the reader decides: it is blocked for the reader, even
         # before its first line. A signal that comes meanwhile is ours when the mask is taken off
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
@@ -109,9 +109,10 @@ class Detached(Source):
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
             os.close(wake)
             os.close(status)
-        told = {**options, "payloads": payloads_to_json(options["payloads"])} if options.get("payloads") else options
-        order = {"spec": spec, "arm": arm_to_json(arm), "options": told}
-        self._send({**order, "record": None if record is None else str(record)})
+        if options.get("payloads"):
+            options["payloads"] = payloads_to_json(options["payloads"])
+        kept = None if record is None else str(record)
+        self._send({"spec": spec, "arm": arm_to_json(arm), "options": options, "record": kept})
         connecting = False
         try:
             event = self._event(_TO_START)
@@ -139,7 +140,7 @@ class Detached(Source):
                     return
                 rows = self._reader.read()
                 if not len(rows) and not os.read(self._wake, 1 << 16) and self._reader.next >= self._ring.written:
-                    return self._say_how_it_ended()
+                    return self._raise_error_of_end()
             for row in rows:
                 self._arrived = float(row[-1])
                 yield Sample(float(row[0]), row[1 : n + 1], row[n + 1 : 2 * n + 1], row[2 * n + 1 : -1])
@@ -187,7 +188,8 @@ class Detached(Source):
             os.close(self._status)
             self._ring.close()
 
-    def _say_how_it_ended(self) -> None:
+    def _raise_error_of_end(self) -> None:
+        """Read events up to the last; SourceError if that is an error."""
         try:
             while self._last is None:
                 self._event(_TO_END)
@@ -219,22 +221,22 @@ class Detached(Source):
             raise SourceError(f"the reader of {self.name} has ended: open the source again") from None
 
     def _event(self, seconds: float, silent: str | None = None) -> dict[str, Any]:
-        """The reader's next event; how it ended, again and again, once it has told. silent: the error if none comes."""
+        """The reader's next event; after the last one, the last one again. silent: the error if none comes."""
         until = time.monotonic() + seconds
         with self._listening:
             if self._last is not None:
                 return self._last
-            while b"\n" not in self._heard:
+            while b"\n" not in self._received:
                 left = until - time.monotonic()
                 if left <= 0 or not select.select([self._status], [], [], left)[0]:
                     raise SourceError(silent or f"the reader of {self.name} did not answer within {seconds:.0f} s")
-                heard = os.read(self._status, 1 << 16)
-                if not heard:
+                received = os.read(self._status, 1 << 16)
+                if not received:
                     how = self.process.wait()
                     ended = f"was killed by signal {-how}" if how < 0 else f"ended with exit code {how}"
                     raise SourceError(f"the reader of {self.name} {ended}: open the source again")
-                self._heard += heard
-            line, self._heard = self._heard.split(b"\n", 1)
+                self._received += received
+            line, self._received = self._received.split(b"\n", 1)
             event = json.loads(line)
             if event["event"] in ("ended", "error"):
                 self._last = event

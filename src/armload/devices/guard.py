@@ -1,4 +1,4 @@
-"""What must hold before a load is written to a robot: a wrong one makes it sink, rise or throw what it holds."""
+"""Checks before a load is written to a robot: with a wrong one the arm sinks, rises or throws what it holds."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armload.arms import ARMS, Arm, namesake
+from armload.arms import ARMS, Arm, prefixed_frame
 from armload.devices.load import Load
 from armload.errors import SinkError
 from armload.identification import Identification
@@ -44,18 +44,13 @@ def stands_still(velocity: Callable[[], ArrayLike]) -> bool:
     return False
 
 
-def reason_of(error: Exception) -> str:
-    """What a vendor's exception says, on one line."""
-    return " ".join(str(error).split()) or type(error).__name__
-
-
 def flange_of(arm: Arm) -> str:
     """The frame a built-in arm's controller calls the flange.
 
     Raises:
         SinkError: the arm is not a built-in one.
     """
-    flange = None if arm.known_as is None else namesake(arm, ARMS[arm.known_as].flange)
+    flange = None if arm.known_as is None else prefixed_frame(arm, ARMS[arm.known_as].flange)
     if flange is None:
         raise SinkError(f"the flange of {arm.name} is not known: name its frame with flange=…")
     return flange

@@ -1,4 +1,4 @@
-"""A `Load`: what is to be told to a controller, and how far it is known."""
+"""A `Load`: a payload for a controller or a simulator, and which of its parameters were measured."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ class Load:
         parameters: phi about the origin and in the axes of its frame.
         determined: for each of the ten, whether it was measured; all of them for a payload that is known.
         robot: name of the arm it was identified on.
-        relative_to: "arm" (everything on the flange), "tool", "tare" or "before" (what was added), None where
-            nobody said.
+        relative_to: "arm" (everything on the flange), "tool", "tare" or "before" (what was added), None: not
+            known.
         std: standard deviation of phi (10,), where it was measured.
     """
 
@@ -126,14 +126,15 @@ class Load:
             return self
         return replace(self, parameters=InertialParameters(self._nearest(), self.frame))
 
-    def said(self) -> tuple[str, ...]:
-        """What to write above the numbers: whose load, about which frame, and what was not measured."""
+    def description(self) -> tuple[str, ...]:
+        """Lines to write above the numbers: whose load, about which frame, and what was not measured."""
         what = f"payload of {self.robot}" if self.robot else "payload"
         if self.frame:
             what += f" about {self.frame}"
         if self.relative_to:
             what += f", relative to the {_RELATIVE.get(self.relative_to, self.relative_to)}"
-        lines = [_line(what)]
+        # on one line, and without what would end a comment
+        lines = [" ".join(what.replace("--", "- -").split())]
         if self.undetermined:
             lines.append(f"not determined by the log: {', '.join(self.undetermined)}; known beforehand, not measured")
         return tuple(lines)
@@ -211,8 +212,3 @@ def _text(content: dict[str, Any], key: str, path: str | Path) -> str | None:
     if value is not None and not isinstance(value, str):
         raise SinkError(f"{path}: {key} is {json.dumps(value)[:80]}, expected text")
     return value
-
-
-def _line(text: str) -> str:
-    """The text on one line and without what would end a comment."""
-    return " ".join(text.replace("--", "- -").split())

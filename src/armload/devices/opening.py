@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
@@ -24,7 +25,7 @@ from armload.payloads import draw_payload
 from armload.simulation import Sensors, World
 
 SCHEMES = ("fr3", "panda", "ur", "ros2")
-_ALONE = ("fr3", "panda", "ur")  # read in a process of their own unless told otherwise
+_DETACHED = ("fr3", "panda", "ur")  # read in a process of their own by default
 
 
 def open_source(
@@ -84,10 +85,10 @@ def open_source(
             f"{name}: unknown kind of source {scheme!r}: expected {', '.join(f'{s}://' for s in SCHEMES)}, sim, or the "
             "path of a recording"
         )
-    if detached or (detached is None and scheme in _ALONE):
-        simulated = None  # the same simulator, never run here: it knows the truth
-        if name == "sim":
-            simulated = _simulator(arm, payloads, world, sensors, rate=rate, speed=speed, duration=duration, seed=seed)
+    timing = {"rate": rate, "speed": speed, "duration": duration, "seed": seed}
+    simulator = partial(_simulator, arm, payloads, world, sensors, **timing)
+    if detached or (detached is None and scheme in _DETACHED):
+        simulated = simulator() if name == "sim" else None  # the same simulator, never run here: it knows the truth
         return Detached(
             name,
             arm,
@@ -107,7 +108,7 @@ def open_source(
     if scheme:
         source = _robot(name, arm, torque_constants)
     elif name == "sim":
-        source = _simulator(arm, payloads, world, sensors, rate=rate, speed=speed, duration=duration, seed=seed)
+        source = simulator()
     else:
         source = Replay(name, arm, speed=speed, loop=loop, topic=topic)
     if record is None:
@@ -123,13 +124,13 @@ def prepare(spec: str) -> str | None:
     """Load the client a robot is read through, ahead of `open_source`: loading may take seconds, an answer does not.
 
     Returns:
-        What to say of a robot that then does not answer; None: a source that may take its time, or has no client here.
+        The error message for a robot that then does not answer; None: no limit, or no client.
     """
     parts = urlsplit(spec if "://" in spec else "")
-    if parts.scheme not in _ALONE or not parts.hostname:
+    if parts.scheme not in _DETACHED or not parts.hostname:
         return None
     silent = "it does not answer"
-    with contextlib.suppress(SourceError):  # said again when it is opened, after what else may be wrong
+    with contextlib.suppress(SourceError):  # raised again when the source is opened
         if parts.scheme == "ur":
             ur.load_client()
             return ur.unreachable(parts.hostname, silent)
@@ -141,7 +142,7 @@ def prepare(spec: str) -> str | None:
 def _robot(name: str, arm: Arm, torque_constants: Sequence[float] | None) -> Source:
     parts = urlsplit(name)
     if parts.scheme == "ros2":
-        return Ros2Source(parts.netloc + parts.path, arm)  # ros2://joint_states is meant well
+        return Ros2Source(parts.netloc + parts.path, arm)  # ros2://joint_states means the same
     if not parts.hostname:
         raise SourceError(
             f"{name} names no robot: expected {parts.scheme}://ADDRESS, such as {parts.scheme}://172.16.0.2"
@@ -166,8 +167,8 @@ def _robot(name: str, arm: Arm, torque_constants: Sequence[float] | None) -> Sou
 def _simulator(
     arm: Arm, payloads: Sequence[tuple[float, Any]] | None, world: str, sensors: bool, seed: int, **more: Any
 ) -> Source:
-    worlds = {"nominal": lambda: None, "real-like": lambda: World.real_like(arm, seed)}
-    worlds["beyond"] = lambda: World.beyond(arm, seed)
+    worlds = {"nominal": World.nominal, "real-like": partial(World.real_like, seed=seed)}
+    worlds["beyond"] = partial(World.beyond, seed=seed)
     if world not in worlds:
         raise SourceError(f"there is no world {world!r}: expected one of {', '.join(worlds)}")
     if payloads is None:
@@ -175,4 +176,4 @@ def _simulator(
         for k in range(180):
             payloads += [(5.0 + 20.0 * k, draw_payload("boxes", seed + k, rated=rated)), (20.0 + 20.0 * k, None)]
     seen = Sensors.of(arm) if sensors else None
-    return Simulator(arm, payloads=payloads, world=worlds[world](), sensors=seen, seed=seed, **more)
+    return Simulator(arm, payloads=payloads, world=worlds[world](arm), sensors=seen, seed=seed, **more)

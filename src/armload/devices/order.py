@@ -1,4 +1,4 @@
-"""An arm and payloads as JSON: what the reader's own process is told."""
+"""An arm and payloads as JSON, for the reader's own process."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ that is how it learns that whoever started it has ended, in whatever way. RING i
 byte per sample, STATUS a pipe with one JSON object per event: connecting (to a robot; with what to say if nothing
 follows), ready, ended, error, or what became of a command.
 
-A sample is recorded first and handed on then: what anybody has seen is in the record.
+A sample is recorded before it is handed on: the record has every sample that was used.
 
 Clients print of their own accord: what goes to the descriptors of standard output and standard error goes nowhere here,
 unless ARMLOAD_TRACEBACK=1. What Python has to say, such as where a bug is, goes to the starter's standard error.
@@ -51,7 +51,7 @@ class _Reader:
         self.commands: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
         os.set_blocking(wake, False)
 
-    def tell(self, **event: Any) -> None:
+    def report(self, **event: Any) -> None:
         with contextlib.suppress(BrokenPipeError):
             os.write(self.status, (json.dumps(event) + "\n").encode())
 
@@ -63,21 +63,20 @@ class _Reader:
             options["payloads"] = payloads_from_json(options["payloads"])
         try:
             with contextlib.ExitStack() as stack:
-                if (silent := prepare(order["spec"])) is not None:
-                    self.tell(event="connecting", message=silent)
-                    with _ended_with_its_starter():
-                        source = open_source(order["spec"], arm, detached=False, **options)
-                else:
+                silent = prepare(order["spec"])
+                if silent is not None:
+                    self.report(event="connecting", message=silent)
+                with contextlib.nullcontext() if silent is None else _ended_with_its_starter():
                     source = open_source(order["spec"], arm, detached=False, **options)
                 stack.enter_context(source)
                 record = order["record"]
                 recorder = None if record is None else stack.enter_context(Recorder(record, source.n))
                 threading.Thread(target=self.listen, args=(source, lines), daemon=True).start()
-                self.tell(event="ready", name=source.name, n=source.n, rate=source.rate, speed=source.speed)
+                self.report(event="ready", name=source.name, n=source.n, rate=source.rate, speed=source.speed)
                 self.pass_on(source, recorder)
-            self.tell(event="ended")
+            self.report(event="ended")
         except (ArmloadError, OSError) as error:
-            self.tell(event="error", message=str(error))
+            self.report(event="error", message=str(error))
 
     def pass_on(self, source: Source, recorder: Recorder | None) -> None:
         row = np.empty(self.ring.columns)
@@ -100,9 +99,9 @@ class _Reader:
             if method not in _CALLS or not hasattr(source, method):
                 raise SourceError(f"{source.name} has no {method}: only a Franka robot has")
             value = getattr(source, method)(*command["arguments"])
-            self.tell(event="answer", number=command["number"], value=value)
+            self.report(event="answer", number=command["number"], value=value)
         except ArmloadError as error:
-            self.tell(event="refused", number=command["number"], message=str(error))
+            self.report(event="refused", number=command["number"], message=str(error))
 
     def listen(self, source: Source, lines: Iterator[bytes]) -> None:
         """Take commands until standard input ends; then end the source, and if it does not, the process."""

@@ -1,4 +1,4 @@
-"""What was seen, kept: every sample goes to the operating system before the next one comes.
+"""A record of all samples: each goes to the operating system before the next one comes.
 
 A record is an ordinary CSV log (`read_recording` reads it) that only ever grows by whole lines. Each line is handed
 over by itself, so that a process killed at any moment loses nothing that it had seen; a machine that loses its power
@@ -17,7 +17,6 @@ import math
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
@@ -56,9 +55,9 @@ class Recorder:
         self._bad_lines: _Lines | None = None
         self._last = -math.inf
         self._late = math.inf  # time of the sample before, if it was a late one
-        for beside in (self._path_of_part(2), self._path_of_bad()):  # not known only when it is needed
-            if beside.exists():
-                raise RecordingError(f"{beside} exists, and belongs to another record: choose another name than {path}")
+        for other in (self._path_of_part(2), self._path_of_bad()):  # refused now, not when it is needed
+            if other.exists():
+                raise RecordingError(f"{other} exists, and belongs to another record: choose another name than {path}")
         self._lines = self._next_part()
 
     def append(self, sample: Sample) -> None:
@@ -93,9 +92,7 @@ class Recorder:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _next_part(self) -> _Lines:

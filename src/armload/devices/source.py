@@ -10,7 +10,6 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from types import TracebackType
 from typing import Self
 
 from armload.inertia import InertialParameters
@@ -20,8 +19,8 @@ from armload.recording import Sample
 class Source(ABC):
     """A stream of samples (t, q, dq, tau) of one arm.
 
-    Iterating blocks until the next sample is there and ends when the source has ended. What a source hands on is what
-    the robot said: times may jump and values may be missing (NaN); whoever uses it decides what a bad sample means.
+    Iterating blocks until the next sample is there and ends when the source has ended. Samples are passed on as
+    received: times may jump and values may be missing (NaN); the user decides what a bad sample means.
 
     Attributes:
         name: what messages call it (a path, an address).
@@ -70,7 +69,5 @@ class Source(ABC):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()

@@ -1,7 +1,7 @@
 """Saved models: one safetensors file with the members' arrays and, as JSON in its header, where they belong.
 
 Nothing in the file is executed when it is read. The header names the arm, the frame and the motions the model was
-trained on, because a learned payload model answers for these alone.
+trained on, because a learned payload model is valid for these only.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import fields
-from importlib.metadata import PackageNotFoundError, version
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,12 +19,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
 from armload.atomic import replacing
-from armload.ensembles.compiled import Beside, Compiled, CompiledNetworks, CompiledTrees, Together
+from armload.ensembles.compiled import (
+    AveragedMembers,
+    CombinedEnsembles,
+    Compiled,
+    CompiledNetworks,
+    CompiledTrees,
+    StackedOutputs,
+)
 from armload.ensembles.trained_model import LearnedModel
 from armload.errors import ArmloadError, ModelError
 from armload.inertia import NAMES
 from armload.motion import Motion, MotionFingerprint
 from armload.recording.columns import column_names
+from armload.version import package_versions
 
 if TYPE_CHECKING:
     from armload.ensembles.bagging import Ensemble
@@ -33,7 +40,8 @@ if TYPE_CHECKING:
 FORMAT = 1
 _HEADER = "armload"
 _LEAVES: dict[str, type[Compiled]] = {"trees": CompiledTrees, "networks": CompiledNetworks}
-_BRANCHES: dict[str, type[Beside] | type[Together]] = {"beside": Beside, "together": Together}
+# as stored in files: not the names of the classes
+_BRANCHES: dict[str, type[CombinedEnsembles]] = {"beside": StackedOutputs, "together": AveragedMembers}
 
 
 def save_model(
@@ -91,9 +99,9 @@ def save_model(
         "settings": {k: v for k, v in model.get_params().items() if isinstance(v, str | int | float | bool | None)}
         | {"members": compiled.n_members},
         "epochs": None if model.epochs_ is None else model.epochs_.tolist(),
-        "versions": _versions(),
+        "versions": package_versions("armload", "numpy", "scikit-learn", "jax"),
         "notes": notes,
-        "structure": take_apart(compiled, "", tensors),
+        "structure": to_structure(compiled, "", tensors),
     }
     from safetensors.numpy import save
 
@@ -138,13 +146,13 @@ def load_model(path: str | PathLike[str]) -> LearnedModel:
         digest = header.pop("sha256")
         if digest != _digest(header, tensors):
             raise ModelError(f"{path} was altered after it was saved (its SHA-256 differs): copy it again")
-        strange = [kind for kind in _kinds(header["structure"]) if kind not in _LEAVES and kind not in _BRANCHES]
-        if strange:
+        unknown = [kind for kind in _kinds(header["structure"]) if kind not in _LEAVES and kind not in _BRANCHES]
+        if unknown:
             raise ModelError(
-                f"{path} belongs to another version of armload, its members are {strange[0]!r}: expected "
+                f"{path} belongs to another version of armload, its members are {unknown[0]!r}: expected "
                 f"{' or '.join(_LEAVES)}; train it again"
             )
-        compiled = put_together(header["structure"], "", tensors)
+        compiled = from_structure(header["structure"], "", tensors)
         arm = header["arm"]
         model = LearnedModel(
             compiled=compiled,
@@ -176,11 +184,11 @@ def load_model(path: str | PathLike[str]) -> LearnedModel:
     return model
 
 
-def take_apart(compiled: Compiled, prefix: str, tensors: dict[str, NDArray]) -> dict[str, Any]:
-    """The tree of parts as plain data; their arrays go to `tensors`, named by their place."""
+def to_structure(compiled: Compiled, prefix: str, tensors: dict[str, NDArray]) -> dict[str, Any]:
+    """The tree of parts as plain data; its arrays go to `tensors`, named by their place in the tree."""
     for kind, branch in _BRANCHES.items():
         if isinstance(compiled, branch):
-            parts = [take_apart(part, f"{prefix}{k}.", tensors) for k, part in enumerate(compiled.parts)]
+            parts = [to_structure(part, f"{prefix}{k}.", tensors) for k, part in enumerate(compiled.parts)]
             return {"type": kind, "parts": parts}
     kind = next(kind for kind, leaf in _LEAVES.items() if isinstance(compiled, leaf))
     out: dict[str, Any] = {"type": kind}
@@ -193,10 +201,11 @@ def take_apart(compiled: Compiled, prefix: str, tensors: dict[str, NDArray]) -> 
     return out
 
 
-def put_together(structure: dict[str, Any], prefix: str, tensors: dict[str, NDArray]) -> Compiled:
+def from_structure(structure: dict[str, Any], prefix: str, tensors: dict[str, NDArray]) -> Compiled:
+    """The inverse of `to_structure`."""
     kind = structure["type"]
     if kind in _BRANCHES:
-        parts = [put_together(part, f"{prefix}{k}.", tensors) for k, part in enumerate(structure["parts"])]
+        parts = [from_structure(part, f"{prefix}{k}.", tensors) for k, part in enumerate(structure["parts"])]
         return _BRANCHES[kind](parts)
     leaf = _LEAVES[kind]
     values = {f.name: tensors.get(prefix + f.name, structure.get(f.name)) for f in fields(leaf)}  # type: ignore[arg-type]
@@ -215,13 +224,3 @@ def _digest(header: dict[str, Any], tensors: dict[str, NDArray]) -> str:
     for name in sorted(tensors):
         digest.update(f"{name} {tensors[name].dtype} {tensors[name].shape}".encode() + tensors[name].tobytes())
     return digest.hexdigest()
-
-
-def _versions() -> dict[str, str]:
-    out = {}
-    for package in ("armload", "numpy", "scikit-learn", "jax"):
-        try:
-            out[package] = version(package)
-        except PackageNotFoundError:
-            continue
-    return out

@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, overload
+from typing import ClassVar, Literal, overload
 
 import numpy as np
 from numba import njit
@@ -29,10 +29,10 @@ class Compiled(ABC):
 
     @abstractmethod
     def members(self, X: ArrayLike) -> NDArray[np.float64]:
-        """What each member says: (M, N, k) for rows X (N, d)."""
+        """The prediction of each member: (M, N, k) for rows X (N, d)."""
 
     def row(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What each member says of one row x (d,): (M, k), as `members` to rounding and faster where that matters."""
+        """The prediction of each member for one row x (d,): (M, k), as `members` to rounding, and faster."""
         return self.members(x[None])[:, 0]
 
     @abstractmethod
@@ -58,16 +58,16 @@ class Compiled(ABC):
         mean, spread = np.empty((len(X), self.n_outputs)), np.empty((len(X), self.n_outputs))
         for start in range(0, len(X), _CHUNK):
             rows = slice(start, start + _CHUNK)
-            said = self.members(X[rows])
-            mean[rows] = said.mean(axis=0)
+            predictions = self.members(X[rows])
+            mean[rows] = predictions.mean(axis=0)
             if return_std:
-                spread[rows] = member_spread(said)
+                spread[rows] = member_spread(predictions)
         return (mean, spread) if return_std else mean
 
 
-def member_spread(said: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Sample standard deviation over the first axis; infinite where there is only one member to ask."""
-    return said.std(axis=0, ddof=1) if len(said) > 1 else np.full(said.shape[1:], np.inf)
+def member_spread(predictions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Sample standard deviation over the first axis; infinite for a single member."""
+    return predictions.std(axis=0, ddof=1) if len(predictions) > 1 else np.full(predictions.shape[1:], np.inf)
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,73 +236,43 @@ def _forward(x, weights):  # pragma: no cover - compiled
     return out
 
 
-@dataclass(frozen=True, eq=False)
-class Beside(Compiled):
+@dataclass(eq=False)
+class CombinedEnsembles(Compiled):
+    """Several ensembles as one; their predictions (M, N, k) are concatenated along `axis`.
+
+    Subclasses name the axis and `joined`, the count that adds up along it; the other counts must agree.
+    """
+
+    parts: Sequence[Compiled]
+    axis: ClassVar[int]
+    joined: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        self.parts = tuple(self.parts)
+        for name in ("n_features", "n_members", "n_outputs"):
+            counts = [getattr(part, name) for part in self.parts]
+            if name != self.joined and len(set(counts)) != 1:
+                raise ValueError(f"parts differ in {name}: {counts}")
+            setattr(self, name, sum(counts) if name == self.joined else counts[0])
+
+    def validate(self) -> None:
+        for part in self.parts:
+            part.validate()
+
+    def members(self, X: ArrayLike) -> NDArray[np.float64]:
+        return np.concatenate([part.members(X) for part in self.parts], axis=self.axis)
+
+    def row(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.concatenate([part.row(x) for part in self.parts], axis=self.axis)
+
+
+class StackedOutputs(CombinedEnsembles):
     """Ensembles of different outputs of the same rows, outputs side by side: the two stages of two-stage training."""
 
-    parts: tuple[Compiled, ...]
-
-    def __init__(self, parts: Sequence[Compiled]) -> None:
-        _same(parts, "n_features", "n_members")
-        object.__setattr__(self, "parts", tuple(parts))
-
-    @property
-    def n_features(self) -> int:  # type: ignore[override]
-        return self.parts[0].n_features
-
-    @property
-    def n_members(self) -> int:  # type: ignore[override]
-        return self.parts[0].n_members
-
-    @property
-    def n_outputs(self) -> int:  # type: ignore[override]
-        return sum(part.n_outputs for part in self.parts)
-
-    def validate(self) -> None:
-        for part in self.parts:
-            part.validate()
-
-    def members(self, X: ArrayLike) -> NDArray[np.float64]:
-        return np.concatenate([part.members(X) for part in self.parts], axis=2)
-
-    def row(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.concatenate([part.row(x) for part in self.parts], axis=1)
+    axis, joined = -1, "n_outputs"
 
 
-@dataclass(frozen=True, eq=False)
-class Together(Compiled):
-    """Ensembles of the same outputs as one ensemble of all their members: trees and networks together."""
+class AveragedMembers(CombinedEnsembles):
+    """Ensembles of the same outputs as one ensemble of all their members: trees and networks averaged."""
 
-    parts: tuple[Compiled, ...]
-
-    def __init__(self, parts: Sequence[Compiled]) -> None:
-        _same(parts, "n_features", "n_outputs")
-        object.__setattr__(self, "parts", tuple(parts))
-
-    @property
-    def n_features(self) -> int:  # type: ignore[override]
-        return self.parts[0].n_features
-
-    @property
-    def n_members(self) -> int:  # type: ignore[override]
-        return sum(part.n_members for part in self.parts)
-
-    @property
-    def n_outputs(self) -> int:  # type: ignore[override]
-        return self.parts[0].n_outputs
-
-    def validate(self) -> None:
-        for part in self.parts:
-            part.validate()
-
-    def members(self, X: ArrayLike) -> NDArray[np.float64]:
-        return np.concatenate([part.members(X) for part in self.parts], axis=0)
-
-    def row(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.concatenate([part.row(x) for part in self.parts], axis=0)
-
-
-def _same(parts: Sequence[Compiled], *attributes: str) -> None:
-    for attribute in attributes:
-        if len({getattr(part, attribute) for part in parts}) != 1:
-            raise ValueError(f"parts differ in {attribute}: {[getattr(part, attribute) for part in parts]}")
+    axis, joined = 0, "n_members"

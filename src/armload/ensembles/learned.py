@@ -19,8 +19,8 @@ class LearnedIdentifier(Identifier):
     phī(k) = Σ_{j ≤ k} K(x_j) / k,  x_j = (t_j − t_1, q_j, dq_j, tau_j),  K the mean over the members (eq. 8).
 
     The covariance is diagonal: the variance of the members' own averages, plus the square of the model's error on
-    payloads held out from training where that is known (`LearnedModel.error_std`). The members' disagreement alone
-    says nothing of how far they are from the truth together. It is infinite before the first sample, when phi is the
+    payloads held out from training where that is known (`LearnedModel.error_std`). The spread of the members
+    does not contain the error that they have in common. It is infinite before the first sample, when phi is the
     training mean, and for a model of one member whose error is unknown.
 
     The model knows a motion from its start, so the first sample must be that start. A stream cannot know whether a
@@ -41,11 +41,13 @@ class LearnedIdentifier(Identifier):
         model.check(arm)
         self.model, self.arm, self.single, self.any_motion = model, arm, single, any_motion
         self.name = f"{model.kind} ensemble" + (", single sample" if single else "")
-        # what did not vary in training is not known exactly for that
+        # a parameter that did not vary in training is not known exactly
         self.payload_prior = (model.phi_mean, np.maximum(model.phi_std, SMALL / Z95))
-        self._own = np.zeros(10) if model.error_std is None else model.error_std**2  # variance beside the members'
+        self._model_variance = (
+            np.zeros(10) if model.error_std is None else model.error_std**2
+        )  # added to that of the members
         if model.error_std is None and model.compiled.n_members == 1:
-            self._own = np.full(10, np.inf)
+            self._model_variance = np.full(10, np.inf)
         self.reset()
 
     def reset(self) -> None:
@@ -74,8 +76,8 @@ class LearnedIdentifier(Identifier):
         if _fill(row, t - self._start, q, dq, tau):
             self._count += 1
             phi, covariance = np.zeros(10), np.zeros((10, 10))
-            said, count = self.model.compiled.row(row), 1 if self.single else self._count
-            _average(self._averages, said, count, self._own, phi, covariance)
+            predictions, count = self.model.compiled.row(row), 1 if self.single else self._count
+            _average(self._averages, predictions, count, self._model_variance, phi, covariance)
             self._last = Estimate(t, phi, covariance, self._count, self.model.frame)
 
     def _check(self, recording: Recording) -> None:
@@ -101,20 +103,20 @@ def _fill(row, t, q, dq, tau):  # pragma: no cover - compiled
 
 
 @njit(cache=True, nogil=True)
-def _average(averages, said, count, own, mean, covariance):  # pragma: no cover - compiled
-    """Make what each member said (M, k) the last of so many in its average (M, k), which is changed.
+def _average(averages, predictions, count, model_variance, mean, covariance):  # pragma: no cover - compiled
+    """Update each member's running average (M, k) by its prediction (M, k), number `count`; averages are changed.
 
-    own: (k,) variance there is beside the members' disagreement. mean, covariance: zeros (k,) and (k, k), filled in.
+    model_variance: (k,) added to the variance of the members. mean, covariance: zeros (k,) and (k, k), filled in.
     """
     M, k = averages.shape
     for m in range(M):
         for j in range(k):
             before = averages[m, j] if count > 1 else 0.0
-            averages[m, j] = before + (said[m, j] - before) / count
+            averages[m, j] = before + (predictions[m, j] - before) / count
             mean[j] += averages[m, j]
     for j in range(k):
         mean[j] /= M
         square = 0.0
         for m in range(M):
             square += (averages[m, j] - mean[j]) ** 2
-        covariance[j, j] = own[j] + (square / (M - 1) if M > 1 else 0.0)
+        covariance[j, j] = model_variance[j] + (square / (M - 1) if M > 1 else 0.0)

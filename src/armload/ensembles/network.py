@@ -29,7 +29,7 @@ class NetworkLearner(Learner):
 
     The paper states 500 units and at most 1000 epochs; optimiser, batch and stopping rule are our choice. Training of a
     member stops as soon as `patience` epochs together lowered its best validation loss by less than `tolerance`
-    (relative); the weights of its best epoch are kept. The result depends on the seed alone, on one kind of machine.
+    (relative); the weights of its best epoch are kept. On one kind of machine the result depends on the seed only.
 
     Args:
         hidden: units of the hidden layer.

@@ -1,4 +1,4 @@
-"""What a long training says while it runs, and a bar that shows it."""
+"""Progress of a long training, and a bar that shows it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def reporter(progress: bool | Report | None) -> Iterator[Report]:
         yield lambda _: None
     else:
         from rich.console import Console
-        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
+        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
         from rich.progress import Progress as Bar
 
         columns = (
@@ -36,9 +36,11 @@ def reporter(progress: bool | Report | None) -> Iterator[Report]:
             BarColumn(),
             MofNCompleteColumn(),
             TimeElapsedColumn(),
+            TextColumn("left:"),
+            TimeRemainingColumn(),
             TextColumn("{task.fields[note]}"),
         )
-        with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
+        with Bar(*columns, console=Console(stderr=True), transient=True, speed_estimate_period=300.0) as bar:
             tasks = {}
 
             def show(state: Progress) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from armload.ensembles.bagging import BaggingEnsemble, Ensemble, OneKind, Rows, as_learner
-from armload.ensembles.compiled import Beside, Together
+from armload.ensembles.compiled import AveragedMembers, StackedOutputs
 from armload.ensembles.progress import Report
 from armload.ensembles.weak_learner import Learner
 from armload.errors import ModelError
@@ -26,7 +26,7 @@ class TwoStage(OneKind):
 
     Attributes:
         stages_: the two fitted ensembles.
-        compiled_: their members side by side, member i of one beside member i of the other.
+        compiled_: their members with the outputs of both stages side by side.
     """
 
     def _train(
@@ -43,11 +43,11 @@ class TwoStage(OneKind):
                 X_val,
                 None if y_val is None else y_val[:, columns],
                 progress=progress,
-                checkpoint=_beside(checkpoint, f"stage{k}"),
+                checkpoint=_part_checkpoint(checkpoint, f"stage{k}"),
             )
             for k, columns in enumerate(STAGES, start=1)
         ]
-        self.compiled_ = Beside([stage.compiled_ for stage in self.stages_])
+        self.compiled_ = StackedOutputs([stage.compiled_ for stage in self.stages_])
 
     @property
     def epochs_(self) -> np.ndarray | None:
@@ -93,11 +93,11 @@ class MixedEnsemble(Ensemble):
     ) -> None:
         self.parts_ = [
             BaggingEnsemble(kind, self.members, self.seed, self.bootstrap, self.scale, self.hold_out).fit(
-                *rows, *(validation or ()), progress=progress, checkpoint=_beside(checkpoint, f"part{k}")
+                *rows, *(validation or ()), progress=progress, checkpoint=_part_checkpoint(checkpoint, f"part{k}")
             )
             for k, kind in enumerate(self.kinds, start=1)
         ]
-        self.compiled_ = Together([part.compiled_ for part in self.parts_])
+        self.compiled_ = AveragedMembers([part.compiled_ for part in self.parts_])
 
     @property
     def epochs_(self) -> np.ndarray | None:
@@ -115,6 +115,6 @@ def _epochs(parts: Sequence[BaggingEnsemble]) -> np.ndarray | None:
     return np.concatenate(found) if found else None
 
 
-def _beside(checkpoint: Path | None, part: str) -> Path | None:
+def _part_checkpoint(checkpoint: Path | None, part: str) -> Path | None:
     """The checkpoint of one part: training.npz → training.stage1.npz."""
     return None if checkpoint is None else checkpoint.with_name(f"{checkpoint.stem}.{part}{checkpoint.suffix}")

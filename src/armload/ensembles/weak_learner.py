@@ -25,7 +25,7 @@ BOOTSTRAP, BOOTSTRAP_VALIDATION, HOLD_OUT, INITIAL_WEIGHTS, SHUFFLE, TIES = rang
 class Scaling(NamedTuple):
     """Centre and scale of features (d,) and outputs (k,), taken from the training rows.
 
-    A constant column has the scale 0 and is 0 when scaled: a feature that says nothing, an output that is its mean.
+    A constant column has the scale 0 and is 0 when scaled.
     """
 
     x_mean: NDArray[np.float64]

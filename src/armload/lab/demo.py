@@ -1,4 +1,4 @@
-"""The main job from end to end, in minutes: simulate, train, identify a payload nobody has seen, compare, report.
+"""The main job from end to end, in minutes: simulate, train, identify an unknown payload, compare, report.
 
 A nominal Panda runs the excitation with the container's loadings, with sensors as on real Pandas; small ensembles
 learn from it, by payload: some loadings are held out to stop the networks. Then another Panda, one that differs from
@@ -14,7 +14,6 @@ import shutil
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -22,7 +21,6 @@ import numpy as np
 
 from armload.arms import Arm, arm
 from armload.errors import DatasetError
-from armload.estimators import Identifier
 from armload.identification import Identification, default_for, identify
 from armload.inertia import InertialParameters
 from armload.lab.dataset import Dataset, Split, build_dataset, split_payloads
@@ -35,7 +33,7 @@ from armload.recording import Recording, write_recording
 from armload.simulation import Sensors, World, simulate
 
 if TYPE_CHECKING:
-    from armload.ensembles import BaggingEnsemble, LearnedModel, TwoStage
+    from armload.ensembles import BaggingEnsemble, TwoStage
     from armload.lab.evaluation.contest import Method
 
 PHYSICAL = ("rls", "rls-filter", f"rls-filter{WITH_TARE}", "map", f"map{WITH_TARE}")
@@ -95,7 +93,7 @@ def run_demo(
         quick: seconds instead of minutes; the ensembles are then too small to judge.
         seed: of the world, the sensors' noise, the split and the training; the same seed gives the same numbers.
         progress: bars on stderr.
-        say: told what is being done.
+        say: called with what is being done.
 
     Raises:
         ArmloadError: a file cannot be written.
@@ -175,7 +173,7 @@ def _train(
     clock: _Clock,
 ) -> dict[str, Method]:
     """One ensemble of each kind, single-stage and two-stage, saved and read back as a stream identifier."""
-    from armload.ensembles import BaggingEnsemble, NetworkLearner, TwoStage, save_model
+    from armload.ensembles import BaggingEnsemble, LearnedIdentifier, NetworkLearner, TwoStage, save_model
     from armload.lab.evaluation import held_out_error
 
     network = NetworkLearner(hidden=size.hidden, max_epochs=size.epochs)
@@ -193,15 +191,8 @@ def _train(
         path = folder / f"{name.replace(', ', '-').replace(' ', '-')}.safetensors"
         error = held_out_error(ensemble, dataset, split.validation)
         model = save_model(path, ensemble, arm=robot, motion=motion, dataset_hash=dataset.hash, error_std=error)
-        out[name] = partial(_learned, model, robot)
+        out[name] = lambda _, model=model: LearnedIdentifier(model, robot)  # another motion's tare is of no use to it
     return out
-
-
-def _learned(model: LearnedModel, robot: Arm, _: Recording | None) -> Identifier:
-    """A learned method gets no tare: an empty arm, on another motion, is strange to it."""
-    from armload.ensembles import LearnedIdentifier
-
-    return LearnedIdentifier(model, robot)
 
 
 def _table(c: Comparison) -> Table:

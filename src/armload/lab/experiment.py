@@ -20,7 +20,7 @@ import numpy as np
 
 from armload.atomic import replacing
 from armload.lab.cells import finished_cell, key_of, load_cells, save_cell
-from armload.version import __version__
+from armload.version import __version__, package_versions
 
 Cells = dict[str, dict[str, Any]]  # by name
 
@@ -29,9 +29,9 @@ Cells = dict[str, dict[str, Any]]  # by name
 class Task:
     """What one process measures at a time.
 
-    name: what a user is told. keys: of its cells, by their names. measure: a function of a module, called as
+    name: shown to the user. keys: of its cells, by their names. measure: a function of a module, called as
     measure(names, *parameters) with the names of the cells that are missing; yields their numbers in that order, ready
-    for JSON. unit: what its cells are to a user ("row"); their count is told where a task may have several.
+    for JSON. unit: what its cells are called ("row"); their count is shown where a task may have several.
     """
 
     name: str
@@ -67,7 +67,7 @@ def run_tasks(
         folder: of the cells' files.
         jobs: processes; the numbers do not depend on it.
         until: begin nothing after so many seconds.
-        say: told what is next. part: what it calls a task.
+        say: called with what is next. part: its word for a task.
         indent: of the cells' JSON; None: each on one line.
 
     Raises:
@@ -125,19 +125,12 @@ def source_key(*paths: str | Path) -> str:
     return key_of(*((file.name, file.read_text(encoding="utf-8")) for file in files))
 
 
-def versions(*packages: str) -> dict[str, str]:
-    """The installed version of each package, by name."""
-    from importlib.metadata import version
-
-    return {name: version(name) for name in packages}
-
-
 def provenance(command: str) -> dict[str, Any]:
     """What stands first in the file of a result: the command that repeats it, versions, the machine and its load."""
     return {
         "command": command,
         "version": __version__,
-        "versions": {"python": platform.python_version(), **versions("numpy", "scipy", "pin", "mujoco")},
+        "versions": {"python": platform.python_version(), **package_versions("numpy", "scipy", "pin", "mujoco")},
         "machine": f"{platform.machine()}, {os.cpu_count()} cores",
         "load": [round(x, 2) for x in os.getloadavg()],
     }

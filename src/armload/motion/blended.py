@@ -69,10 +69,7 @@ class BlendedMotion(Motion):
         """The derivative of q of the given order (0 to 3) at times t (N,), by Leibniz' rule; (N, n)."""
         t = np.asarray(t, dtype=float)
         out = self.inner.derivative(t, order)
-        for rows, edge, sign in (
-            (t < self.blend, 0.0, 1.0),
-            (t > self.duration - self.blend, self.duration, -1.0),
-        ):
+        for rows, edge, sign in ((t < self.blend, 0.0, 1.0), (t > self.duration - self.blend, self.duration, -1.0)):
             if not np.any(rows):
                 continue
             at = t[rows]

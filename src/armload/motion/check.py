@@ -1,4 +1,4 @@
-"""May this arm run this motion? Every limit, the torque with a payload, the floor and the arm itself."""
+"""Whether an arm may run a motion: joint limits, torque with a payload, clearance to the floor and to itself."""
 
 from __future__ import annotations
 
@@ -195,8 +195,4 @@ def _jumps(arm: Arm, t: NDArray, dq: NDArray, ddq: NDArray) -> list[str]:
 
 
 def _clearance(what: str, distance: float, nearest: str) -> str:
-    return (
-        f"clearance to {what}: none sought"
-        if np.isinf(distance)
-        else f"clearance to {what}: {distance:.3f} m ({nearest})"
-    )
+    return f"clearance to {what}: " + ("not checked" if np.isinf(distance) else f"{distance:.3f} m ({nearest})")

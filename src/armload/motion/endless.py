@@ -1,4 +1,4 @@
-"""A motion again and again: round and round if it ends as it began, there and back if it only comes to rest."""
+"""A repeated motion: forward each time if it ends as it began, forward and backward if it only comes to rest."""
 
 from __future__ import annotations
 

@@ -40,11 +40,11 @@ class Motion(ABC):
         return self._at(t, 0), self._at(t, 1), self._at(t, 2)
 
     def position(self, t: ArrayLike) -> NDArray[np.float64]:
-        """q alone at times t (N,) [s]; (N, n) [rad]."""
+        """q at times t (N,) [s]; (N, n) [rad]."""
         return self._at(t, 0)
 
     def velocity(self, t: ArrayLike) -> NDArray[np.float64]:
-        """dq alone at times t (N,) [s]; (N, n) [rad/s]."""
+        """dq at times t (N,) [s]; (N, n) [rad/s]."""
         return self._at(t, 1)
 
     def jerk(self, t: ArrayLike) -> NDArray[np.float64]:

@@ -56,10 +56,10 @@ def random_motion(
     ('random-ur10e-1', 6.0, True)
 
     Args:
-        arm: any arm; limits its maker does not give are replaced by sane ones (velocity reached in 0.25 s).
+        arm: any arm; limits its maker does not give are assumed (velocity reached in 0.25 s).
         seed: the same seed gives the same motion.
         duration: T [s].
-        harmonics: number of harmonics K, at least 2 (one alone cannot start at rest).
+        harmonics: number of harmonics K, at least 2 (a single one cannot start at rest).
         floor: height of the floor in the base's frame [m]; None: there is none.
         around: mean pose (n,) [rad], as of an arm that works in one place; None: a clear one is drawn.
 
@@ -68,15 +68,15 @@ def random_motion(
             pose found.
     """
     if harmonics < 2:
-        raise MotionError(f"{harmonics} harmonic(s) asked for: expected at least 2, one alone cannot start at rest")
+        raise MotionError(f"{harmonics} harmonic(s) asked for: expected at least 2, a single one cannot start at rest")
     if not (np.isfinite(duration) and duration > 0):
         raise MotionError(f"a motion of {duration} s asked for: expected a positive number of seconds")
     rng = np.random.default_rng(seed)
-    limits, model, load = _filled(arm.limits), capsule_arm(arm), rated_load(arm)
+    limits, model, load = filled_limits(arm.limits), capsule_arm(arm), rated_load(arm)
     best: tuple[float, FourierMotion] | None = None
     k = np.arange(1.0, harmonics + 1.0)
     if around is None:
-        poses = _clear_poses(arm, model, limits, rng, floor)[:_TRIALS]
+        poses = clear_poses(arm, model, rng, floor, _POSES, 2 * _FLOOR, 2 * _SELF)[:_TRIALS]
     else:
         poses = np.tile(np.asarray(around, dtype=float), (_TRIALS, 1))
         if poses.shape != (_TRIALS, arm.n):
@@ -107,8 +107,8 @@ def random_motion(
     return best[1]
 
 
-def _filled(limits: Limits) -> Limits:
-    """The limits with a sane number wherever the maker gives none."""
+def filled_limits(limits: Limits) -> Limits:
+    """The limits with an assumed number wherever the maker gives none; positions within one turn."""
     velocity = np.where(np.isfinite(limits.velocity), limits.velocity, _SPEED)
     acceleration = np.where(np.isfinite(limits.acceleration), limits.acceleration, velocity / _TO_SPEED)
     jerk = np.where(np.isfinite(limits.jerk), limits.jerk, acceleration / _TO_PUSH)
@@ -122,18 +122,24 @@ def _filled(limits: Limits) -> Limits:
     )
 
 
-def _clear_poses(
-    arm: Arm, model: CapsuleArm, limits: Limits, rng: np.random.Generator, floor: float | None
+def clear_poses(
+    arm: Arm,
+    model: CapsuleArm,
+    rng: np.random.Generator,
+    floor: float | None,
+    count: int,
+    floor_clearance: float,
+    self_clearance: float,
 ) -> NDArray[np.float64]:
-    """Poses (P, n) from the middle of the range that are clear and whose torque with the rated payload is allowed."""
+    """Those of `count` random poses (P, n) in the middle of the range that are clear and can hold the rated payload."""
+    limits = filled_limits(arm.limits)
     middle, half = (limits.position_low + limits.position_high) / 2, (limits.position_high - limits.position_low) / 2
-    poses = middle + 0.7 * half * rng.uniform(-1.0, 1.0, size=(_POSES, arm.n))
+    poses = middle + 0.7 * half * rng.uniform(-1.0, 1.0, size=(count, arm.n))
     clear = model.clearance(poses, floor)
     load = rated_load(arm)
     held = np.abs((arm if load is None else arm.with_payload(load)).torque(poses))
-    return poses[
-        (clear.floor >= 2 * _FLOOR) & (clear.self >= 2 * _SELF) & np.all(held <= _SHARE * limits.effort, axis=1)
-    ]
+    apart = (clear.floor >= floor_clearance) & (clear.self >= self_clearance)
+    return poses[apart & np.all(held <= _SHARE * limits.effort, axis=1)]
 
 
 def _within(motion: FourierMotion, limits: Limits, travel: NDArray[np.float64]) -> FourierMotion:

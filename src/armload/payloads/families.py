@@ -10,7 +10,7 @@
 | `odd`       | dumbbells, poles, panes, rings far off the flange's axis: unlike all of the others       |
 | `light`     | the `shapes` at 0.3–15 % of the weight and of the same density: a screw, a phone, a box   |
 
-No prior is fitted on `odd`: it is there to see what happens with a payload that nobody expected. Figures are those
+No prior is fitted on `odd`: it tests payloads outside the training families. Figures are those
 of an arm rated for 3 kg. For another, masses grow with its rating and lengths with the cube root.
 """
 
@@ -23,7 +23,7 @@ from armload.inertia import InertialParameters
 from armload.payloads.container import BOTTOM, POSITIONS, TOP, container, position_centre
 from armload.payloads.odd import ODD
 from armload.payloads.payload import Box, Payload
-from armload.payloads.shapes import SHAPES, TOOLS, Shape
+from armload.payloads.shapes import SHAPES, TOOLS
 
 MASS = (0.2, 2.8)  # [kg] of all boxes together
 CENTRE_LOW, CENTRE_HIGH = (-0.08, -0.08, 0.0), (0.08, 0.08, 0.16)  # [m] of each box
@@ -82,18 +82,15 @@ def draw_payload(family: str, seed: int, rated: float = RATED) -> Payload:
         scale *= float(np.exp(rng.uniform(*np.log(_LIGHT))))
         family = "shapes"
     if family == "container":
-        # a small arm carries a small container; a large one the same as everybody
+        # a small arm carries a small container, a large one a container of the usual size
         return _scaled(_filling(rng, name), min(1.0, scale))
     shapes, masses = {"shapes": (SHAPES, _SHAPE_MASS), "tools": (TOOLS, _TOOL_MASS), "odd": (ODD, _ODD_MASS)}[family]
-    return _shaped(shapes, rng.uniform(*masses) * scale, float(np.cbrt(scale)), rng, name)
+    mass = rng.uniform(*masses) * scale
+    kind = list(shapes)[rng.integers(len(shapes))]
+    return Payload(f"{name}, {kind}", shapes[kind](rng, mass, float(np.cbrt(scale))))
 
 
 FAMILIES = ("boxes", "shapes", "tools", "container", "nothing", "odd", "light")
-
-
-def _shaped(shapes: dict[str, Shape], mass: float, scale: float, rng: np.random.Generator, name: str) -> Payload:
-    kind = list(shapes)[rng.integers(len(shapes))]
-    return Payload(f"{name}, {kind}", shapes[kind](rng, mass, scale))
 
 
 def _filling(rng: np.random.Generator, name: str) -> Payload:

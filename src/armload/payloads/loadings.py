@@ -36,7 +36,7 @@ def choose_loadings() -> list[str]:
 
 def _chosen_of_one_mass(weights: int) -> list[str]:
     best: dict[tuple[int, int, int], tuple[int, ...]] = {}
-    for taken in sorted(combinations(range(len(POSITIONS)), weights), key=lambda taken: (-_slots_used(taken), taken)):
+    for taken in sorted(combinations(range(len(POSITIONS)), weights), key=_spread_first):
         best.setdefault(_centre(taken), taken)
     shells: dict[int, list[tuple[int, ...]]] = {}
     for (x, y, _), taken in best.items():
@@ -53,12 +53,9 @@ def _centre(taken: tuple[int, ...]) -> tuple[int, int, int]:
     """Sum of the positions in units of slot offset and level: among loadings of one mass it orders the centres of mass
     exactly, without rounding, whatever the container's dimensions."""
     slots = list(SLOTS.values())
-    return (
-        sum(slots[k // 2][0] for k in taken),
-        sum(slots[k // 2][1] for k in taken),
-        sum(k % 2 for k in taken),
-    )
+    return (sum(slots[k // 2][0] for k in taken), sum(slots[k // 2][1] for k in taken), sum(k % 2 for k in taken))
 
 
-def _slots_used(taken: tuple[int, ...]) -> int:
-    return len({k // 2 for k in taken})
+def _spread_first(taken: tuple[int, ...]) -> tuple[int, tuple[int, ...]]:
+    """A sort key: loadings over many slots first, then in the order of `POSITIONS`."""
+    return -len({k // 2 for k in taken}), taken

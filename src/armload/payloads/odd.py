@@ -1,7 +1,7 @@
 """Bodies unlike those of any other family: held far off the flange's axis, with their mass far from their centre.
 
-No prior is fitted on them; they show what an estimator does with a payload that nobody expected. Made of solids, so
-consistent by construction; lengths as in `shapes`.
+No prior is fitted on them; they test an estimator outside the training families. Made of solids, so consistent by
+construction; lengths as in `shapes`.
 """
 
 from __future__ import annotations

@@ -48,7 +48,12 @@ def payload_from(content: dict[str, Any], path: str | Path) -> Payload:
     try:
         parameters = _parameters(content, path)
         require_consistent(parameters, f"the payload in {path}")
-        _require_size(parameters, path)
+        reach = _gyration(parameters) if parameters.mass > _LIGHT else 0.0
+        if reach > _WIDEST:
+            raise PayloadError(
+                f"payload file {path} has the inertia of a body {reach:.3g} m wide about its centre of mass (radius of "
+                f"gyration): expected at most {_WIDEST:g} m; is it in kg·m²?"
+            )
         return Payload(_text(content, "name", path) or path.stem, parameters, _boxes(content, path))
     except PayloadError:
         raise
@@ -140,14 +145,6 @@ def _parameters(content: dict[str, Any], path: Path) -> InertialParameters:
     return parameters
 
 
-def _require_size(parameters: InertialParameters, path: Path) -> None:
-    if parameters.mass > _LIGHT and (reach := _gyration(parameters)) > _WIDEST:
-        raise PayloadError(
-            f"payload file {path} has the inertia of a body {reach:.3g} m wide about its centre of mass (radius of "
-            f"gyration): expected at most {_WIDEST:g} m; is it in kg·m²?"
-        )
-
-
 def _gyration(parameters: InertialParameters) -> float:
     """The largest radius of gyration about the centre of mass [m]."""
     return float(np.sqrt(np.abs(np.linalg.eigvalsh(parameters.inertia_com)).max() / parameters.mass))
@@ -157,8 +154,8 @@ def _require_agreement(phi: InertialParameters, triple: InertialParameters, path
     for key, tolerance in _AGREE.items():
         if triple.mass <= 0 or np.any(np.abs(getattr(phi, key) - getattr(triple, key)) > tolerance):
             raise PayloadError(
-                f"payload file {path} says two things: its {key} differs from that of its phi; correct one of them, or "
-                "remove phi"
+                f"payload file {path} contradicts itself: its {key} differs from that of its phi; correct one of "
+                "them, or remove phi"
             )
 
 

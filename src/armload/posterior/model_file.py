@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from armload.arms import Arm, kinship, namesake
+from armload.arms import Arm, link_fingerprint, prefixed_frame
 from armload.atomic import replacing
-from armload.ensembles.artefact import put_together, take_apart
+from armload.ensembles.artefact import from_structure, to_structure
 from armload.errors import ModelError
 from armload.inertia import InertialParameters
 from armload.posterior.calibration import COVERAGE, Calibration
@@ -57,7 +57,7 @@ class HybridModel:
     Args:
         prior: over the payloads.
         calibration: of the evidence and of the widths.
-        arm_name, arm_fingerprint, frame: of the arm it was trained on (`kinship`); the prior is about that frame.
+        arm_name, arm_fingerprint, frame: of its arm (`link_fingerprint`); the prior is about that frame.
         provenance: what else is known of its training, for people.
         training: what it was trained on and how well it held; None: nobody has checked it.
     """
@@ -82,10 +82,10 @@ class HybridModel:
         Raises:
             ModelError: the model was trained for another arm.
         """
-        flange = namesake(arm, self.frame)
+        flange = prefixed_frame(arm, self.frame)
         if arm.n != self.n or flange is None:
             raise ModelError(f"the hybrid was trained for {self.arm_name}: {arm.name} is another arm; train one for it")
-        if kinship(replace(arm, frame=flange, attached=None)) != self.arm_fingerprint:
+        if link_fingerprint(replace(arm, frame=flange, attached=None)) != self.arm_fingerprint:
             raise ModelError(
                 f"the hybrid was trained for {self.arm_name}: {arm.name} has other links; train one for it with "
                 "`armload train --method hybrid`"
@@ -117,7 +117,7 @@ class HybridModel:
             "families": list(prior.families),
             "traits": list(TRAITS),
             "level": calibration.level,
-            "bag": None if calibration.bag is None else take_apart(calibration.bag, "bag.", tensors),
+            "bag": None if calibration.bag is None else to_structure(calibration.bag, "bag.", tensors),
             "training": None if self.training is None else asdict(self.training),
             "provenance": self.provenance,
         }
@@ -155,7 +155,7 @@ class HybridModel:
             if header["format"] != FORMAT or header["traits"] != list(TRAITS):
                 raise ModelError(f"{path} belongs to another version of armload: train it again")
             arm = header["arm"]
-            bag = None if header["bag"] is None else put_together(header["bag"], "bag.", tensors)
+            bag = None if header["bag"] is None else from_structure(header["bag"], "bag.", tensors)
             prior = MixturePrior(
                 tensors["weights"], tensors["means"], tensors["covariances"], tuple(header["families"])
             )

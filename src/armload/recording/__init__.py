@@ -1,4 +1,4 @@
-"""Recordings: what a robot's joints did, the files they come in, and whether they can be believed."""
+"""Recordings: what a robot's joints did, the files they come in, and whether their data are valid."""
 
 from armload.recording.alignment import Alignment, same_motion
 from armload.recording.copies import check_own_measurements, shared_samples

@@ -73,7 +73,7 @@ def checked_recording(
     joint_names: tuple[str, ...] | None = None,
     notes: tuple[str, ...] = (),
 ) -> Recording:
-    """A Recording from a table (N, 1 + 3n) in the order of `column_names`, if every row of it can be believed.
+    """A Recording from a table (N, 1 + 3n) in the order of `column_names`, if every row of it is valid.
 
     Rows that repeat the row before them exactly are dropped, with a note: some loggers write every sample twice.
 

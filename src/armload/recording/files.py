@@ -34,7 +34,7 @@ def read_recording(path: str | Path, arm: Arm | None = None, *, topic: str | Non
         topic: the JointState topic of a bag, where several have the arm's joints.
 
     Raises:
-        RecordingError: the file cannot be read, or a line of it cannot be believed; one sentence that names the place
+        RecordingError: the file cannot be read, or a line of it is not valid; one sentence that names the place
             (for CSV the line of the file, the header being line 1).
     """
     path, where = Path(path), str(path)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from armload.arms import Arm
-from armload.errors import RecordingError
+from armload.errors import RecordingError, one_line
 from armload.recording.columns import QUANTITIES, check_joint_count, checked_recording
 from armload.recording.recording import CHANNELS, Recording
 
@@ -28,8 +28,7 @@ def read_npz(path: Path, where: str, arm: Arm | None = None) -> Recording:
     except RecordingError:
         raise
     except Exception as error:  # a damaged archive can fail anywhere between zip, zlib and the array header
-        text = " ".join(str(error).split()) or type(error).__name__
-        raise RecordingError(f"{where} is not a NumPy archive that can be read: {text[:160]}") from None
+        raise RecordingError(f"{where} is not a NumPy archive that can be read: {one_line(error)[:160]}") from None
 
     for name in _ARRAYS:
         if arrays[name].dtype.kind not in "iuf":

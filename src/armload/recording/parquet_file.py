@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from armload.arms import Arm
-from armload.errors import RecordingError
+from armload.errors import RecordingError, one_line
 from armload.recording.columns import checked_recording, column_names, joint_count
 from armload.recording.recording import CHANNELS, Recording
 
@@ -39,9 +39,10 @@ def read_parquet(path: Path, where: str, arm: Arm | None = None) -> Recording:
     except RecordingError:
         raise
     except Exception as error:  # a damaged file can fail anywhere in the decoder
-        raise RecordingError(f"{where} is not a Parquet file that can be read: {_reason(error)}") from None
+        raise RecordingError(f"{where} is not a Parquet file that can be read: {one_line(error)[:160]}") from None
     channel, joints = _about(about, n)
-    return checked_recording(matrix, where, lambda k: f"row {k}", channel=channel, joint_names=joints or _names(arm))
+    joints = joints or (arm.joint_names if arm is not None else None)
+    return checked_recording(matrix, where, lambda k: f"row {k}", channel=channel, joint_names=joints)
 
 
 def write_parquet(path: Path, recording: Recording) -> None:
@@ -67,12 +68,3 @@ def _about(raw: bytes | None, n: int) -> tuple[str, tuple[str, ...] | None]:
         return "measured", None
     named = isinstance(joints, list) and len(joints) == n and all(isinstance(name, str) for name in joints)
     return channel if channel in CHANNELS else "measured", tuple(joints) if named else None
-
-
-def _names(arm: Arm | None) -> tuple[str, ...] | None:
-    return None if arm is None else arm.joint_names
-
-
-def _reason(error: Exception) -> str:
-    text = " ".join(str(error).split()) or type(error).__name__
-    return text if len(text) <= 160 else text[:160] + "…"

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
-from armload.errors import RecordingError
+from armload.errors import RecordingError, one_line
 from armload.recording.columns import checked_recording
 from armload.recording.recording import Recording
 
@@ -36,16 +36,14 @@ def read_bag(path: Path, where: str, arm: Arm | None = None, topic: str | None =
     """Read the JointState messages of a bag; see `read_recording` for what it raises."""
     try:
         with ExitStack() as stack:
-            readers = [stack.enter_context(reader) for reader in _readers(path, where, stack)]
-            bag = _Bag(readers)
-            topic = _choose(bag, where, arm, topic)
-            recording = _recording(bag, topic, where, arm)
+            bag = _Bag([stack.enter_context(reader) for reader in _readers(path, where, stack)])
+            return _recording(bag, _choose(bag, where, arm, topic), where, arm)
     except RecordingError:
         raise
     except Exception as error:  # a damaged bag can fail anywhere between the index, the chunks and the messages
-        text = " ".join(str(error).split()) or type(error).__name__
-        raise RecordingError(f"{where} is not a bag that can be read (damaged or cut off?): {text[:160]}") from None
-    return recording
+        raise RecordingError(
+            f"{where} is not a bag that can be read (damaged or cut off?): {one_line(error)[:160]}"
+        ) from None
 
 
 class _Bag:
@@ -148,13 +146,14 @@ def _choose(bag: _Bag, where: str, arm: Arm | None, topic: str | None) -> str:
 
 def _recording(bag: _Bag, topic: str, where: str, arm: Arm | None) -> Recording:
     wanted = None if arm is None else arm.joint_names
-    columns: dict[tuple[str, ...], list[int] | None] = {}  # how each list of names maps to the arm's joints
+    columns: dict[tuple[str, ...], list[int] | None] = {}  # by names in a message: places of the arm's joints
     stamps, log_times, rows, numbers = [], [], [], []
     for number, message in enumerate(bag.messages(topic), start=1):
         if wanted is None:
             wanted = message.names
         if message.names not in columns:
-            columns[message.names] = _columns(message.names, wanted)
+            complete = wanted and set(wanted) <= set(message.names)
+            columns[message.names] = [message.names.index(name) for name in wanted] if complete else None
         order = columns[message.names]
         if order is None:
             continue  # another device on the same topic, such as a gripper
@@ -181,11 +180,6 @@ def _recording(bag: _Bag, topic: str, where: str, arm: Arm | None) -> Recording:
         joint_names=wanted,
         notes=tuple(notes),
     )
-
-
-def _columns(names: tuple[str, ...], wanted: tuple[str, ...]) -> list[int] | None:
-    """Where each wanted joint stands among the names; None if not all of them are there."""
-    return [names.index(name) for name in wanted] if wanted and set(wanted) <= set(names) else None
 
 
 def _values(message: _Message, order: list[int], place: str) -> list[NDArray[np.float64]]:

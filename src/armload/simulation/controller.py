@@ -19,7 +19,7 @@ from armload.motion import Motion
 # Where an arm's sheet gives no stiffness, the full rated torque bends a joint by this much [rad]; a payload takes about
 # a third of it. (With libfranka's stiffness and 2 kg at arm's length the Panda sags 4 mrad in joint 2.)
 _FULL_LOAD_SAG = 0.02
-# Critical damping of the bare links alone would leave the smallest wrists too loose against friction, as their motors'
+# Critical damping of the bare links would leave the smallest wrists too loose against friction, as their motors'
 # inertia is not modelled: a displaced joint needs at least this long to come back. (franka_ros' joint impedance example
 # is slower still: its kd/kp is 0.03 s and more.)
 _SHORTEST_RETURN = 0.01  # [s]
@@ -60,7 +60,7 @@ class Gains:
 
 @dataclass(frozen=True, eq=False)
 class Command:
-    """What the controller is told along a motion, at steps j = 0 … N−1 of h seconds, each (N, n).
+    """The controller's command along a motion, at steps j = 0 … N−1 of h seconds, each (N, n).
 
     position: q_d(j·h) [rad].
     velocity: dq_d at (j + ½)·h, the instant at which the integrator's damping acts [rad/s].

@@ -1,4 +1,4 @@
-"""What no rigid body explains: joint torque that is a smooth, repeatable function of the pose."""
+"""Residual torque outside the rigid-body model: a smooth, repeatable function of the pose."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class SmoothTorque:
         """Draw one with the given rms (n,) [N·m] and length scales between 0.7 and 1.5 rad."""
         rms = np.asarray(rms, dtype=float)
         waves = rng.normal(size=(_WAVES, len(rms))) / rng.uniform(*_LENGTH_SCALE, size=(_WAVES, 1))
-        return cls._of_rms(waves, np.ones_like(waves), rms, rng)
+        return cls._of_rms(waves, rms, rng)
 
     @classmethod
     def of_length(cls, rms: ArrayLike, length: tuple[float, float], rng: np.random.Generator) -> SmoothTorque:
@@ -40,17 +40,19 @@ class SmoothTorque:
         rms = np.asarray(rms, dtype=float)
         scale = np.exp(rng.uniform(*np.log(length), size=(_WAVES, 1)))
         waves = rng.normal(size=(_WAVES, len(rms))) / scale
-        return cls._of_rms(waves, np.ones_like(waves), rms, rng)
+        return cls._of_rms(waves, rms, rng)
 
     @classmethod
     def ripple(cls, rms: ArrayLike, rng: np.random.Generator) -> SmoothTorque:
         """Harmonics of each joint's own angle, as transmissions and bearings make them, with the given rms (n,)."""
         rms = np.asarray(rms, dtype=float)
         own = np.tile(np.eye(len(rms)), (len(_HARMONICS), 1))
-        return cls._of_rms(np.repeat(_HARMONICS, len(rms))[:, None] * own, own, rms, rng)
+        return cls._of_rms(np.repeat(_HARMONICS, len(rms))[:, None] * own, rms, rng, own)
 
     @classmethod
-    def _of_rms(cls, waves: NDArray, share: NDArray, rms: NDArray, rng: np.random.Generator) -> SmoothTorque:
+    def _of_rms(
+        cls, waves: NDArray, rms: NDArray, rng: np.random.Generator, share: NDArray | float = 1.0
+    ) -> SmoothTorque:
         a, b = rng.normal(size=(2, *waves.shape)) * share
         scale = rms / np.sqrt(0.5 * (a**2 + b**2).sum(axis=0))
         return cls(waves, a * scale, b * scale)

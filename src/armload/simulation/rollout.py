@@ -134,17 +134,14 @@ def _picard(runs: Sequence[Prepared], clock: Clock, workers: int) -> tuple[NDArr
     threads = [mujoco.MjData(models[0]) for _ in range(max(1, min(workers, len(runs))))]
     start = np.array([np.concatenate([[0.0], run.position, run.velocity]) for run in runs])
     control = np.array([run.command.control(run.gains) for run in runs])
-    applied = np.array([_disturbance(run.world, clock, *_commanded(run.command)) for run in runs])
+    commands = ((run.world, run.command) for run in runs)
+    applied = np.array([_disturbance(w, clock, c.position, c.velocity, c.feed_forward) for w, c in commands])
     states = np.asarray(rollout.rollout(models, threads, start, control - applied)[0], dtype=float)
     if any(run.world.disturbed for run in runs):
         for _ in range(clock.resolution.passes - 1):
             applied = np.array([_along(*each) for each in zip(runs, repeat(clock), states, applied, strict=False)])
             states = np.asarray(rollout.rollout(models, threads, start, control - applied)[0], dtype=float)
     return states, applied
-
-
-def _commanded(command: Command) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    return command.position, command.velocity, command.feed_forward
 
 
 def _along(

@@ -29,7 +29,7 @@ class Run:
     """One run to simulate.
 
     Args:
-        motion: what the controller is told to do.
+        motion: the desired motion.
         payload: about the arm's payload frame: inertial parameters, or anything with `.parameters`; None: no payload.
         world: the arm as it really is; None: nominal.
         sensors: None: ideal.

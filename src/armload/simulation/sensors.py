@@ -1,4 +1,4 @@
-"""Sensors: from what happens in the joints to what a log says.
+"""Sensors: from the true joint signals to those of a log.
 
 Each effect is one field of `Sensors`; `dataclasses.replace(sensors, vibration=None)` switches one off. In order: lag
 behind the command, skew between channels, vibration, white noise, quantisation, jitter of the stamps, lost samples.
@@ -78,13 +78,13 @@ class Sensors:
     @classmethod
     def measured(cls, facts: ArmFacts) -> Sensors:
         """As an arm's sheet says; ideal in what it leaves out."""
-        said: dict[str, Any] = facts.sensors or {}
-        made: dict[str, Any] = {name: np.array(x) if isinstance(x, tuple) else x for name, x in said.items()}
-        return cls(**made)
+        figures: dict[str, Any] = facts.sensors or {}
+        arrays: dict[str, Any] = {name: np.array(x) if isinstance(x, tuple) else x for name, x in figures.items()}
+        return cls(**arrays)
 
     @classmethod
     def generic(cls, arm: Arm) -> Sensors:
-        """The Panda's figures in proportion to the joints' rated torque, for an arm nobody has measured for us."""
+        """The Panda's figures in proportion to the joints' rated torque, for an arm that was not measured."""
         effort, like = rated_effort(arm), ARMS["panda"]
         return replace(
             cls.measured(like),
@@ -97,7 +97,7 @@ class Sensors:
 
     @classmethod
     def of(cls, arm: Arm) -> Sensors:
-        """As the arm's sheet says, or the like for an arm nobody has measured for us."""
+        """As the arm's sheet says, or the like for an arm that was not measured."""
         facts = facts_of(arm)
         return cls.generic(arm) if facts is None or facts.sensors is None else cls.measured(facts)
 

@@ -1,4 +1,4 @@
-"""The arm under joint torque control at 1 kHz: what a model-based controller makes of the payload it was told.
+"""The arm under joint torque control at 1 kHz: how a model-based controller moves with the payload it assumes.
 
 At every step a law reads (t, q, dq) and commands the torque that the joints' sensors are to show. The torque loop in
 the joints is ideal, so that a sensor's offset and the friction enter the motion as they do on a real arm:

@@ -19,13 +19,13 @@ def stamp(message):
 def inertia(message):
     i = message.inertia
     six = [i.ixx, i.ixy, i.ixz, i.iyy, i.iyz, i.izz]
-    said = {"stamp": stamp(message), "frame": message.header.frame_id, "m": i.m, "com": [i.com.x, i.com.y, i.com.z]}
-    print(json.dumps(said | {"inertia": six}), flush=True)
+    fields = {"stamp": stamp(message), "frame": message.header.frame_id, "m": i.m, "com": [i.com.x, i.com.y, i.com.z]}
+    print(json.dumps(fields | {"inertia": six}), flush=True)
 
 
 def states(message):
-    said = {"stamp": stamp(message), "names": list(message.name), "q": list(message.position)}
-    print(json.dumps(said | {"dq": list(message.velocity), "tau": list(message.effort)}), flush=True)
+    fields = {"stamp": stamp(message), "names": list(message.name), "q": list(message.position)}
+    print(json.dumps(fields | {"dq": list(message.velocity), "tau": list(message.effort)}), flush=True)
 
 
 rclpy.init()

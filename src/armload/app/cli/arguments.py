@@ -1,4 +1,4 @@
-"""What the commands share: a parser that complains in one sentence, and the arguments that name an arm and a tool."""
+"""What the commands share: a parser with one-sentence errors, and the arguments that name an arm, a tool and so on."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from armload.inertia import InertialParameters
     from armload.lab.dataset import Dataset
     from armload.motion import Motion
+    from armload.simulation import World
 
 # options whose value may begin with a minus sign: argparse would take "-1,0,-9.7" for an option
 _SIGNED = ("--gravity",)
@@ -134,6 +135,17 @@ def add_identifier_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_tool_and_topic_arguments(parser: argparse.ArgumentParser) -> None:
+    """`--tool` and `--topic`."""
+    parser.add_argument(
+        "--tool",
+        type=file_name,
+        metavar="FILE",
+        help="a mounted tool that is known (JSON, or franka-hand); the answer is what it carries",
+    )
+    parser.add_argument("--topic", metavar="T", help="JointState topic of a bag, where it has several")
+
+
 def arm_of(options: argparse.Namespace) -> Arm:
     """The arm that `--robot`, `--frame` and `--gravity` name."""
     from armload.arms import arm
@@ -171,6 +183,17 @@ def motion_of(name: str, arm: Arm) -> Motion:
     if name.startswith("random:"):
         return random_motion(arm, whole_number(name, "motion"))
     return load_motion(name)
+
+
+def world_of(name: str, arm: Arm) -> World:
+    """A world by name: `nominal`, or `real-like:SEED`."""
+    from armload.simulation import World
+
+    if name == "nominal":
+        return World.nominal(arm)
+    if name.startswith("real-like:"):
+        return World.real_like(arm, whole_number(name, "world"))
+    raise UsageError(f"unknown world {name!r}: expected nominal or real-like:SEED")
 
 
 def whole_number(text: str, what: str) -> int:

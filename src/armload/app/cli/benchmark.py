@@ -31,16 +31,17 @@ def parser() -> Parser:
         description="Measure methods on populations of simulated episodes: errors over time, intervals, repeatability.",
         epilog=_EXAMPLES,
     )
-    parser.add_argument("--quick", action="store_true", help="reduced size; everything goes to --out")
-    parser.add_argument("--populations", metavar="A,B", help="populations (default: all)")
-    parser.add_argument("--methods", metavar="A,B", help="methods (default: all but the slow and the trained)")
-    parser.add_argument("--episodes", type=at_least(1), metavar="N", help="episodes of a population (default: 100)")
-    parser.add_argument("--rate", type=at_least(20.0, float), metavar="HZ", help="of the logs (default: 1000)")
-    parser.add_argument("--jobs", type=at_least(1), default=1, metavar="N", help="processes (default: 1); same numbers")
-    parser.add_argument("--hours", type=at_least(0.0, float), metavar="H", help="begin nothing after so many hours")
-    parser.add_argument("--out", metavar="DIR", help="cells and report (default: out/benchmark)")
-    parser.add_argument("--summary", metavar="FILE", help="the JSON (default: benchmarks/results/benchmark.json)")
-    parser.add_argument("--page", metavar="FILE", help="the page (default: docs/benchmark.md)")
+    add = parser.add_argument
+    add("--quick", action="store_true", help="reduced size; everything goes to --out")
+    add("--populations", metavar="A,B", help="populations (default: all)")
+    add("--methods", metavar="A,B", help="methods (default: all but the slow and the trained)")
+    add("--episodes", type=at_least(1), metavar="N", help="episodes of a population (default: 100)")
+    add("--rate", type=at_least(20.0, float), metavar="HZ", help="of the logs (default: 1000)")
+    add("--jobs", type=at_least(1), default=1, metavar="N", help="processes (default: 1); same numbers")
+    add("--hours", type=at_least(0.0, float), metavar="H", help="begin nothing after so many hours")
+    add("--out", metavar="DIR", help="cells and report (default: out/benchmark)")
+    add("--summary", metavar="FILE", help="the JSON (default: benchmarks/results/benchmark.json)")
+    add("--page", metavar="FILE", help="the page (default: docs/benchmark.md)")
     return parser
 
 

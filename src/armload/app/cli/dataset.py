@@ -5,8 +5,16 @@ from __future__ import annotations
 import argparse
 import sys
 
-from armload.app.cli.arguments import Parser, add_arm_arguments, arm_of, at_least, file_name, motion_of, whole_number
-from armload.errors import UsageError
+from armload.app.cli.arguments import (
+    Parser,
+    add_arm_arguments,
+    arm_of,
+    at_least,
+    file_name,
+    motion_of,
+    whole_number,
+    world_of,
+)
 
 _EXAMPLES = """\
 examples:
@@ -26,35 +34,32 @@ def parser() -> Parser:
         description="Simulate every payload on every motion in every world; write one table with its provenance.",
         epilog=_EXAMPLES,
     )
-    parser.add_argument("--out", required=True, type=file_name, metavar="DIR", help="folder of the data set")
+    add = parser.add_argument
+    add("--out", required=True, type=file_name, metavar="DIR", help="folder of the data set")
     add_arm_arguments(parser, default="panda")
-    parser.add_argument(
+    add(
         "--motion",
         nargs="+",
         default=["taie2024"],
         metavar="M",
         help="taie2024, a JSON file, or random:SEED (default: taie2024)",
     )
-    parser.add_argument(
-        "--payloads", nargs="+", default=["loadings"], metavar="P", help="see below (default: loadings)"
-    )
-    parser.add_argument(
+    add("--payloads", nargs="+", default=["loadings"], metavar="P", help="see below (default: loadings)")
+    add(
         "--world",
         nargs="+",
         default=["nominal"],
         metavar="W",
         help="nominal (the arm as its model says) or real-like:SEED (default: nominal)",
     )
-    parser.add_argument(
-        "--rows", type=at_least(2), default=3244, metavar="N", help="rows of each run (default: 3244, the paper's)"
-    )
-    parser.add_argument(
+    add("--rows", type=at_least(2), default=3244, metavar="N", help="rows of each run (default: 3244, the paper's)")
+    add(
         "--noise",
         action=argparse.BooleanOptionalAction,
         default=True,
         help="sensors as measured on real robots, or ideal ones (default: --noise)",
     )
-    parser.add_argument("--seed", type=at_least(0), default=0, metavar="N", help="of noise and random payloads")
+    add("--seed", type=at_least(0), default=0, metavar="N", help="of noise and random payloads")
     return parser
 
 
@@ -62,7 +67,7 @@ def run(options: argparse.Namespace) -> None:
     """Build the data set and say what it holds."""
     from armload.lab.dataset import build_dataset
     from armload.payloads import Payload, container_loadings, random_payloads, read_payload
-    from armload.simulation import Sensors, World
+    from armload.simulation import Sensors
 
     arm = arm_of(options)
     payloads: list[Payload] = []
@@ -73,24 +78,13 @@ def run(options: argparse.Namespace) -> None:
             payloads += random_payloads(whole_number(name, "payloads"), options.seed)
         else:
             payloads.append(read_payload(name))
-    worlds = []
-    for name in options.world:
-        if name == "nominal":
-            worlds.append(World.nominal(arm))
-        elif name.startswith("real-like:"):
-            worlds.append(World.real_like(arm, whole_number(name, "world")))
-        else:
-            raise UsageError(f"unknown world {name!r}: expected nominal or real-like:SEED")
-    sensors = None
-    if options.noise:
-        sensors = Sensors.of(arm)
     dataset = build_dataset(
         options.out,
         arm,
         [motion_of(name, arm) for name in options.motion],
         payloads,
-        worlds=worlds,
-        sensors=sensors,
+        worlds=[world_of(name, arm) for name in options.world],
+        sensors=Sensors.of(arm) if options.noise else None,
         rows_per_run=options.rows,
         seed=options.seed,
         progress=sys.stderr.isatty(),

@@ -1,4 +1,4 @@
-"""From an argument list to an exit code: which command runs, and how everything that can go wrong is said.
+"""From an argument list to an exit code: which command runs, and how each error is reported.
 
 | exit code | what happened                                             | stdout     | stderr                        |
 |-----------|-----------------------------------------------------------|------------|-------------------------------|
@@ -66,7 +66,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         arguments.remove("--traceback")
         show_traceback = True
     for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:  # closed by whoever started us: what is said goes nowhere
+        if getattr(sys, name) is None:  # closed by the parent process: the output is dropped
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure") and (stream.encoding or "").lower().replace("-", "") != "utf8":
@@ -76,13 +76,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         code = _guarded(arguments, show_traceback)
     try:
         sys.stdout.flush()
-    except OSError:  # said already; the interpreter flushes once more when it ends: let that go nowhere
+    except OSError:  # reported already; the interpreter flushes once more when it ends: drop that
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return code
 
 
 def _guarded(arguments: list[str], show_traceback: bool) -> int:
-    """Run the command and say what went wrong, if anything did."""
+    """Run the command and report its error, if there is one."""
     try:
         try:
             code = _run(arguments)
@@ -162,7 +162,6 @@ def _run(arguments: list[str]) -> int:
 
 
 def _overview() -> Parser:
-
     width = max(map(len, COMMANDS))
     commands = "\n".join(f"  {name:<{width}}  {text}" for name, text in COMMANDS.items())
     parser = Parser(

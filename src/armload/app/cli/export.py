@@ -42,15 +42,16 @@ def parser() -> Parser:
         description="Write an identified payload in a controller's or simulator's own form.",
         epilog=_EXAMPLES,
     )
-    parser.add_argument(
+    add = parser.add_argument
+    add(
         "result",
         type=file_name,
         metavar="RESULT",
         help="what `armload identify --json` printed, a payload file, or franka-hand",
     )
-    parser.add_argument("--to", required=True, choices=_FORMS, metavar="FORM", help=", ".join(_FORMS))
-    parser.add_argument("--out", type=file_name, metavar="FILE", help="write a file instead of printing")
-    parser.add_argument(
+    add("--to", required=True, choices=_FORMS, metavar="FORM", help=", ".join(_FORMS))
+    add("--out", type=file_name, metavar="FILE", help="write a file instead of printing")
+    add(
         "--minus",
         type=file_name,
         metavar="FILE",
@@ -58,7 +59,7 @@ def parser() -> Parser:
         default=[],
         help="a known part to take off first (JSON, or franka-hand); may be given several times",
     )
-    parser.add_argument(
+    add(
         "--plus",
         type=file_name,
         metavar="FILE",
@@ -66,27 +67,25 @@ def parser() -> Parser:
         default=[],
         help="a known part to add first, likewise",
     )
-    parser.add_argument(
-        "--frame", metavar="F", help="link to write it about (default: a controller's flange, else that of RESULT)"
-    )
-    parser.add_argument(
-        "--robot", metavar="NAME|FILE.urdf", help="the arm, where frames differ (default: that of RESULT)"
-    )
-    parser.add_argument(
-        "--name", default="payload", metavar="N", help="name of the link, body or model (default: payload)"
-    )
+    add("--frame", metavar="F", help="link to write it about (default: a controller's flange, else that of RESULT)")
+    add("--robot", metavar="NAME|FILE.urdf", help="the arm, where frames differ (default: that of RESULT)")
+    add("--name", default="payload", metavar="N", help="name of the link, body or model (default: payload)")
     return parser
 
 
 def run(options: argparse.Namespace) -> None:
     """Read, combine, move, write."""
-    from armload.devices import CONTROLLERS, export_load
+    from armload.arms import ARMS
+    from armload.arms import arm as arm_named
+    from armload.devices import CONTROLLERS, Load, export_load, read_load
     from armload.errors import SinkError
     from armload.inertia import held
 
-    arm = None if options.robot is None else _named(options)
-    load = _load_of(options.result, arm)
-    arm = arm or _arm_of(load)
+    arm = None if options.robot is None else arm_named(options.robot, options.frame)
+    built_in = options.result in ("franka-hand", "test")
+    load = Load(payload_of(options.result, arm)) if built_in else read_load(options.result)
+    if arm is None and load.robot in ARMS:
+        arm = arm_named(load.robot)
     doubts = _doubts(options.minus, load)
     for part in options.minus:
         load = load - _part(part, load, arm)
@@ -94,13 +93,17 @@ def run(options: argparse.Namespace) -> None:
         load = load + _part(part, load, arm)
     nothing = load.std is not None and load.determined[0] and not held(load.parameters.mass, load.std[0], True)
     frame = options.frame
-    if frame is None and arm is not None and (load.frame is None or (options.to in CONTROLLERS and not _on(load, arm))):
-        frame = arm.frame
+    if frame is None and arm is not None:
+        # a load about a flange that the arm knows by another name stays as it is
+        on_flange = load.frame is not None and load.frame not in arm.frames and _is_flange(load.frame)
+        if load.frame is None or (options.to in CONTROLLERS and not on_flange):
+            frame = arm.frame
     load = load.about(frame, arm)
     elsewhere = options.to in CONTROLLERS and load.frame is not None and not _is_flange(load.frame)
     if elsewhere and options.frame is None:
+        flanges = ", ".join(sorted({facts.flange for facts in ARMS.values()}))
         raise SinkError(
-            f"the payload is about {load.frame!r} and a controller counts from its flange ({', '.join(_flanges())}): "
+            f"the payload is about {load.frame!r} and a controller counts from its flange ({flanges}): "
             "name the arm and its flange with --robot FILE.urdf --frame FLANGE"
         )
     body = load.as_body()
@@ -119,13 +122,7 @@ def run(options: argparse.Namespace) -> None:
     if options.out is None:
         print(text, end="")
     else:
-        print_note(f"{options.out}: {'; '.join(body.said())}")
-
-
-def _flanges() -> list[str]:
-    from armload.arms import ARMS
-
-    return sorted({facts.flange for facts in ARMS.values()})
+        print_note(f"{options.out}: {'; '.join(body.description())}")
 
 
 def _is_flange(frame: str) -> bool:
@@ -133,30 +130,6 @@ def _is_flange(frame: str) -> bool:
     from armload.arms import ARMS
 
     return frame.endswith(tuple(facts.flange_ending for facts in ARMS.values()))
-
-
-def _on(load: Load, arm: Arm) -> bool:
-    """Whether a load is about a flange already that an arm knows by another name."""
-    return load.frame is not None and load.frame not in arm.frames and _is_flange(load.frame)
-
-
-def _named(options: argparse.Namespace) -> Arm:
-    from armload.arms import arm
-
-    return arm(options.robot, options.frame)
-
-
-def _load_of(name: str, arm: Arm | None) -> Load:
-    from armload.devices import Load, read_load
-
-    return Load(payload_of(name, arm)) if name in ("franka-hand", "test") else read_load(name)
-
-
-def _arm_of(load: Load) -> Arm | None:
-    """The arm that a result names; None where it is only known to whoever made it."""
-    from armload.arms import ARMS, arm
-
-    return None if load.robot is None or load.robot not in ARMS else arm(load.robot)
 
 
 def _part(name: str, load: Load, arm: Arm | None) -> InertialParameters:
@@ -171,7 +144,7 @@ def _part(name: str, load: Load, arm: Arm | None) -> InertialParameters:
 
 
 def _doubts(parts: list[str], load: Load) -> list[str]:
-    """What to ask of whoever takes parts off a load: whether they are in it, and only once."""
+    """Questions on parts that are taken off a load: whether they are in it, and only once."""
     doubts = [
         f"{part} is taken off {parts.count(part)} times" for part in dict.fromkeys(parts) if parts.count(part) > 1
     ]

@@ -1,4 +1,4 @@
-"""Estimates as lines of JSON, for whoever reads a pipe."""
+"""Estimates as lines of JSON, for a pipe."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
+from armload.app.cli.printing import finite
 from armload.app.page.session import Session
 from armload.inertia import InertialParameters
 from armload.online import OnlineEstimate
@@ -26,15 +27,15 @@ def lines(session: Session, every: float = 0.1, duration: float | None = None) -
     Raises:
         SourceError: the connection was lost.
     """
-    told, changed, last, clock, since = -math.inf, None, None, None, time.monotonic()
+    printed, changed, last, clock, since = -math.inf, None, None, None, time.monotonic()
     for estimate in session.estimates(duration):
         last, now = estimate, time.monotonic()
         if estimate.t != clock:
             clock, since = estimate.t, now
         event = estimate.event and (estimate.event.t, estimate.event.kind)
         # a clock that was set back counts as later; a thousandth less, or rounding would double the distance
-        if abs(estimate.t - told) >= 0.999 * every or event != changed or now - since >= every:
-            told, changed, last, since = estimate.t, event, None, now
+        if abs(estimate.t - printed) >= 0.999 * every or event != changed or now - since >= every:
+            printed, changed, last, since = estimate.t, event, None, now
             yield _json(estimate, session)
     if last is not None:
         yield _json(session.estimate or last, session)
@@ -42,18 +43,10 @@ def lines(session: Session, every: float = 0.1, duration: float | None = None) -
 
 def line_of(estimate: OnlineEstimate, robot: str, truth: InertialParameters | None = None) -> dict[str, Any]:
     """The estimate as one JSON object; what is not a finite number is null."""
-    told = {"robot": robot, **estimate.to_dict()}
-    return _finite(told if truth is None else {**told, "truth": truth.phi.tolist()})
+    fields = {"robot": robot, **estimate.to_dict()}
+    return finite(fields if truth is None else {**fields, "truth": truth.phi.tolist()})
 
 
 def _json(estimate: OnlineEstimate, session: Session) -> str:
-    told = line_of(estimate, session.arm.name, session.truth(estimate.t))
-    return json.dumps({**told, "lost": session.lost}, allow_nan=False)
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _finite(each) for key, each in value.items()}
-    if isinstance(value, list):
-        return [_finite(each) for each in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    fields = line_of(estimate, session.arm.name, session.truth(estimate.t))
+    return json.dumps({**fields, "lost": session.lost}, allow_nan=False)

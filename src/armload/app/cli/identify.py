@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import argparse
 
-from armload.app.cli.arguments import Parser, add_arm_arguments, add_identifier_arguments, arm_of, file_name, payload_of
+from armload.app.cli.arguments import (
+    Parser,
+    add_arm_arguments,
+    add_identifier_arguments,
+    add_tool_and_topic_arguments,
+    arm_of,
+    file_name,
+    payload_of,
+)
 from armload.app.cli.printing import print_identification, print_json, print_note, working
 
 _EXAMPLES = """\
@@ -30,13 +38,7 @@ def parser() -> Parser:
     parser.add_argument("log", type=file_name, metavar="LOG", help="log of a motion with the payload")
     add_arm_arguments(parser)
     add_identifier_arguments(parser)
-    parser.add_argument(
-        "--tool",
-        type=file_name,
-        metavar="FILE",
-        help="a mounted tool that is known (JSON, or franka-hand); the answer is what it carries",
-    )
-    parser.add_argument("--topic", metavar="T", help="JointState topic of a bag, where it has several")
+    add_tool_and_topic_arguments(parser)
     parser.add_argument("--tare-topic", metavar="T", help="that of the tare's bag, where it is another one")
     parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     return parser

@@ -10,6 +10,7 @@ from armload.app.cli.arguments import (
     Parser,
     add_arm_arguments,
     add_identifier_arguments,
+    add_tool_and_topic_arguments,
     arm_of,
     at_least,
     file_name,
@@ -48,7 +49,8 @@ def parser() -> Parser:
         description="Identify what the robot holds while it moves, on a page in the browser or as lines of JSON.",
         epilog=_EXAMPLES,
     )
-    parser.add_argument(
+    add = parser.add_argument
+    add(
         "source",
         nargs="?",
         default="sim",
@@ -58,33 +60,27 @@ def parser() -> Parser:
     )
     add_arm_arguments(parser, required=False)
     add_identifier_arguments(parser)
-    parser.add_argument(
-        "--tool",
-        type=file_name,
-        metavar="FILE",
-        help="a mounted tool that is known (JSON, or franka-hand); the answer is what it carries",
-    )
-    parser.add_argument("--headless", action="store_true", help="no page: one JSON object per line on stdout")
-    parser.add_argument(
+    add_tool_and_topic_arguments(parser)
+    add("--headless", action="store_true", help="no page: one JSON object per line on stdout")
+    add(
         "--every",
         type=at_least(0.0, float),
         default=0.1,
         metavar="S",
         help="with --headless: seconds between lines (0.1)",
     )
-    parser.add_argument(
-        "--record", type=file_name, metavar="FILE.csv", help="keep every sample in a log that does not exist yet"
+    add("--record", type=file_name, metavar="FILE.csv", help="keep every sample in a log that does not exist yet")
+    add(
+        "--speed",
+        type=lambda text: None if text == "max" else at_least(0.01, float)(text),
+        default=1.0,
+        metavar="X|max",
+        help="of a log or the simulator (1: real time)",
     )
-    parser.add_argument(
-        "--speed", type=_speed, default=1.0, metavar="X|max", help="of a log or the simulator (1: real time)"
-    )
-    parser.add_argument("--loop", action="store_true", help="replay a log again and again")
-    parser.add_argument("--topic", metavar="T", help="JointState topic of a bag, where it has several")
-    parser.add_argument(
-        "--duration", type=at_least(0.0, float), metavar="S", help="end after so many seconds of samples"
-    )
-    parser.add_argument("--host", default="127.0.0.1", metavar="H", help="interface of the page (127.0.0.1)")
-    parser.add_argument(
+    add("--loop", action="store_true", help="replay a log again and again")
+    add("--duration", type=at_least(0.0, float), metavar="S", help="end after so many seconds of samples")
+    add("--host", default="127.0.0.1", metavar="H", help="interface of the page (127.0.0.1)")
+    add(
         "--port",
         type=at_least(0, int, 65535),
         default=8080,
@@ -95,7 +91,8 @@ def parser() -> Parser:
 
 
 def run(options: argparse.Namespace) -> int | None:
-    """Identify until the source ends (--headless) or somebody interrupts; 2 if an error was told meanwhile."""
+    """Identify until the source ends (--headless) or somebody interrupts; 2 after an error."""
+    from armload.app.cli.headless import lines
     from armload.app.page.session import Session
     from armload.devices import open_source
     from armload.recording import check_own_measurements, read_recording
@@ -106,12 +103,12 @@ def run(options: argparse.Namespace) -> int | None:
     if tare is not None and options.source != "sim" and "://" not in options.source:  # a log
         check_own_measurements(read_recording(options.source, arm, topic=options.topic), tare)
     # the page takes time from its own process: what runs on the clock is read in another one
-    beside = True if not options.headless and options.speed is not None and options.speed <= 1.0 else None
+    detached = True if not options.headless and options.speed is not None and options.speed <= 1.0 else None
     source = open_source(
         options.source,
         arm,
         record=options.record,
-        detached=beside,
+        detached=detached,
         speed=options.speed,
         loop=options.loop,
         topic=options.topic,
@@ -119,7 +116,11 @@ def run(options: argparse.Namespace) -> int | None:
     with source:
         session = Session(source, arm, tare, options.method, _warn)
         try:
-            return _print_lines(session, options) if options.headless else _serve(session, options)
+            if not options.headless:
+                return _serve(session, options)
+            for line in lines(session, options.every, options.duration):
+                print(line, flush=True)
+            return None
         finally:
             session.close()
 
@@ -143,13 +144,6 @@ def _warn(text: str) -> None:
     print_note(f"warning: {text}")
 
 
-def _print_lines(session, options: argparse.Namespace) -> None:
-    from armload.app.cli.headless import lines
-
-    for line in lines(session, options.every, options.duration):
-        print(line, flush=True)
-
-
 def _serve(session, options: argparse.Namespace) -> int | None:
     from armload.app.page.page import Page
 
@@ -161,7 +155,7 @@ def _serve(session, options: argparse.Namespace) -> int | None:
     except KeyboardInterrupt:  # the only way to end it
         if session.error is not None and not isinstance(session.error, (ArmloadError, OSError)):
             raise session.error from None  # a bug: whoever wants to see where asks for it
-        return 0 if session.error is None else 2  # which was told when it happened
+        return 0 if session.error is None else 2  # reported when it happened
     finally:
         page.close()
 
@@ -173,7 +167,7 @@ def _robot_of(source: str) -> str:
     if source == "sim":
         return _SIMULATED
     scheme = urlsplit(source).scheme if "://" in source else None
-    speaking = [name for name, facts in ARMS.items() if scheme is not None and facts.scheme == scheme]
-    if len(speaking) != 1:
+    known = [name for name, facts in ARMS.items() if scheme is not None and facts.scheme == scheme]
+    if len(known) != 1:
         raise UsageError(f"{source}: name the robot with --robot, such as --robot {_SIMULATED}")
-    return speaking[0]
+    return known[0]

@@ -116,48 +116,48 @@ def _show(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> int:
-    from armload.app.cli import motion_check as said
+    from armload.app.cli import motion_check
     from armload.inertia import NAMES, UNITS
     from armload.posterior import advise, bound
     from armload.recording import Recording
 
     arm = arm_of(options)
-    run = said.run_of(options.motion, arm)
-    tare = run if options.tare is None else said.run_of(options.tare, arm)
+    run = motion_check.run_of(options.motion, arm)
+    tare = run if options.tare is None else motion_check.run_of(options.tare, arm)
     result, carried = None, ""
     with working("checking"):
         if isinstance(run, Recording):
             if options.payload is not None:
                 raise UsageError("--payload is for motions: a log was made with whatever the arm carried; leave it out")
-            problems = said.passed(run, arm)
+            problems = motion_check.passed(run, arm)
         else:
             result, carried = _limits(options.payload or "rated", arm, run)
             problems = result.problems
-        alone, tared = bound(arm, run), bound(arm, run, tare=tare)
+        without_tare, tared = bound(arm, run), bound(arm, run, tare=tare)
         advice = advise(arm, run, tare) if options.tare else advise(arm, run)
     if options.json:
         print_json(
             {
-                **said.check_fields(run, result, problems),
+                **motion_check.check_fields(run, result, problems),
                 "robot": arm.name,
                 "frame": str(arm.frame),
                 "parameters": NAMES,
                 "units": UNITS,
-                "prior_half_width": alone.prior_half_width.tolist(),
-                "without_tare": said.bound_fields(alone),
-                "with_tare": said.bound_fields(tared),
+                "prior_half_width": without_tare.prior_half_width.tolist(),
+                "without_tare": motion_check.bound_fields(without_tare),
+                "with_tare": motion_check.bound_fields(tared),
                 "advice": None if advice is None else str(advice),
             }
         )
         return NOT_ALLOWED if problems else 0
     if isinstance(run, Recording):
-        said.print_passed(run, arm, problems)
+        motion_check.print_passed(run, arm, problems)
     else:
         print(f"{result}\ntorque with {carried}")
-    for found in (alone, tared):
+    for found in (without_tare, tared):
         print()
-        said.print_bound(found)
-    said.print_advice(tared if options.tare else alone, advice)
+        motion_check.print_bound(found)
+    motion_check.print_advice(tared if options.tare else without_tare, advice)
     return NOT_ALLOWED if problems else 0
 
 

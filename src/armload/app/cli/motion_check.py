@@ -6,11 +6,9 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from armload.app.cli.printing import console, table
+from armload.app.cli.printing import console, finite, table
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from armload.arms import Arm
     from armload.motion import Motion, MotionCheck
     from armload.posterior import Advice, Bound
@@ -91,8 +89,8 @@ def print_bound(found: Bound) -> None:
         rows.add_row(name, unit, *widths, _since(found, k))
     console().print(rows)
     condition = found.condition[-1]
-    said = f"{condition:.3g}" if math.isfinite(condition) else "infinite: some combinations leave no trace"
-    print(f"condition number of the payload's regressor (columns scaled by 1, L, L², L = 0.15 m): {said}")
+    shown = f"{condition:.3g}" if math.isfinite(condition) else "infinite: some combinations leave no trace"
+    print(f"condition number of the payload's regressor (columns scaled by 1, L, L², L = 0.15 m): {shown}")
 
 
 def print_advice(found: Bound, advice: Advice | None) -> None:
@@ -103,7 +101,7 @@ def print_advice(found: Bound, advice: Advice | None) -> None:
     missing = [name for name, known in zip(NAMES, found.determined[-1], strict=True) if not known]
     if not missing:
         return
-    more = advice or "no joint alone, moved more, would change that"
+    more = advice or "no single joint, moved more, would change that"
     which = "without a tare" if found.tare is None else "after this tare"
     print(f"{which} not determined: {', '.join(missing)}; {more}")
 
@@ -135,7 +133,7 @@ def check_fields(run: Recording | Motion, result: MotionCheck | None, problems: 
         "within_limits": result.ok,
         "problems": problems,
         "peak": {name: value.tolist() for name, value in result.peak.items()},
-        "margin": {name: finite(value) for name, value in result.margin.items()},
+        "margin": {name: finite(value.tolist()) for name, value in result.margin.items()},
         "floor_clearance": finite(result.floor_clearance),
         "self_clearance": finite(result.self_clearance),
     }
@@ -148,12 +146,5 @@ def bound_fields(found: Bound) -> dict[str, Any]:
         "times": found.times.tolist(),
         "half_width": found.half_width.tolist(),
         "determined": found.determined.tolist(),
-        "condition": finite(found.condition),
+        "condition": finite(found.condition.tolist()),
     }
-
-
-def finite(value: np.ndarray | float) -> Any:
-    """A number, or a list of them, with null for what is infinite."""
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return [x if math.isfinite(x) else None for x in value.tolist()]

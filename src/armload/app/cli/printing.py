@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -19,6 +20,15 @@ if TYPE_CHECKING:
 def print_json(value: dict[str, Any]) -> None:
     """One JSON object on one line; a number that is not finite is a bug and raises ValueError."""
     print(json.dumps(value, allow_nan=False))
+
+
+def finite(value: Any) -> Any:
+    """Numbers, however nested in dictionaries and lists, with null for what is not finite."""
+    if isinstance(value, dict):
+        return {key: finite(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [finite(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def print_note(text: str) -> None:

@@ -14,7 +14,6 @@ from armload.errors import UsageError
 
 if TYPE_CHECKING:
     from armload.arms import Arm
-    from armload.ensembles import LearnedModel
     from armload.estimators import Identifier
     from armload.lab.report import Section
     from armload.recording import Recording
@@ -41,18 +40,17 @@ def parser() -> Parser:
         description="Write an HTML report: motion and torques of a log, and every method's estimate over time.",
         epilog=_EXAMPLES,
     )
-    parser.add_argument("log", nargs="?", type=file_name, metavar="LOG", help="log of a motion with the payload")
+    add = parser.add_argument
+    add("log", nargs="?", type=file_name, metavar="LOG", help="log of a motion with the payload")
     add_arm_arguments(parser, required=False)
-    parser.add_argument(
-        "--tare", type=file_name, metavar="LOG0", help="an earlier log of the arm; the payload is what was added"
-    )
-    parser.add_argument("--truth", metavar="FILE", help="the payload, where it is known (JSON, franka-hand or test)")
-    parser.add_argument("--dataset", metavar="DIR", help="take runs of a data set instead of LOG")
-    parser.add_argument("--runs", type=at_least(1), default=8, metavar="N", help="of the data set (default: 8)")
-    parser.add_argument("--seed", type=at_least(0), default=0, metavar="N", help="of the data set's split (default: 0)")
-    parser.add_argument("--model", nargs="+", default=[], metavar="FILE", help="trained models to show too")
-    parser.add_argument("--topic", metavar="T", help="JointState topic of a bag, where it has several")
-    parser.add_argument("--out", required=True, type=file_name, metavar="FILE.html", help="file to write")
+    add("--tare", type=file_name, metavar="LOG0", help="an earlier log of the arm; the payload is what was added")
+    add("--truth", metavar="FILE", help="the payload, where it is known (JSON, franka-hand or test)")
+    add("--dataset", metavar="DIR", help="take runs of a data set instead of LOG")
+    add("--runs", type=at_least(1), default=8, metavar="N", help="of the data set (default: 8)")
+    add("--seed", type=at_least(0), default=0, metavar="N", help="of the data set's split (default: 0)")
+    add("--model", nargs="+", default=[], metavar="FILE", help="trained models to show too")
+    add("--topic", metavar="T", help="JointState topic of a bag, where it has several")
+    add("--out", required=True, type=file_name, metavar="FILE.html", help="file to write")
     return parser
 
 
@@ -129,8 +127,8 @@ def _of_dataset(options: argparse.Namespace, say: Callable[[str], None]) -> tupl
 
 
 def _methods(arm: Arm, log: Recording, models: list[str]) -> dict[str, Callable[[Recording | None], Identifier]]:
-    """Every method by name, each to be told of the tare."""
-    from armload.ensembles import load_model
+    """Every method by name, each a function of the tare."""
+    from armload.ensembles import LearnedIdentifier, load_model
     from armload.identification import METHODS, default_for
     from armload.posterior import HybridIdentifier, HybridModel
 
@@ -142,11 +140,5 @@ def _methods(arm: Arm, log: Recording, models: list[str]) -> dict[str, Callable[
             continue
         model = load_model(path)
         model.check(arm, log)
-        methods[Path(path).stem] = partial(_learned, model, arm)
+        methods[Path(path).stem] = lambda _, model=model: LearnedIdentifier(model, arm)
     return methods
-
-
-def _learned(model: LearnedModel, arm: Arm, _: Recording | None) -> Identifier:
-    from armload.ensembles import LearnedIdentifier
-
-    return LearnedIdentifier(model, arm)

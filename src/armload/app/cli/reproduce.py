@@ -31,16 +31,15 @@ def parser() -> Parser:
         description="Run the study of a paper again and put what it says beside what is measured, claim by claim.",
         epilog=_EXAMPLES,
     )
-    parser.add_argument("study", choices=("taie2024",), help="the study")
-    parser.add_argument("--quick", action="store_true", help="reduced size; everything goes to --out")
-    parser.add_argument("--out", metavar="DIR", help="data sets, models, report (default: out/taie2024)")
-    parser.add_argument("--results", metavar="DIR", help="finished cells (default: benchmarks/results/taie2024)")
-    parser.add_argument("--page", metavar="FILE", help="the page to write (default: docs/paper.md)")
-    parser.add_argument(
-        "--jobs", type=at_least(1), default=1, metavar="N", help="cells at once (default: 1); same numbers"
-    )
-    parser.add_argument("--hours", type=at_least(0.0, float), metavar="H", help="begin nothing after so many hours")
-    parser.add_argument(
+    add = parser.add_argument
+    add("study", choices=("taie2024",), help="the study")
+    add("--quick", action="store_true", help="reduced size; everything goes to --out")
+    add("--out", metavar="DIR", help="data sets, models, report (default: out/taie2024)")
+    add("--results", metavar="DIR", help="finished cells (default: benchmarks/results/taie2024)")
+    add("--page", metavar="FILE", help="the page to write (default: docs/paper.md)")
+    add("--jobs", type=at_least(1), default=1, metavar="N", help="cells at once (default: 1); same numbers")
+    add("--hours", type=at_least(0.0, float), metavar="H", help="begin nothing after so many hours")
+    add(
         "--real-log",
         metavar="FILE",
         help=f"unloaded log of a real Panda for the semi-real runs (default: {_LOG} in the folder ARMLOAD_REAL_DATA)",

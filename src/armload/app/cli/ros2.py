@@ -13,10 +13,9 @@ from armload.app.cli.arguments import (
     file_name,
     motion_of,
     payload_of,
-    whole_number,
+    world_of,
 )
 from armload.app.cli.printing import print_note
-from armload.errors import UsageError
 
 _EXAMPLES = """\
 examples:
@@ -139,18 +138,10 @@ def _simulate(options: argparse.Namespace) -> None:
 
     from armload.devices import Ros2Connection
     from armload.devices.ros2 import RobotNode
-    from armload.simulation import Sensors, World
+    from armload.simulation import Sensors
 
     arm = arm_of(options)
-    sensors = None
-    if options.noise:
-        sensors = Sensors.of(arm)
-    if options.world == "nominal":
-        world = World.nominal(arm)
-    elif options.world.startswith("real-like:"):
-        world = World.real_like(arm, whole_number(options.world, "world"))
-    else:
-        raise UsageError(f"unknown world {options.world!r}: expected nominal or real-like:SEED")
+    world = world_of(options.world, arm)
     limits = arm.limits
     middle = 0.5 * (limits.position_low + limits.position_high)
     stand = np.where(np.isfinite(middle), middle, 0.0)
@@ -164,7 +155,7 @@ def _simulate(options: argparse.Namespace) -> None:
             first,
             payload,
             world=world,
-            sensors=sensors,
+            sensors=Sensors.of(arm) if options.noise else None,
             rate=options.rate,
             seed=options.seed,
             states=options.topic,

@@ -59,19 +59,20 @@ def parser() -> Parser:
         description="Train the hybrid for an arm, or a bag of trees or networks on a data set.",
         epilog=_EXAMPLES,
     )
-    parser.add_argument(
+    add = parser.add_argument
+    add(
         "--method",
         choices=("ensemble", "hybrid"),
         help="what to train (default: ensemble with --dataset, hybrid without)",
     )
-    parser.add_argument(
+    add(
         "--out",
         type=file_name,
         metavar="FILE",
         help="model to write, .safetensors (hybrid, default: out/hybrid-ROBOT.safetensors)",
     )
-    parser.add_argument("--seed", type=at_least(0), default=0, metavar="N", help="of everything random (default: 0)")
-    parser.add_argument(
+    add("--seed", type=at_least(0), default=0, metavar="N", help="of everything random (default: 0)")
+    add(
         "--robot",
         metavar="NAME|FILE.urdf",
         help="the arm; with --dataset only where the data set's arm is not a built-in one",

@@ -72,7 +72,7 @@ def run(options: argparse.Namespace) -> None:
         print_json(report | {"out": str(out)})
         return
     console().print(cells_table(coverage))
-    print("\n".join(said(coverage)))
+    print("\n".join(summary_lines(coverage)))
     frame = "" if options.frame is None else f" --frame {options.frame}"
     print(f"wrote {out}; use it with: armload identify LOG --robot {options.robot}{frame} --method {out}")
 
@@ -124,7 +124,7 @@ def cells_table(coverage: Coverage) -> RichTable:
     return rows
 
 
-def said(coverage: Coverage) -> list[str]:
+def summary_lines(coverage: Coverage) -> list[str]:
     """The pooled coverage, the cells where it is lowest and those where the intervals are widest, in words.
 
     Cells of a few episodes are left out: their share says nothing.
@@ -163,32 +163,10 @@ def episodes_shown() -> Iterator[Callable[[int, int], None]]:
     if not sys.stderr.isatty():
         yield _Lines()
         return
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
+    from armload.ensembles.progress import Progress, reporter
 
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left:"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True, speed_estimate_period=300.0) as bar:
-        task = bar.add_task("episodes", total=None)
-
-        def show(done: int, total: int) -> None:
-            what = "episodes" if done < total else "learning"
-            bar.update(task, completed=done, total=total, description=what)
-
-        yield show
+    with reporter(True) as report:
+        yield lambda done, total: report(Progress("episodes", done, total, "" if done < total else "learning"))
 
 
 _LEARNING = "learning from the episodes, and checking on those left out"

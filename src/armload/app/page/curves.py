@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from armload.inertia import NAMES, UNITS
 
-# Okabe & Ito, "Color Universal Design", 2008: told apart by the colour-blind
+# Okabe & Ito, "Color Universal Design", 2008: distinct for the colour-blind
 COLOURS = ((0, 114, 178), (213, 94, 0), (0, 158, 115))
 _WIDER = 1.5  # times the narrowest present interval that is shown beyond the values
 _UNKNOWN = 1e9  # half-width of an interval of which nothing is known, in any unit
@@ -19,10 +19,7 @@ HEIGHT = 122  # [px] of a plot
 PADDING = (8, 14, 0, 0)  # [px] above, right, below, left
 # uPlot takes the least of 1, 2, 2.5, 5, 10, … that leaves `space` [px] between two ticks: at most twice as much. The y
 # axis has HEIGHT − 8 − 24 px: at uPlot's own 30 px between them that can mean one tick, at half of it at least three.
-AXES = (
-    {"size": 24, "gap": 2, "ticks": {"size": 4}},
-    {"size": 58, "gap": 3, "ticks": {"size": 4}, "space": 15},
-)
+AXES = ({"size": 24, "gap": 2, "ticks": {"size": 4}}, {"size": 58, "gap": 3, "ticks": {"size": 4}, "space": 15})
 
 
 class Group(NamedTuple):

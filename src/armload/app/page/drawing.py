@@ -98,20 +98,11 @@ def frame_poses(arm: Arm, q: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np
     return np.concatenate([[np.eye(3)], R[0], R_end]), np.concatenate([np.zeros((1, 3)), p[0], p_end])
 
 
-def _principal(parameters: InertialParameters) -> tuple[NDArray, NDArray, NDArray]:
-    """Axes (3, 3), centre (3,) and how far the mass is spread along each axis (3,): standard deviations [m].
-
-    The second moments S = ½·tr(I)·1 − I about the centre of mass are m times that spread squared; what would be below
-    zero, as no body's is, counts as zero.
-    """
-    mass, com, inertia = phi_to_com(parameters.phi)
-    spread, axes = np.linalg.eigh((0.5 * np.trace(inertia) * np.eye(3) - inertia) / mass)
-    axes[:, 2] *= np.sign(np.linalg.det(axes))
-    return axes, com, np.sqrt(np.maximum(spread, 0.0))
-
-
 def equivalent_box(parameters: InertialParameters) -> Box:
     """The homogeneous box with these parameters; its lengths are the sides, √12 times the spread of mass.
+
+    The second moments S = ½·tr(I)·1 − I about the centre of mass are m times the squared spread (3,); what is below
+    zero, as no body's is, counts as zero.
 
     >>> from armload.payloads import solids
     >>> box = equivalent_box(solids.box((0.1, 0.2, 0.3), mass=2.0, translation=(0, 0, 0.15)))
@@ -121,18 +112,10 @@ def equivalent_box(parameters: InertialParameters) -> Box:
     Raises:
         InertiaError: the mass is zero.
     """
-    axes, centre, spread = _principal(parameters)
-    return Box(axes, centre, np.sqrt(12.0) * spread)
-
-
-def equivalent_ellipsoid(parameters: InertialParameters) -> Box:
-    """The homogeneous ellipsoid with these parameters; its lengths are the semi-axes, √5 times the spread of mass.
-
-    Raises:
-        InertiaError: the mass is zero.
-    """
-    axes, centre, spread = _principal(parameters)
-    return Box(axes, centre, np.sqrt(5.0) * spread)
+    mass, com, inertia = phi_to_com(parameters.phi)
+    squared, axes = np.linalg.eigh((0.5 * np.trace(inertia) * np.eye(3) - inertia) / mass)
+    axes[:, 2] *= np.sign(np.linalg.det(axes))
+    return Box(axes, com, np.sqrt(12.0 * np.maximum(squared, 0.0)))
 
 
 def com_region(phi: NDArray[np.float64], covariance: NDArray[np.float64]) -> Box:

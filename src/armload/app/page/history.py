@@ -1,4 +1,4 @@
-"""What was said over time, for curves: days of it in a fixed amount of memory.
+"""Estimates over time, for curves: days of them in a fixed amount of memory.
 
 Several rings hold the same columns, each coarser than the one before by a factor: the last half minute is kept ten
 times a second, the last days once in some hours. A curve is taken from the finest ring that reaches far enough back.
@@ -83,8 +83,5 @@ class History:
         return self._rings[level, np.arange(max(0, count - size), count) % size]
 
     def _time_of_last(self, level: int) -> float:
-        return (
-            float(self._rings[level, (self._written[level] - 1) % self._rings.shape[1], 0])
-            if self._written[level]
-            else -np.inf
-        )
+        last = (self._written[level] - 1) % self._rings.shape[1]
+        return float(self._rings[level, last, 0]) if self._written[level] else -np.inf

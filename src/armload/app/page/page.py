@@ -1,6 +1,6 @@
-"""The page: what the session knows, in a browser (viser). It looks ten times a second and is waited for by nobody.
+"""The page: the state of the session in a browser (viser), read ten times a second; nothing waits for it.
 
-viser keeps what it was told, so that whoever opens the page later sees what everybody sees.
+viser keeps its state, so that a page that is opened later shows the same.
 """
 
 from __future__ import annotations
@@ -23,13 +23,7 @@ from armload.errors import ArmloadError, ModelError, UsageError
 from armload.identification import METHODS, default_for
 
 _NUMBERS, _CURVES = 3, 8  # pictures from which on numbers and curves follow
-SPANS = {
-    "last 30 s": 30.0,
-    "last 2 min": 120.0,
-    "last 10 min": 600.0,
-    "last hour": 3600.0,
-    "everything": float("inf"),
-}
+SPANS = {"last 30 s": 30.0, "last 2 min": 120.0, "last 10 min": 600.0, "last hour": 3600.0, "everything": float("inf")}
 _KEY = (
     '<div style="font-size:12px;padding:2px 8px;color:var(--mantine-color-dimmed)">line: estimate, shaded: 95 % '
     "interval, dashed: truth where it is known. In the picture: box of the same mass and inertia (grey: not all "
@@ -147,13 +141,13 @@ class Page:
         def _(event: Any) -> None:
             if event.client is None or event.target.value == session.method:
                 return  # we set it ourselves
-            if not _told(event.client, "Method", lambda: session.use(event.target.value)):
+            if not _done(event.client, "Method", lambda: session.use(event.target.value)):
                 self._method.value = session.method
 
         @again.on_click
         def _(event: Any) -> None:
             what = session.take_tare if event.target.value == "Tare" else session.reset
-            _told(event.client, event.target.value, what)
+            _done(event.client, event.target.value, what)
 
         @export.on_click
         def _(event: Any) -> None:
@@ -161,7 +155,7 @@ class Page:
                 name, text = file_of(session.estimate, session.arm, self._form.value)
                 event.client.send_file_download(name, text.encode(), save_immediately=True)
 
-            _told(event.client, "Download", send)
+            _done(event.client, "Download", send)
 
 
 def methods_for(session: Session) -> tuple[str, ...]:
@@ -178,12 +172,12 @@ def methods_for(session: Session) -> tuple[str, ...]:
 def _has_hybrid(arm: Arm) -> bool:
     try:
         return default_for(arm) == "hybrid"
-    except ModelError:  # its file is missing: who asks for it is told so
+    except ModelError:  # its file is missing: reported when the method is chosen
         return True
 
 
-def _told(client: Any, title: str, action: Any) -> bool:
-    """Do what somebody at the page asked for; if it cannot be done, say so there."""
+def _done(client: Any, title: str, action: Any) -> bool:
+    """Do what was asked for at the page; False, with a notification there, if it failed."""
     try:
         action()
     except ArmloadError as error:

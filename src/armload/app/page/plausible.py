@@ -1,4 +1,4 @@
-"""Whether a live stream is what it claims to be: the checks of a log, on what was seen lately, again and again."""
+"""Whether a live stream is plausible: the checks of a log, repeated on the latest samples."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from armload.identification.torque_scale import TorqueScale, torque_scale
 from armload.online import Health, OnlineEstimate
 from armload.recording import Recording, Sample
 
-_SAID = "the samples are not plausible, the answer is not to be trusted"
+_IMPLAUSIBLE = "the samples are not plausible, the answer is not to be trusted"
 # [s] of motion to the first check, and at most between two; meanwhile each comes after twice the motion, as the checks
 # get surer the more was seen
 _SOONEST, _LATEST = 3.0, 24.0
@@ -26,15 +26,15 @@ _STEP, _MOVED = 0.25, 0.01  # [s] between two looks at the joints; [rad] that on
 class Plausibility:
     """Checks the samples a session has kept once the arm has moved for 3 s, after 6, 12 and 24 s, and then every 24 s.
 
-    A doubt stays, whatever is held, until evidence takes it back: no check has said anything for as much motion as the
-    doubt rested on, and if the torque's scale was wrong it is surely another one now. A log in which nothing is to be
+    A doubt stays, whatever is held, until evidence takes it back: no check has failed for as much motion as the doubt
+    rested on, and if the torque's scale was wrong it is surely another one now. A log in which nothing is to be
     seen takes nothing back. While there is a doubt the checks come every 3 s; once it is taken back, as at first.
 
     Args:
         arm: the arm. name: what the stream is called in messages.
 
     Attributes:
-        doubt: what the last check that found something said, one sentence; None: nothing is in doubt.
+        doubt: the message of the last check that failed, one sentence; None: nothing is in doubt.
     """
 
     def __init__(self, arm: Arm, name: str) -> None:
@@ -87,7 +87,7 @@ class Plausibility:
         return not self._checked and self._since > 0.0 and self._check(recent)
 
     def qualified(self, estimate: OnlineEstimate) -> OnlineEstimate:
-        """The estimate with what is to be said of samples that cannot be right: no interval holds then."""
+        """The estimate with the doubt among its notes: its intervals do not hold then."""
         if self.doubt is None:
             return estimate
         return OnlineEstimate.of({**vars(estimate), "calibrated": False, "notes": (*estimate.notes, self.doubt)})
@@ -102,7 +102,7 @@ class Plausibility:
         try:
             check_plausible(replace(log, source=self._name), self._arm)
         except ArmloadError as error:
-            self.doubt = f"{_SAID}: {error}"
+            self.doubt = f"{_IMPLAUSIBLE}: {error}"
             self._doubted, self._rests_on = self._moved, min(self._since, _LOOKED_AT)
             scale = torque_scale(log, self._arm)
             self._wrong = scale if scale is not None and scale.is_wrong else self._wrong

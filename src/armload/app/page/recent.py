@@ -1,4 +1,4 @@
-"""The samples just seen, in a fixed amount of memory: what a tare is made of when somebody asks for one."""
+"""The latest samples, in a fixed amount of memory: a tare is made of them."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """From a source to the newest state: the loop that identifies, and what others may ask of it meanwhile.
 
-The loop runs in one thread and never waits for anybody. Whoever looks takes the newest estimate as it is; whoever wants
-something changed leaves an order, which is carried out between two samples.
+The loop runs in one thread and never waits. Other threads read the newest estimate, or leave an order, which is carried
+out between two samples.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Session:
     Args:
         source: closed with the session.
         arm: the bare arm, or with a tool that is known. tare: an earlier log of it. method: see `OnlineIdentifier`.
-        warn: told at once what is wrong with the stream, also what it ended with in a thread of its own (`start`).
+        warn: called with each warning on the stream, also with the error it ended with in a thread (`start`).
 
     Attributes:
         sample: the newest that could be used. estimate: the newest. None before the first.
@@ -66,7 +66,7 @@ class Session:
         ended: the source has ended. error: what it ended with, if that was one.
 
     Raises:
-        ArmloadError: an unknown method, a model of another arm, or a tare that is none of this arm.
+        ArmloadError: an unknown method, a model of another arm, or a tare of another arm.
     """
 
     def __init__(
@@ -91,7 +91,7 @@ class Session:
         self._orders: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._recent = Recent(arm.n)
         self._plausibility = Plausibility(arm, source.name)
-        self._trouble = False  # whether it is told that samples cannot be used
+        self._trouble = False  # whether unusable samples were reported
         self._warned = -np.inf  # and when it last was, on the stream's clock
         self._thread: threading.Thread | None = None
         self._stop = False
@@ -109,7 +109,7 @@ class Session:
     # ------------------------------------------------------------------ the loop
 
     def estimates(self, duration: float | None = None) -> Iterator[OnlineEstimate]:
-        """One estimate per sample, until the source ends or has told of `duration` [s].
+        """One estimate per sample, until the source ends or has given `duration` [s].
 
         Raises:
             SourceError: the connection was lost.
@@ -137,7 +137,7 @@ class Session:
             pass
 
     def start(self, duration: float | None = None) -> None:
-        """The same in a thread of its own; an error is kept in `error` and told in the log."""
+        """The same in a thread of its own; an error is kept in `error` and in the log."""
 
         def loop() -> None:
             try:
@@ -161,7 +161,7 @@ class Session:
         before, used = self.estimate, self._identifier.health.used
         estimate = self._identifier.update(*sample)
         if estimate.event is not None and (before is None or estimate.event != before.event):
-            self._tell(estimate.event)
+            self._log_event(estimate.event)
         usable = estimate.health.used > used
         if usable:
             self._recent.append(sample)
@@ -170,7 +170,7 @@ class Session:
         estimate = self._plausibility.qualified(estimate).behind(self.source.lag())
         self.sample, self.estimate = sample if usable else self.sample, estimate
         if self._trouble or self._identifier.trouble is not None:
-            self._listen(self._identifier.trouble)
+            self._report_trouble(self._identifier.trouble)
         if usable and self.history.due(estimate.t):
             truth = self.truth(estimate.t)
             known = np.full(10, np.nan) if truth is None else truth.phi
@@ -181,8 +181,8 @@ class Session:
         doubt = self._plausibility.doubt
         self._say("the samples are plausible now") if doubt is None else self._warn(doubt)
 
-    def _listen(self, trouble: str | None) -> None:
-        """Tell that samples cannot be used, and that they can again; not each time of a stream that stutters."""
+    def _report_trouble(self, trouble: str | None) -> None:
+        """Report that samples cannot be used, and that they can again; at most every 10 s."""
         now = 0.0 if self.estimate is None else self.estimate.t
         if trouble is None:
             self._trouble = False
@@ -191,8 +191,8 @@ class Session:
             self._trouble, self._warned = True, now
             self._warn(trouble)
 
-    def _tell(self, event: Event) -> None:
-        """Into the log; what a change was is known a little later, in place of the first guess."""
+    def _log_event(self, event: Event) -> None:
+        """Add an event to the log; a later, better classification of the same event replaces the first."""
         entry = Entry(event.t, str(event), event)
         for k, known in enumerate(self.log):
             if known.event is not None and known.event.t == event.t:

@@ -1,4 +1,4 @@
-"""The numbers of the page as HTML: what is held and how well it is known, what happened, how the stream is."""
+"""The numbers of the page as HTML: estimate and intervals, events, state of the stream."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ def state_of(estimate: OnlineEstimate) -> str:
     else:
         unused = any(note.startswith(UNUSED) for note in estimate.notes)  # nobody knows whether it moves
         words = ["mass undetermined yet" if estimate.moving or unused else "mass undetermined: move the arm"]
-    told = any(note.startswith((UNUSED, "standing")) for note in estimate.notes)
-    if estimate.determined[0] and not (estimate.moving or told):
+    noted = any(note.startswith((UNUSED, "standing")) for note in estimate.notes)
+    if estimate.determined[0] and not (estimate.moving or noted):
         words.append("the arm stands still")
     words += [note for note in estimate.notes if "moving" not in note and "has changed" not in note]
     return "; ".join(words)
@@ -64,7 +64,7 @@ def rests_on(estimate: OnlineEstimate) -> str:
 
 
 def parameters(estimate: OnlineEstimate | None, truth: InertialParameters | None = None) -> str:
-    """The ten parameters with intervals and units; what the stream does not determine is said to be so."""
+    """The ten parameters with intervals and units; what the stream does not determine is marked."""
     if estimate is None:
         return ""
     head = "".join(
@@ -99,27 +99,22 @@ def events(log: Iterable[Entry], most: int = 6) -> str:
         return f'<div style="{_TEXT};{_DIM}" data-armload="log">nothing has happened yet</div>'
     lines = "".join(
         f'<div{_WARNING if entry.warning else ""}><span style="{_DIM}">{entry.t:.1f} s</span>&ensp;'
-        f"{escape(said(entry))}</div>"
+        f"{escape(entry.text if entry.event is None else entry.event.kind)}</div>"
         for entry in last
     )
     return f'<div style="{_TEXT}" data-armload="log">{lines}</div>'
-
-
-def said(entry: Entry) -> str:
-    """A line of the log without its time, which stands before it."""
-    return entry.text if entry.event is None else entry.event.kind
 
 
 def stream(name: str, estimate: OnlineEstimate | None, lost: int = 0) -> str:
     """Where samples come from, how many counted, why others were left out, and whether this machine keeps up."""
     if estimate is None:
         return f'<div style="{_TEXT};{_DIM}" data-armload="health">{escape(name)}</div>'
-    said = f"{name}: t = {estimate.t:.1f} s, {estimate.health}"
+    text = f"{name}: t = {estimate.t:.1f} s, {estimate.health}"
     if estimate.lag >= GAP:
-        said += f"; answered {estimate.lag:.1f} s after it arrived: this machine is too busy"
+        text += f"; answered {estimate.lag:.1f} s after it arrived: this machine is too busy"
     if lost:
-        said += f"; {lost} lost: this machine is too busy"
-    return f'<div style="{_TEXT};{_DIM}" data-armload="health">{escape(said)}</div>'
+        text += f"; {lost} lost: this machine is too busy"
+    return f'<div style="{_TEXT};{_DIM}" data-armload="health">{escape(text)}</div>'
 
 
 def _com(estimate: OnlineEstimate) -> str:

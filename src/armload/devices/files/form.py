@@ -70,7 +70,7 @@ def _numbers(load: Load, order: str) -> list[str]:
 
 def _document(tag: str, load: Load, use: str, **attributes: str) -> ET.Element:
     root = ET.Element(tag, attributes)
-    for line in (*load.said(), use):
+    for line in (*load.description(), use):
         root.append(ET.Comment(f" {line} "))
     return root
 

@@ -28,7 +28,7 @@ class Replay(Source):
         speed: 1: real time; 2: twice as fast; None: as fast as possible.
         loop: again from the start after the end, with times that go on: one sample time lies between end and start.
             The arm jumps there unless it ended where it began.
-        payload: what the arm held, where known; told by `truth`.
+        payload: what the arm held, where known; returned by `truth`.
         topic: the topic of a bag.
 
     Raises:

@@ -44,7 +44,7 @@ def set_load_text(load: Load) -> str:
     mass, com, inertia = franka_load(load.parameters)
     return "\n".join(
         [
-            *(f"# {line}" for line in load.said()),
+            *(f"# {line}" for line in load.description()),
             f"mass = {mass!r}  # [kg]",
             f"F_x_Cload = {com!r}  # [m] centre of mass in the flange frame",
             f"load_inertia = {inertia!r}  # [kg·m²] about it, in the flange's axes, column by column",
@@ -67,10 +67,5 @@ def desk_text(load: Load, transformation: ArrayLike | None = None) -> str:
     if not (np.allclose(R @ R.T, np.eye(3), atol=1e-6) and np.linalg.det(R) > 0 and np.array_equal(T[3], [0, 0, 0, 1])):
         raise SinkError("transformation is not a pose: expected 4 rows of 4 numbers, the last one 0 0 0 1")
     mass, com, inertia = franka_load(load.parameters)
-    content = {
-        "mass": mass,
-        "centerOfMass": com,
-        "inertia": inertia,
-        "transformation": T.flatten(order="F").tolist(),
-    }
+    content = {"mass": mass, "centerOfMass": com, "inertia": inertia, "transformation": T.flatten(order="F").tolist()}
     return json.dumps(content) + "\n"

@@ -3,8 +3,8 @@
 Both clients have the same names, and both hold the interpreter while they wait for a state: read them in a process of
 their own (`Detached`, which `open_source` does). `RealtimeConfig.kIgnore` needs no real-time kernel: nothing is
 controlled here. The torque is `tau_J`, the sensors behind the gears: rigid body and friction, gravity included,
-whatever load the robot was told. The time is the robot's own, in milliseconds since it was switched on: gaps are lost
-packets.
+whatever load is set in the controller. The time is the robot's own, in milliseconds since it was switched on: gaps
+are lost packets.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from armload.arms import Arm
 from armload.devices.source import Source
-from armload.errors import SourceError
+from armload.errors import SourceError, one_line
 from armload.recording import Sample
 
 
@@ -38,7 +38,7 @@ SYSTEMS = {
 
 
 class FrankaStatus(NamedTuple):
-    """What the robot says of itself: velocity (n,) [rad/s], and the masses it was told to count with [kg]."""
+    """State of the robot: velocity (n,) [rad/s], masses set for the end effector and the load [kg]."""
 
     dq: list[float]
     m_ee: float
@@ -75,7 +75,7 @@ class FrankaSource(Source):
         try:
             self.robot: Any = client.Robot(address, client.RealtimeConfig.kIgnore)
         except Exception as error:  # the maker's errors have no common base in Python
-            raise SourceError(unreachable(address, _said(error), system)) from None
+            raise SourceError(unreachable(address, one_line(error), system)) from None
 
     def __iter__(self) -> Iterator[Sample]:
         while not self._closed:
@@ -111,7 +111,7 @@ class FrankaSource(Source):
         try:
             self._robot().set_load(float(mass), np.ravel(com).tolist(), np.ravel(inertia).tolist())
         except Exception as error:
-            raise SourceError(f"{self.name} refused the load: {_said(error)}") from None
+            raise SourceError(f"{self.name} refused the load: {one_line(error)}") from None
 
     def _robot(self) -> Any:
         robot = self.robot  # may be let go by another thread
@@ -124,7 +124,7 @@ class FrankaSource(Source):
         try:
             return robot.read_once()
         except Exception as error:
-            raise SourceError(f"{self.name} was lost: {_said(error)}") from None
+            raise SourceError(f"{self.name} was lost: {one_line(error)}") from None
 
 
 def load_client(system: str) -> Any:
@@ -150,7 +150,3 @@ def unreachable(address: str, why: str, system: str) -> str:
         f"the {facts.called} at {address} cannot be reached ({why}): check its address, that its joints are unlocked "
         f"and FCI is activated in Desk, and that no other client is connected; {facts.other}"
     )
-
-
-def _said(error: Exception) -> str:
-    return " ".join(str(error).split()) or type(error).__name__

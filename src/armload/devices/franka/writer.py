@@ -6,9 +6,9 @@ from typing import Any, Protocol
 
 from armload.arms import Arm
 from armload.devices.franka.form import FrankaLoad, franka_load
-from armload.devices.guard import check_writable, reason_of, stands_still
+from armload.devices.guard import check_writable, stands_still
 from armload.devices.load import Load
-from armload.errors import SinkError
+from armload.errors import SinkError, one_line
 from armload.identification import Identification
 
 
@@ -31,7 +31,7 @@ def set_load(
     flange: str | None = None,
     allow_undetermined_inertia: bool = False,
 ) -> FrankaLoad:
-    """Tell a Franka robot what it holds, and return what was told.
+    """Tell a Franka robot what it holds, and return the arguments that were sent.
 
     The robot's own state says whether it stands still, and whether it counts an end effector beside the load: it must
     count nothing twice, and nothing that is mounted not at all.
@@ -49,8 +49,8 @@ def set_load(
         end_effector = float(robot.read_once().m_ee)
         moving = not stands_still(lambda: robot.read_once().dq)
     except Exception as error:  # the vendor's own exceptions have no common base
-        raise SinkError(f"the robot's state cannot be read, so no load is written: {reason_of(error)}") from error
-    told = franka_load(
+        raise SinkError(f"the robot's state cannot be read, so no load is written: {one_line(error)}") from error
+    load = franka_load(
         check_writable(
             result,
             arm,
@@ -62,7 +62,7 @@ def set_load(
         )
     )
     try:
-        robot.set_load(*told)
+        robot.set_load(*load)
     except Exception as error:
-        raise SinkError(f"the robot refused the load: {reason_of(error)}") from error
-    return told
+        raise SinkError(f"the robot refused the load: {one_line(error)}") from error
+    return load

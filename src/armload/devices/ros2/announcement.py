@@ -1,4 +1,4 @@
-"""What of an estimate other nodes are told: a body that can exist, nothing at all, or no message yet."""
+"""What of an estimate is published: a body that can exist, nothing at all, or no message yet."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from armload.estimators import Estimate
 from armload.inertia import HELD, InertialParameters, is_consistent, nearest_body
 from armload.online import OnlineEstimate
 
-_KNOWN = 0.15  # [kg] standard deviation of the mass above which nothing is said, if it is a tenth of the mass, too
+_KNOWN = 0.15  # [kg] standard deviation of the mass above which nothing is published, if it is also a tenth of the mass
 
 
 def announced(estimate: Estimate) -> InertialParameters | None:
-    """The body that is held, with a mass of 0 if nothing is; None: not known well enough to be told.
+    """The body that is held, with a mass of 0 if nothing is; None: not known well enough to be published.
 
     A subscriber may put the answer into a controller, so it is always a body that can exist: the nearest one in the
-    metric of the estimate's covariance. Nothing is told while a parameter is not known at all, the mass is not known to
-    0.15 kg or a tenth of itself, or it is clearly negative (something was taken off since the tare); nor while a live
-    identifier still settles on a new payload.
+    metric of the estimate's covariance. Nothing is published while a parameter is not known at all, the mass is not
+    known to 0.15 kg or a tenth of itself, or it is clearly negative (something was taken off since the tare); nor while
+    a live identifier still settles on a new payload.
     """
     phi, covariance = estimate.phi, estimate.covariance
     if isinstance(estimate, OnlineEstimate) and estimate.settling:

@@ -1,4 +1,4 @@
-"""What a robot is told to do, changed while it runs."""
+"""A commanded motion that can be changed while the robot runs."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ class CommandedMotion(Motion):
     there.
 
     >>> from armload.motion import taie2024
-    >>> told = CommandedMotion(taie2024())
-    >>> told.position([0.0, 1.0]).shape, told.order(taie2024())
+    >>> commanded = CommandedMotion(taie2024())
+    >>> commanded.position([0.0, 1.0]).shape, commanded.order(taie2024())
     ((2, 7), 1.0)
 
     Args:

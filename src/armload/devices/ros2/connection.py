@@ -1,6 +1,6 @@
 """One process's place in a ROS 2 network: a node with its own context, its subscriptions and its publishers.
 
-rclpy comes with ROS 2, not with armload, and is imported here alone, when a connection is opened.
+rclpy comes with ROS 2, not with armload, and is imported only here, when a connection is opened.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ INSTALL = (
 
 
 class Ros2Connection:
-    """A ROS 2 node, and what armload says and hears through it.
+    """A ROS 2 node with armload's publishers and subscriptions.
 
     Discovery is ROS 2's own affair: ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE count as for every other node.
     Ctrl-C stays Python's.

@@ -26,7 +26,7 @@ def inertia_stamped_text(load: Load) -> str:
     )
     x, y, z = numbers[1:4]
     return (
-        "".join(f"# {line}\n" for line in load.said())
+        "".join(f"# {line}\n" for line in load.description())
         + f"header:\n  stamp: {{sec: 0, nanosec: 0}}\n  frame_id: {json.dumps(load.frame)}\n"
         + f"inertia:\n  m: {numbers[0]}\n  com: {{x: {x}, y: {y}, z: {z}}}\n{inertia}"
     )

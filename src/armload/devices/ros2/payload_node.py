@@ -1,4 +1,4 @@
-"""The node that listens to joint states and says what the arm holds."""
+"""The node that subscribes to joint states and publishes the payload."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ class PayloadNode:
         self._kind = source.connection.InertiaStamped
         self._publish = source.connection.publisher(self._kind, topic)
 
-    def run(self, told: Callable[[InertialParameters], None] | None = None) -> None:
+    def run(self, on_published: Callable[[InertialParameters], None] | None = None) -> None:
         """Identify and publish until the source is closed.
 
         Args:
-            told: called with what was published, each time.
+            on_published: called with each payload that was published.
 
         Raises:
             SourceError: the joint states ended.
@@ -54,5 +54,5 @@ class PayloadNode:
             last = estimate.t
             old = estimate.age - estimate.lag if isinstance(estimate, OnlineEstimate) else 0.0  # on the samples' clock
             self._publish(message_of(body, self._source.stamp(estimate.t - old), self._kind))
-            if told is not None:
-                told(body)
+            if on_published is not None:
+                on_published(body)

@@ -1,6 +1,6 @@
 """The simulated robot as a ROS 2 node: joint states out, joint trajectories in.
 
-What Gazebo and ROS do in the paper (Taie et al., RA-L 2024, Section IV). The physics is `sources.Simulator`: computed a
+What Gazebo and ROS do in the paper (Taie et al., RA-L 2024, Section IV). The physics is `devices.Simulator`: computed a
 quarter of a second ahead, published in real time. A trajectory counts from the end of what is computed already, and
 replaces the one before it, as ROS 2's joint trajectory controller has it.
 """
@@ -30,7 +30,7 @@ _LOOK = 0.1  # [s] at most between two looks at whether somebody interrupts
 class RobotNode:
     """Publishes sensor_msgs/JointState and obeys trajectory_msgs/JointTrajectory.
 
-    A trajectory that the arm cannot run is refused; `say` is told why.
+    A trajectory that the arm cannot run is refused; `say` is called with the reason.
 
     Args:
         arm: as the controller knows it, which does not know the payload.
@@ -42,7 +42,7 @@ class RobotNode:
         rate: joint states per second [Hz].
         seed: of the sensors' noise.
         states, commands: the topics.
-        say: told in a sentence what happens.
+        say: called with a sentence on what happens.
 
     Raises:
         SourceError: a topic's name is not one.
@@ -65,18 +65,19 @@ class RobotNode:
         say: Callable[[str], None] = lambda _: None,
     ) -> None:
         self._arm, self._connection, self._say = arm, connection, say
-        motion = first if isinstance(first, Motion) else _standing(first)
-        self._told = CommandedMotion(EndlessMotion(motion))
+        standing = None if isinstance(first, Motion) else np.array([first, first])
+        motion = first if standing is None else TrajectoryMotion([0.0, 1.0], standing, name="standing")
+        self._commanded = CommandedMotion(EndlessMotion(motion))
         self._simulator = Simulator(
             arm, motion, [(0.0, payload)], world=world, sensors=sensors, rate=rate, speed=None, seed=seed
         )
-        self._simulator.motion = self._told
+        self._simulator.motion = self._commanded
         self._stopped = False
         self._publish = connection.publisher(connection.JointState, states)
         connection.subscribe(connection.JointTrajectory, commands, self._take)
 
     def run(self) -> None:
-        """Be a robot until `stop`, or until somebody interrupts."""
+        """Publish and obey until `stop` or an interruption."""
         start = None
         for sample in self._simulator:
             if start is None:  # by now what the simulation needs is loaded
@@ -92,7 +93,7 @@ class RobotNode:
         self._stopped = True
 
     def _wait_until(self, stamp: int) -> None:
-        """Hear what comes in until a sample is due, and once at least."""
+        """Handle incoming messages until a sample is due, at least once."""
         while True:
             ahead = 1e-9 * (stamp - self._connection.now())
             self._connection.spin(min(_LOOK, max(0.0, ahead)))
@@ -102,11 +103,11 @@ class RobotNode:
     def _take(self, message: Any, _: int) -> None:
         """A trajectory has come."""
         try:
-            motion = read_trajectory(message, self._arm, self._told.state)
+            motion = read_trajectory(message, self._arm, self._commanded.state)
         except ArmloadError as error:
             self._say(f"a trajectory was refused: {error}")
             return
-        self._told.order(motion)
+        self._commanded.order(motion)
         self._say(f"a trajectory of {motion.duration:.2f} s was accepted")
 
     def _message(self, sample: Sample, stamp: int) -> Any:
@@ -115,7 +116,3 @@ class RobotNode:
         message.name = list(self._arm.joint_names)
         message.position, message.velocity, message.effort = (x.tolist() for x in (sample.q, sample.dq, sample.tau))
         return message
-
-
-def _standing(pose: NDArray[np.float64]) -> Motion:
-    return TrajectoryMotion([0.0, 1.0], np.array([pose, pose]), name="standing")

@@ -41,23 +41,17 @@ class Ros2Source(Source):
     """
 
     def __init__(
-        self,
-        topic: str,
-        arm: Arm,
-        *,
-        rate: float | None = None,
-        timeout: float | None = 10.0,
-        node: str = "armload",
+        self, topic: str, arm: Arm, *, rate: float | None = None, timeout: float | None = 10.0, node: str = "armload"
     ) -> None:
         self.name, self.n = topic, arm.n
         self._arm, self._timeout, self._closed = arm, timeout, False
         self._states = JointStates(arm, topic)
-        self._heard: deque[tuple[Any, int]] = deque(maxlen=SENSOR_DEPTH)
+        self._received: deque[tuple[Any, int]] = deque(maxlen=SENSOR_DEPTH)
         self._first: deque[tuple[Sample, float]] = deque()
         self._arrived: float | None = None
         self.connection = Ros2Connection(node)
         try:
-            self.connection.subscribe(self.connection.JointState, topic, self._hear, sensor=True)
+            self.connection.subscribe(self.connection.JointState, topic, self._receive, sensor=True)
             self.rate = self._measured_rate() if rate is None else float(rate)
         except BaseException:
             self.close()
@@ -88,15 +82,15 @@ class Ros2Source(Source):
         self._closed = True
         self.connection.close()
 
-    def _hear(self, message: Any, received: int) -> None:
-        self._heard.append((message, received))
+    def _receive(self, message: Any, received: int) -> None:
+        self._received.append((message, received))
 
     def _next(self) -> tuple[Sample, float] | None:
         """The next sample of the arm and when it arrived, on the monotonic clock [s]; None: closed meanwhile."""
         begun = time.monotonic()
         while not self._closed:
-            while self._heard:
-                message, received = self._heard.popleft()
+            while self._received:
+                message, received = self._received.popleft()
                 sample = self._states.sample(message, received)
                 if sample is not None:
                     waited = max(0, time.time_ns() - received) if received else 0  # a middleware may not tell

@@ -1,7 +1,7 @@
 """A trajectory_msgs/JointTrajectory as a motion, interpolated as ROS 2's joint trajectory controller does it.
 
 Between two points each joint follows the polynomial that their derivatives determine: a cubic with velocities, a
-quintic with accelerations. With positions alone the controller goes in straight lines, whose velocity jumps; here a
+quintic with accelerations. With positions only the controller goes in straight lines, whose velocity jumps; here a
 cubic spline through all points, to rest at the last, takes their place.
 """
 
@@ -97,7 +97,7 @@ class TrajectoryMotion(Motion):
 def read_trajectory(
     message: Any, arm: Arm, start: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 ) -> TrajectoryMotion:
-    """The motion that a JointTrajectory asks of an arm that is told to be at `start`: q, dq and ddq, each (n,).
+    """The motion that a JointTrajectory asks of an arm commanded to be at `start`: q, dq and ddq, each (n,).
 
     It begins at once, whatever the header's stamp, and blends into the points from the state the arm is in.
 

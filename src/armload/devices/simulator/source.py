@@ -125,7 +125,7 @@ class Simulator(Source):
         assert self._sensors is not None
         t, q, dq, tau = exact if before is None else map(np.concatenate, zip(before, exact, strict=True))
         behind = tuple(x[-max(2, round(_BEFORE * self.rate)) :] for x in (t, q, dq, tau))
-        if len(t) < 2:  # one sample alone has no lag and no spectrum
+        if len(t) < 2:  # a single sample has no lag and no spectrum
             return exact, behind
         seed = int(np.random.SeedSequence([self._seed, row]).generate_state(1)[0])
         log = self._sensors.observe(Recording(t, q, dq, tau), seed)

@@ -47,7 +47,7 @@ def set_payload_text(load: Load) -> str:
 
 
 def _script(load: Load, call: str) -> str:
-    return "\n".join([*(f"# {line}" for line in load.said()), call, ""])
+    return "\n".join([*(f"# {line}" for line in load.description()), call, ""])
 
 
 def _plain(*numbers: float) -> str:

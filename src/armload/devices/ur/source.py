@@ -5,9 +5,9 @@ A UR has no torque sensors in its joints. What there is, and what is made of it:
 - `actual_current` [A] is measured. Times a constant per joint (motor constant times gear ratio [N·m/A]) it is the
   torque on the motor's side of the gear, with the gear's friction in it: what this source gives. Expect percent, not
   grams, and always take a tare. The constants differ between models and are not published by the maker.
-- `target_moment` is what the controller's model expects for the payload it was told: it knows nothing of the real one.
+- `target_moment` is what the controller's model expects for the payload that is set: it does not measure the real one.
 - `actual_current_as_torque` (PolyScope 5.23 and later) has gravity taken out already, by the maintainers of the ROS 2
-  driver's account (pull request 1551 of Universal_Robots_ROS2_Driver), with the payload it was told; ur-rtde 1.6 does
+  driver's account (pull request 1551 of Universal_Robots_ROS2_Driver), with the payload that is set; ur-rtde 1.6 does
   not read it. That driver publishes it as effort unless `use_currents_as_efforts` is set.
 """
 
@@ -22,7 +22,7 @@ import numpy as np
 
 from armload.arms import ARMS, Arm
 from armload.devices.source import Source
-from armload.errors import SourceError
+from armload.errors import SourceError, one_line
 from armload.recording import Sample
 
 _FIELDS = ["timestamp", "actual_q", "actual_qd", "actual_current"]
@@ -61,7 +61,11 @@ class URSource(Source):
             raise SourceError(f"torque constants are {list(torque_constants)}: expected six finite numbers in N·m/A")
         self._arrived: float | None = None
         self._stop = threading.Event()
-        self._client = _connect(address)
+        client = load_client()
+        try:
+            self._client = client(address, -1.0, _FIELDS)  # −1: the fastest the controller has
+        except Exception as error:
+            raise SourceError(unreachable(address, one_line(error))) from None
         self.rate = 500.0
 
     def __iter__(self) -> Iterator[Sample]:
@@ -114,11 +118,3 @@ def unreachable(address: str, why: str) -> str:
         f"the UR arm at {address} cannot be reached ({why}): check its address, that it is switched on, and that RTDE "
         "is enabled in its security settings"
     )
-
-
-def _connect(address: str) -> Any:
-    client = load_client()
-    try:
-        return client(address, -1.0, _FIELDS)  # −1: the fastest the controller has
-    except Exception as error:
-        raise SourceError(unreachable(address, " ".join(str(error).split()))) from None

@@ -7,10 +7,10 @@ from typing import Any, Protocol
 from numpy.typing import ArrayLike
 
 from armload.arms import Arm
-from armload.devices.guard import check_writable, reason_of, stands_still
+from armload.devices.guard import check_writable, stands_still
 from armload.devices.load import Load
 from armload.devices.ur.form import URPayload, ur_payload
-from armload.errors import SinkError
+from armload.errors import SinkError, one_line
 from armload.identification import Identification
 
 
@@ -29,7 +29,7 @@ class URReceive(Protocol):
         ...
 
     def isConnected(self) -> bool:
-        """Whether they are new ones."""
+        """Whether the connection is up; if not, the velocities are old."""
         ...
 
 
@@ -43,7 +43,7 @@ def set_load(
     flange: str | None = None,
     allow_undetermined_inertia: bool = False,
 ) -> URPayload:
-    """Tell a Universal Robots arm what is on its flange, and return what was told.
+    """Tell a Universal Robots arm what is on its flange, and return the arguments that were sent.
 
     Its controller knows of no tool beside the payload: a load relative to a tool or a tare lacks what was mounted then,
     and is refused until that is added.
@@ -62,8 +62,8 @@ def set_load(
             raise ConnectionError("the connection is lost")
         moving = not stands_still(receive.getActualQd)
     except Exception as error:  # the vendor's own exceptions have no common base
-        raise SinkError(f"the robot's state cannot be read, so no payload is written: {reason_of(error)}") from error
-    told = ur_payload(
+        raise SinkError(f"the robot's state cannot be read, so no payload is written: {one_line(error)}") from error
+    payload = ur_payload(
         check_writable(
             result,
             arm,
@@ -74,9 +74,9 @@ def set_load(
         )
     )
     try:
-        taken = control.setTargetPayload(*told)
+        taken = control.setTargetPayload(*payload)
     except Exception as error:
-        raise SinkError(f"the robot refused the payload: {reason_of(error)}") from error
+        raise SinkError(f"the robot refused the payload: {one_line(error)}") from error
     if taken is False:
         raise SinkError("the robot refused the payload: setTargetPayload returned False")
-    return told
+    return payload

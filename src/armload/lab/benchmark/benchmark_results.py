@@ -31,11 +31,7 @@ _rounded = partial(listed, digits=4)
 
 
 def write_results(
-    cells: Mapping[str, dict[str, Any]],
-    size: Size,
-    summary: str | Path,
-    page: str | Path,
-    report: str | Path,
+    cells: Mapping[str, dict[str, Any]], size: Size, summary: str | Path, page: str | Path, report: str | Path
 ) -> dict[str, Path]:
     """Write the summary, the page and the report; each appears whole or not at all.
 
@@ -73,12 +69,12 @@ def pages(page: str | Path) -> dict[str, Path]:
     'docs/pictures/benchmark.png'
     """
     page = Path(page)
-    beside = page.with_name(f"{page.stem}_tables{page.suffix}")
-    return {"page": page, "tables": beside, "picture": page.parent / "pictures" / f"{page.stem}.png"}
+    tables = page.with_name(f"{page.stem}_tables{page.suffix}")
+    return {"page": page, "tables": tables, "picture": page.parent / "pictures" / f"{page.stem}.png"}
 
 
 def write_front(numbers: Mapping[str, Any], page: str | Path) -> None:
-    """Write the first page and its picture from the summary alone; folders must exist.
+    """Write the first page and its picture from the summary only; folders must exist.
 
     Raises:
         ReportError: a file cannot be written.

@@ -1,4 +1,4 @@
-"""The benchmark's first page: one picture and one table, drawn and written from the summary (benchmark.json) alone."""
+"""The benchmark's first page: one picture and one table, drawn and written from the summary (benchmark.json)."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from armload.payloads import draw_payload
 from armload.regression import GaussianPrior
 
 REPEAT = "repeat"
-_PAYLOADS = 400  # that the baselines are told of
+_PAYLOADS = 400  # behind the baselines' prior
 PRIOR = f"{_PAYLOADS} payloads of the population's family, of other seeds"
 _PRIOR_SEED = 20_000_003  # no episode's payload is drawn from it
 _PROBE_RATE, _PROBE_DURATION = 50.0, 0.5  # [Hz], [s]

@@ -40,9 +40,9 @@ _DIGITS = 5  # of an answer that count as the same
 class Row:
     """A row of the benchmark's tables.
 
-    name: as in the tables; `+tare` marks a method that subtracts what it says of the tare (virtual calibration), its
-        name alone what it says without. method: its name in the catalogue; "" for a baseline. tared: whether it is
-        given the tare, where there is one.
+    name: as in the tables; `+tare` marks a method that subtracts its estimate of the tare (virtual calibration); the
+        name without it marks the method without that. method: its name in the catalogue; "" for a baseline. tared:
+        whether it is given the tare, where there is one.
     """
 
     name: str

@@ -134,11 +134,7 @@ def _claim(folder: Path, provenance: dict[str, Any]) -> bool:
 
 
 def _runs(
-    motions: Sequence[Motion],
-    payloads: Sequence[Payload],
-    worlds: Sequence[World],
-    sensors: Sensors | None,
-    seed: int,
+    motions: Sequence[Motion], payloads: Sequence[Payload], worlds: Sequence[World], sensors: Sensors | None, seed: int
 ) -> list[tuple[Run, Payload, int, int, int]]:
     """Every run with its payload and the indices of payload, motion and world; payloads vary fastest."""
     out = []

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.errors import DatasetError
+from armload.errors import DatasetError, one_line
 from armload.inertia import InertialParameters
 from armload.lab.dataset.provenance import TABLE_FILE, canonical, read_provenance
 from armload.recording import Recording
@@ -120,7 +120,9 @@ def open_dataset(path: str | Path) -> Dataset:
     except FileNotFoundError:
         raise DatasetError(f"{folder} lacks {TABLE_FILE}: restore it, or build the data set anew") from None
     except (OSError, KeyError, ValueError, TypeError, pa.ArrowException) as error:
-        raise DatasetError(f"{folder / TABLE_FILE} is damaged ({_short(error)}): build the data set anew") from None
+        raise DatasetError(
+            f"{folder / TABLE_FILE} is damaged ({one_line(error)[:120]}): build the data set anew"
+        ) from None
     found = content_hash(provenance, [table])
     if found != provenance["sha256"]:
         raise DatasetError(
@@ -149,7 +151,3 @@ def content_hash(provenance: dict[str, Any], tables: Iterable[pa.Table]) -> str:
         for batch in table.to_batches(max_chunksize=65536):
             digest.update(np.column_stack([np.asarray(c, dtype="<f8") for c in batch.columns]).astype("<f8").tobytes())
     return digest.hexdigest()
-
-
-def _short(error: Exception) -> str:
-    return (" ".join(str(error).split()) or type(error).__name__)[:120]

@@ -1,11 +1,10 @@
-"""Where a data set comes from: everything that decides its numbers, as JSON beside the table."""
+"""Where a data set comes from: everything that decides its numbers, as JSON in its folder."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
 from dataclasses import fields
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from armload.errors import DatasetError
 from armload.motion import Motion, MotionFingerprint
 from armload.payloads import Payload
 from armload.simulation import Sensors, World
+from armload.version import package_versions
 
 FORMAT = "armload data set 1"
 PROVENANCE_FILE = "provenance.json"
@@ -56,7 +56,7 @@ def provenance_of(
         "sensors": None if sensors is None else {f.name: _plain(getattr(sensors, f.name)) for f in fields(sensors)},
         "rows_per_run": rows_per_run,
         "seed": seed,
-        "versions": {name: _version(name) for name in _PACKAGES},
+        "versions": package_versions(*_PACKAGES),
         "sha256": None,
     }
 
@@ -98,10 +98,3 @@ def write_provenance(folder: Path, provenance: dict[str, Any]) -> None:
 
 def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
-
-
-def _version(package: str) -> str:
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return "unknown"

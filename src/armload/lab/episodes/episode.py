@@ -16,7 +16,7 @@ from armload.simulation import Gains, Resolution, Run, Sensors, World, simulate_
 from armload.simulation.resolution import COARSE
 
 _TARE_NOISE = 1 << 30  # the tare's sensor noise is another than the run's
-_BATCH = 8  # episodes a process simulates at a time: what memory holds, and how often progress is told
+_BATCH = 8  # episodes a process simulates at a time: what memory holds, and how often progress is reported
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class Episode:
     payload: what was put on.
     sensors: how both runs are seen.
     tare_motion, tare_duration: what it did before; None: there is no tare.
-    tool: on the arm in both runs, and known to nobody; None: the flange was bare at the tare.
+    tool: on the arm in both runs, unknown to the methods; None: the flange was bare at the tare.
     gains: the controller's; None: the arm's own.
     elapsed: from the start of the tare to the start of the run [s]; a world's offset may drift meanwhile.
     rate: of the logs [Hz].

@@ -8,17 +8,15 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm
+from armload.arms import Arm, Limits
 from armload.errors import MotionError
 from armload.inertia import InertialParameters
 from armload.motion import FourierMotion, Motion, check_motion, rated_load
 from armload.motion.blended import BlendedMotion
 from armload.motion.collision import CapsuleArm, capsule_arm
 from armload.motion.point_to_point import PointToPoint
+from armload.motion.random_fourier import clear_poses, filled_limits
 
-_SPEED = 1.5  # [rad/s] velocity limit of an arm whose maker gives none
-_TO_SPEED = 0.25  # [s] in which it reaches its velocity limit, where no acceleration limit is given
-_TO_PUSH = 0.10  # [s] in which it reaches its acceleration limit, where no jerk limit is given
 _POSES = 512  # poses tried for the list of clear ones
 _TRIALS = 40  # motions tried until one may be run
 _FACTORS = 0.8 ** np.arange(7)  # by which all amplitudes are reduced until nothing touches
@@ -31,7 +29,7 @@ KINDS = ("reference", "long", "slow", "fast", "harmonics", "point-to-point", "pi
 class MotionSource:
     """Draws motions for one arm; what does not depend on the draw is made once.
 
-    arm: any arm; limits its maker does not give are replaced by sane ones.
+    arm: any arm; limits its maker does not give are assumed (`filled_limits`).
     floor: height of the floor in the base's frame [m]; None: there is none.
     """
 
@@ -112,7 +110,7 @@ class MotionSource:
         for _ in range(_TRIALS):
             centre = self._place(rng, around, near)
             reach = rng.uniform(*travel, size=n)
-            room = 0.7 * np.minimum(centre - self.limits["low"], self.limits["high"] - centre)
+            room = 0.7 * np.minimum(centre - self.limits.position_low, self.limits.position_high - centre)
             reach = np.minimum(reach, room) * (1.0 if moving is None else moving)
             ramp, pace = rng.uniform(0.25, 0.5), share * rng.uniform(0.4, 1.0)
             poses, starts, ends = [], [], []
@@ -194,29 +192,15 @@ class MotionSource:
         return rated_load(self.arm)
 
     @cached_property
-    def limits(self) -> dict[str, NDArray[np.float64]]:
-        """low, high [rad] and the largest velocity, acceleration and jerk, (n,) each, all finite."""
-        given = self.arm.limits
-        velocity = np.where(np.isfinite(given.velocity), given.velocity, _SPEED)
-        acceleration = np.where(np.isfinite(given.acceleration), given.acceleration, velocity / _TO_SPEED)
-        return {
-            "low": np.maximum(given.position_low, -np.pi),
-            "high": np.minimum(given.position_high, np.pi),
-            "velocity": velocity,
-            "acceleration": acceleration,
-            "jerk": np.where(np.isfinite(given.jerk), given.jerk, acceleration / _TO_PUSH),
-        }
+    def limits(self) -> Limits:
+        """The arm's limits, all finite but the efforts."""
+        return filled_limits(self.arm.limits)
 
     @cached_property
     def poses(self) -> NDArray[np.float64]:
         """Clear poses (P, n) from the middle of the range that the arm can hold with its rated payload."""
-        low, high = self.limits["low"], self.limits["high"]
         rng = np.random.default_rng(0)
-        poses = (low + high) / 2 + 0.35 * (high - low) * rng.uniform(-1.0, 1.0, size=(_POSES, self.arm.n))
-        clear = self.model.clearance(poses, self.floor)
-        held = np.abs((self.arm if self.load is None else self.arm.with_payload(self.load)).torque(poses))
-        fit = np.all(held <= 0.7 * self.arm.limits.effort, axis=1)
-        poses = poses[(clear.floor >= 2 * _FLOOR) & (clear.self >= 2 * _SELF) & fit]
+        poses = clear_poses(self.arm, self.model, rng, self.floor, _POSES, 2 * _FLOOR, 2 * _SELF)
         if not len(poses):
             raise MotionError(
                 f"no pose of {self.arm.name} found that is clear of the floor and of itself and within its torque "
@@ -228,7 +212,7 @@ class MotionSource:
         """A mean pose (n,): a clear one, or one near another, not in the outermost tenth of a joint's range."""
         if around is None:
             return self.poses[rng.integers(len(self.poses))]
-        low, high = self.limits["low"], self.limits["high"]
+        low, high = self.limits.position_low, self.limits.position_high
         margin = 0.1 * (high - low)
         return np.clip(around + near * rng.normal(size=self.arm.n), low + margin, high - margin)
 
@@ -244,9 +228,9 @@ class MotionSource:
         top = 1.0 / (1.0 - ramp)  # of the trapezoid, over a constant speed; then its first two derivatives
         return max(
             0.2,
-            float(np.max(way * top / (share * self.limits["velocity"]))),
-            float(np.max(np.sqrt(way * top * 1.5 / ramp / (share * self.limits["acceleration"])))),
-            float(np.max(np.cbrt(way * top * 6.0 / ramp**2 / (share * self.limits["jerk"])))),
+            float(np.max(way * top / (share * self.limits.velocity))),
+            float(np.max(np.sqrt(way * top * 1.5 / ramp / (share * self.limits.acceleration)))),
+            float(np.max(np.cbrt(way * top * 6.0 / ramp**2 / (share * self.limits.jerk)))),
         )
 
     def _scale(
@@ -255,12 +239,12 @@ class MotionSource:
         """Factor (n,) by which each joint may be scaled about the pose."""
         t = np.linspace(0.0, motion.duration, max(301, round(50 * motion.duration)))
         q, dq, ddq = motion(t)
-        room = share * np.minimum(pose - self.limits["low"], self.limits["high"] - pose)
+        room = share * np.minimum(pose - self.limits.position_low, self.limits.position_high - pose)
         used = [
             (np.abs(q - pose), np.minimum(travel, room)),
-            (np.abs(dq), share * self.limits["velocity"]),
-            (np.abs(ddq), share * self.limits["acceleration"]),
-            (np.abs(motion.jerk(t)), share * self.limits["jerk"]),
+            (np.abs(dq), share * self.limits.velocity),
+            (np.abs(ddq), share * self.limits.acceleration),
+            (np.abs(motion.jerk(t)), share * self.limits.jerk),
         ]
         # a joint that one harmonic leaves at rest needs no scaling
         return np.min([allowed / np.maximum(value.max(axis=0), 1e-9) for value, allowed in used], axis=0)

@@ -1,7 +1,7 @@
 """Two rows that belong into every table: what a method must beat before its errors mean anything.
 
-A model trained on a narrow family of payloads carries that family as a prior. `TrainingMean` shows what the prior
-alone is worth, `PriorLeastSquares` what least squares makes of the same prior and the same log.
+A model trained on a narrow family of payloads carries that family as a prior. `TrainingMean` is the prior without the
+log, `PriorLeastSquares` is least squares with the same prior and the same log.
 """
 
 from __future__ import annotations

@@ -149,10 +149,7 @@ class Comparison:
         """How often the methods' own intervals hold the truth, and how wide they are."""
         share, width = self.coverage(level), self.half_width(level)
         rows = [
-            (
-                name,
-                *(f"{c:.0%} (±{short(SHOWN_SCALE * w, 2)})" for c, w in zip(share[m], width[m], strict=True)),
-            )
+            (name, *(f"{c:.0%} (±{short(SHOWN_SCALE * w, 2)})" for c, w in zip(share[m], width[m], strict=True)))
             for m, name in enumerate(self.methods)
         ]
         note = f"Share of runs whose {level:.0%} interval holds the truth (± its mean half-width). " + self.conditions

@@ -31,7 +31,7 @@ _STEP = 0.125  # [s] estimates are collected at least so often, unless the times
 class EvaluationRun:
     """A recording whose payload is known.
 
-    recording: what the robot said.
+    recording: of the robot's joints.
     truth: the payload, about the arm's payload frame; with a tare, what was added since.
     label: how tables call the run.
     tare: an earlier log of the same arm without the payload, if the methods may use one.
@@ -72,7 +72,7 @@ def compare(
         training: the payloads that the learned methods were trained on, or the prior made of them; None, where
             nothing was trained: nothing held, within half the rated payload.
         split: what was held out from training, in words; stands in every table.
-        progress: told in a few words what is being done.
+        progress: called with a few words on what is being done.
 
     Raises:
         IdentificationError: nothing to compare, times that no recording has, or a truth about another frame.

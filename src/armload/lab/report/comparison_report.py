@@ -21,11 +21,7 @@ _IZZ = NAMES.index("Izz")
 
 
 def default_report(
-    comparison: Comparison,
-    runs: Sequence[EvaluationRun] = (),
-    arm: Arm | None = None,
-    *,
-    introduction: str = "",
+    comparison: Comparison, runs: Sequence[EvaluationRun] = (), arm: Arm | None = None, *, introduction: str = ""
 ) -> list[Section]:
     """What `armload demo` and `armload report` show.
 
@@ -81,12 +77,7 @@ def default_report(
             )
         ]
         if arm is not None:
-            shown.append(
-                (
-                    recordings.torques(log, arm),
-                    recordings.TORQUES_CAPTION,
-                )
-            )
+            shown.append((recordings.torques(log, arm), recordings.TORQUES_CAPTION))
         sections.append(Section("The recording", f"Source: {log.source}.", figures=tuple(shown)))
     return [*sections, Section("What this does not prove", _limits(c))]
 

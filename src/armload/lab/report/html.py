@@ -36,7 +36,7 @@ class Section:
 
 
 def write_report(path: str | Path, sections: Sequence[Section], title: str = "armload report") -> Path:
-    """Write the sections as one HTML file; an existing file is replaced whole, or left alone if something fails.
+    """Write the sections as one HTML file; an existing file is replaced whole, or kept if something fails.
 
     Args:
         path: the file to write; its folder must exist.

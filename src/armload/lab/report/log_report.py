@@ -50,10 +50,7 @@ def log_report(
             f"Source: {recording.source}.",
             figures=(
                 (recordings.motion(recording), f"Joint position and velocity: {recording.rate:.0f} Hz."),
-                (
-                    recordings.torques(recording, arm),
-                    recordings.TORQUES_CAPTION,
-                ),
+                (recordings.torques(recording, arm), recordings.TORQUES_CAPTION),
             ),
         ),
     ]

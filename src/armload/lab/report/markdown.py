@@ -10,7 +10,7 @@ from armload.lab.report.shown import Table
 
 
 def write_markdown(path: str | Path, sections: Sequence[Section], title: str, note: str = "") -> Path:
-    """Write sections as Markdown; an existing file is replaced whole, or left alone if something fails.
+    """Write sections as Markdown; an existing file is replaced whole, or kept if something fails.
 
     Args:
         path: the file to write; its folder must exist.

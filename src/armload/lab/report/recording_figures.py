@@ -1,4 +1,4 @@
-"""Figures of a recording: how the arm moves, and what its joints feel beside what the bare arm would need."""
+"""Figures of a recording: how the arm moves, measured torque and the torque of the bare-arm model."""
 
 from __future__ import annotations
 

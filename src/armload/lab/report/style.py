@@ -1,4 +1,4 @@
-"""One look for all figures: a colour per method, told apart by the colour-blind, readable at page width."""
+"""One look for all figures: a colour per method, distinct for the colour-blind, readable at page width."""
 
 from __future__ import annotations
 

@@ -6,13 +6,4 @@ from armload.lab.study.spec import Spec
 from armload.lab.study.study_results import write_results
 from armload.lab.study.study_run import run_study
 
-__all__ = [
-    "FULL",
-    "QUICK",
-    "Basis",
-    "Size",
-    "Spec",
-    "plan",
-    "run_study",
-    "write_results",
-]
+__all__ = ["FULL", "QUICK", "Basis", "Size", "Spec", "plan", "run_study", "write_results"]

@@ -57,7 +57,7 @@ def ablation_table(cells: Cells, ablation: str) -> Table:
     if ablation == "torque" and own:
         for split, shown in SPLITS.items():
             if found := benchmark(cells, "training-mean", split):
-                rows.append((TRAINING_MEAN, shown, "none", *_errors([next(iter(found.values()))], protocols)))
+                rows.append((TRAINING_MEAN, shown, "none", *_errors(found[:1], protocols)))
     heads = [f"{g} [{SHOWN_UNITS[p][0]}]" for g, p in GROUPS.items()]
     columns = ("method", "split", "epochs", *(f"{where}: {h}" for where in protocols.values() for h in heads))
     columns += ("file [kB]",) * sized

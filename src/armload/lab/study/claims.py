@@ -19,7 +19,6 @@ from armload.inertia import NAMES
 from armload.lab.study.numbers import (
     EXACT,
     LEAST,
-    Cell,
     Cells,
     Ensemble,
     Match,
@@ -184,16 +183,12 @@ def _pairs(claim: dict[str, Any], cells: Cells, split: str, protocol: str) -> li
                 out.append((match, _Pair(better[:, column], worse[:, column])))
         return out
     stages = 1 if column < 4 else 2
-    worse = at_end(_all(benchmark(cells, claim["worse"])), protocol)
+    worse = at_end(benchmark(cells, claim["worse"]), protocol)
     for match in matched(cells, Ensemble(claim["better"], stages, split)):
         better = at_end(match.cells[0], protocol)
         if better is not None and worse is not None:
             out.append((match, _Pair(better[:, column], worse[:, column])))
     return out
-
-
-def _all(by_seed: dict[int, Cell]) -> list[Cell]:
-    return list(by_seed.values())
 
 
 def _ensemble(name: str, split: str) -> Ensemble:

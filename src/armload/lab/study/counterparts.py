@@ -84,16 +84,16 @@ def benchmark_rows(cells: Cells, reduced: bool = False) -> list[Row]:
     for kind, scale in SHOWN_ENSEMBLES:
         found = both_stages(cells, kind, "row", REAL, scale)
         rows.append((_shown(kind, scale, found), found and found.errors))
-    rows += [(name, at_end(list(benchmark(cells, m).values()), REAL)) for m, name in LEAST_SQUARES.items()]
-    rows.append((TRAINING_MEAN, at_end(list(benchmark(cells, "training-mean", "row").values()), REAL)))
+    rows += [(name, at_end(benchmark(cells, m), REAL)) for m, name in LEAST_SQUARES.items()]
+    rows.append((TRAINING_MEAN, at_end(benchmark(cells, "training-mean", "row"), REAL)))
     left_out = (ensemble_shown("tree", "standard"), LEAST_SQUARES["rls-filter-calibrated-other"])
     return [row for row in rows if not (reduced and row[0] in left_out)]
 
 
 def ratio_table(cells: Cells) -> Table:
     """Where the ensembles beat least squares: their errors over those of each method, parameter by parameter."""
-    theirs = {LEAST_SQUARES[m]: at_end(list(benchmark(cells, m).values()), REAL) for m in RIVALS}
-    theirs[TRAINING_MEAN] = at_end(list(benchmark(cells, "training-mean", "row").values()), REAL)
+    theirs = {LEAST_SQUARES[m]: at_end(benchmark(cells, m), REAL) for m in RIVALS}
+    theirs[TRAINING_MEAN] = at_end(benchmark(cells, "training-mean", "row"), REAL)
     rows = []
     for kind, scale in SHOWN_ENSEMBLES:
         own = both_stages(cells, kind, "row", REAL, scale)
@@ -118,14 +118,14 @@ def ratio_table(cells: Cells) -> Table:
 def first_table(cells: Cells) -> Table:
     """The first estimate of a run and the last, with their errors."""
     read = {"first": at_first, "end": at_end}
-    mean = list(benchmark(cells, "training-mean", "row").values())
+    mean = benchmark(cells, "training-mean", "row")
     blind = at_first(mean, REAL)
     wanted = [("first", NOMINAL), ("first", REAL), ("end", REAL)]
     rows = []
     for kind, scale in SHOWN_ENSEMBLES:
         found = [both_stages(cells, kind, "row", protocol, scale, read[when]) for when, protocol in wanted]
         rows.append((_shown(kind, scale, found[1]), [answers and answers.errors for answers in found]))
-    named = {name: list(benchmark(cells, method).values()) for method, name in LEAST_SQUARES.items()}
+    named = {name: benchmark(cells, method) for method, name in LEAST_SQUARES.items()}
     for name, group in (named | {TRAINING_MEAN: mean}).items():
         rows.append((name, [read[when](group, protocol) for when, protocol in wanted]))
     filled = []
@@ -160,9 +160,9 @@ def curves(cells: Cells) -> dict[str, dict[str, Any]]:
         if found:
             out[ensemble_shown(kind, most=found[0].cap)] = izz(found[0].cells[0][0])
     for method in ("rls", "rls-filter", "rls-filter-calibrated", "same-prior"):
-        for cell in benchmark(cells, method).values():
+        for cell in benchmark(cells, method):
             out.setdefault(LEAST_SQUARES[method], izz(cell))
-    for cell in benchmark(cells, "training-mean", "row").values():
+    for cell in benchmark(cells, "training-mean", "row"):
         out.setdefault(TRAINING_MEAN, izz(cell))
     return {name: curve for name, curve in out.items() if curve is not None}
 

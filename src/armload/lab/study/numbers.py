@@ -72,11 +72,11 @@ def _by_cap_and_seed(cells: Cells, ensemble: Ensemble) -> dict[int | None, dict[
     return out
 
 
-def benchmark(cells: Cells, method: str, split: str | None = None) -> dict[int, Cell]:
-    """The cells of a least-squares method or a baseline by seed."""
+def benchmark(cells: Cells, method: str, split: str | None = None) -> list[Cell]:
+    """The cells of a least-squares method or a baseline, one for each seed."""
     stem = f"benchmark-{method}{f'-{split}' if split else ''}-s"
     seeds = {name.removeprefix(stem): cell for name, cell in cells.items() if name.startswith(stem)}
-    return {int(seed): cell for seed, cell in sorted(seeds.items()) if seed.isdigit()}
+    return [cell for seed, cell in sorted(seeds.items()) if seed.isdigit()]
 
 
 def held_out(group: Sequence[Cell]) -> NDArray[np.float64] | None:

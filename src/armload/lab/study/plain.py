@@ -9,7 +9,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from armload.lab.evaluation import Table
-from armload.lab.report.shown import SHOWN_SCALE, SHOWN_UNITS, short
+from armload.lab.report.shown import short
 from armload.lab.study.ablations import compared
 from armload.lab.study.claims import CONFIRMED, DEPENDS, NOT_CONFIRMED, NOT_MEASURED
 from armload.lab.study.numbers import (
@@ -23,7 +23,17 @@ from armload.lab.study.numbers import (
     matched,
     mean_ratio,
 )
-from armload.lab.study.study_tables import COMMAND, LEARNERS, LEAST_SQUARES, MISSING, NOT_YET, REAL, TRAINING_MEAN
+from armload.lab.study.study_tables import (
+    COMMAND,
+    LEARNERS,
+    LEAST_SQUARES,
+    MISSING,
+    NOT_YET,
+    REAL,
+    TRAINING_MEAN,
+    listing,
+    mass_shown,
+)
 
 _KINDS = ("tree", "network")
 _RIVALS = ("rls", "rls-filter", "rls-filter-calibrated", "same-prior")
@@ -51,8 +61,8 @@ def in_plain_words(cells: Cells, claims: Sequence[dict[str, Any]]) -> str:
 
 def against_table(cells: Cells) -> Table:
     """The ensembles' error divided by that of least squares: one number for all ten parameters."""
-    others = {m: at_end(list(benchmark(cells, m).values()), REAL) for m in _RIVALS}
-    others[TRAINING_MEAN] = at_end(list(benchmark(cells, "training-mean", "row").values()), REAL)
+    others = {m: at_end(benchmark(cells, m), REAL) for m in _RIVALS}
+    others[TRAINING_MEAN] = at_end(benchmark(cells, "training-mean", "row"), REAL)
     rows = []
     for kind in _KINDS:
         own = both_stages(cells, kind, "row", REAL)
@@ -89,33 +99,35 @@ def _learned(cells: Cells) -> str:
             if row is not None and payload is not None and other is not None:
                 factor = short(payload[:, 0].mean() / max(row[:, 0].mean(), 1e-30), 2)
                 grown.append(f"{factor} times as large for the {LEARNERS[kind]}")
-                moved.append(f"{_mass(other)} for the {LEARNERS[kind]}")
-    mean = at_end(list(benchmark(cells, "training-mean", "row").values()), "other_motion")
+                moved.append(f"{mass_shown(other)} for the {LEARNERS[kind]}")
+    mean = at_end(benchmark(cells, "training-mean", "row"), "other_motion")
     if not grown:
         return ""
     text = (
         "The paper tests on rows of the same runs as the training rows. If whole payloads are kept out of the training "
-        f"instead, the mass error of a single sample is {_listed(grown)}. On motions that were not in the training it "
-        f"is {_listed(moved)} at the end of a run."
+        f"instead, the mass error of a single sample is {listing(grown)}. On motions that were not in the training it "
+        f"is {listing(moved)} at the end of a run."
     )
     return text + (
-        f" The {TRAINING_MEAN}, which uses no measurement, is off by {_mass(mean)}." if mean is not None else ""
+        f" The {TRAINING_MEAN}, which uses no measurement, is off by {mass_shown(mean)}." if mean is not None else ""
     )
 
 
 def _first(cells: Cells) -> str:
     found = {LEARNERS[kind]: both_stages(cells, kind, "row", REAL, read=at_first) for kind in _KINDS}
     errors = {name: answers.errors for name, answers in found.items() if answers is not None}
-    blind = at_first(list(benchmark(cells, "training-mean", "row").values()), REAL)
-    filtered = at_first(list(benchmark(cells, "rls-filter").values()), REAL)
+    blind = at_first(benchmark(cells, "training-mean", "row"), REAL)
+    filtered = at_first(benchmark(cells, "rls-filter"), REAL)
     if blind is None or not errors:
         return ""
     masses = {**errors, **({} if filtered is None else {LEAST_SQUARES["rls-filter"]: filtered}), TRAINING_MEAN: blind}
-    shown = [f"{_mass(e)} for {'the ' * (name != LEAST_SQUARES['rls-filter'])}{name}" for name, e in masses.items()]
+    shown = [
+        f"{mass_shown(e)} for {'the ' * (name != LEAST_SQUARES['rls-filter'])}{name}" for name, e in masses.items()
+    ]
     ratios = [f"{_ratio(e, blind)} times (the {name})" for name, e in errors.items()]
     return (
-        f"After one sample on real-like arms the mass error is {_listed(shown)}. Over all ten parameters the error is "
-        f"{_listed(ratios)} that of the {TRAINING_MEAN}."
+        f"After one sample on real-like arms the mass error is {listing(shown)}. Over all ten parameters the error is "
+        f"{listing(ratios)} that of the {TRAINING_MEAN}."
     )
 
 
@@ -124,9 +136,10 @@ def _torque(cells: Cells) -> str:
     for reference, cell in compared(cells, "torque"):
         seen, unseen = held_out([reference]), held_out([cell])
         if cell["spec"]["split"] == "row" and seen is not None and unseen is not None:
+            without, with_torque = mass_shown(unseen), mass_shown(seen)
             sentences.append(
-                f"On held-out rows {LEARNERS[cell['spec']['kind']]} have a mass error of {_mass(unseen)} without the "
-                f"torque and of {_mass(seen)} with it."
+                f"On held-out rows {LEARNERS[cell['spec']['kind']]} have a mass error of {without} without the torque "
+                f"and of {with_torque} with it."
             )
     if not sentences:
         return ""
@@ -139,11 +152,3 @@ def _torque(cells: Cells) -> str:
 
 def _ratio(errors: NDArray, reference: NDArray) -> str:
     return short(mean_ratio(errors.mean(axis=0), reference.mean(axis=0)), 2)
-
-
-def _mass(errors: NDArray) -> str:
-    return f"{short(SHOWN_SCALE * float(errors[:, 0].mean()))} {SHOWN_UNITS[0]}"
-
-
-def _listed(parts: Sequence[str]) -> str:
-    return parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " and " + parts[-1]

@@ -24,25 +24,16 @@ def measure_learned(predict: Predict, runs: dict[str, list[EvaluationRun]]) -> d
     single: mean |K(x) − phi| over samples and runs (10,); first: |K(x) − phi| of each run's first sample (R, 10);
     running: |mean of K(x) − phi over a run|, each run (R, 10).
     """
-    protocols, izz = {}, {}
-    for protocol, members in runs.items():
-        single, first, running = [], [], []
-        for k, run in enumerate(members):
-            answers = predict(features(run.recording))
-            error = answers - run.truth.phi
-            single.append(np.abs(error).mean(axis=0))
-            first.append(np.abs(error[0]))
-            running.append(np.abs(error.mean(axis=0)))
-            if k == 0 and protocol in _SHOWN:
-                average = np.cumsum(answers[:, 9]) / np.arange(1, len(answers) + 1)
-                izz[protocol] = _curve(run, answers[:, 9], average)
-        protocols[protocol] = {
-            "running": listed(running),
-            "first": listed(first),
-            "single": listed(np.mean(single, axis=0)),
-            "labels": [run.label for run in members],
-        }
-    return {"protocols": protocols, "izz": izz}
+
+    def measure(run: EvaluationRun) -> tuple[dict[str, NDArray], dict[str, Any]]:
+        X = features(run.recording)
+        answers = predict(X)
+        error = answers - run.truth.phi
+        errors = {"running": error.mean(axis=0), "first": error[0], "single": np.abs(error).mean(axis=0)}
+        average = np.cumsum(answers[:, 9]) / np.arange(1, len(answers) + 1)
+        return errors, _curve(run, X[:, 0], answers[:, 9], average)
+
+    return _measured(measure, runs)
 
 
 def measure_stream(make: Callable[[EvaluationRun], Identifier], runs: dict[str, list[EvaluationRun]]) -> dict[str, Any]:
@@ -53,30 +44,34 @@ def measure_stream(make: Callable[[EvaluationRun], Identifier], runs: dict[str, 
     benchmark's authors report.
 
     Args:
-        make: the identifier for a run, already calibrated or told the tare where it uses one.
+        make: the identifier for a run, already calibrated or with the tare where it uses one.
     """
+
+    def measure(run: EvaluationRun) -> tuple[dict[str, NDArray], dict[str, Any]]:
+        trace = make(run).trace(run.recording, max(1, len(run.recording) // _STREAM_POINTS))
+        t, phi = np.array([e.t for e in trace]) - run.recording.t[0], np.array([e.phi for e in trace])
+        error = phi - run.truth.phi
+        half = error[len(error) // 2 :].mean(axis=0)
+        single = np.abs(error).mean(axis=0)
+        errors = {"running": error[-1], "first": error[0], "second_half": half, "single": single}
+        return errors, _curve(run, t, phi[:, 9], phi[:, 9])
+
+    return _measured(measure, runs)
+
+
+def _measured(
+    measure: Callable[[EvaluationRun], tuple[dict[str, NDArray], dict[str, Any]]], runs: dict[str, list[EvaluationRun]]
+) -> dict[str, Any]:
+    """Absolute errors of every run by protocol, `single` averaged over the runs, and the first runs' curves of Izz."""
     protocols, izz = {}, {}
     for protocol, members in runs.items():
-        single, first, running, half = [], [], [], []
-        for k, run in enumerate(members):
-            every = max(1, len(run.recording) // _STREAM_POINTS)
-            trace = make(run).trace(run.recording, every)
-            phi = np.array([e.phi for e in trace])
-            error = phi - run.truth.phi
-            single.append(np.abs(error).mean(axis=0))
-            first.append(np.abs(error[0]))
-            running.append(np.abs(error[-1]))
-            half.append(np.abs(error[len(error) // 2 :].mean(axis=0)))
-            if k == 0 and protocol in _SHOWN:
-                curve = _curve(run, phi[:, 9], phi[:, 9], np.array([e.t for e in trace]) - run.recording.t[0])
-                izz[protocol] = curve
-        protocols[protocol] = {
-            "running": listed(running),
-            "first": listed(first),
-            "second_half": listed(half),
-            "single": listed(np.mean(single, axis=0)),
-            "labels": [run.label for run in members],
-        }
+        found = [measure(run) for run in members]
+        errors = {name: np.abs([errors[name] for errors, _ in found]) for name in found[0][0]}
+        errors["single"] = errors["single"].mean(axis=0)
+        protocols[protocol] = {name: listed(values) for name, values in errors.items()}
+        protocols[protocol]["labels"] = [run.label for run in members]
+        if protocol in _SHOWN:
+            izz[protocol] = found[0][1]
     return {"protocols": protocols, "izz": izz}
 
 
@@ -86,11 +81,10 @@ def features(recording: Recording) -> NDArray[np.float64]:
     return np.column_stack([t, recording.q, recording.dq, recording.tau])
 
 
-def _curve(run: EvaluationRun, single: NDArray, running: NDArray, t: NDArray | None = None) -> dict[str, Any]:
-    times = run.recording.t - run.recording.t[0] if t is None else t
-    keep = np.unique(np.linspace(0, len(times) - 1, _POINTS).round().astype(int))
+def _curve(run: EvaluationRun, t: NDArray, single: NDArray, running: NDArray) -> dict[str, Any]:
+    keep = np.unique(np.linspace(0, len(t) - 1, _POINTS).round().astype(int))
     return {
-        "t": listed(times[keep]),
+        "t": listed(t[keep]),
         "single": listed(single[keep]),
         "running": listed(running[keep]),
         "truth": float(run.truth.phi[9]),

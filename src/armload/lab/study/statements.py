@@ -71,7 +71,7 @@ def _curves(cells: Cells, kind: str | None, split: str) -> tuple[list[dict[str, 
 
 def _first_step(cells: Cells, learner: str | None, split: str) -> Measured | None:
     own = both_stages(cells, str(learner), split, REAL, read=at_first)
-    mean = at_first(list(benchmark(cells, "training-mean", split).values()), REAL)
+    mean = at_first(benchmark(cells, "training-mean", split), REAL)
     if own is None or mean is None:
         return None
     return _over_arms(own, lambda errors: _percent_of_means(errors, mean))
@@ -96,7 +96,7 @@ def _flat(cells: Cells, learner: str | None, split: str) -> Measured | None:
 
 
 def _overshoot(cells: Cells, _learner: str | None, _split: str) -> Measured | None:
-    curves = [c for c in map(izz, benchmark(cells, "rls").values()) if c is not None]
+    curves = [c for c in map(izz, benchmark(cells, "rls")) if c is not None]
     if not curves:
         return None
     early, late = [], []
@@ -138,7 +138,7 @@ def _real_and_nominal(cells: Cells, learner: str | None, split: str) -> tuple[An
 def _no_filter(cells: Cells, learner: str | None, split: str) -> Measured | None:
     own = both_stages(cells, str(learner), split, REAL)
     methods = ("rls-filter", "rls-filter-calibrated")  # those of [7]
-    others = [e for m in methods if (e := at_end(list(benchmark(cells, m).values()), REAL)) is not None]
+    others = [e for m in methods if (e := at_end(benchmark(cells, m), REAL)) is not None]
     if own is None or len(others) < len(methods):
         return None
     best = min(others, key=lambda e: mean_ratio(e.mean(axis=0), own.errors.mean(axis=0)))

@@ -16,12 +16,13 @@ from armload.estimators import Identifier
 from armload.identification import METHODS
 from armload.lab.dataset import Split, split_payloads, split_rows
 from armload.lab.evaluation import EvaluationRun, PriorLeastSquares, mean_absolute_error
-from armload.lab.experiment import Cells, Task, run_tasks, versions
+from armload.lab.experiment import Cells, Task, run_tasks
 from armload.lab.study.basis import Basis, Size
 from armload.lab.study.plan import plan
 from armload.lab.study.protocols import measure_learned, measure_stream
 from armload.lab.study.spec import Spec
 from armload.regression import GaussianPrior
+from armload.version import package_versions
 
 if TYPE_CHECKING:
     from armload.ensembles import BaggingEnsemble, MixedEnsemble, TwoStage
@@ -65,7 +66,7 @@ def _measured(spec: Spec, rests_on: tuple[Path, Size, Path | None], progress: bo
         "wall_s": round(time.perf_counter() - begun, 1),
         "rows": basis.size.rows * len(basis.loadings),
         "payloads": len(basis.loadings),
-        "versions": versions("armload", "numpy", "scikit-learn", "jax", "pin", "mujoco"),
+        "versions": package_versions("armload", "numpy", "scikit-learn", "jax", "pin", "mujoco"),
         **measured,
     }
 

@@ -87,11 +87,11 @@ def _least_squares_rows(cells: Cells) -> list[tuple[str, str, str, str, Callable
     rows = []
     for method, label in LEAST_SQUARES.items():
         found = benchmark(cells, method)
-        rows.append((label, "none", "none", MISSING if not found else "none", errors_of(list(found.values()))))
+        rows.append((label, "none", "none", MISSING if not found else "none", errors_of(found)))
     for split, shown in SPLITS.items():
         found = benchmark(cells, "training-mean", split)
-        seeds = ", ".join(map(str, found)) or MISSING
-        rows.append((TRAINING_MEAN, shown, "none", seeds, errors_of(list(found.values()))))
+        seeds = ", ".join(str(cell["spec"]["seed"]) for cell in found) or MISSING
+        rows.append((TRAINING_MEAN, shown, "none", seeds, errors_of(found)))
     return rows
 
 
@@ -156,6 +156,16 @@ def mean_and_spread(values: NDArray) -> str:
     return value(float(values.mean()), float(values.std(ddof=1)) if len(values) > 1 else None)
 
 
+def mass_shown(errors: NDArray) -> str:
+    """The mean mass error of errors (R, 10), with its unit."""
+    return f"{short(SHOWN_SCALE * float(errors[:, 0].mean()))} {SHOWN_UNITS[0]}"
+
+
+def listing(parts: Sequence[str]) -> str:
+    """ "a, b and c"."""
+    return parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " and " + parts[-1]
+
+
 def parameter_table(title: str, rows: Iterable[Row], note: str) -> Table:
     """Mean absolute error of each of the ten parameters, a row per method."""
     filled = []
@@ -168,7 +178,7 @@ def parameter_table(title: str, rows: Iterable[Row], note: str) -> Table:
 
 
 def claims_table(claims: Sequence[dict[str, Any]], title: str) -> Table:
-    """What the paper says beside what we measure."""
+    """The claims of the paper and our measurements."""
     rows = []
     for claim in claims:
         paper = MISSING if claim["paper"] is None else f"{claim['paper']:g} %"

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.inertia import NAMES
-from armload.lab.report.shown import GROUPS, SHOWN_SCALE, SHOWN_UNITS, short
+from armload.lab.report.shown import GROUPS, short
 from armload.lab.study.ablations import compared
 from armload.lab.study.claims import CONFIRMED, DEPENDS, NOT_MEASURED, VERDICTS
 from armload.lab.study.counterparts import RIVALS, SHOWN_ENSEMBLES
@@ -39,6 +39,8 @@ from armload.lab.study.study_tables import (
     TRAINING_MEAN,
     capped,
     ensemble_shown,
+    listing,
+    mass_shown,
     within_spread,
 )
 from armload.payloads import test_payload
@@ -88,7 +90,7 @@ def _against(cells: Cells, kind: str) -> str:
         return _capital(_NOT_YET)
     sentences = []
     for method in RIVALS:
-        other = at_end(list(benchmark(cells, method).values()), REAL)
+        other = at_end(benchmark(cells, method), REAL)
         if other is not None:
             sentences.append(f"than {LEAST_SQUARES[method]} on {_named(own.errors.mean(axis=0) < other.mean(axis=0))}")
     if not sentences:
@@ -104,7 +106,7 @@ def _named(which: NDArray[np.bool_]) -> str:
     true, false = ([n for n, yes in zip(NAMES, which, strict=True) if yes == wanted] for wanted in (True, False))
     if not true or not false:
         return "all ten" if true else "none"
-    return f"all but {_listed(false)}" if len(false) < len(true) else f"{_listed(true)} only"
+    return f"all but {listing(false)}" if len(false) < len(true) else f"{listing(true)} only"
 
 
 def _memorising(cells: Cells) -> str:
@@ -124,21 +126,21 @@ def _memorising(cells: Cells) -> str:
             f"over that with rows held out: {_each(ratios)}"
         )
         if all(errors is not None for errors in ends):
-            mass = [_mass(errors) for errors in ends if errors is not None]
+            mass = [mass_shown(errors) for errors in ends if errors is not None]
             text += (
                 f"; the mass error at the end of a run is {mass[0]} for the test payload, {mass[1]} for payloads "
                 f"outside the container's family and {mass[2]} on motions they were not trained on"
             )
         sentences.append(text + ".")
-    blind = [at_end(list(benchmark(cells, "training-mean", "row").values()), p) for p in (NOMINAL, "off_family")]
-    mean = [_mass(errors) for errors in blind if errors is not None]
+    blind = [at_end(benchmark(cells, "training-mean", "row"), p) for p in (NOMINAL, "off_family")]
+    mean = [mass_shown(errors) for errors in blind if errors is not None]
     if len(mean) == 2:
         sentences.append(f"The training mean errs by {mean[0]} on the test payload and by {mean[1]} on the others.")
     return " ".join(sentences)
 
 
 def _first_step(cells: Cells) -> str:
-    blind = at_first(list(benchmark(cells, "training-mean", "row").values()), REAL)
+    blind = at_first(benchmark(cells, "training-mean", "row"), REAL)
     first = {}
     for kind, scale in SHOWN_ENSEMBLES:
         own = both_stages(cells, kind, "row", REAL, scale, at_first)
@@ -156,20 +158,20 @@ def _first_step(cells: Cells) -> str:
     hit = [n for n, e, x in zip(NAMES, blind.mean(axis=0), truth, strict=True) if e < _HIT * abs(x)]
     if hit:
         text += (
-            f" The training mean happens to be within {100 * _HIT:g} % of the truth on {_listed(hit)}, which in the "
+            f" The training mean happens to be within {100 * _HIT:g} % of the truth on {listing(hit)}, which in the "
             "geometric mean counts against every method that uses measurements, and hardly within a group."
         )
-    prior = list(benchmark(cells, "same-prior").values())
+    prior = benchmark(cells, "same-prior")
     begin, end = at_first(prior, REAL), at_end(prior, REAL)
     if begin is not None and end is not None:
         text += (
             f" For comparison {LEAST_SQUARES['same-prior']}, whose prior is the same payloads: "
             f"their first estimate, the prior, is at {_over(begin, blind)}; their last one at {_over(end, blind)}."
         )
-    filtered = at_first(list(benchmark(cells, "rls-filter").values()), REAL)
+    filtered = at_first(benchmark(cells, "rls-filter"), REAL)
     if filtered is not None:
-        masses = [f"{name} {_mass(errors)}" for name, errors in first.items()]
-        masses += [f"{LEAST_SQUARES['rls-filter']} {_mass(filtered)}", f"{TRAINING_MEAN} {_mass(blind)}"]
+        masses = [f"{name} {mass_shown(errors)}" for name, errors in first.items()]
+        masses += [f"{LEAST_SQUARES['rls-filter']} {mass_shown(filtered)}", f"{TRAINING_MEAN} {mass_shown(blind)}"]
         text += f" Error of the mass from one sample: {'; '.join(masses)}."
     return text
 
@@ -191,7 +193,7 @@ def _same_prior(cells: Cells) -> str:
         ratios, name = [], ensemble_shown(kind, scale)
         for protocol in (p for p in PROTOCOLS if p != "held_out"):
             own = both_stages(cells, kind, "row", protocol, scale)
-            other = at_end(list(benchmark(cells, "same-prior").values()), protocol)
+            other = at_end(benchmark(cells, "same-prior"), protocol)
             if own is not None and other is not None:
                 name = _name(kind, own, scale)
                 ratio = mean_ratio(own.errors.mean(axis=0), other.mean(axis=0))
@@ -212,7 +214,7 @@ def _without_torque(cells: Cells) -> str:
             ratios = [short(b[:, p].mean() / a[:, p].mean(), 2) for p in GROUPS.values()]
             name = ensemble_shown(cell["spec"]["kind"], cell["spec"]["scale"], most=cap(cell))
             sentences.append(
-                f"{name}, {SPLITS[cell['spec']['split']]} held out: {_each(ratios)}, mass error {_mass(b)}"
+                f"{name}, {SPLITS[cell['spec']['split']]} held out: {_each(ratios)}, mass error {mass_shown(b)}"
             )
     if not sentences:
         return _capital(_NOT_YET)
@@ -264,14 +266,6 @@ def _ratios(found: Sequence[Match], name: str) -> str:
 
 def _name(kind: str, found: Answers | Match, scale: str = "raw") -> str:
     return ensemble_shown(kind, scale, most=found.cap)
-
-
-def _mass(errors: NDArray) -> str:
-    return f"{short(SHOWN_SCALE * float(errors[:, 0].mean()))} {SHOWN_UNITS[0]}"
-
-
-def _listed(parts: Sequence[str]) -> str:
-    return parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " and " + parts[-1]
 
 
 def _capital(text: str) -> str:

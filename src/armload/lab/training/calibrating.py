@@ -1,7 +1,7 @@
 """How far evidence can be trusted, learned from episodes: the bag that reads kappa, and the calibrated widths.
 
-The widths are cross-conformal: each episode is scored by a bag that has not seen it, so
-that the widths hold for new ones.
+The widths are cross-conformal: each episode is scored by a bag that has not seen it, so that the widths hold for new
+ones.
 
 Sources: Lei et al., JASA 2018; Vovk, Annals of Mathematics and Artificial Intelligence 2015; Breiman 1996.
 """
@@ -29,16 +29,11 @@ _MEMBERS = 5
 TREES = (TreeLearner(max_depth=7),)
 _FEWEST = 30  # episodes below which a quantile is not worth its name
 _FOLDS = 3  # of the episodes: each is scored by a bag fitted on the others
-_NARROWEST = 0.1  # c is no less, even where the gain alone covers 95 %
+_NARROWEST = 0.1  # c is no less, even where the gain covers 95 %
 
 
 def fit_calibration(
-    records: Records,
-    prior: MixturePrior,
-    *,
-    learners: Sequence[Learner] = TREES,
-    trusted: bool = False,
-    seed: int = 0,
+    records: Records, prior: MixturePrior, *, learners: Sequence[Learner] = TREES, trusted: bool = False, seed: int = 0
 ) -> Calibration:
     """Fit the bag on all episodes, and the widths on the scores of bags that had a third of them left out.
 
@@ -86,7 +81,7 @@ def nearest(t: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.in
 
 
 def scores(records: Records, prior: MixturePrior, calibration: Calibration) -> NDArray[np.float64]:
-    """The smallest c (N, 10) with which each answer's intervals would hold: 0 where the gain's part alone does."""
+    """The smallest c (N, 10) with which each answer's intervals would hold: 0 where the gain's part does."""
     out = np.empty((len(records), 10))
     for k in range(len(records)):
         trusted = calibration.trusted(records.evidence(k))
@@ -100,7 +95,7 @@ def overrating(records: Records, prior: MixturePrior) -> tuple[NDArray[np.float6
     """By which factor each row's evidence was overrated: squared error over variance, where the log tells something.
 
     In the coordinates in which the prior's covariance is the identity, Λ = V·diag(l)·Vᵀ; over the directions with
-    l ≥ 9 the mean of l·(vᵀ·(phi − phi_ML))²; NaN where there is no such direction. Beside it, how many there are.
+    l ≥ 9 the mean of l·(vᵀ·(phi − phi_ML))²; NaN where there is no such direction. And how many there are.
     """
     s = prior.std
     out, count = np.full(len(records), np.nan), np.zeros(len(records), dtype=np.int64)

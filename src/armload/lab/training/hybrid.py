@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict, astuple, replace
-from importlib import metadata
 from pathlib import Path
 from platform import python_version
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm, kinship, rated_mass
+from armload.arms import Arm, link_fingerprint, rated_mass
 from armload.errors import ModelError
 from armload.lab.cells import key_of
 from armload.lab.episodes import LIGHTEST, POPULATIONS, TOOL_SHARE, Episode, draw_episodes
@@ -21,7 +20,7 @@ from armload.lab.training.records import TIMES, Records, measure_episodes
 from armload.payloads import draw_payload
 from armload.posterior import TRAITS, HybridModel, MixturePrior, Training
 from armload.regression import payload_prior_std
-from armload.version import __version__
+from armload.version import __version__, package_versions
 
 EPISODES = 2400
 _CHUNK = 300  # episodes that are kept together: what an interruption can lose
@@ -53,7 +52,7 @@ def train_hybrid(
     population: str = "broad",
     progress: Callable[[int, int], None] | None = None,
 ) -> tuple[HybridModel, Coverage]:
-    """Train the learned parts for an arm on simulated episodes alone.
+    """Train the learned parts for an arm on simulated episodes only.
 
     Args:
         arm: the bare arm, nominal.
@@ -80,7 +79,7 @@ def train_hybrid(
         prior,
         fit_calibration(records, prior, seed=seed),
         arm.name,
-        kinship(arm),
+        link_fingerprint(arm),
         str(arm.frame),
         arm.n,
         {**checked.table(), "versions": versions()},
@@ -91,7 +90,7 @@ def train_hybrid(
 
 def versions() -> dict[str, str]:
     """Versions of what can change a trained number."""
-    return {"python": python_version(), **{name: metadata.version(name) for name in _PACKAGES}}
+    return {"python": python_version(), **package_versions(*_PACKAGES)}
 
 
 def payload_mixture(arm: Arm, seed: int = 0) -> MixturePrior:

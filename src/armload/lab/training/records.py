@@ -1,4 +1,4 @@
-"""Episodes turned into what the learned parts are fitted on: evidence at a few times, beside the truth."""
+"""Episodes turned into what the learned parts are fitted on: evidence at a few times, and the truth."""
 
 from __future__ import annotations
 

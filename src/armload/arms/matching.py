@@ -1,4 +1,4 @@
-"""Whether two descriptions are of the same arm, however their bases stand and whatever is called how."""
+"""Whether two descriptions are of the same arm, whatever the names in them and the pose of the base."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from armload.arms.model import Arm
 _TURN = 0.3  # [rad, m] of the first joint, which shows its axis
 
 
-def kinship(arm: Arm) -> str:
-    """SHA-256 of an arm's links, of how they sit to each other and move: the same however its base stands."""
+def link_fingerprint(arm: Arm) -> str:
+    """SHA-256 of an arm's link parameters and joint geometry, whatever the pose of its base."""
     q = np.linspace(-0.5, 0.7, arm.n)
     R, p = _poses(arm, q)
     turned_R, turned_p = _poses(arm, q + _TURN * np.eye(arm.n)[0])
@@ -28,8 +28,8 @@ def kinship(arm: Arm) -> str:
     return digest.hexdigest()
 
 
-def namesake(arm: Arm, frame: str) -> str | None:
-    """The frame of an arm that is called so, with whatever prefix; None: there is none, or there are several."""
+def prefixed_frame(arm: Arm, frame: str) -> str | None:
+    """The arm's frame of this name, with or without a prefix; None: there is none, or there are several."""
     if frame in arm.frames:
         return frame
     found = [name for name in arm.frames if name.endswith(frame)]
