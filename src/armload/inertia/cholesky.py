@@ -55,7 +55,8 @@ def root(A, F, order, floor):  # pragma: no cover - compiled
         for j in range(n):
             S[i, j] = 0.5 * (A[i, j] + A[j, i]) / (unit[i] * unit[j])
             F[i, j] = 0.0
-        S[i, i] = 1.0 if A[i, i] > -floor * largest else S[i, i]
+        if A[i, i] > -floor * largest:
+            S[i, i] = 1.0
     left = 0.0
     for k in range(n):
         best = k

@@ -29,9 +29,8 @@ from armload.inertia.cholesky import factor
 from armload.inertia.cone import congruent, dual, of_dual, pack, primal, pseudo, unpack
 from armload.inertia.orthogonal import eigen, least_squares, reflect, singular
 
-_BORDER = 0.1  # share of the way to the border that a step leaves, times that of the predicted one
-_LEAST = 1e-3
-_STALLED = 4  # steps without halving the bound
+_BORDER, _LEAST = 0.1, 1e-3  # a step leaves 0.1 of the way to the border, times what the predictor left, at least 1e-3
+_STALLED = 9  # steps without halving the bound; a badly scaled metric has five in a row
 _ROUNDING = 1e-15  # of x
 
 
@@ -68,15 +67,16 @@ def nearest(target, F, order, tolerance, absolute, limit, x):  # pragma: no cove
                 total += F[k, i] * pull[k]
             steepest += abs(total)
         gap = gaps[0] ** 2 + gaps[1] ** 2 + gaps[2] ** 2 + gaps[3] ** 2
-        now = (gap + left * left * off) / (tolerance * cost + absolute + _ROUNDING * steepest)
+        excess = gap + left * left * off
+        now = excess / (tolerance * cost + absolute + _ROUNDING * steepest)
         if not np.isfinite(now):
             break
         if now < bound:
             bound = now
             for i in range(n):
                 x[i] = target[i] + away[i]
-        stalled = stalled + 1 if now > 0.5 * least else 0
-        least = min(least, now)
+        stalled = stalled + 1 if excess > 0.5 * least else 0
+        least = min(least, excess)
         if now <= 1.0 or stalled > _STALLED or taken >= limit:
             break
         taken += 1
@@ -102,7 +102,7 @@ def nearest(target, F, order, tolerance, absolute, limit, x):  # pragma: no cove
             for j in range(4):
                 dJ_ij, dZ_ij = reached * dJ[i, j], reached * dZ[i, j]
                 predicted += (dJ_ij + gaps[i]) * (dZ_ij + gaps[i]) if i == j else dJ_ij * dZ_ij
-        centring = min(1.0, max(0.0, predicted / gap)) ** 3
+        centring = max(min(1.0, max(0.0, predicted / gap)), 1.0 - reached) ** 3
 
         for i in range(4):
             for j in range(i, 4):

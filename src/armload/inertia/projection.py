@@ -98,6 +98,8 @@ def near_consistent(phi: ArrayLike, precision: ArrayLike) -> NDArray[np.float64]
     """
     phi = np.ascontiguousarray(phi, dtype=float)
     P = np.ascontiguousarray(precision, dtype=float)
+    if phi.shape != (10,) or P.shape != (10, 10):
+        return nearest_consistent(phi, P)  # which says so
     x, bound, left = _project(phi, P, _ANSWER, -_CONSISTENT * max(1.0, phi[0]), _CLOSE, _NEAR)
     return x if bound <= 1.0 and left <= _INDEFINITE else nearest_consistent(phi, P, _ANSWER)
 
