@@ -4,14 +4,11 @@ No other room packs, reorders, moves or projects the 10-vector.
 """
 
 from armload.inertia.consistency import (
-    distance_to_body,
     from_log_cholesky,
     is_consistent,
     log_cholesky,
     log_cholesky_curvature,
     log_cholesky_jacobian,
-    nearest_body,
-    nearest_consistent,
     pseudo_inertia,
     pseudo_inertia_to_phi,
 )
@@ -28,7 +25,7 @@ from armload.inertia.parameters import (
     skew,
     vech,
 )
-from armload.inertia.projection import near_consistent
+from armload.inertia.projection import distance_to_body, near_consistent, nearest_body, nearest_consistent
 
 __all__ = [
     "HELD",

@@ -36,6 +36,55 @@ def factor(A, L, floor=0.0):  # pragma: no cover - compiled
 
 
 @njit(cache=True, nogil=True)
+def root(A, F, order, floor):  # pragma: no cover - compiled
+    """F (n, n) with FᵀF = A (n, n), by the largest pivot first; the size of what is left of A where pivots end.
+
+    Diagonal entries, and pivots relative to them, below `floor` count as rounding and are taken to be the floor, so
+    that F is regular and a singular A has no noise for its null space. F[:, order] is upper triangular. Relative to
+    its diagonal, what is left of a positive semidefinite A is of the size of the floor; more says that A is not.
+    """
+    n = A.shape[0]
+    largest = 0.0
+    for i in range(n):
+        largest = max(largest, A[i, i])
+    unit, S = np.empty(n), np.empty((n, n))
+    for i in range(n):
+        unit[i] = np.sqrt(max(A[i, i], floor * largest))
+        order[i] = i
+    for i in range(n):
+        for j in range(n):
+            S[i, j] = 0.5 * (A[i, j] + A[j, i]) / (unit[i] * unit[j])
+            F[i, j] = 0.0
+        if A[i, i] > -floor * largest:
+            S[i, i] = 1.0
+    left = 0.0
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            if S[order[i], order[i]] > S[order[best], order[best]]:
+                best = i
+        order[k], order[best] = order[best], order[k]
+        p = order[k]
+        if S[p, p] <= floor:
+            for i in range(k, n):
+                for j in range(k, n):
+                    left = max(left, abs(S[order[i], order[j]]))
+                F[i, order[i]] = np.sqrt(floor) * unit[order[i]]
+            break
+        pivot = np.sqrt(S[p, p])
+        F[k, p] = pivot * unit[p]
+        for i in range(k + 1, n):
+            F[k, order[i]] = S[p, order[i]] / pivot
+        for i in range(k + 1, n):
+            for j in range(k + 1, i + 1):
+                S[order[i], order[j]] -= F[k, order[i]] * F[k, order[j]]
+                S[order[j], order[i]] = S[order[i], order[j]]
+        for i in range(k + 1, n):
+            F[k, order[i]] *= unit[order[i]]
+    return left
+
+
+@njit(cache=True, nogil=True)
 def solve(L, b, x):  # pragma: no cover - compiled
     """x (n,) with L·Lᵀ·x = b (n,); x may be b."""
     n = L.shape[0]

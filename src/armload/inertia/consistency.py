@@ -1,4 +1,4 @@
-"""Which ten numbers belong to a body that can exist, and the nearest such numbers.
+"""Which ten numbers belong to a body that can exist.
 
 A body with density ρ(x) ≥ 0 has the pseudo-inertia
 
@@ -10,20 +10,14 @@ numbers one to one onto J ≻ 0 (Rucker, Wensing, RA-L 2022).
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armload.errors import InertiaError
-from armload.inertia.parameters import InertialParameters, inertia_matrix, vech
+from armload.inertia.parameters import inertia_matrix, vech
 
-# Lengths are divided by this before matrices are compared or projected, so that kg, kg·m and kg·m² weigh alike.
-_LENGTH = 0.1  # [m]
-# phi of the body whose J, lengths in units of _LENGTH, is the 4×4 identity
-_BALL = np.array([1.0, 0.0, 0.0, 0.0, *(2 * _LENGTH**2 * np.array([1.0, 0.0, 0.0, 1.0, 0.0, 1.0]))])
-
-_ANSWER = 1e-5  # [kg] smallest eigenvalue of an answer's J, lengths in units of 0.1 m
+# Lengths are divided by this before matrices are compared, so that kg, kg·m and kg·m² weigh alike.
+LENGTH = 0.1  # [m]
 
 
 def pseudo_inertia(phi: ArrayLike) -> NDArray[np.float64]:
@@ -53,73 +47,6 @@ def is_consistent(phi: ArrayLike, tolerance: float = 1e-9) -> bool:
     """
     J = _scaled(pseudo_inertia(phi))
     return bool(J[3, 3] > 0 and np.linalg.eigvalsh(J)[0] >= -tolerance * max(1.0, float(J[3, 3])))
-
-
-def nearest_body(phi: NDArray[np.float64], covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """An answer (10,): phi where a body can have it, else the nearest that one can, in the metric of phi's covariance.
-
-    It stays far enough inside to survive being printed.
-    """
-    if is_consistent(phi):
-        return phi.copy()
-    return nearest_consistent(phi, np.linalg.inv(covariance), margin=_ANSWER)
-
-
-def distance_to_body(phi: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
-    """Standard deviations between an estimate phi (10,) and the nearest body, in the metric of phi's covariance.
-
-    Bodies are a convex cone: where the truth is one and phi ~ N(truth, covariance), the square is at most that of the
-    distance to the truth, a chi-square of ten degrees of freedom.
-    """
-    away = nearest_body(phi, covariance) - phi
-    return float(np.sqrt(away @ np.linalg.solve(covariance, away))) if away.any() else 0.0
-
-
-def nearest_consistent(phi: ArrayLike, information: ArrayLike | None = None, margin: float = 1e-6) -> NDArray:
-    """The physically consistent parameters nearest to phi: argmin (x − phi)ᵀ·Λ·(x − phi) subject to J(x) ⪰ margin.
-
-    Solved as a semidefinite program with Clarabel (the LMI of Sousa & Cortesão, IJRR 2014, with Wensing's J).
-
-    Args:
-        phi: the ten numbers to project.
-        information: Λ (10, 10), symmetric positive semidefinite, usually the inverse covariance of phi. Default: units
-            of kg, 0.1 kg·m and 0.01 kg·m².
-        margin: smallest eigenvalue of J allowed, lengths in units of 0.1 m [kg].
-
-    Raises:
-        InertiaError: phi is not ten finite numbers, or the solver found no answer.
-    """
-    import clarabel
-    from scipy import sparse
-
-    phi = InertialParameters(np.asarray(phi, dtype=float)).phi  # ten finite numbers, or a sentence
-    if np.linalg.eigvalsh(_scaled(pseudo_inertia(phi)))[0] >= 0.99 * margin:  # what the solver returns passes too
-        return phi.copy()
-    scale = _column_scale()
-    weight = np.eye(10) if information is None else np.asarray(information, dtype=float) / np.outer(scale, scale)
-    weight = 0.5 * (weight + weight.T) / max(np.abs(weight).max(), 1e-300) + 1e-12 * np.eye(10)
-    target = phi * scale
-    size = np.abs(target).max() + margin
-    svec, order = _svec_of_basis()
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    # solved for (x − phi) / size: numbers near 1 around 0, where the solver's relative tolerances mean most
-    solver = clarabel.DefaultSolver(
-        sparse.csc_matrix(np.triu(weight)),
-        np.zeros(10),
-        sparse.csc_matrix(-svec),
-        (svec @ target - margin * _svec_identity(order)) / size,
-        [clarabel.PSDTriangleConeT(4)],
-        settings,
-    )
-    solution = solver.solve()
-    x = (target + size * np.asarray(solution.x)) / scale
-    if "Solved" not in str(solution.status) or not np.all(np.isfinite(x)):
-        raise InertiaError(f"no consistent parameters found near {phi.tolist()} (solver: {solution.status})")
-    missing = margin - np.linalg.eigvalsh(_scaled(pseudo_inertia(x)))[0]
-    if missing > 0:  # rounding of the solver: a small ball at the origin makes up for it
-        x = x + missing * _BALL
-    return x
 
 
 def log_cholesky(phi: ArrayLike) -> NDArray[np.float64]:
@@ -190,23 +117,5 @@ def _root_of_chart(theta: ArrayLike) -> NDArray[np.float64]:
 
 
 def _scaled(J: NDArray[np.float64]) -> NDArray[np.float64]:
-    units = np.array([1 / _LENGTH, 1 / _LENGTH, 1 / _LENGTH, 1.0])
+    units = np.array([1 / LENGTH, 1 / LENGTH, 1 / LENGTH, 1.0])
     return J * np.outer(units, units)
-
-
-def _column_scale() -> NDArray[np.float64]:
-    return np.array([1.0] + [1 / _LENGTH] * 3 + [1 / _LENGTH**2] * 6)
-
-
-@cache
-def _svec_of_basis() -> tuple[NDArray[np.float64], tuple[tuple[int, int], ...]]:
-    """svec(J) as a linear map (10, 10) of the scaled parameters; Clarabel stacks the upper triangle by columns."""
-    order = tuple((i, j) for j in range(4) for i in range(j + 1))
-    basis = pseudo_inertia(np.eye(10))  # scale-free: the scaled parameters are those of lengths in units of 0.1 m
-    svec = np.array([[basis[k, i, j] * (1 if i == j else np.sqrt(2)) for k in range(10)] for i, j in order])
-    return svec, order
-
-
-def _svec_identity(order: tuple[tuple[int, int], ...]) -> NDArray[np.float64]:
-    """svec of the 4×4 identity in the given order of entries."""
-    return np.array([1.0 if i == j else 0.0 for i, j in order])

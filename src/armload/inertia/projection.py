@@ -1,13 +1,9 @@
-"""The nearest body, in a bounded time: what a live stream can afford at every answer.
+"""The nearest body: what ten numbers that no body has are replaced by.
 
-    min ½·(x − phi)ᵀ·P·(x − phi) − ν·ln det J(x),      ν = 0.3 … 1e-4
+    min (x − phi)ᵀ·Λ·(x − phi)   subject to J(x) ⪰ margin      (lengths in units of 0.1 m)
 
-Newton's method along the central path; at its end x is a body, and (x − phi)ᵀ·P·(x − phi) is at most 8·ν above that of
-`nearest_consistent`, which solves the same by Clarabel in fifteen times the time. That one stays because the worlds of
-a seed hang on its last digits: at its default tolerance Clarabel stops short of the optimum, by 2.5e-4 standard
-deviations (median, at most 0.01) for answers of `identify`.
-
-Source: Boyd & Vandenberghe, Convex Optimization, 2004, ch. 11.
+One compiled solver (`interior_point.py`) serves estimates, which ask for all digits, and live streams, which ask for
+less and wait for less. Where Λ knows nothing of a direction, the nearest within it is asked for, too.
 """
 
 from __future__ import annotations
@@ -16,127 +12,127 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from armload.inertia.cholesky import factor, invert, solve
-from armload.inertia.consistency import nearest_consistent, pseudo_inertia
+from armload.errors import InertiaError
+from armload.inertia.cholesky import factor, root
+from armload.inertia.cone import pseudo
+from armload.inertia.consistency import LENGTH, is_consistent
+from armload.inertia.interior_point import nearest
+from armload.inertia.orthogonal import eigen
+from armload.inertia.parameters import InertialParameters
 
-_BASIS = np.ascontiguousarray(pseudo_inertia(np.eye(10)))  # J is linear in phi
-_LENGTH, _TOLERANCE = 0.1, 1e-9  # [m] and [kg] of `is_consistent`
-_BARRIERS = np.array([0.3, 1e-2, 1e-4])
-_SIZE, _FARTHEST, _LIGHTEST = 0.05, 0.3, 1e-3  # [m], [m], [kg] of the body that the search begins with
+_SCALE = np.array([1.0] + [1 / LENGTH] * 3 + [1 / LENGTH**2] * 6)
+_BALL = np.array([1.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 2.0, 0.0, 2.0])  # phi·_SCALE of the body whose J is the identity
+
+_ANSWER = 1e-5  # [kg] smallest eigenvalue of an answer's J, lengths in units of 0.1 m
+_CONSISTENT = 1e-9  # [kg] tolerance of `is_consistent`
+_FLOOR = 1e-13  # of the information, relative: a condition of 1e12 is information, a thousand roundings are not
+_INDEFINITE = 1e-8  # relative, of what no information of that rank leaves
+_STEPS = 60  # about 15 are taken, 40 where the information is singular
+_CLOSE = 1e-12  # relative to the squared distance
+_ENOUGH = 1e4  # times what is asked for, where rounding ends the search before
+_NEAR = 5e-4  # of half the squared distance, in standard deviations
+
+
+def nearest_body(phi: NDArray[np.float64], covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """An answer (10,): phi where a body can have it, else the nearest that one can, in the metric of phi's covariance.
+
+    It stays far enough inside to survive being printed.
+    """
+    if is_consistent(phi):
+        return phi.copy()
+    return nearest_consistent(phi, np.linalg.inv(covariance), margin=_ANSWER)
+
+
+def distance_to_body(phi: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
+    """Standard deviations between an estimate phi (10,) and the nearest body, in the metric of phi's covariance.
+
+    Bodies are a convex cone: where the truth is one and phi ~ N(truth, covariance), the square is at most that of the
+    distance to the truth, a chi-square of ten degrees of freedom.
+    """
+    away = nearest_body(phi, covariance) - phi
+    return float(np.sqrt(away @ np.linalg.solve(covariance, away))) if away.any() else 0.0
+
+
+def nearest_consistent(phi: ArrayLike, information: ArrayLike | None = None, margin: float = 1e-6) -> NDArray:
+    """The physically consistent parameters nearest to phi: argmin (x − phi)ᵀ·Λ·(x − phi) subject to J(x) ⪰ margin.
+
+    The LMI of Sousa & Cortesão, IJRR 2014, with Wensing's J, solved to 1e-12 of the squared distance or to rounding.
+
+    Args:
+        phi: the ten numbers to project.
+        information: Λ (10, 10), symmetric positive semidefinite, usually the inverse covariance of phi. Default: units
+            of kg, 0.1 kg·m and 0.01 kg·m². What is below 1e-13 of the largest counts as rounding.
+        margin: smallest eigenvalue of J allowed, lengths in units of 0.1 m [kg].
+
+    Raises:
+        InertiaError: phi is not ten finite numbers, the information is not what is expected, or no answer was found.
+    """
+    phi = InertialParameters(np.asarray(phi, dtype=float)).phi  # ten finite numbers, or a sentence
+    weight = np.diag(_SCALE**2) if information is None else np.ascontiguousarray(information, dtype=float)
+    if weight.shape != (10, 10) or not np.all(np.isfinite(weight)):
+        raise InertiaError(
+            f"the information of phi has shape {weight.shape} or is not finite: expected a finite matrix (10, 10), "
+            "usually the inverse covariance"
+        )
+    x, bound, left = _project(phi, weight, margin, 0.99 * margin, _CLOSE, 0.0)
+    if left > _INDEFINITE:
+        raise InertiaError(
+            "the information of phi has a negative eigenvalue: expected a symmetric positive semidefinite matrix, "
+            "usually the inverse covariance"
+        )
+    if not bound <= _ENOUGH:
+        raise InertiaError(
+            f"no consistent parameters found near {phi.tolist()}: the search ended {_CLOSE * bound:.1g} of the squared "
+            "distance from the optimum; check the units of the parameters and of their information"
+        )
+    return x
 
 
 def near_consistent(phi: ArrayLike, precision: ArrayLike) -> NDArray[np.float64]:
-    """A body (10,) as near to phi (10,) as any within 1e-3 in the metric of `precision` (10, 10); phi if it is one.
+    """phi (10,) if it is a body, else one whose squared distance is at most 1e-3 above that of `nearest_body`.
+
+    The metric is that of `precision` (10, 10). A live stream can afford it at every answer.
 
     Raises:
-        InertiaError: numbers that are not finite.
+        InertiaError: numbers that are not finite, or as for `nearest_consistent`.
     """
     phi = np.ascontiguousarray(phi, dtype=float)
     P = np.ascontiguousarray(precision, dtype=float)
-    x, found = _near(phi, P, _BARRIERS, _BASIS)
-    return x if found else nearest_consistent(phi, P)
+    if phi.shape != (10,) or P.shape != (10, 10):
+        return nearest_consistent(phi, P)  # which says so
+    x, bound, left = _project(phi, P, _ANSWER, -_CONSISTENT * max(1.0, phi[0]), _CLOSE, _NEAR)
+    return x if bound <= 1.0 and left <= _INDEFINITE else nearest_consistent(phi, P, _ANSWER)
 
 
 @njit(cache=True, nogil=True)
-def _near(phi, P, barriers, basis):  # pragma: no cover - compiled
-    """phi, if it is a body, or the end of the central path; and whether that is anything."""
-    if not np.isfinite(phi.sum() + P.sum()):
-        return phi, False
-    if _is_body(phi, basis):
-        return phi, True
-    x, converged = _central_path(phi, P, _start(phi), barriers, basis)
-    return x, converged and np.isfinite(x.sum())
-
-
-@njit(cache=True, nogil=True)
-def _start(phi):  # pragma: no cover - compiled
-    m = max(phi[0], _LIGHTEST)
-    far = np.sqrt(phi[1] * phi[1] + phi[2] * phi[2] + phi[3] * phi[3]) / m
-    shrink = min(1.0, _FARTHEST / max(far, 1e-12)) / m
-    x, y, z = phi[1] * shrink, phi[2] * shrink, phi[3] * shrink
-    k = _SIZE**2
-    return m * np.array([1.0, x, y, z, y * y + z * z + k, -x * y, -x * z, x * x + z * z + k, -y * z, x * x + y * y + k])
-
-
-@njit(cache=True, nogil=True)
-def _is_body(phi, basis):  # pragma: no cover - compiled
-    """What `is_consistent` says, its tolerance included."""
-    J = np.empty((4, 4))
-    _pseudo(phi, basis, J)
-    for k in range(4):
-        J[k, k] += _TOLERANCE * max(1.0, phi[0]) * (1.0 if k == 3 else _LENGTH**2)
-    return phi[0] > 0.0 and factor(J, np.empty((4, 4)))
-
-
-@njit(cache=True, nogil=True)
-def _central_path(phi, P, x, barriers, basis):  # pragma: no cover - compiled
-    J, L, inverse, work = np.empty((4, 4)), np.empty((4, 4)), np.empty((4, 4)), np.empty((4, 4))
-    M, H, root = np.empty((10, 4, 4)), np.empty((10, 10)), np.empty((10, 10))
-    g, step, new, pull = np.empty(10), np.empty(10), np.empty(10), np.empty(10)
-    converged = False
-    for nu in barriers:
-        for _ in range(60):
-            _pseudo(x, basis, J)
-            if not factor(J, L):
-                return x, False
-            invert(L, work, inverse)
-            before = _value(x, phi, P, L, nu, g)
-            for i in range(10):
-                for a in range(4):
-                    for b in range(4):
-                        total = 0.0
-                        for k in range(4):
-                            total += inverse[a, k] * basis[i, k, b]
-                        M[i, a, b] = total
-                g[i] -= nu * (M[i, 0, 0] + M[i, 1, 1] + M[i, 2, 2] + M[i, 3, 3])
-            for i in range(10):
-                for j in range(i + 1):
-                    total = 0.0
-                    for a in range(4):
-                        for b in range(4):
-                            total += M[i, a, b] * M[j, b, a]
-                    H[i, j] = P[i, j] + nu * total
-            if not factor(H, root):
-                return x, False
-            solve(root, g, step)  # against the direction of the step
-            decrease = 0.0
-            for i in range(10):
-                decrease += g[i] * step[i]
-            length, moved = 1.0, False
-            while length > 1e-6:
-                for i in range(10):
-                    new[i] = x[i] - length * step[i]
-                _pseudo(new, basis, J)
-                if factor(J, L) and _value(new, phi, P, L, nu, pull) <= before - 0.1 * length * decrease:
-                    x[:] = new
-                    moved = True
-                    break
-                length *= 0.5
-            converged = decrease < (0.05 if nu == barriers[-1] else 1.0) * nu
-            if converged or not moved:
-                break
-    return x, converged
-
-
-@njit(cache=True, nogil=True)
-def _value(x, phi, P, L, nu, pull):  # pragma: no cover - compiled
-    """½·(x − phi)ᵀ·P·(x − phi) − ν·ln det J, J = L·Lᵀ, and P·(x − phi)."""
-    total = 0.0
-    for i in range(10):
-        Pd = 0.0
-        for k in range(10):
-            Pd += P[i, k] * (x[k] - phi[k])
-        pull[i] = Pd
-        total += 0.5 * (x[i] - phi[i]) * Pd
-    for a in range(4):
-        total -= 2.0 * nu * np.log(L[a, a])
-    return total
-
-
-@njit(cache=True, nogil=True)
-def _pseudo(x, basis, J):  # pragma: no cover - compiled
-    J[:] = 0.0
-    for k in range(10):
-        for a in range(4):
-            for b in range(4):
-                J[a, b] += x[k] * basis[k, a, b]
+def _project(phi, information, margin, inside, tolerance, absolute):  # pragma: no cover - compiled
+    """x (10,); the bound that `nearest` gives, 0 for phi itself where J(phi) ⪰ inside; what `root` left over."""
+    n = 10
+    x, target, J, L = np.empty(n), np.empty(n), np.empty((4, 4)), np.empty((4, 4))
+    if not np.isfinite(phi.sum() + information.sum()):
+        return phi, np.inf, 0.0
+    for i in range(n):
+        target[i] = phi[i] * _SCALE[i] - inside * _BALL[i]
+    pseudo(target, J)
+    if factor(J, L) and (inside > 0.0 or phi[0] > 0.0):
+        return phi.copy(), 0.0, 0.0
+    size = 0.0
+    for i in range(n):
+        target[i] += (inside - margin) * _BALL[i]
+        size = max(size, abs(target[i]))
+    F, order = np.empty((n, n)), np.empty(n, np.int64)
+    scaled = np.empty((n, n))
+    for i in range(n):
+        target[i] /= size
+        for j in range(n):
+            scaled[i, j] = information[i, j] / (_SCALE[i] * _SCALE[j]) * size * size
+    left = root(scaled, F, order, _FLOOR)
+    bound, _ = nearest(target, F, order, tolerance, absolute, _STEPS, x)
+    for i in range(n):
+        x[i] = size * x[i] + margin * _BALL[i]
+    pseudo(x, J)
+    eigen(J, L, False)
+    missing = max(0.0, margin - min(J[0, 0], J[1, 1], J[2, 2], J[3, 3]))  # rounding: a small ball makes up for it
+    for i in range(n):
+        x[i] = (x[i] + missing * _BALL[i]) / _SCALE[i]
+    return x, bound, left

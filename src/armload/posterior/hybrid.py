@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.errors import ModelError
-from armload.inertia import near_consistent, nearest_body, nearest_consistent
+from armload.inertia import near_consistent, nearest_body
 from armload.inertia.cholesky import inverse
 from armload.posterior.calibration import Calibration
 from armload.posterior.evidence import Evidence
@@ -76,10 +76,9 @@ class HybridIdentifier(PosteriorLeastSquares):
         self._trusted: Evidence | None = None
 
     def prepare(self) -> None:
-        """Do now what the first sample would have to wait for, the solvers' loading among it."""
+        """Do now what the first sample would have to wait for, the solver's loading among it."""
         super().prepare()
-        for nearest in (near_consistent, nearest_consistent):
-            nearest(-self._weak, np.diag(self._weak**-2.0))
+        near_consistent(-self._weak, np.diag(self._weak**-2.0))
 
     @property
     def weak_std(self) -> NDArray[np.float64]:
