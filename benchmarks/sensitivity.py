@@ -348,7 +348,7 @@ def table(result: dict[str, Any]) -> str:
     lines = [
         "As they are: "
         + "; ".join(f"{on}: " + ", ".join(f"{k} {v:g}" for k, v in base[on].items()) for on in ("streams", "logs"))
-        + ".",
+        + f". A run of all took {result['cpu_s']['streams and logs']:.0f} s of processor time.",
         "",
         "| constant | value | unit | reason | half | double |",
         "| --- | --- | --- | --- | --- | --- |",
