@@ -84,7 +84,7 @@ def run(options: argparse.Namespace) -> None:
     arm = None if options.robot is None else arm_named(options.robot, options.frame)
     built_in = options.result in ("franka-hand", "test")
     load = Load(payload_of(options.result, arm)) if built_in else read_load(options.result)
-    if arm is None and load.robot in ARMS:
+    if arm is None and load.robot is not None and load.robot in ARMS:
         arm = arm_named(load.robot)
     doubts = _doubts(options.minus, load)
     for part in options.minus:

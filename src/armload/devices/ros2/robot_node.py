@@ -65,8 +65,9 @@ class RobotNode:
         say: Callable[[str], None] = lambda _: None,
     ) -> None:
         self._arm, self._connection, self._say = arm, connection, say
-        standing = None if isinstance(first, Motion) else np.array([first, first])
-        motion = first if standing is None else TrajectoryMotion([0.0, 1.0], standing, name="standing")
+        motion = first
+        if not isinstance(motion, Motion):
+            motion = TrajectoryMotion([0.0, 1.0], np.array([first, first]), name="standing")
         self._commanded = CommandedMotion(EndlessMotion(motion))
         self._simulator = Simulator(
             arm, motion, [(0.0, payload)], world=world, sensors=sensors, rate=rate, speed=None, seed=seed
