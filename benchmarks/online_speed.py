@@ -35,9 +35,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from hybrid_cost import sklearn_row
 from learner_speed import table
 from script import RESULTS, options, say, write
+from sklearn.ensemble import BaggingRegressor
 from threadpoolctl import threadpool_limits
 
 from armload import Recording, arm
@@ -47,13 +47,26 @@ from armload.ensembles import BaggingEnsemble, LearnedIdentifier, NetworkLearner
 from armload.inertia import InertialParameters
 from armload.motion import random_motion
 from armload.online import OnlineIdentifier
-from armload.posterior import StreamingIdentifier
+from armload.posterior import PosteriorLeastSquares
 from armload.recording import Sample
 from armload.simulation import Sensors, World, simulate
 
 SAMPLE = 1e-3  # [s]
 KINDS = ("ordinary", "adopted", "early", "change")
 SEED = 60_001
+
+
+def sklearn_row() -> float:
+    """Median time [s] of one row through scikit-learn's own bag of five trees."""
+    rng = np.random.default_rng(0)
+    X, y = rng.normal(size=(3000, 22)), rng.normal(size=(3000, 10))
+    bag = BaggingRegressor(n_estimators=5, random_state=0).fit(X, y)
+    times = []
+    for k in range(200):
+        start = time.thread_time()
+        bag.predict(X[k : k + 1])
+        times.append(time.thread_time() - start)
+    return float(np.median(times))
 
 
 def minute(robot: Arm, seconds: float = 60.0) -> Recording:
@@ -91,10 +104,10 @@ class Kinds:
 
     def _look(self) -> tuple:
         run = getattr(self._identifier, "engine", None)
-        stream = run.stream if isinstance(run, StreamingIdentifier) else None
+        stream = run.stream if isinstance(run, PosteriorLeastSquares) else None
         if stream is None:
             return run, None, 0, None
-        return run, stream.state is None, stream.refits, self._identifier.event
+        return run, stream.state is None, stream.solutions, self._identifier.event
 
     def of(self, settling: bool) -> int:
         """Index into KINDS of the update just made."""

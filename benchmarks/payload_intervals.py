@@ -28,7 +28,7 @@ from armload.inertia import Z95, determined
 from armload.lab.training import Records
 from armload.payloads import solids
 from armload.posterior import HybridModel, shipped_model
-from armload.posterior.hybrid import std_alone
+from armload.posterior.hybrid import std_under_weak_prior
 from armload.regression import payload_prior_std
 
 MASS, SIDE, THICK = (0.3, 2.0), (0.2, 0.4), (0.002, 0.01)  # [kg, m]
@@ -76,7 +76,7 @@ def held(robot: Arm, model: HybridModel, records: Records) -> dict[str, NDArray[
         P = np.linalg.inv(trusted.information + np.diag(weak**-2))
         alone = P @ trusted.vector
         out["log alone"][k] = np.abs(alone - truth) <= Z95 * np.sqrt(np.diag(P) + (trusted.gain_std * alone) ** 2)
-        told = determined(half / Z95, prior.std, std_alone(trusted, weak), weak)
+        told = determined(half / Z95, prior.std, std_under_weak_prior(trusted.information, weak), weak)
         before, reach = Z95 * prior.std, np.minimum(half, Z95 * prior.std)
         low = np.where(told, found.mean - half, np.minimum(prior.mean - before, found.mean - reach))
         high = np.where(told, found.mean + half, np.maximum(prior.mean + before, found.mean + reach))

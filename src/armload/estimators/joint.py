@@ -3,10 +3,10 @@
     r_tare = Z·eta + e,      r_run = W·phi + Z·eta + e,      Z·eta = Z·B·beta
 
 eta are the deviations of the arm from its model: ten inertial parameters per link, friction, offsets, motor inertia
-(`correction.py`). Most of them never show alone; B spans what shows, the base parameters, found as the right singular
-vectors of Z at random states. [phi, beta] then follow from weighted least squares, joints weighed by the long-run
-variance of their residual. Directions that the two motions leave unexcited are held at zero by a ridge of 1e-8 of the
-largest information, and have the covariance that goes with it: where they reach phi, nothing is known.
+(`regression.mismatch`). Most of them never show alone; B spans what shows, the base parameters, found as the right
+singular vectors of Z at random states. [phi, beta] then follow from weighted least squares, joints weighed by the
+long-run variance of their residual. Directions that the two motions leave unexcited are held at zero by a ridge of 1e-8
+of the largest information, and have the covariance that goes with it: where they reach phi, nothing is known.
 
 What was mounted at the tare is part of the last link; the answer is what was added since. Sources: Khalil, Gautier &
 Lemoine, ICRA 2007 (arm and load together); Gautier, J. Robotic Systems 1991 (base parameters numerically).

@@ -83,7 +83,7 @@ class HybridIdentifier(PosteriorLeastSquares):
     @property
     def weak_std(self) -> NDArray[np.float64]:
         """Standard deviation (10,) of the last estimate under the weak prior of `payload_prior_std` instead."""
-        return self._weak if self._trusted is None else _weak_std(self._trusted.information, self._weak)
+        return self._weak if self._trusted is None else std_under_weak_prior(self._trusted.information, self._weak)
 
     @property
     def unprojected(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
@@ -133,7 +133,7 @@ def without_learned_prior(
 
 
 @njit(cache=True, nogil=True)
-def _weak_std(information, weak):  # pragma: no cover - compiled
+def std_under_weak_prior(information, weak):  # pragma: no cover - compiled
     """Standard deviation (10,) under a weak prior of standard deviations `weak`, evidence trusted as far as it is."""
     unit, out = np.eye(10), np.empty(10)
     for i in range(10):

@@ -29,7 +29,7 @@ class NoiseModel:
         novelty: [s] beyond which more time on similar motions counts no more, as for a mismatch that is a function of
             the configuration and has no unknown of its own.
         overrated: by which factor the posterior's covariance is too small on arms unlike those the model was made for:
-            squared error over variance, mean over simulated episodes (`hybrid.calibration.overrating`, 2 % trimmed).
+            squared error over variance, mean over simulated episodes (`overrating` in lab/training, 2 % trimmed).
     """
 
     residual: float

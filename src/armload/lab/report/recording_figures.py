@@ -46,7 +46,7 @@ def motion(recording: Recording) -> Figure:
 def torques(recording: Recording, arm: Arm) -> Figure:
     """Measured joint torque and the bare arm's torque on the same motion: the payload (and friction) is between them.
 
-    Both are drawn behind the lag F = λ/(s + λ), λ = `_GAIN`, so that no acceleration is needed (`arms.filtered`).
+    Both are drawn behind the lag F = λ/(s + λ), λ = `_GAIN`, so that no acceleration is needed (`regression.rows`).
     """
     t, measured, bare = lagged_torques(recording, arm)
     with look():
