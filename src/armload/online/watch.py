@@ -50,7 +50,7 @@ from armload.online.thresholds import (
     TRANSIENT,
 )
 from armload.posterior import PosteriorLeastSquares
-from armload.posterior.stream import Worker
+from armload.posterior.worker import Worker
 from armload.recording import Sample
 from armload.regression import payload_prior_std
 

@@ -12,12 +12,10 @@ there before anyone noticed. Were they kept, a cycle that returns to the same po
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Future
 from copy import deepcopy
 from queue import SimpleQueue
-from threading import Thread
-from typing import Any
 
 import numpy as np
 from numba import njit
@@ -27,6 +25,7 @@ from armload.posterior.problem import Posterior, Scales
 from armload.posterior.same_motion import Difference, SameMotion
 from armload.posterior.sequential import SequentialPosterior
 from armload.posterior.solve import Solution, solve_to_go_on
+from armload.posterior.worker import Worker
 from armload.regression import Correction, GaussianPrior, JointFeatures
 from armload.regression.information import RegressionData
 from armload.regression.lag import GAIN
@@ -39,31 +38,6 @@ _REFITS = (20, 60, 100, 150, 200, 300, 400, 600, 800, 1200, 1600, 2400)
 _REFIT_EVERY, _ADOPTED = 2000, 20
 _CHUNK = 50  # [rows] handed over at once in between: one matrix product of 0.25 s
 _LATE = 50  # [rows] that can be taken back, 0.25 s: those that `online.thresholds.LONGEST` asks for, and two more
-
-
-class Worker:
-    """One thread that does what it is given, in order; a program may end while it waits."""
-
-    def __init__(self) -> None:
-        self._tasks: SimpleQueue[tuple[Future, Callable, tuple] | None] = SimpleQueue()
-        Thread(target=self._run, name="armload-scales", daemon=True).start()
-
-    def submit(self, task: Callable, *arguments: Any) -> Future:
-        future: Future = Future()
-        self._tasks.put((future, task, arguments))
-        return future
-
-    def stop(self) -> None:
-        self._tasks.put(None)
-
-    def _run(self) -> None:
-        while (given := self._tasks.get()) is not None:
-            future, task, arguments = given
-            try:
-                future.set_result(task(*arguments))
-            except BaseException as error:  # whoever waits for the result gets it
-                future.set_exception(error)
-            del given, future, task, arguments  # a thread that waits must keep nothing alive
 
 
 class StreamingPosterior:
