@@ -352,7 +352,7 @@ def test_the_rebuilt_estimator_says_what_the_one_before_it_said():
 
 def test_an_update_costs_what_was_measured_beside_the_version_before():
     cost = json.loads((RESULTS / "before_after.json").read_text())["online"]["thread"]
-    for score, most in {"p50": 1.35, "p99": 1.0, "p99.9": 1.05, "mean": 1.07}.items():
+    for score, most in {"p50": 1.0, "p99": 1.0, "p99.9": 1.1, "mean": 1.0}.items():
         before, after = cost[score]["us"]
         assert after / before <= most
         assert cost[score]["ratio"] == pytest.approx(after / before, abs=0.01)
