@@ -22,9 +22,9 @@ import numpy as np
 from armload.atomic import replacing
 from armload.errors import IdentificationError
 
-FORMAT = 5
+FORMAT = 6
 _PACKAGE = "armload."
-_NOT_SAVED = ("_worker", "_data", "_model", "_catching_up")  # threads, and what Pinocchio makes anew
+_NOT_SAVED = ("_worker", "_data", "_model")  # threads, and what Pinocchio makes anew
 _MADE_ANEW = (
     "armload.arms.momentum_row.MomentumRow",
     "armload.arms.forward.ForwardDynamics",

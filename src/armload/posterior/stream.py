@@ -13,19 +13,17 @@ there before anyone noticed. Were they kept, a cycle that returns to the same po
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Future
 from copy import deepcopy
-from queue import SimpleQueue
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from armload.posterior.handover import Handover, Result
 from armload.posterior.problem import Posterior, Scales
 from armload.posterior.same_motion import Difference, SameMotion
 from armload.posterior.sequential import SequentialPosterior
 from armload.posterior.solve import Solution, solve_to_go_on
-from armload.posterior.worker import Worker
 from armload.regression import Correction, GaussianPrior, JointFeatures
 from armload.regression.information import RegressionData
 from armload.regression.lag import GAIN
@@ -33,9 +31,9 @@ from armload.regression.noise import MOMENT, NoiseModel, share_of_noise, whole_n
 from armload.regression.rows import REGRESSOR_RATE, FilteredRegression, Row, Rows
 
 # [rows] after which the scales are found anew (0.1, 0.3, … 12 s): they change with the logarithm of the time. Then
-# every so many, 10 s, and how many later they are adopted, 0.1 s: the second thread takes 2 % of a core
+# every so many, 10 s: the second thread takes 2 % of a core
 _REFITS = (20, 60, 100, 150, 200, 300, 400, 600, 800, 1200, 1600, 2400)
-_REFIT_EVERY, _ADOPTED = 2000, 20
+_REFIT_EVERY = 2000
 _CHUNK = 50  # [rows] handed over at once in between: one matrix product of 0.25 s
 _LATE = 50  # [rows] that can be taken back, 0.25 s: those that `online.thresholds.LONGEST` asks for, and two more
 
@@ -78,12 +76,12 @@ class StreamingPosterior:
         self._same_motion = same_motion
         self._whole = whole_noise(correction, noise)
         self._base: SequentialPosterior | None = None
-        self._worker: Worker | None = None
+        self._handover = Handover()
         self.reset()
 
     def reset(self) -> None:
         """Forget the run (not the tare); the next sample is the first."""
-        self._abandon()
+        self._handover.abandon()
         self._regression.reset()
         if self._same_motion is not None:
             self._same_motion = self._same_motion.fresh()
@@ -190,11 +188,9 @@ class StreamingPosterior:
             self._state.take(row)
         self._early_is_old = False
 
-    # ------------------------------------------------------------------ full solutions
-
     def conclude(self) -> None:
         """A last solution from all rows so far, as no more will come; it begins with the scales found from the tare."""
-        self._abandon()
+        self._handover.abandon()
         self._accumulate_waiting()
         self._adopt(self._solved([*self.tares, self._run], self.start, self.iterations - 1))
         self.difference = self._better(self.posterior.covariance)
@@ -218,52 +214,35 @@ class StreamingPosterior:
         rows, self._waiting = self._waiting, []
         self._accumulate(rows)
 
-    # ------------------------------------------------------------------ beside the stream
-
     def _beside(self, row: Row) -> None:
         """Hand rows over, begin a solution, adopt one: each at fixed numbers of rows."""
-        if self._future is not None:
-            assert self._catching_up is not None
-            self._catching_up.put(row)
-            if self.rows >= self._adopt_at:
-                self.hold()
-        elif self._ready is not None:
-            self._ready[0].state.take(row)
-        if self._ready is not None and self.rows >= self._adopt_at:
-            (solution, self.difference), self._ready = self._ready, None
-            self._adopt(solution)
-            return
-        if self._future is not None or self._ready is not None:
-            return
-        if (self._last is not None or self._found is not None) and self.rows >= self._adopt_at:
-            self.hold()
-            assert self._found is not None
-            (self.difference,), self._found = self._found, None
+        work = self._handover
+        work.follow(row)
         due = self.rows in _REFITS or self.rows % _REFIT_EVERY == 0
+        if work.pending:
+            if self.rows < work.adopt_at and not due:
+                return
+            solution, self.difference = work.take()
+            if solution is not None:
+                self._adopt(solution)
+                return
         if due or len(self._waiting) >= _CHUNK + _LATE:
             rows, self._waiting = self._waiting[:-_LATE], self._waiting[-_LATE:]
             covariance = self.posterior.covariance
-            if self._worker is None:
-                self._worker = Worker()
-            self._adopt_at = self.rows + _ADOPTED
             if due:
-                late, following = self._waiting.copy(), SimpleQueue()
-                self._catching_up = following
-                self._future = self._worker.submit(self._refit, rows, late, following, covariance)
+                work.begin_solution(self.rows, self._refit, rows, self._waiting.copy(), covariance)
             else:
-                self._last = self._worker.submit(self._accumulate, rows, covariance)
+                work.begin(self.rows, self._handed_over, rows, covariance)
 
-    def _refit(
-        self, rows: list[Row], late: list[Row], following: SimpleQueue, covariance: NDArray
-    ) -> tuple[Solution, Difference | None]:
+    def _handed_over(self, rows: list[Row], covariance: NDArray) -> Result:
+        return None, self._accumulate(rows, covariance)
+
+    def _refit(self, rows: list[Row], late: list[Row], covariance: NDArray) -> Result:
         difference = self._accumulate(rows, covariance)
         run = deepcopy(self._run, {id(self.correction): self.correction})
         if late:
             run.take(Rows.of(late))
-        solution = self._step(run)
-        while (row := following.get()) is not None:
-            solution.state.take(row)
-        return solution, difference
+        return self._step(run), difference
 
     def _step(self, run: RegressionData) -> Solution:
         """One step of expectation–maximisation from the last solution's scales."""
@@ -281,12 +260,7 @@ class StreamingPosterior:
 
     def hold(self) -> None:
         """Wait for what is done beside; nothing is from then on, until the next rows. What is adopted when stays."""
-        if self._future is not None:
-            assert self._catching_up is not None
-            self._catching_up.put(None)
-            self._ready, self._future, self._catching_up = self._future.result(), None, None
-        if self._last is not None:
-            self._found, self._last = (self._last.result(),), None
+        self._handover.hold()
 
     def finish(self, taken_back: int = 0) -> RegressionData:
         """All rows so far, accumulated, for another run to take as its tare; this one may go on later.
@@ -294,7 +268,7 @@ class StreamingPosterior:
         Args:
             taken_back: so many of the last rows, as far as they are still to be had, never were.
         """
-        self._abandon()
+        self._handover.abandon()
         rows, self._waiting = self._waiting, []
         kept = max(len(rows) - taken_back, 0)
         self._accumulate(rows[:kept])
@@ -304,28 +278,10 @@ class StreamingPosterior:
             self._adopt(self._step(self._run))
         return self._run
 
-    def _abandon(self) -> None:
-        """Let a solution under way go nowhere."""
-        future: Future | None = getattr(self, "_future", None)
-        if future is not None:
-            assert self._catching_up is not None
-            self._catching_up.put(None)
-            future.exception()  # waited for, whatever became of it: its tare may have gone on meanwhile
-        self._future: Future[tuple[Solution, Difference | None]] | None = None
-        self._catching_up: SimpleQueue[Row | None] | None = None  # rows since it was begun
-        self._ready: tuple[Solution, Difference | None] | None = None  # a solution that waits to be adopted
-        last: Future | None = getattr(self, "_last", None)
-        if last is not None:
-            last.result()
-        self._last: Future[Difference | None] | None = None
-        self._found: tuple[Difference | None] | None = None  # what waits to be adopted of it
-
     def close(self) -> None:
         """Stop the second thread."""
-        self._abandon()
-        if self._worker is not None:
-            self._worker.stop()
-            self._worker = None
+        self._handover.abandon()
+        self._handover.close()
 
 
 @njit(cache=True, nogil=True)
