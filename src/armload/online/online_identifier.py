@@ -8,7 +8,6 @@ for sample in source:
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -18,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
-from armload.errors import IdentificationError
 from armload.estimators import Estimate, Identifier
 from armload.identification.answer import body_of
 from armload.identification.choice import choose
@@ -27,7 +25,8 @@ from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
 from armload.online.gate import Gate, Health, all_finite
 from armload.online.listening import Listening
-from armload.online.state import load_state, model_fingerprint, save_state
+from armload.online.restoring import known_parts, origin, same_origin
+from armload.online.state import load_state, save_state
 from armload.online.step import MassStep
 from armload.online.thresholds import MOVING, RECENT, STANDS
 from armload.online.watch import PayloadWatch
@@ -178,7 +177,8 @@ class OnlineIdentifier:
         if self._watch is not None:
             self._watch.hold()
         state = {k: v for k, v in vars(self).items() if k not in ("arm", "tare")}
-        return save_state({"state": state, "tared": self._tared}, self._known(), path, self._origin())
+        own = origin(self.arm, self.method, self._engine)
+        return save_state({"state": state, "tared": self._tared}, known_parts(self.arm, self._engine), path, own)
 
     @classmethod
     def restore(cls, path: str | PathLike[str], arm: Arm, method: str | Path | None = None) -> Self:
@@ -191,44 +191,14 @@ class OnlineIdentifier:
             IdentificationError: the file is none, or of another arm or trained model.
         """
         new = cls(arm, method=method)
-        own = new._origin()
-
-        def check(origin: Mapping[str, Any]) -> None:
-            if origin["arm"] != own["arm"]:
-                raise IdentificationError(
-                    f"{path} was saved for {origin['name']}: {arm.name} is another arm, or has another frame, gravity "
-                    "or tool"
-                )
-            if origin["model"] not in (None, own["model"]):  # its numbers and this model's would be mixed
-                there = "which has no trained model" if own["model"] is None else f"whose model is {own['model'][:12]}"
-                raise IdentificationError(
-                    f"{path} was saved with the method {origin['method']} and its trained model "
-                    f"{origin['model'][:12]} (SHA-256): found the method {own['method']}, {there}; give the method or "
-                    "the model's file that it was saved with, or begin anew"
-                )
-
         try:
-            saved = load_state(path, new._known(), check)
+            own = origin(arm, new.method, new._engine)
+            saved = load_state(path, known_parts(arm, new._engine), same_origin(path, arm, own))
         finally:
             new.close()
         new.__dict__.update(saved["state"])
         new._tared = saved["tared"]
         return new
-
-    def _known(self) -> dict[str, Any]:
-        """What a new identifier for the same arm has already: the arm and the trained parts."""
-        parts = {name: value for name in ("model", "_payloads") if (value := getattr(self._engine, name, None))}
-        return {"arm": self.arm, **parts}
-
-    def _origin(self) -> dict[str, Any]:
-        """What a state holds for: it refers to the arm and the trained model, and has neither in it."""
-        model = self._known().get("model")
-        return {
-            "arm": self.arm.fingerprint,
-            "name": self.arm.name,
-            "method": self.method,
-            "model": None if model is None else model_fingerprint(model),
-        }
 
     def _identify(self, sample: Sample) -> None:
         run: Identifier = self._engine
