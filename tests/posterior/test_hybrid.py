@@ -405,9 +405,10 @@ def test_errors_on_real_like_arms_stay_near_their_error_bars(panda, logs):
 
 def test_another_payload_frame_describes_the_same_body(panda, logs):
     wrist = arm("panda", "panda_link7")  # turns with the flange, 0.107 m before it
-    here, there = (HybridIdentifier(a, logs[0].tare).run(logs[0].run) for a in (panda, wrist))
-    moved = wrist.in_frame(InertialParameters(here.phi, panda.frame))
-    assert there.phi == pytest.approx(moved.phi, abs=2e-3)
+    for log in logs:
+        here, there = (HybridIdentifier(a, log.tare).run(log.run) for a in (panda, wrist))
+        moved = wrist.in_frame(InertialParameters(here.phi, panda.frame))
+        assert there.phi == pytest.approx(moved.phi, abs=2e-4)  # the weak priors of either frame differ
 
 
 def test_what_was_taken_off_since_the_tare_is_negative(panda):

@@ -58,6 +58,7 @@ class Evidence:
         speed: float,
         weak: NDArray[np.float64],
         same_motion: bool = False,
+        into_frame: NDArray[np.float64] | None = None,
     ) -> Evidence:
         """Of logs as they stand.
 
@@ -68,11 +69,13 @@ class Evidence:
             speed: rms of the run's joint velocities so far [rad/s].
             weak: (10,) the arm's units of phi, `payload_prior_std`.
             same_motion: whether Λ and h are those of the torque difference with a tare along the same motion.
+            into_frame: T (10, 10), phi = T·phi' of the frame that the traits are about; None: they are about phi's own.
         """
         Λ = 0.5 * (information + information.T)
         ratios = np.array([posterior.ratios[name] for name in _RATIOS])
         motor, same = float(posterior.torque == "motor"), float(same_motion)
-        traits = _traits(Λ, weak, ratios, float(t), float(tare_time), motor, speed, same)
+        told = Λ if into_frame is None else into_frame.T @ Λ @ into_frame
+        traits = _traits(told, weak, ratios, float(t), float(tare_time), motor, speed, same)
         kind = 2 if same_motion else int(tare_time > 0)
         return cls(Λ, vector, posterior.gain_std, traits, float(t), kind)
 

@@ -59,6 +59,7 @@ class HybridIdentifier(PosteriorLeastSquares):
     ) -> None:
         self.model = shipped_model(arm) if model is None else model
         self._payloads = self.model.prior_for(arm)
+        self._traits_frame = self.model.into_frame(arm)
         self.calibrated = self.model.calibrated
         self.payload_prior = (self._payloads.mean, self._payloads.std)
         self.features = features or JointFeatures(arm.n)

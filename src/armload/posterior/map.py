@@ -56,6 +56,7 @@ class PosteriorLeastSquares(Identifier):
     _noise: NoiseModel = RIGID
     _iterations = 12  # of expectation–maximisation in a last solution; with features it settles in five
     _same_motion: SameMotion | None = None
+    _traits_frame: NDArray[np.float64] | None = None  # see `Evidence.of`: they are about the estimate's own frame
 
     def __init__(
         self, arm: Arm, tare: Recording | None = None, gain: float = GAIN, prior: GaussianPrior | None = None
@@ -208,7 +209,8 @@ class PosteriorLeastSquares(Identifier):
         speed, weak = float(np.sqrt(self._squares / self._values)), self._weak
         difference = stream.difference is not None
         tare_time = self._tare_time + earlier
-        return Evidence.of(said.information, said.vector, stream.posterior, now, tare_time, speed, weak, difference)
+        log = (said.information, said.vector, stream.posterior, now, tare_time, speed, weak, difference)
+        return Evidence.of(*log, self._traits_frame)
 
     # ------------------------------------------------------------------ beside a running robot
 

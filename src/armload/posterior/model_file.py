@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armload.arms import Arm, link_fingerprint, prefixed_frame
 from armload.atomic import replacing
@@ -76,11 +77,11 @@ class HybridModel:
         """Whether the training has shown that the intervals hold (`Training.calibrated`)."""
         return self.training is not None and self.training.calibrated
 
-    def prior_for(self, arm: Arm) -> MixturePrior:
-        """The payload prior about the frame of an arm: of this model's kind, whatever its frame, base and hand.
+    def into_frame(self, arm: Arm) -> NDArray[np.float64] | None:
+        """T (10, 10): parameters about the arm's frame from those about the model's; None where they are the same.
 
         Raises:
-            ModelError: the model was trained for another arm.
+            ModelError: the model was trained for another arm, whatever the arm's frame, base and hand.
         """
         flange = prefixed_frame(arm, self.frame)
         if arm.n != self.n or flange is None:
@@ -91,9 +92,13 @@ class HybridModel:
                 "`armload train --method hybrid`"
             )
         if arm.frame == flange:
-            return self.prior
-        T = np.array([arm.in_frame(InertialParameters(unit, flange)).phi for unit in np.eye(10)]).T
-        return self.prior.moved(T)
+            return None
+        return np.array([arm.in_frame(InertialParameters(unit, flange)).phi for unit in np.eye(10)]).T
+
+    def prior_for(self, arm: Arm) -> MixturePrior:
+        """The payload prior about the frame of an arm. Raises as `into_frame`."""
+        T = self.into_frame(arm)
+        return self.prior if T is None else self.prior.moved(T)
 
     def save(self, path: str | PathLike[str]) -> Path:
         """Write one .safetensors file; it appears whole or not at all.
