@@ -81,8 +81,10 @@ def _inverse(A: NDArray[np.float64]) -> NDArray[np.float64]:
     factor, failed = dpotrf(A, lower=1)
     if failed:
         raise np.linalg.LinAlgError("not positive definite")
-    inverse, _ = dpotri(factor, lower=1)
-    return np.tril(inverse) + np.tril(inverse, -1).T
+    inverse, _ = dpotri(factor, lower=1)  # its lower triangle, zeros above
+    symmetric = inverse + inverse.T
+    symmetric.flat[:: len(A) + 1] *= 0.5
+    return symmetric
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,8 +171,8 @@ class Problem:
         S = scales.noise
         A, b = np.zeros((self.size, self.size)), np.zeros(self.size)
         for (squares, products), s in zip(self.parts, S, strict=True):
-            A += np.einsum("jab,j->ab", squares, 1.0 / s)
-            b += np.einsum("ja,j->a", products, 1.0 / s)
+            A += np.tensordot(1.0 / s, squares, 1)
+            b += (1.0 / s) @ products
         own, slope, rest = np.zeros((n, R)), np.zeros((n, R, self.size)), np.zeros((n, R, R))
         for j in range(n if R else 0):
             Agg = sum(run.A[j, c:, c:] / s[j] for run, s in zip(self.runs, S, strict=True))

@@ -21,6 +21,7 @@ within a factor of 3 of each other so, but for friction, which is five times as 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -56,7 +57,7 @@ class Correction:
         """Number of unknowns p."""
         return len(PER_JOINT) * self.arm.n + 10 * self.arm.n
 
-    @property
+    @cached_property
     def prior_std(self) -> NDArray[np.float64]:
         """Prior standard deviation of eta (p,), its mean being zero."""
         larger = _MOTOR_FRICTION if self.arm.motor_torque else {}
