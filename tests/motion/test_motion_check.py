@@ -44,9 +44,10 @@ def test_clearances_are_those_of_segments_on_the_links_less_their_radii(any_arm,
         assert clear.self[k] == pytest.approx(min(apart), abs=1e-6)  # a sampled distance is too long by 1e-6 at most
         assert apart[clear.self_pair[k]] == pytest.approx(min(apart), abs=1e-6)
         height = np.minimum(start[:, 2], end[:, 2]) - capsules.radius - floor
-        height[capsules.link < 2] = np.inf
-        assert clear.floor[k] == pytest.approx(height.min(), abs=1e-12)
-        assert height[clear.floor_part[k]] == pytest.approx(height.min(), abs=1e-12)
+        assert set(capsules.above) <= set(np.flatnonzero(capsules.link >= 2))
+        height[np.setdiff1d(np.arange(len(height)), capsules.above)] = np.inf
+        assert clear.floor[k] == pytest.approx(height.min(), abs=1e-10)
+        assert height[clear.floor_part[k]] == pytest.approx(height.min(), abs=1e-10)
     assert (clear.self < 0).any()  # penetration is among them
 
 
@@ -57,6 +58,25 @@ def test_automatic_capsules_run_from_joint_to_joint_and_end_at_the_flange():
         start, end = axes(capsules, q)
         np.testing.assert_allclose(end[:-1], start[1:], atol=1e-12)
         np.testing.assert_allclose(end[-1], ur.frame_pose(q)[1][0], atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["ur5", "ur3e", "gen3"])
+def test_what_is_tested_against_each_other_can_be_apart(name):
+    capsules = capsule_arm(arm(name))
+    poses = np.random.default_rng(5).uniform(-np.pi, np.pi, size=(100, capsules.arm.n))
+    ends = [axes(capsules, q) for q in poses]
+    for i, j in capsules.pairs:
+        apart = max(segment_distance(start[i], end[i], start[j], end[j]) for start, end in ends)
+        assert apart - capsules.radius[i] - capsules.radius[j] > 0.015
+
+
+def test_a_ur5_is_not_asked_to_keep_apart_what_it_cannot():
+    capsules = capsule_arm(arm("ur5"))
+    # its wrist is 0.205 m long to the ball's centre, the radii of forearm and ball are 0.194 m
+    tested = {(capsules.names[i], capsules.names[j]) for i, j in capsules.pairs}
+    assert ("the link of elbow_joint", "the payload") not in tested
+    assert 2 not in capsules.link[capsules.above]  # its shoulder is 0.09 m above the floor
+    assert 2 in capsule_arm(arm("ur5e")).above
 
 
 def test_the_payload_ball_sits_a_tenth_of_a_metre_beyond_the_flange(any_arm):
