@@ -80,8 +80,8 @@ class CapsuleArm:
 
     @cached_property
     def _capsules(self) -> list[Capsule]:
-        parts = zip(self.link.tolist(), self.start.tolist(), self.end.tolist(), self.radius.tolist(), strict=True)
-        return [Capsule(link, tuple(start), tuple(end), radius) for link, start, end, radius in parts]
+        parts = zip(self.link, self.start, self.end, self.radius, strict=True)
+        return [_capsule(*part) for part in parts]
 
     @cached_property
     def _itself(self) -> NearestCapsules:
@@ -130,7 +130,7 @@ def capsule_arm(arm: Arm, payload_radius: float = PAYLOAD_RADIUS) -> CapsuleArm:
     pairs = [pair for pair in combinations(range(len(parts)), 2) if not always_touch(*pair)]
     above = [(part, -1) for part, (link, *_) in enumerate(parts) if link >= 2]  # the rest only turns on the base
     if measured is None:
-        capsules = [Capsule(link, *np.array([start, end]).tolist(), radius) for link, start, end, radius in parts]
+        capsules = [_capsule(link, start, end, radius) for link, start, end, radius in parts]
         pairs = _separable(arm, capsules, pairs, POSE_SELF)
         above = _separable(arm, capsules, above, POSE_FLOOR)
     return CapsuleArm(
@@ -143,6 +143,10 @@ def capsule_arm(arm: Arm, payload_radius: float = PAYLOAD_RADIUS) -> CapsuleArm:
         np.array([part for part, _ in above], dtype=int),
         tuple(names),
     )
+
+
+def _capsule(link: int, start: NDArray[np.float64], end: NDArray[np.float64], radius: float) -> Capsule:
+    return Capsule(int(link), (start[0], start[1], start[2]), (end[0], end[1], end[2]), float(radius))
 
 
 def _separable(arm: Arm, capsules: list[Capsule], pairs: list[tuple[int, int]], apart: float) -> list[tuple[int, int]]:
