@@ -27,7 +27,7 @@ PAYLOAD = InertialParameters.from_com(
 
 @pytest.fixture(params=[LEVEL, TILTED], ids=["level", "tilted"])
 def mounted_arm(any_arm, request):
-    """Every arm of the catalogue, upright and on a tilted base."""
+    """An arm of every family, upright and on a tilted base."""
     return replace(any_arm, gravity=request.param)
 
 

@@ -31,9 +31,9 @@ def axes(capsules, q):
 
 
 @pytest.mark.parametrize("floor", [0.0, -0.3])
-def test_clearances_are_those_of_segments_on_the_links_less_their_radii(any_arm, floor):
-    capsules = capsule_arm(any_arm)
-    poses = np.random.default_rng(0).uniform(-2.5, 2.5, size=(20, any_arm.n))
+def test_clearances_are_those_of_segments_on_the_links_less_their_radii(every_arm, floor):
+    capsules = capsule_arm(every_arm)
+    poses = np.random.default_rng(0).uniform(-2.5, 2.5, size=(20, every_arm.n))
     clear = capsules.clearance(poses, floor)
     for k, q in enumerate(poses):
         start, end = axes(capsules, q)
@@ -79,10 +79,10 @@ def test_a_ur5_is_not_asked_to_keep_apart_what_it_cannot():
     assert 2 in capsule_arm(arm("ur5e")).above
 
 
-def test_the_payload_ball_sits_a_tenth_of_a_metre_beyond_the_flange(any_arm):
-    q = np.random.default_rng(2).uniform(-1, 1, size=any_arm.n)
-    R, p = any_arm.frame_pose(q)
-    start, end = axes(capsule_arm(any_arm, payload_radius=0.12), q)
+def test_the_payload_ball_sits_a_tenth_of_a_metre_beyond_the_flange(every_arm):
+    q = np.random.default_rng(2).uniform(-1, 1, size=every_arm.n)
+    R, p = every_arm.frame_pose(q)
+    start, end = axes(capsule_arm(every_arm, payload_radius=0.12), q)
     np.testing.assert_allclose(start[-1], p[0] + 0.1 * R[0, :, 2], atol=1e-12)
     np.testing.assert_array_equal(start[-1], end[-1])
 
@@ -198,9 +198,9 @@ def test_an_arm_without_acceleration_limits_shows_none():
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_random_motions_pass_the_check_and_move_every_joint(any_arm, seed):
-    motion = random_motion(any_arm, seed)
-    check = check_motion(any_arm, motion, rated_load(any_arm), rate=500, collision_rate=200)
+def test_random_motions_pass_the_check_and_move_every_joint(every_arm, seed):
+    motion = random_motion(every_arm, seed)
+    check = check_motion(every_arm, motion, rated_load(every_arm), rate=500, collision_rate=200)
     assert check.problems == []
     q, dq, _ = motion(np.linspace(0, motion.duration, 300))
     assert np.all(np.ptp(q, axis=0) > 0.15)
