@@ -9,7 +9,6 @@ import pytest
 from armload.arms import ARMS, arm
 from armload.recording import Recording
 
-
 # one arm of each family, and those that have a hybrid; the others differ from one of these in figures only
 FAMILIES = ("fr3", "gen3", "iiwa14", "panda", "ur10e", "ur5e", "xarm7")
 

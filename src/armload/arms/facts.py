@@ -45,6 +45,7 @@ class ArmFacts:
     name: str  # of the arm, its sheet and its description
     product: str = _fact("arm", "product")
     joints: int = _fact("arm", "joints")
+    weight: float | None = _fact("arm", "weight [kg]", None)  # of the whole arm with its base
     flange: str = _fact("flange", "frame")  # what its maker counts payloads from
     flange_ending: str = _fact("flange", "ending")  # what every such flange is called behind a prefix
     hand: str | None = _fact("flange", "hand", None)  # the built-in tool that sits on it
