@@ -15,7 +15,7 @@ One rule for each figure, here and nowhere else. How near they come, their figur
 | ur20   | 1.09                              | 0.41 – 0.84                           |
 | iiwa7  | 1.30                              | 0.18 – 0.74                           |
 | iiwa14 | 0.98                              | 0.19 – 0.52                           |
-| gen3   | 0.39 (0.78 at full reach)         | 0.35 – 1.20                           |
+| gen3   | 0.39 (full reach: 1.42)           | 0.35 – 1.20                           |
 | xarm7  | 0.56                              | 0.32 – 1.28                           |
 
 Two fifths of the moving links' mass, another rule for the rated mass, is off by 0.65 to 2.14.
