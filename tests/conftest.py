@@ -9,10 +9,19 @@ import pytest
 from armload.arms import ARMS, arm
 from armload.recording import Recording
 
+# one arm of each family, and those that have a hybrid; the others differ from one of these in figures only
+FAMILIES = ("fr3", "gen3", "iiwa14", "panda", "ur10e", "ur5e", "xarm7")
+
+
+@pytest.fixture(params=FAMILIES)
+def any_arm(request):
+    """An arm of each family of the catalogue in turn."""
+    return arm(request.param)
+
 
 @pytest.fixture(params=sorted(ARMS))
-def any_arm(request):
-    """Each arm of the catalogue in turn."""
+def every_arm(request):
+    """Each arm of the catalogue in turn: for what is cheap, and what depends on the figures."""
     return arm(request.param)
 
 

@@ -83,7 +83,15 @@ def of_arm(name, **changes):
 
 
 @pytest.mark.parametrize(
-    ("name", "to"), [("panda", "ur"), ("ur10e", "franka-desk"), ("ur5e", "franka"), ("fr3", "ur-payload")]
+    ("name", "to"),
+    [
+        ("panda", "ur"),
+        ("ur10e", "franka-desk"),
+        ("ur5e", "franka"),
+        ("fr3", "ur-payload"),
+        ("iiwa14", "ur"),  # of makers whose forms are not written
+        ("gen3", "franka"),
+    ],
 )
 def test_a_load_for_another_maker_s_arm_is_said_to_be_one(export, name, to):
     assert f"identified on a {name}" in export(of_arm(name), "--to", to)[1]

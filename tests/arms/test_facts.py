@@ -46,7 +46,7 @@ def test_a_sheet_and_its_description_are_of_one_arm(name):
     facts, robot = ARMS[name], arm(name)
     assert (facts.name, facts.joints, facts.flange) == (name, robot.n, robot.frame)
     assert facts.flange.endswith(facts.flange_ending)
-    assert facts.scheme in SCHEMES
+    assert facts.scheme is None or facts.scheme in SCHEMES
     assert f'name="{facts.flange}"' in description_of(name)
     assert facts_of(robot) is facts
     assert excitation(robot).n == robot.n
@@ -75,7 +75,8 @@ def test_an_arm_cut_short_by_its_frame_has_no_figures_per_joint():
         (SHEET.replace("[links]", "[bars]"), r"\[bars\] of the sheet of two has 'spread': expected another table"),
         (SHEET.replace("spread = 1.0\n", ""), r"lacks 'spread' in \[links\]"),
         (SHEET.replace('"link"', '"joint"'), "torque side of the sheet of two is 'joint'"),
-        (SHEET + '[current]\n"torque_constants [N·m/A]" = [1.0]\nsource = "ours"', "has 1 numbers: expected 2"),
+        (SHEET + '[current]\n"torque_constants [N·m/A]" = [1.0]\nsource = "ours"', "has 1 entries: expected 2"),
+        (SHEET + '[logs]\njoint_names = [["a", "b"], ["a"]]\nsource = "ours"', "has 1 entries: expected 2"),
         ("[arm\n", "is not TOML"),
     ],
 )
@@ -85,11 +86,15 @@ def test_a_sheet_that_is_not_whole_is_refused_in_a_sentence(wrong, text):
         read_sheet("two", wrong)
 
 
+HELD_EVERYWHERE = {"gen3": 1.1}  # [kg] where the maker's figure is of the middle of the reach only
+
+
 @pytest.mark.parametrize("name", ARMS)
 def test_what_is_assumed_of_an_unrated_arm_lies_within_a_factor_of_two_of_its_maker_s_figure(name):
     known = arm(name)
     assert rated_mass(known) == known.rated_payload
-    assert 0.5 < rated_mass(replace(known, rated_payload=None)) / known.rated_payload < 2.0
+    held = HELD_EVERYWHERE.get(name, known.rated_payload)
+    assert 0.5 < rated_mass(replace(known, rated_payload=None)) / held < 2.0
     np.testing.assert_array_equal(rated_effort(known), known.limits.effort)
 
 

@@ -18,6 +18,7 @@ import pinocchio as pin
 import pytest
 from rosbags.typesys import Stores, get_typestore
 
+from armload.arms import arm
 from armload.devices import Ros2Source
 from armload.devices.ros2 import (
     CommandedMotion,
@@ -82,6 +83,13 @@ def test_joints_are_known_by_name_in_any_order_and_among_others(panda):
         sample = states.sample(joint_state(names, q, dq, tau, SECOND), 0)
         expected = np.array([values[name] for name in panda.joint_names]).T
         assert np.array_equal([sample.q, sample.dq, sample.tau], expected)
+
+
+def test_joints_are_known_by_another_driver_s_names_on_the_arm_s_sheet():
+    states, q = JointStates(arm("iiwa14"), "/joint_states"), np.arange(7.0)
+    names = [f"iiwa_joint_{k}" for k in range(1, 8)]
+    sample = states.sample(joint_state(names[::-1], q[::-1], q[::-1], q[::-1], SECOND), 0)
+    assert np.array_equal([sample.q, sample.dq, sample.tau], [q, q, q])
 
 
 def test_a_message_of_another_device_is_no_sample(panda):

@@ -36,7 +36,14 @@ from armload.identification import Identification
 from armload.inertia import InertialParameters, is_consistent
 from armload.payloads import franka_hand, hand_on, random_payload, test_payload, write_payload
 
-FLANGES = {"panda": "panda_link8", "fr3": "fr3_link8", "ur5e": "tool0", "ur10e": "tool0"}
+FLANGES = {
+    "panda": "panda_link8",
+    "fr3": "fr3_link8",
+    **dict.fromkeys(("ur3e", "ur5", "ur5e", "ur10", "ur10e", "ur16e", "ur20"), "tool0"),
+    **dict.fromkeys(("iiwa7", "iiwa14"), "lbr_link_ee"),
+    "gen3": "end_effector_link",
+    "xarm7": "link_eef",
+}
 
 
 def rotation_of(axis, angle):

@@ -725,9 +725,9 @@ def test_a_bug_in_the_reader_still_says_where_it_is(client, capfd):
 # ---------------------------------------------------------------- by name
 
 
-def test_an_arm_goes_to_another_process_as_it_is(any_arm):
-    content = json.loads(json.dumps(arm_to_json(any_arm)))
-    assert arm_from_json(content).fingerprint == any_arm.fingerprint
+def test_an_arm_goes_to_another_process_as_it_is(every_arm):
+    content = json.loads(json.dumps(arm_to_json(every_arm)))
+    assert arm_from_json(content).fingerprint == every_arm.fingerprint
 
 
 def test_an_arm_with_a_tool_other_links_and_a_tilted_base_too(panda):

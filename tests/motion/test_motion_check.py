@@ -31,9 +31,9 @@ def axes(capsules, q):
 
 
 @pytest.mark.parametrize("floor", [0.0, -0.3])
-def test_clearances_are_those_of_segments_on_the_links_less_their_radii(any_arm, floor):
-    capsules = capsule_arm(any_arm)
-    poses = np.random.default_rng(0).uniform(-2.5, 2.5, size=(20, any_arm.n))
+def test_clearances_are_those_of_segments_on_the_links_less_their_radii(every_arm, floor):
+    capsules = capsule_arm(every_arm)
+    poses = np.random.default_rng(0).uniform(-2.5, 2.5, size=(20, every_arm.n))
     clear = capsules.clearance(poses, floor)
     for k, q in enumerate(poses):
         start, end = axes(capsules, q)
@@ -44,9 +44,10 @@ def test_clearances_are_those_of_segments_on_the_links_less_their_radii(any_arm,
         assert clear.self[k] == pytest.approx(min(apart), abs=1e-6)  # a sampled distance is too long by 1e-6 at most
         assert apart[clear.self_pair[k]] == pytest.approx(min(apart), abs=1e-6)
         height = np.minimum(start[:, 2], end[:, 2]) - capsules.radius - floor
-        height[capsules.link < 2] = np.inf
-        assert clear.floor[k] == pytest.approx(height.min(), abs=1e-12)
-        assert height[clear.floor_part[k]] == pytest.approx(height.min(), abs=1e-12)
+        assert set(capsules.above) <= set(np.flatnonzero(capsules.link >= 2))
+        height[np.setdiff1d(np.arange(len(height)), capsules.above)] = np.inf
+        assert clear.floor[k] == pytest.approx(height.min(), abs=1e-10)
+        assert height[clear.floor_part[k]] == pytest.approx(height.min(), abs=1e-10)
     assert (clear.self < 0).any()  # penetration is among them
 
 
@@ -59,10 +60,29 @@ def test_automatic_capsules_run_from_joint_to_joint_and_end_at_the_flange():
         np.testing.assert_allclose(end[-1], ur.frame_pose(q)[1][0], atol=1e-12)
 
 
-def test_the_payload_ball_sits_a_tenth_of_a_metre_beyond_the_flange(any_arm):
-    q = np.random.default_rng(2).uniform(-1, 1, size=any_arm.n)
-    R, p = any_arm.frame_pose(q)
-    start, end = axes(capsule_arm(any_arm, payload_radius=0.12), q)
+@pytest.mark.parametrize("name", ["ur5", "ur3e", "gen3"])
+def test_what_is_tested_against_each_other_can_be_apart(name):
+    capsules = capsule_arm(arm(name))
+    poses = np.random.default_rng(5).uniform(-np.pi, np.pi, size=(100, capsules.arm.n))
+    ends = [axes(capsules, q) for q in poses]
+    for i, j in capsules.pairs:
+        apart = max(segment_distance(start[i], end[i], start[j], end[j]) for start, end in ends)
+        assert apart - capsules.radius[i] - capsules.radius[j] > 0.015
+
+
+def test_a_ur5_is_not_asked_to_keep_apart_what_it_cannot():
+    capsules = capsule_arm(arm("ur5"))
+    # its wrist is 0.205 m long to the ball's centre, the radii of forearm and ball are 0.194 m
+    tested = {(capsules.names[i], capsules.names[j]) for i, j in capsules.pairs}
+    assert ("the link of elbow_joint", "the payload") not in tested
+    assert 2 not in capsules.link[capsules.above]  # its shoulder is 0.09 m above the floor
+    assert 2 in capsule_arm(arm("ur5e")).above
+
+
+def test_the_payload_ball_sits_a_tenth_of_a_metre_beyond_the_flange(every_arm):
+    q = np.random.default_rng(2).uniform(-1, 1, size=every_arm.n)
+    R, p = every_arm.frame_pose(q)
+    start, end = axes(capsule_arm(every_arm, payload_radius=0.12), q)
     np.testing.assert_allclose(start[-1], p[0] + 0.1 * R[0, :, 2], atol=1e-12)
     np.testing.assert_array_equal(start[-1], end[-1])
 
@@ -178,9 +198,9 @@ def test_an_arm_without_acceleration_limits_shows_none():
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_random_motions_pass_the_check_and_move_every_joint(any_arm, seed):
-    motion = random_motion(any_arm, seed)
-    check = check_motion(any_arm, motion, rated_load(any_arm), rate=500, collision_rate=200)
+def test_random_motions_pass_the_check_and_move_every_joint(every_arm, seed):
+    motion = random_motion(every_arm, seed)
+    check = check_motion(every_arm, motion, rated_load(every_arm), rate=500, collision_rate=200)
     assert check.problems == []
     q, dq, _ = motion(np.linspace(0, motion.duration, 300))
     assert np.all(np.ptp(q, axis=0) > 0.15)

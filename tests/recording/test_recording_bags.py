@@ -116,6 +116,25 @@ def test_a_ur_bag_with_the_elbow_first_reads_in_the_arms_order(tmp_path):
     assert read_recording(path).joint_names == names  # without an arm: as published, and named
 
 
+def test_a_bag_that_calls_an_iiwa_s_joints_by_another_driver_s_names_reads_in_the_arm_s_order(tmp_path):
+    iiwa = arm("iiwa7")
+    for names in (iiwa.joint_names, tuple(f"iiwa_joint_{k}" for k in range(1, 8))):
+        sent = samples(names[::-1])
+        path = write_bag(tmp_path, "mcap", {"/joint_states": sent, "/gripper": samples(FINGERS)}, name=names[0])
+        log = read_recording(path, iiwa)
+        np.testing.assert_array_equal(log.q, [m[3][::-1] for m in sent])
+        assert log.joint_names == iiwa.joint_names
+
+
+def test_another_arm_s_joints_are_not_taken_for_the_arm_s_by_their_number(tmp_path):
+    names = tuple(f"joint_{k}" for k in range(1, 8))  # a Gen3's; an xArm7's are joint1 to joint7
+    path = write_bag(tmp_path, "mcap", {"/joint_states": samples(names)})
+    assert read_recording(path, arm("gen3")).joint_names == names
+    for other in ("xarm7", "iiwa14", "panda"):
+        with pytest.raises(RecordingError, match=f"{other}'s joints .* are not on topic /joint_states: found joint_1"):
+            read_recording(path, arm(other))
+
+
 def test_another_device_on_the_same_topic_is_passed_over(tmp_path, panda):
     gripper = samples(FINGERS, rows=7, start=EPOCH + 1_000_000, effort=[])
     path = write_bag(tmp_path, "mcap", {"/joint_states": sorted([*samples(), *gripper], key=lambda m: m[0])})

@@ -46,15 +46,15 @@ def assert_same_dynamics(model: mujoco.MjModel, arm: Arm) -> None:
 
 @pytest.mark.parametrize("gravity", [(0.0, 0.0, -9.81), TILTED], ids=["upright", "tilted"])
 @pytest.mark.parametrize("payload", [None, PAYLOAD], ids=["bare", "loaded"])
-def test_engines_agree_on_the_urdf_as_written(any_arm, payload, gravity):
-    arm = replace(any_arm, gravity=gravity)
+def test_engines_agree_on_the_urdf_as_written(every_arm, payload, gravity):
+    arm = replace(every_arm, gravity=gravity)
     loaded = arm if payload is None else arm.with_payload(payload)
     assert_same_dynamics(as_written(arm, payload), loaded)
 
 
 @pytest.mark.parametrize("payload", [None, PAYLOAD], ids=["bare", "loaded"])
-def test_plant_is_the_urdf_with_the_payload_welded_on(any_arm, payload):
-    arm = replace(any_arm, gravity=TILTED)
+def test_plant_is_the_urdf_with_the_payload_welded_on(every_arm, payload):
+    arm = replace(every_arm, gravity=TILTED)
     loaded = arm if payload is None else arm.with_payload(payload)
     plant, welded = build_model(loaded), as_written(arm, payload)
     data, other = mujoco.MjData(plant), mujoco.MjData(welded)
@@ -67,20 +67,20 @@ def test_plant_is_the_urdf_with_the_payload_welded_on(any_arm, payload):
     assert_same_dynamics(plant, loaded)
 
 
-def test_payloads_add_like_masses_in_mujoco(any_arm):
+def test_payloads_add_like_masses_in_mujoco(every_arm):
     other = InertialParameters.from_com(0.4, (-0.05, 0.0, 0.02), np.diag([1e-3, 2e-3, 2e-3]))
-    spec = mujoco.MjSpec.from_string(any_arm.urdf)
+    spec = mujoco.MjSpec.from_string(every_arm.urdf)
     for name, payload in (("one", PAYLOAD), ("two", other)):
-        body = spec.body(any_arm.frame).add_body(name=name)
+        body = spec.body(every_arm.frame).add_body(name=name)
         numbers = to_order(payload, "mujoco")
         body.explicitinertial = True
         body.mass, body.ipos, body.fullinertia = numbers[0], numbers[1:4], numbers[4:]
-    assert_same_dynamics(spec.compile(), any_arm.with_payload(PAYLOAD + other))
+    assert_same_dynamics(spec.compile(), every_arm.with_payload(PAYLOAD + other))
 
 
-def test_engines_agree_on_replaced_links_under_a_payload(any_arm):
-    world = World.real_like(any_arm, seed=4)
-    actual = any_arm.with_links(world.links).with_payload(PAYLOAD)
+def test_engines_agree_on_replaced_links_under_a_payload(every_arm):
+    world = World.real_like(every_arm, seed=4)
+    actual = every_arm.with_links(world.links).with_payload(PAYLOAD)
     assert_same_dynamics(build_model(actual), actual)
 
 

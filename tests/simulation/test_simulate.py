@@ -218,7 +218,7 @@ def test_friction_and_residual_converge_to_the_motion_that_comes_out(any_arm):
         left[passes] = rms(rollout.iteration_error([prepared], fine, 1)[0]).max()
     assert left[2] < 0.25 * left[1]
     assert left[4] < 0.1 * left[2]
-    assert left[2] < 0.01
+    assert left[2] < max(0.01, 5e-5 * any_arm.limits.effort.max())
 
 
 def test_with_the_friction_of_a_motors_side_the_controller_misreads_its_torque_by_a_few_percent_at_most():

@@ -4,7 +4,7 @@ from armload.arms.capsules import NearestCapsules
 from armload.arms.catalogue import arm, facts_of
 from armload.arms.facts import ARMS, ArmFacts, Capsule
 from armload.arms.forward import ForwardDerivatives, ForwardDynamics
-from armload.arms.matching import link_fingerprint, prefixed_frame
+from armload.arms.matching import link_fingerprint, names_among, prefixed_frame
 from armload.arms.model import LINK_SPREAD, Arm, BodyMotion, Limits
 from armload.arms.regressors import MomentumRegressor, full_arm_regressor, momentum_regressor, payload_regressor
 from armload.arms.strength import FRICTION_WIDTH, PAYLOAD_REACH, poses, rated_effort, rated_mass
@@ -28,6 +28,7 @@ __all__ = [
     "full_arm_regressor",
     "link_fingerprint",
     "momentum_regressor",
+    "names_among",
     "payload_regressor",
     "poses",
     "prefixed_frame",

@@ -45,6 +45,7 @@ class ArmFacts:
     name: str  # of the arm, its sheet and its description
     product: str = _fact("arm", "product")
     joints: int = _fact("arm", "joints")
+    weight: float | None = _fact("arm", "weight [kg]", None)  # of the whole arm with its base
     flange: str = _fact("flange", "frame")  # what its maker counts payloads from
     flange_ending: str = _fact("flange", "ending")  # what every such flange is called behind a prefix
     hand: str | None = _fact("flange", "hand", None)  # the built-in tool that sits on it
@@ -69,6 +70,7 @@ class ArmFacts:
     lost: float | None = _fact("sensors", "lost [1]", None)
     capsules: tuple[Capsule, ...] | None = _fact("collision", "capsules [m]", None)  # its outer size
     excitation: str | None = _fact("motion", "excitation", None)  # the shipped motion that was designed for it
+    log_names: tuple[tuple[str, ...], ...] | None = _fact("logs", "joint_names", None)  # of its joints in others' logs
     scheme: str | None = _fact("connection", "scheme", None)  # of its address as a live source
     controller: str | None = _fact("connection", "controller", None)  # whose forms of a load it takes
     torque_constants: tuple[float, ...] | None = _fact("current", "torque_constants [N·m/A]", None)
@@ -76,11 +78,13 @@ class ArmFacts:
     def __post_init__(self) -> None:
         for entry in fields(self):
             value = getattr(self, entry.name)
-            if isinstance(value, tuple) and entry.name != "capsules" and len(value) != self.joints:
-                raise ArmError(
-                    f"{entry.name} of the sheet of {self.name} has {len(value)} numbers: expected {self.joints}, one "
-                    "per joint"
-                )
+            rows = value if entry.name == "log_names" and value is not None else (value,)
+            for row in rows:
+                if isinstance(row, tuple) and entry.name != "capsules" and len(row) != self.joints:
+                    raise ArmError(
+                        f"{entry.name} of the sheet of {self.name} has {len(row)} entries: expected {self.joints}, one "
+                        "per joint"
+                    )
         if self.torque_side not in ("link", "motor"):
             raise ArmError(f"torque side of the sheet of {self.name} is {self.torque_side!r}: expected link or motor")
 

@@ -1,12 +1,14 @@
-"""Whether two descriptions are of the same arm, whatever the names in them and the pose of the base."""
+"""Whether two descriptions are of the same arm, whatever the names in them; and which joints of a log are the arm's."""
 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Collection
 
 import numpy as np
 from numpy.typing import NDArray
 
+from armload.arms.facts import ARMS
 from armload.arms.model import Arm
 
 _TURN = 0.3  # [rad, m] of the first joint, which shows its axis
@@ -34,6 +36,22 @@ def prefixed_frame(arm: Arm, frame: str) -> str | None:
         return frame
     found = [name for name in arm.frames if name.endswith(frame)]
     return found[0] if len(found) == 1 else None
+
+
+def names_among(arm: Arm, found: Collection[str]) -> tuple[str, ...] | None:
+    """What the arm's joints (n,) are called among these names; None: one of them is missing.
+
+    The names of its description hold first; then those under which its sheet knows its joints in logs of others.
+
+    >>> from armload.arms import arm
+    >>> names_among(arm("ur5e"), ["elbow_joint"]) is None
+    True
+    >>> names_among(arm("iiwa14"), [f"iiwa_joint_{k}" for k in range(7, 0, -1)])[0]
+    'iiwa_joint_1'
+    """
+    facts = None if arm.known_as is None else ARMS.get(arm.known_as)
+    others = facts.log_names or () if facts is not None and facts.joints == arm.n else ()
+    return next((names for names in (arm.joint_names, *others) if set(names) <= set(found)), None)
 
 
 def _poses(arm: Arm, q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

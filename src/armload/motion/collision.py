@@ -10,7 +10,9 @@ Capsules are coarse on purpose: a motion must stay clear of them by a margin, no
 - floor: the plane z = 0 of the base, on which the base is mounted (for an arm on a wall or ceiling: that wall).
 
 Neighbouring links share a joint and always touch, so they are not tested against each other; nor are links with so
-little between them that they touch whenever the arm folds.
+little between them that they touch whenever the arm folds. Of an arm without a size on its sheet, no two parts are
+tested that no pose brings `POSE_SELF` apart (a UR5's forearm and the ball), and no part against a floor that it is
+never `POSE_FLOOR` above (its shoulder): no motion could keep them clear.
 """
 
 from __future__ import annotations
@@ -23,10 +25,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armload.arms import ARMS, PAYLOAD_REACH, Arm, Capsule, NearestCapsules, arm
+from armload.arms import ARMS, PAYLOAD_REACH, Arm, Capsule, NearestCapsules, arm, poses
 
 PAYLOAD_RADIUS = 0.15  # [m]
 _THIN, _THICK = 0.02, 0.04  # radius of an unknown arm's links over the sum of its link lengths
+POSE_FLOOR, POSE_SELF = 0.10, 0.02  # [m] clearances of a pose that a motion may be built around
 _SAME_PLACE = 1e-3  # [m] between joints' origins of arms with the same links
 _ROOM_TO_FOLD = 1.2  # links nearer than this multiple of their radii cannot be kept apart by the joints between them
 
@@ -48,6 +51,7 @@ class CapsuleArm:
     start, end: (C, 3) ends of the capsules' axes in the links' joint frames [m].
     radius: (C,) [m].
     pairs: (P, 2) capsules to test against each other.
+    above: (F,) capsules to test against the floor.
     names: what each capsule is called in a message.
     """
 
@@ -57,6 +61,7 @@ class CapsuleArm:
     end: NDArray[np.float64]
     radius: NDArray[np.float64]
     pairs: NDArray[np.int64]
+    above: NDArray[np.int64]
     names: tuple[str, ...]
 
     def clearance(self, q: ArrayLike, floor: float | None = 0.0) -> Clearance:
@@ -71,25 +76,20 @@ class CapsuleArm:
         if floor is None:
             return Clearance(np.full(len(poses), np.inf), np.zeros(len(poses), dtype=int), apart, pair)
         height, lowest = self._ground(poses)
-        return Clearance(height - floor, self._above[lowest] if len(self._above) else lowest, apart, pair)
+        return Clearance(height - floor, self.above[lowest] if len(self.above) else lowest, apart, pair)
 
     @cached_property
     def _capsules(self) -> list[Capsule]:
-        parts = zip(self.link.tolist(), self.start.tolist(), self.end.tolist(), self.radius.tolist(), strict=True)
-        return [Capsule(link, tuple(start), tuple(end), radius) for link, start, end, radius in parts]
+        parts = zip(self.link, self.start, self.end, self.radius, strict=True)
+        return [_capsule(*part) for part in parts]
 
     @cached_property
     def _itself(self) -> NearestCapsules:
         return NearestCapsules(self.arm, self._capsules, [(int(i), int(j)) for i, j in self.pairs])
 
     @cached_property
-    def _above(self) -> NDArray[np.int64]:
-        """Which capsules may hit the floor: the base, and what only turns on it, stand on it."""
-        return np.flatnonzero(self.link >= 2)
-
-    @cached_property
     def _ground(self) -> NearestCapsules:
-        return NearestCapsules(self.arm, self._capsules, [(int(part), -1) for part in self._above])
+        return NearestCapsules(self.arm, self._capsules, [(int(part), -1) for part in self.above])
 
 
 def capsule_arm(arm: Arm, payload_radius: float = PAYLOAD_RADIUS) -> CapsuleArm:
@@ -128,6 +128,11 @@ def capsule_arm(arm: Arm, payload_radius: float = PAYLOAD_RADIUS) -> CapsuleArm:
         return between <= _ROOM_TO_FOLD * (r_i + r_j)
 
     pairs = [pair for pair in combinations(range(len(parts)), 2) if not always_touch(*pair)]
+    above = [(part, -1) for part, (link, *_) in enumerate(parts) if link >= 2]  # the rest only turns on the base
+    if measured is None:
+        capsules = [_capsule(link, start, end, radius) for link, start, end, radius in parts]
+        pairs = _separable(arm, capsules, pairs, POSE_SELF)
+        above = _separable(arm, capsules, above, POSE_FLOOR)
     return CapsuleArm(
         arm,
         np.array([part[0] for part in parts]),
@@ -135,8 +140,19 @@ def capsule_arm(arm: Arm, payload_radius: float = PAYLOAD_RADIUS) -> CapsuleArm:
         np.array([part[2] for part in parts]),
         np.array([part[3] for part in parts]),
         np.array(pairs, dtype=int).reshape(-1, 2),
+        np.array([part for part, _ in above], dtype=int),
         tuple(names),
     )
+
+
+def _capsule(link: int, start: NDArray[np.float64], end: NDArray[np.float64], radius: float) -> Capsule:
+    return Capsule(int(link), (start[0], start[1], start[2]), (end[0], end[1], end[2]), float(radius))
+
+
+def _separable(arm: Arm, capsules: list[Capsule], pairs: list[tuple[int, int]], apart: float) -> list[tuple[int, int]]:
+    """Those of the pairs that some pose brings this far apart [m]."""
+    q = poses(arm)
+    return [pair for pair in pairs if NearestCapsules(arm, capsules, [pair])(q)[0].max() >= apart]
 
 
 def _measured(origins: NDArray[np.float64]) -> tuple[Capsule, ...] | None:

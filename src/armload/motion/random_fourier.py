@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from armload.arms import Arm, Limits, facts_of
 from armload.errors import MotionError
 from armload.motion.check import check_motion, rated_load
-from armload.motion.collision import CapsuleArm, capsule_arm
+from armload.motion.collision import POSE_FLOOR, POSE_SELF, CapsuleArm, capsule_arm
 from armload.motion.fourier import FourierMotion
 from armload.motion.motion_file import shipped_motion
 
@@ -76,7 +76,7 @@ def random_motion(
     best: tuple[float, FourierMotion] | None = None
     k = np.arange(1.0, harmonics + 1.0)
     if around is None:
-        poses = clear_poses(arm, model, rng, floor, _POSES, 2 * _FLOOR, 2 * _SELF)[:_TRIALS]
+        poses = clear_poses(arm, model, rng, floor, _POSES, POSE_FLOOR, POSE_SELF)[:_TRIALS]
     else:
         poses = np.tile(np.asarray(around, dtype=float), (_TRIALS, 1))
         if poses.shape != (_TRIALS, arm.n):

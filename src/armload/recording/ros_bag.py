@@ -1,8 +1,9 @@
 """Logs inside ROS bags: the sensor_msgs/JointState messages of one topic (ROS 1 .bag, ROS 2 .db3, .mcap or folder).
 
-The joints of a JointState are known by **name**: their order is the publisher's own (UR's driver may list the elbow
-first, grippers publish finger joints on the same topic). Time is the message's header stamp, counted from the first;
-where all stamps are equal, as with publishers that do not set them, it is the time of logging.
+The joints of a JointState are known by **name**, that of the description or another on the arm's sheet: their order
+is the publisher's own (UR's driver may list the elbow first, grippers publish finger joints on the same topic). Time
+is the message's header stamp, counted from the first; where all stamps are equal, as with publishers that do not set
+them, it is the time of logging.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm
+from armload.arms import Arm, names_among
 from armload.errors import RecordingError, one_line
 from armload.recording.columns import checked_recording
 from armload.recording.recording import Recording
@@ -131,8 +132,7 @@ def _choose(bag: _Bag, where: str, arm: Arm | None, topic: str | None) -> str:
     if arm is None:
         candidates = bag.topics
     else:
-        wanted = set(arm.joint_names)
-        candidates = [name for name in bag.topics if any(wanted <= set(m.names) for m in bag.messages(name))]
+        candidates = [name for name in bag.topics if any(names_among(arm, m.names) for m in bag.messages(name))]
         if not candidates:
             found = sorted({joint for name in bag.topics for m in bag.messages(name) for joint in m.names})
             _refuse_joints(where, f"topics {', '.join(bag.topics)}", arm, found)
@@ -146,14 +146,17 @@ def _choose(bag: _Bag, where: str, arm: Arm | None, topic: str | None) -> str:
 
 def _recording(bag: _Bag, topic: str, where: str, arm: Arm | None) -> Recording:
     wanted = None if arm is None else arm.joint_names
+    called: tuple[str, ...] | None = None  # what the log calls the arm's joints
     columns: dict[tuple[str, ...], list[int] | None] = {}  # by names in a message: places of the arm's joints
     stamps, log_times, rows, numbers = [], [], [], []
     for number, message in enumerate(bag.messages(topic), start=1):
         if wanted is None:
             wanted = message.names
         if message.names not in columns:
-            complete = wanted and set(wanted) <= set(message.names)
-            columns[message.names] = [message.names.index(name) for name in wanted] if complete else None
+            if called is None:
+                called = wanted if arm is None else names_among(arm, message.names)
+            complete = called is not None and set(called) <= set(message.names)
+            columns[message.names] = [message.names.index(name) for name in called or ()] if complete else None
         order = columns[message.names]
         if order is None:
             continue  # another device on the same topic, such as a gripper

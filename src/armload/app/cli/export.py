@@ -162,8 +162,7 @@ def _notes(load: Load, to: str) -> list[str]:
     if load.undetermined:
         notes.append(f"not determined by the log: {', '.join(load.undetermined)}; written as known beforehand")
     facts = ARMS.get(load.robot or "")
-    maker = None if facts is None else facts.controller
-    if maker is not None and to in CONTROLLERS and not to.startswith(maker):
+    if facts is not None and to in CONTROLLERS and not (facts.controller and to.startswith(facts.controller)):
         notes.append(f"it was identified on a {load.robot}: another maker's flange may have other axes")
     if to == "franka" and load.relative_to == "arm":
         notes.append("this contains any hand that is mounted: take off what Desk counts already with --minus")

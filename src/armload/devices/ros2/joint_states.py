@@ -1,8 +1,9 @@
 """From sensor_msgs/JointState messages to samples of one arm, as they come.
 
-Joints are known by **name**: a message may list them in any order and others beside them (gripper fingers). Time is the
-header's stamp, counted from the first; where messages are not stamped (all zero) it is the time of receipt. `effort` is
-the joint torque. `armload.recording.ros_bag` does the same for whole logs, and refuses what is only suspicious here.
+Joints are known by **name**, that of the description or another on the arm's sheet: a message may list them in any
+order and others beside them (gripper fingers). Time is the header's stamp, counted from the first; where messages are
+not stamped (all zero) it is the time of receipt. `effort` is the joint torque. `armload.recording.ros_bag` does the
+same for whole logs, and refuses what is only suspicious here.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm
+from armload.arms import Arm, names_among
 from armload.errors import SourceError
 from armload.recording import Sample
 
@@ -33,7 +34,8 @@ class JointStates:
 
     def __init__(self, arm: Arm, topic: str) -> None:
         self.others: set[str] = set()
-        self._wanted, self._topic = arm.joint_names, topic
+        self._arm, self._topic = arm, topic
+        self._called: tuple[str, ...] | None = None  # what the topic calls the arm's joints
         self._layouts: dict[tuple[str, ...], list[int] | None] = {}
         self._first_received: int | None = None  # [ns] since 1970, as all times here
         self._zero: int | None = None  # the stamp at t = 0, once a message was stamped
@@ -54,8 +56,10 @@ class JointStates:
             if len(self._layouts) >= _MOST_LAYOUTS:
                 self._layouts.clear()
                 self.others.clear()
-            complete = set(self._wanted) <= set(names)
-            self._layouts[names] = [names.index(name) for name in self._wanted] if complete else None
+            if self._called is None:
+                self._called = names_among(self._arm, names)
+            complete = self._called is not None and set(self._called) <= set(names)
+            self._layouts[names] = [names.index(name) for name in self._called or ()] if complete else None
             self.others.update(() if complete else names)
         order = self._layouts[names]
         if order is None:

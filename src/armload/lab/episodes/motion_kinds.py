@@ -13,7 +13,7 @@ from armload.errors import MotionError
 from armload.inertia import InertialParameters
 from armload.motion import FourierMotion, Motion, check_motion, rated_load
 from armload.motion.blended import BlendedMotion
-from armload.motion.collision import CapsuleArm, capsule_arm
+from armload.motion.collision import POSE_FLOOR, POSE_SELF, CapsuleArm, capsule_arm
 from armload.motion.point_to_point import PointToPoint
 from armload.motion.random_fourier import clear_poses, filled_limits
 
@@ -200,7 +200,7 @@ class MotionSource:
     def poses(self) -> NDArray[np.float64]:
         """Clear poses (P, n) from the middle of the range that the arm can hold with its rated payload."""
         rng = np.random.default_rng(0)
-        poses = clear_poses(self.arm, self.model, rng, self.floor, _POSES, 2 * _FLOOR, 2 * _SELF)
+        poses = clear_poses(self.arm, self.model, rng, self.floor, _POSES, POSE_FLOOR, POSE_SELF)
         if not len(poses):
             raise MotionError(
                 f"no pose of {self.arm.name} found that is clear of the floor and of itself and within its torque "
