@@ -41,6 +41,7 @@ class HybridIdentifier(PosteriorLeastSquares):
         tare: an earlier log of the same arm, on any motion, with whatever was mounted then.
         model: the learned parts; None: those shipped for the arm.
         features: of the smooth mismatch; a model's error bars were calibrated with the default.
+        drift: as for `PosteriorLeastSquares`.
 
     Raises:
         ModelError: no model is shipped for this arm, or it was trained for another one.
@@ -56,6 +57,7 @@ class HybridIdentifier(PosteriorLeastSquares):
         tare: Recording | None = None,
         model: HybridModel | None = None,
         features: JointFeatures | None = None,
+        drift: float = 0.0,
     ) -> None:
         self.model = shipped_model(arm) if model is None else model
         self._payloads = self.model.prior_for(arm)
@@ -63,7 +65,7 @@ class HybridIdentifier(PosteriorLeastSquares):
         self.calibrated = self.model.calibrated
         self.payload_prior = (self._payloads.mean, self._payloads.std)
         self.features = features or JointFeatures(arm.n)
-        super().__init__(arm, tare)
+        super().__init__(arm, tare, drift=drift)
         if tare is not None:
             self._same_motion = SameMotion(arm, tare, self.gain)
 

@@ -22,7 +22,7 @@ from armload.posterior.solve import solve
 from armload.posterior.stream import StreamingPosterior
 from armload.recording import GAP, Recording, Sample
 from armload.regression import Correction, GaussianPrior, JointFeatures, payload_prior_std, solution_prior_std
-from armload.regression.information import RegressionData
+from armload.regression.information import SAME, RegressionData, Session
 from armload.regression.lag import GAIN
 from armload.regression.noise import RIGID, SMOOTH, NoiseModel
 
@@ -46,6 +46,7 @@ class PosteriorLeastSquares(Identifier):
             relative to it.
         gain: λ of the lag [1/s].
         prior: what is known about the payload before; None: the weak prior of `solution_prior_std`.
+        drift: by how many daily deviations (`Correction.daily_std`) offsets and friction may have changed since the tare.
 
     Attributes:
         reference: an earlier run of the stream with the same mounted as at the tare; it is a tare, too.
@@ -56,12 +57,19 @@ class PosteriorLeastSquares(Identifier):
     _noise: NoiseModel = RIGID
     _iterations = 12  # of expectation–maximisation in a last solution; with features it settles in five
     _same_motion: SameMotion | None = None
+    test_tare = True  # whether an answer asks if the arm is as it was at the tare; episodes of a training do not
     _traits_frame: NDArray[np.float64] | None = None  # see `Evidence.of`: they are about the estimate's own frame
 
     def __init__(
-        self, arm: Arm, tare: Recording | None = None, gain: float = GAIN, prior: GaussianPrior | None = None
+        self,
+        arm: Arm,
+        tare: Recording | None = None,
+        gain: float = GAIN,
+        prior: GaussianPrior | None = None,
+        drift: float = 0.0,
     ) -> None:
         self.arm, self.gain, self.prior = arm, gain, prior
+        self.session = Session(1, drift) if tare is not None and drift > 0.0 else SAME
         self._weak = payload_prior_std(arm)
         self._correction = Correction(arm, rated_effort(arm))
         self.reference: PosteriorLeastSquares | None = None
@@ -182,6 +190,8 @@ class PosteriorLeastSquares(Identifier):
                 self.gain,
                 self._iterations,
                 self._same_motion,
+                self.session,
+                self.test_tare,
             )
         return self._stream
 
@@ -249,7 +259,7 @@ class SmoothPosteriorLeastSquares(PosteriorLeastSquares):
     'map-gp'
 
     Args:
-        arm, tare, gain, prior: as for `PosteriorLeastSquares`.
+        arm, tare, gain, prior, drift: as for `PosteriorLeastSquares`.
         features: of the smooth part; None: 128 of the pose, 12 of the velocity.
         same_motion: whether a tare along the run's own motion takes the posterior's place in the `evidence`.
     """
@@ -266,11 +276,12 @@ class SmoothPosteriorLeastSquares(PosteriorLeastSquares):
         prior: GaussianPrior | None = None,
         features: JointFeatures | None = None,
         same_motion: bool = False,
+        drift: float = 0.0,
     ) -> None:
         self.features = features or JointFeatures(arm.n)
         if same_motion and tare is not None:
             self._same_motion = SameMotion(arm, tare, gain)
-        super().__init__(arm, tare, gain, prior)
+        super().__init__(arm, tare, gain, prior, drift)
 
     @property
     def _features(self) -> JointFeatures:

@@ -1,12 +1,13 @@
 """One solution of the MAP problem: unknowns eliminated joint by joint, scales improved step by step.
 
-z = [payloads, eta] is what all joints share, g_j are the weights of joint j's own features. Given the scales, all is
+z = [payloads, eta, drifts] is what all joints share, g_j are the weights of joint j's own features. A drift is what
+offsets and friction of a session differ by from those of session 0. Given the scales, all is
 linear and Gaussian; `posterior` says what `posterior.solve` does with it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple
 
@@ -41,12 +42,14 @@ class Scales:
 
     noise: S of each run (K, n) [N²·m²·s]. eta: prior variance (p,). features: prior variance of the weights (n, R).
     payloads: prior variance (10,) of the payload, or (20,) of the tares' and of what was added.
+    drifts: prior variance (K', d) of each session that drifts.
     """
 
     noise: NDArray[np.float64]
     eta: NDArray[np.float64]
     features: NDArray[np.float64]
     payloads: NDArray[np.float64]
+    drifts: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +58,8 @@ class Posterior:
 
     phi, covariance: (10,), (10, 10) of the payload (relative to the tare, if there was one).
     information, vector: Λ (10, 10) and Λ·phi_ML (10,): what the logs alone say, all else integrated out.
-    eta: (p,) the arm's mismatch.
+    eta: (p,) the arm's mismatch, in session 0.
+    drift, drift_covariance: (d,), (d, d) by which the run's session differs from session 0; (0,) where it does not.
     residual: √S (n,) of the run [N·m·√s].
     torque: "link" or "motor", the side the torque seems to be measured on.
     gain_std: relative standard deviation of the torque's calibration.
@@ -69,6 +73,8 @@ class Posterior:
     information: NDArray[np.float64]
     vector: NDArray[np.float64]
     eta: NDArray[np.float64]
+    drift: NDArray[np.float64]
+    drift_covariance: NDArray[np.float64]
     residual: NDArray[np.float64]
     torque: str
     gain_std: float
@@ -127,7 +133,13 @@ class Problem:
         self.runs, self.noise_model, self.correction = runs, noise, runs[0].correction
         self.features = runs[0].features
         count, p = min(len(runs), 2), self.correction.size
-        self.payloads, self.size = 10 * count, 10 * count + p
+        d = self.correction.drifting
+        # the run's own session first: its rows go on
+        own, others = runs[-1].session, {run.session for run in runs[:-1]} - {runs[-1].session}
+        self.sessions = [s for s in (own, *sorted(others, key=lambda s: s.number)) if s.drift > 0.0]
+        self.payloads, self.size = 10 * count, 10 * count + p + d * len(self.sessions)
+        self.eta = slice(self.payloads, self.payloads + p)
+        self.drift_variance = np.array([(s.drift * self.correction.daily_std) ** 2 for s in self.sessions])
         self.last = slice(10 * (count - 1), 10 * count)
         self.payload_variance = np.tile(np.asarray(prior_std) ** 2, count)
         self.mean, self.root = np.zeros(self.size), None
@@ -140,25 +152,35 @@ class Problem:
             E = np.zeros((10 + p, self.size))
             for i in range(count if run is runs[-1] else 1):
                 E[:10, 10 * i : 10 * i + 10] = np.eye(10)
-            E[10:, self.payloads :] = np.eye(p)
+            E[10:, self.eta] = np.eye(p)
+            if run.session in self.sessions:
+                E[10 : 10 + d, self._drift(self.sessions.index(run.session))] = np.eye(d)
             self.selections.append(E)
         self.parts = [run.selected(E) for run, E in zip(runs, self.selections, strict=True)]
         self.crossed = [run.A[:, 10 + p :, : 10 + p] @ E for run, E in zip(runs, self.selections, strict=True)]
         group = np.repeat([_POSE, _VELOCITY], [self.features.pose, self.features.velocity])
         self.feature_variance = (np.outer(self.correction.effort, group)) ** 2
 
+    def _drift(self, k: int) -> slice:
+        """Where z has the drift of the k-th session that drifts."""
+        d = self.correction.drifting
+        return slice(self.eta.stop + k * d, self.eta.stop + (k + 1) * d)
+
     def scales(self, start: Scales | None) -> Scales:
         """Where expectation–maximisation begins."""
         noise = self.expected.copy()
         if start is None:
-            return Scales(noise, self.correction.prior_std**2, self.feature_variance, self.payload_variance)
+            eta = self.correction.prior_std**2
+            return Scales(noise, eta, self.feature_variance, self.payload_variance, self.drift_variance)
         noise[: len(start.noise)] = start.noise[: len(noise)]
-        return Scales(noise, start.eta, start.features, self.payload_variance)
+        same = start.drifts.shape == self.drift_variance.shape
+        drifts = start.drifts if same else self.drift_variance
+        return Scales(noise, start.eta, start.features, self.payload_variance, drifts)
 
     def posterior(self, scales: Scales) -> _Gaussian:
         """z and g given the scales."""
         A, b, own, slope, rest = self._eliminated(scales)
-        root = np.diag(np.sqrt(np.concatenate([scales.payloads, scales.eta])))
+        root = np.diag(np.sqrt(np.concatenate([scales.payloads, scales.eta, scales.drifts.ravel()])))
         if self.root is not None:
             root[self.last, self.last] = self.root
         P = root @ np.linalg.inv(root.T @ A @ root + np.eye(self.size)) @ root.T
@@ -190,7 +212,7 @@ class Problem:
         first, last = self.last.start, self.last
         shared = np.r_[0:first, last.stop : self.size]
         order = np.r_[last.start : last.stop, shared]
-        prior = np.concatenate([scales.payloads, scales.eta])[shared]
+        prior = np.concatenate([scales.payloads, scales.eta, scales.drifts.ravel()])[shared]
         A, b = found.A, found.b
         root = np.sqrt(prior)
         C = np.linalg.inv(root[:, None] * A[np.ix_(shared, shared)] * root + np.eye(len(root)))
@@ -208,6 +230,7 @@ class Problem:
             vector=h,
             noise=scales.noise[-1].copy(),
             tares=first // 10,
+            drifts=self.correction.drifting if self.runs[-1].session.drift > 0.0 else 0,
         )
 
     def improved(self, scales: Scales, found: _Gaussian) -> Scales:
@@ -216,7 +239,7 @@ class Problem:
         variance = np.diag(P)
         eta, stated = scales.eta.copy(), self.correction.prior_std**2
         adaptive = self.correction.adaptive
-        seen = z[self.payloads :] ** 2 + variance[self.payloads :]
+        seen = z[self.eta] ** 2 + variance[self.eta]
         eta[adaptive] = 0.5 * (stated + seen)[adaptive]
         features = scales.features.copy()
         weights = found.weights
@@ -227,7 +250,8 @@ class Problem:
                 total = (weights[:, part] ** 2 + spread[:, part]).sum(axis=1, keepdims=True)
                 known = _FEATURE_COUNT * self.feature_variance[:, part]
                 features[:, part] = (known + total) / (_FEATURE_COUNT + size)
-        return Scales(self._noise(found), eta, features, self._payloads(z, variance))
+        drifts = 0.5 * (self.drift_variance + (z**2 + variance)[self.eta.stop :].reshape(self.drift_variance.shape))
+        return Scales(self._noise(found), eta, features, self._payloads(z, variance), drifts)
 
     def _noise(self, found: _Gaussian) -> NDArray[np.float64]:
         """S of each run."""
@@ -250,7 +274,8 @@ class Problem:
     def answer(self, scales: Scales, found: _Gaussian) -> Posterior:
         """The payload of the last run."""
         phi, covariance = found.mean[self.last], found.covariance[self.last, self.last]
-        eta = found.mean[self.payloads :]
+        eta = found.mean[self.eta]
+        drift = self._drift(0) if self.runs[-1].session.drift > 0.0 else slice(0, 0)
         friction = float(np.median(np.abs(self.correction.coulomb(eta)) / self.correction.effort))
         torque = "motor" if self.correction.arm.motor_torque or friction > _MOTOR_SIDE else "link"
         precision = np.linalg.inv(covariance)
@@ -266,6 +291,8 @@ class Problem:
             information=precision - before,
             vector=precision @ phi - pull,
             eta=eta,
+            drift=found.mean[drift],
+            drift_covariance=found.covariance[drift, drift],
             residual=np.sqrt(scales.noise[-1]),
             torque=torque,
             gain_std=gain,

@@ -38,7 +38,8 @@ class SequentialPosterior:
     C (n, R, R), own (n, R), slope (n, R, 10 + m): of the joints' own weights. shared_C (m, m), shared_own (m,),
     shared_slope (m, 10): of what the joints share, s = [tares' payloads, eta]. Of C and shared_C only the lower
     triangles count: half of what a row reads and writes. information Λ (10, 10), vector h (10,).
-    noise: S (n,) [N²·m²·s]. tares: payloads of runs before this one, which the rows carry too: 0 or 1.
+    noise: S (n,) [N²·m²·s]. tares: payloads of runs before this one, which the rows carry too: 0 or 1. drifts: how many
+    unknowns of eta, the first ones, have a deviation of this session, which follows eta in s.
     seen: (n, 12) of each joint's last row, given all before: w (10,), e' and v', so that e' ~ N(w·phi, v').
     scale: (n,) what the last row was multiplied by.
     """
@@ -53,6 +54,7 @@ class SequentialPosterior:
     vector: NDArray[np.float64]
     noise: NDArray[np.float64]
     tares: int
+    drifts: int
     seen: NDArray[np.float64] = field(init=False)
     scale: NDArray[np.float64] = field(init=False)
 
@@ -77,7 +79,7 @@ class SequentialPosterior:
     def _condition(self, row: Row, scale: NDArray, seen: NDArray, condition: bool) -> None:
         own, shared = (self.C, self.own, self.slope), (self.shared_C, self.shared_own, self.shared_slope)
         found = (self.information, self.vector, seen)
-        _condition(row.X, row.r, scale, self.tares, *own, *shared, *found, condition)
+        _condition(row.X, row.r, scale, self.tares, self.drifts, *own, *shared, *found, condition)
 
     def copy(self) -> Self:
         """Another one in the same state."""
@@ -97,7 +99,7 @@ def _product(lower, x, c):  # pragma: no cover - compiled
 
 @njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz"})
 def _condition(
-    X, r, scale, tares, C, own, slope, shared_C, shared_own, shared_slope, information, vector, seen, condition
+    X, r, scale, tares, drifts, C, own, slope, shared_C, shared_own, shared_slope, information, vector, seen, condition
 ):  # pragma: no cover - compiled
     """Each joint's row freed of its own weights, then of what the joints share; the state changes if `condition`."""
     n, R, Z = C.shape[0], C.shape[1], slope.shape[2]
@@ -113,6 +115,10 @@ def _condition(
                 z[10 * (i + 1) + k] = z[k]
         for k in range(10, known):
             z[10 * tares + k] = a * X[j, k]
+        for k in range(drifts):
+            z[10 * tares + known + k] = a * X[j, 10 + k]
+        for k in range(10 * tares + known + drifts, Z):
+            z[k] = 0.0  # of other sessions
         e, v = a * r[j], 1.0
         for i in range(R):
             x[i] = a * X[j, known + i]

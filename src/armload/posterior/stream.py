@@ -19,13 +19,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from armload.posterior.drift import ALLOWED, Drift, drift_since_tare
 from armload.posterior.handover import Handover, Result
 from armload.posterior.problem import Posterior, Scales
 from armload.posterior.same_motion import Difference, SameMotion
 from armload.posterior.sequential import SequentialPosterior
 from armload.posterior.solve import Solution, solve_to_go_on
 from armload.regression import Correction, GaussianPrior, JointFeatures
-from armload.regression.information import RegressionData
+from armload.regression.information import SAME, RegressionData, Session
 from armload.regression.lag import GAIN
 from armload.regression.noise import MOMENT, NoiseModel, share_of_noise, whole_noise
 from armload.regression.rows import REGRESSOR_RATE, FilteredRegression, Row, Rows
@@ -47,10 +48,13 @@ class StreamingPosterior:
         tares: what earlier runs said, all with the same mounted; `start`: the scales found from them.
         gain: λ of the lag [1/s]. iterations: of expectation–maximisation in the last solution.
         same_motion: asks whether the tare shows the run's motion; None: nobody asks.
+        session: of the run; the tares' is session 0 unless they are of this one.
+        test_tare: whether `conclude` asks if the arm is as it was at the tare; the solution allows for it if not.
 
     Attributes:
         posterior: the last full solution; its scales, ratios and torque side hold until the next.
         difference: what the torque difference with a tare along the same motion says, where it is the better evidence.
+        drift: by how much the arm differs from what it was at the tare; None: not asked yet.
         solutions: full solutions so far. rows: how many. row: the last one; seconds: what all rows stand for [s].
     """
 
@@ -66,9 +70,12 @@ class StreamingPosterior:
         gain: float = GAIN,
         iterations: int = 5,
         same_motion: SameMotion | None = None,
+        session: Session = SAME,
+        test_tare: bool = True,
     ) -> None:
         self.correction, self.features, self.noise = correction, features, noise
-        self.prior_std, self.prior, self.iterations = prior_std, prior, iterations
+        self.prior_std, self.prior, self.iterations, self.session = prior_std, prior, iterations, session
+        self._test_tare = test_tare
         mean, root = (np.zeros(10), np.diag(prior_std)) if prior is None else (prior.mean.copy(), prior.root)
         self._gaussian = mean, np.ascontiguousarray(root), np.ascontiguousarray(root.T)
         self.tares, self.gain, self.start = tuple(tares), gain, start
@@ -93,6 +100,7 @@ class StreamingPosterior:
         self.rows, self.seconds, self.solutions = 0, 0.0, 0
         self.row: Row | None = None
         self.difference: Difference | None = None
+        self.drift: Drift | None = None
         self._posterior: Posterior | None = None
 
     def prepare(self) -> None:
@@ -111,7 +119,7 @@ class StreamingPosterior:
         return self._posterior
 
     def _empty(self) -> RegressionData:
-        return RegressionData(self.correction, self.gain, self.features, self.noise.block)
+        return RegressionData(self.correction, self.gain, self.features, self.noise.block, self.session)
 
     def take(self, t: float, q: NDArray, dq: NDArray, tau: NDArray) -> bool:
         """Take one sample (n,); times rise. True if it completed a row, that is, if there is something new."""
@@ -192,8 +200,17 @@ class StreamingPosterior:
         """A last solution from all rows so far, as no more will come; it begins with the scales found from the tare."""
         self._handover.abandon()
         self._accumulate_waiting()
-        self._adopt(self._solved([*self.tares, self._run], self.start, self.iterations - 1))
-        self.difference = self._better(self.posterior.covariance)
+        runs = [*self.tares, self._run]
+        self._adopt(self._solved(runs, self.start, self.iterations - 1))
+        self.drift = None
+        if self.tares and self._test_tare:
+            self.drift = drift_since_tare(runs, self.prior_std, self.prior, self.noise, self.posterior)
+            if self.drift.changed:
+                self._run.session = Session(1, max(ALLOWED, self.session.drift))
+                self._adopt(self._solved(runs, self.start, self.iterations - 1))
+                self._run.session = self.session
+        changed = self.drift is not None and self.drift.changed  # then the difference is of two arms, too
+        self.difference = None if changed else self._better(self.posterior.covariance)
 
     def _solved(self, runs: list[RegressionData], start: Scales | None, steps: int) -> Solution:
         return solve_to_go_on(runs, self.prior_std, self.prior, self.noise, steps + 1, start)

@@ -8,6 +8,7 @@ The rows are those of `rows.FilteredRegression`; eta is shared by the joints, g 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,21 @@ _PRIOR_COUNT = 4.0
 NOVELTY = 10.0
 
 
+@dataclass(frozen=True)
+class Session:
+    """Between two switchings-on of an arm: its offsets and friction are the same throughout.
+
+    number: sessions of the same number are one. drift: by how many daily deviations (`Correction.daily_std`) it differs
+    from session 0, 1 sigma; 0: not at all.
+    """
+
+    number: int = 0
+    drift: float = 0.0
+
+
+SAME = Session()
+
+
 class RegressionData:
     """What one recording says about x_j = [phi, eta, g_j]: information per joint and block sums.
 
@@ -32,12 +48,18 @@ class RegressionData:
         gain: λ of the lag [1/s].
         features: of each joint's nonparametric part; None: there is none.
         block: length of the blocks of the residual's batch means [s].
+        session: that the recording is of.
     """
 
     def __init__(
-        self, correction: Correction, gain: float, features: JointFeatures | None = None, block: float = BLOCK
+        self,
+        correction: Correction,
+        gain: float,
+        features: JointFeatures | None = None,
+        block: float = BLOCK,
+        session: Session = SAME,
     ) -> None:
-        self.correction, self.gain = correction, gain
+        self.correction, self.gain, self.session = correction, gain, session
         arm = correction.arm
         self.features = features or JointFeatures(arm.n, 0, 0)
         size = 10 + correction.size + self.features.size

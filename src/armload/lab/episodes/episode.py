@@ -35,6 +35,7 @@ class Episode:
     rate: of the logs [Hz].
     seed: of the sensors' noise.
     population: where it was drawn from.
+    tare_world: the arm as it was at the tare, where it has changed since; None: it has not.
     """
 
     arm: Arm
@@ -51,6 +52,7 @@ class Episode:
     rate: float = 200.0
     seed: int = 0
     population: str = ""
+    tare_world: World | None = None
 
     @property
     def truth(self) -> InertialParameters:
@@ -122,7 +124,7 @@ def _simulated(batch: Sequence[Episode], rate: float | None, resolution: Resolut
         loaded = carried if tool is None else carried + InertialParameters(tool.phi)
         runs = [("run", e.duration, Run(e.motion, loaded, e.world, e.sensors, e.seed, e.gains, e.elapsed))]
         if e.tare_motion is not None:
-            tare = Run(e.tare_motion, tool, e.world, e.sensors, e.seed + _TARE_NOISE, e.gains)
+            tare = Run(e.tare_motion, tool, e.tare_world or e.world, e.sensors, e.seed + _TARE_NOISE, e.gains)
             runs.append(("tare", e.tare_duration, tare))
         for part, seconds, run in runs:
             groups.setdefault((id(e.arm), hz, seconds), []).append((k, part, run))

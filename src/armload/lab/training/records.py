@@ -130,6 +130,7 @@ def _measured(first: int, batch: Sequence[Episode], times: tuple[float, ...]) ->
 def evidence_over_time(arm: Any, run: Recording, tare: Recording | None, times: Sequence[float]) -> list[Evidence]:
     """Evidence `times` [s] after a run began."""
     physics = SmoothPosteriorLeastSquares(arm, tare, same_motion=True)
+    physics.test_tare = False  # what a training learns is how far such evidence can be trusted
     stops = np.searchsorted(run.t, run.t[0] + np.asarray(times), side="right")
     out, start = [], 0
     for stop in np.maximum(stops, 2):

@@ -1,0 +1,119 @@
+"""Is an arm as it was at its tare? How often sound logs are doubted, how often changed arms are, and what is answered.
+
+    python benchmarks/tare_drift.py [--episodes 40] [--seed 5] [--cases sound,old]
+
+Every case draws episodes of a population of the benchmark (`armload.lab.episodes`), with a tare, and changes the arm
+between tare and run:
+
+sound        nothing, in four populations and on other arms
+a day        offsets and friction by what is expected of a day, 1 sigma (`Correction.daily_std`)
+a third, old offsets by ±0.1 (wrist 0.03) N·m and friction by 10 %; by ±0.3 (wrist 0.1) N·m and 30 %
+other arm    the tare is of another arm of the same kind
+
+Each log is answered by the hybrid (or `map-gp`, where none is shipped) with and without the test of
+`armload.posterior.drift`. doubted: share that are told to have changed. said or inside: share whose mass lies in its
+interval, or that are doubted. Printed, and written to benchmarks/results/tare_drift.json; about ten minutes of one core.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from script import options, say, write
+
+from armload import Arm, arm
+from armload.arms import rated_effort
+from armload.identification.choice import choose
+from armload.inertia import Z95
+from armload.lab.episodes import Episode, draw_episodes, simulate_episodes
+from armload.regression import Correction
+from armload.simulation import World
+
+CASES = {  # name → arm, population, what has changed
+    "sound": ("panda", "reference", None),
+    "sound, tare elsewhere": ("panda", "elsewhere", None),
+    "sound, everyday motions": ("panda", "everyday", None),
+    "sound, along the same motion": ("panda", "same-motion", None),
+    "sound, arms beyond the measured": ("panda", "beyond", None),
+    "sound, UR10e": ("ur10e", "reference", None),
+    "a day": ("panda", "reference", "day"),
+    "a third": ("panda", "reference", 0.33),
+    "old": ("panda", "reference", 1.0),
+    "old, along the same motion": ("panda", "same-motion", 1.0),
+    "other arm": ("panda", "reference", "other"),
+    "a day, UR10e": ("ur10e", "reference", "day"),
+    "other arm, UR10e": ("ur10e", "reference", "other"),
+}
+OLD_OFFSET = np.array([0.3, 0.3, 0.3, 0.3, 0.1, 0.1, 0.1])  # [N·m] of a Panda
+OLD_FRICTION = 0.3
+
+
+def before(episode: Episode, change: Any, k: int) -> Episode:
+    """The episode with a tare of the arm before it changed."""
+    world, rng = episode.world, np.random.default_rng([k, 99])
+    if change is None:
+        return episode
+    if change == "other":
+        return replace(episode, tare_world=World.real_like(episode.arm, 7000 + k))
+    if change == "day":
+        drift = rng.normal(size=(2, episode.arm.n)) * Correction(episode.arm, rated_effort(episode.arm)).daily_std[
+            : 2 * episode.arm.n
+        ].reshape(2, -1)
+        level = np.maximum(world.friction.level + drift[1], 0.3 * world.friction.level)
+        then = replace(world, offset=world.offset + drift[0], friction=replace(world.friction, level=level))
+    else:
+        level = world.friction.level * (1.0 + change * OLD_FRICTION)
+        offset = world.offset + change * rng.choice([-1.0, 1.0], episode.arm.n) * OLD_OFFSET
+        then = replace(world, offset=offset, friction=replace(world.friction, level=level))
+    return replace(episode, tare_world=then)
+
+
+def answered(known: Arm, episodes: list[Episode]) -> dict[str, Any]:
+    """What is said of the episodes' logs with the test and without."""
+    errors, inside, doubted, statistics = {True: [], False: []}, {True: [], False: []}, [], []
+    half: dict[bool, list[float]] = {True: [], False: []}
+    for logs in simulate_episodes(episodes):
+        for tested in (True, False):
+            identifier = choose(known, logs.tare).identifier
+            identifier.test_tare = tested
+            estimate = identifier.run(logs.run)
+            error = np.abs(estimate.phi - logs.truth.phi)
+            errors[tested].append(error)
+            inside[tested].append(error <= Z95 * estimate.std)
+            half[tested].append(float(Z95 * estimate.std[0]))
+            if tested:
+                doubted.append(identifier.stream.drift.changed)
+                statistics.append(identifier.stream.drift.statistic)
+    out: dict[str, Any] = {"episodes": len(doubted), "doubted": round(float(np.mean(doubted)), 3)}
+    out["statistic, quantiles 0.5 0.9 1"] = np.quantile(statistics, [0.5, 0.9, 1.0]).round(1).tolist()
+    for tested, name in ((True, "with the test"), (False, "without")):
+        error, held = np.array(errors[tested]), np.array(inside[tested])
+        said = held[:, 0] | np.array(doubted) if tested else held[:, 0]
+        out[name] = {
+            "mass error [g]": round(1e3 * float(error[:, 0].mean()), 1),
+            "half-width [g]": round(1e3 * float(np.mean(half[tested])), 1),
+            "first moments [g·m]": round(1e3 * float(error[:, 1:4].mean()), 2),
+            "inside": [round(float(held[:, part].mean()), 3) for part in (slice(0, 1), slice(1, 4), slice(4, 10))],
+            "said or inside": round(float(said.mean()), 3),
+        }
+    return out
+
+
+def main() -> None:
+    asked = options(__doc__, episodes=40, seed=5, cases="")
+    chosen = [name for name in CASES if not asked.cases or name in asked.cases.split(";")]
+    found = {}
+    for name in chosen:
+        robot, population, change = CASES[name]
+        known = arm(robot)
+        drawn = draw_episodes(known, population, asked.episodes, asked.seed, motions=max(6, asked.episodes // 4))
+        found[name] = answered(known, [before(episode, change, k) for k, episode in enumerate(drawn)])
+        say(f"{name}: {found[name]}")
+    if not asked.cases:
+        write("tare_drift", {"episodes": asked.episodes, "seed": asked.seed, "cases": found})
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,80 @@
+"""Whether an arm is as it was at its tare: the change of its offsets and friction since, and how surely it is one.
+
+The run's rows have unknowns of their own, delta ~ N(0, D), by which offsets and friction differ from those at the tare
+(`problem.Problem`). With P the posterior covariance of delta, and E the part of D that the tare's age explains,
+
+    T = deltaᵀ·(P + E)⁻¹·delta
+
+is small where nothing else has changed. It is large for a tare of another day, of another arm, or of another base.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.posterior.problem import Posterior
+from armload.posterior.solve import solve
+from armload.regression import Correction, GaussianPrior
+from armload.regression.information import RegressionData, Session
+from armload.regression.noise import NoiseModel
+
+# [daily deviations] that the test allows for: with a wider prior little else changes (`benchmarks/tare_drift.py`)
+TESTED = 1.0
+# [daily deviations] that an answer allows for once the arm has been found changed: about ten days', or a repair
+ALLOWED = 3.0
+# T above which an arm is not as it was at its tare, by the side its torque is measured on: of sound simulated logs, no
+# more than one in fifty is above. Motor currents hold friction that is no function of pose and velocity
+# (`benchmarks/tare_drift.py`)
+CHANGED = {"link": 60.0, "motor": 400.0}
+_STEPS = 2  # of expectation–maximisation from the scales of the solution that is tested
+
+
+@dataclass(frozen=True, eq=False)
+class Drift:
+    """By how much an arm differs from what it was at its tare.
+
+    offset, coulomb: (n,) change of the torque offsets and of the Coulomb friction [N·m]. statistic: T.
+    joint: the joint whose own T is largest, from 0. changed: whether T is beyond what sound logs show.
+    """
+
+    offset: NDArray[np.float64]
+    coulomb: NDArray[np.float64]
+    statistic: float
+    joint: int
+    changed: bool
+
+
+def drift_since_tare(
+    runs: list[RegressionData],
+    prior_std: NDArray[np.float64],
+    prior: GaussianPrior | None,
+    noise: NoiseModel,
+    found: Posterior,
+) -> Drift:
+    """Test whether the last run's arm is that of the runs before it.
+
+    Args:
+        runs, prior_std, prior, noise: as of `solve`. found: their solution, for its scales.
+    """
+    run, explained = copy(runs[-1]), runs[-1].session.drift
+    run.session = Session(1, max(TESTED, explained))
+    there = solve([*runs[:-1], run], prior_std, prior, noise, _STEPS, found.scales)
+    return _drift(there, run.correction, explained)
+
+
+def _drift(found: Posterior, correction: Correction, explained: float) -> Drift:
+    n, change = correction.arm.n, found.drift
+    C = found.drift_covariance + np.diag((explained * correction.daily_std) ** 2)
+    own = [change[j::n] @ np.linalg.solve(C[j::n, j::n], change[j::n]) for j in range(n)]
+    statistic = float(change @ np.linalg.solve(C, change))
+    return Drift(
+        offset=correction.offset(change),
+        coulomb=correction.coulomb(change),
+        statistic=statistic,
+        joint=int(np.argmax(own)),
+        changed=statistic > CHANGED[found.torque],
+    )

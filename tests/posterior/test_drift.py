@@ -1,0 +1,101 @@
+"""A tare of another session: offsets and friction that have changed since are unknowns, found, allowed for and said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from armload import arm
+from armload.inertia import Z95
+from armload.lab.episodes import draw_episodes, simulate_episodes
+from armload.posterior import HybridIdentifier, SmoothPosteriorLeastSquares
+from armload.posterior.drift import CHANGED
+from armload.posterior.problem import Problem
+from armload.regression.rows import Rows
+from armload.simulation import World
+
+OFFSET = np.array([0.3, -0.3, 0.3, -0.3, 0.1, -0.1, 0.1])  # [N·m]
+
+
+@pytest.fixture(scope="module")
+def panda():
+    return arm("panda")
+
+
+def logs_of(panda, changed, population="reference", count=3):
+    """Episodes whose tare is of the arm as `changed` makes it."""
+    drawn = draw_episodes(panda, population, count, seed=81, motions=3)
+    return list(simulate_episodes([replace(e, tare_world=changed(e.world)) for e in drawn]))
+
+
+@pytest.fixture(scope="module")
+def old(panda):
+    return logs_of(panda, lambda w: replace(w, offset=w.offset - OFFSET))
+
+
+@pytest.fixture(scope="module")
+def sound(panda):
+    return logs_of(panda, lambda w: w)
+
+
+def test_an_answer_allows_for_offsets_that_changed_since_the_tare_and_says_by_how_much(panda, old):
+    error, inside = {True: [], False: []}, {True: [], False: []}
+    for log in old:
+        for tested in (True, False):
+            identifier = HybridIdentifier(panda, log.tare)
+            identifier.test_tare = tested
+            estimate = identifier.run(log.run)
+            error[tested].append(abs(estimate.phi[0] - log.truth.mass))
+            inside[tested].append(np.abs(estimate.phi - log.truth.phi) <= Z95 * estimate.std)
+            if tested:
+                drift = identifier.stream.drift
+                assert drift.changed
+                assert drift.offset[:4] == pytest.approx(OFFSET[:4], abs=0.2)
+    assert np.mean(error[True]) < 0.6 * np.mean(error[False])
+    assert np.mean(inside[True]) > 0.8 > np.mean(inside[False])
+
+
+def test_a_tare_of_another_arm_is_noticed(panda):
+    for log in logs_of(panda, lambda w: World.real_like(panda, w.seed + 1)):
+        identifier = HybridIdentifier(panda, log.tare)
+        identifier.run(log.run)
+        assert identifier.stream.drift.changed
+
+
+def test_an_arm_that_has_not_changed_is_answered_as_without_the_question(panda, sound):
+    for log in sound:
+        asked, silent = HybridIdentifier(panda, log.tare), HybridIdentifier(panda, log.tare)
+        silent.test_tare = False
+        assert np.array_equal(asked.run(log.run).phi, silent.run(log.run).phi)
+        assert not asked.stream.drift.changed
+        assert asked.stream.drift.statistic < 0.6 * CHANGED["link"]
+
+
+def test_a_tare_of_known_age_is_worth_less_and_its_change_is_expected(panda, old, sound):
+    for log in (*old, *sound):
+        same_day, aged = (HybridIdentifier(panda, log.tare, drift=d) for d in (0.0, 3.0))
+        same_day.test_tare = aged.test_tare = False
+        assert aged.run(log.run).std[0] >= 0.99 * same_day.run(log.run).std[0]
+    for log in old:
+        aged = HybridIdentifier(panda, log.tare, drift=3.0)
+        aged.run(log.run)
+        assert not aged.stream.drift.changed
+
+
+def test_rows_one_by_one_give_the_posterior_of_the_accumulated_rows_with_a_drift(panda, old):
+    log = old[0]
+    identifier = SmoothPosteriorLeastSquares(panda, log.tare, drift=1.0)
+    for _, sample in zip(range(400), log.run, strict=False):
+        identifier.update(sample)
+    stream = identifier.stream
+    stream.hold()
+    running = stream.information.copy(), stream.vector.copy()
+    scales = stream.posterior.scales
+    run = stream._run
+    run.take(Rows.of(stream._waiting))
+    problem = Problem([*stream.tares, run], stream.prior_std, stream.prior, stream.noise)
+    whole = problem.sequential(scales)
+    assert running[0] == pytest.approx(whole.information, rel=1e-6, abs=1e-6 * np.abs(whole.information).max())
+    assert running[1] == pytest.approx(whole.vector, rel=1e-6, abs=1e-6 * np.abs(whole.vector).max())
