@@ -12,7 +12,7 @@ other arm    the tare is of another arm of the same kind
 
 Each log is answered by the hybrid (or `map-gp`, where none is shipped) with and without the test of
 `armload.posterior.drift`. doubted: share that are told to have changed. said or inside: share whose mass lies in its
-interval, or that are doubted. Printed, and written to benchmarks/results/tare_drift.json; about ten minutes of one core.
+interval, or that are doubted. Printed, and written to benchmarks/results/tare_drift.json; ten minutes of one core.
 """
 
 from __future__ import annotations

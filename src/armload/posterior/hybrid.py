@@ -15,6 +15,7 @@ from armload.inertia import near_consistent, nearest_body
 from armload.inertia.cholesky import inverse
 from armload.posterior.calibration import Calibration
 from armload.posterior.evidence import Evidence
+from armload.posterior.known_mass import KnownMass
 from armload.posterior.map import PosteriorLeastSquares
 from armload.posterior.model_file import HybridModel
 from armload.posterior.payload_prior import MixturePrior
@@ -99,27 +100,37 @@ class HybridIdentifier(PosteriorLeastSquares):
     def _answer(self, elapsed: float, concluded: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         self._trusted = self.model.calibration.trusted(self.evidence(elapsed))
         tool = self.arm.attached is not None
-        return answer(self._trusted, self.model.calibration, self._payloads, tool, quick=not concluded)
+        return answer(
+            self._trusted, self.model.calibration, self._payloads, tool, quick=not concluded, known=self.known_mass
+        )
 
 
 def answer(
-    trusted: Evidence, calibration: Calibration, payloads: MixturePrior, tool: bool, quick: bool = False
+    trusted: Evidence,
+    calibration: Calibration,
+    payloads: MixturePrior,
+    tool: bool,
+    quick: bool = False,
+    known: KnownMass | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """phi (10,), a body that can exist or what such a body left behind, and its covariance with calibrated widths.
 
     `trusted`: evidence as far as it can be trusted (`Calibration.trusted`). `tool`: whether the arm counts with one,
     which may not be there, as something may have been taken off since a tare. `quick`: the body is found in bounded
-    time, to a hundredth of a standard deviation.
+    time, to a hundredth of a standard deviation. `known`: the mass, where it was weighed.
     """
     vectors = np.array([trusted.vector, -trusted.vector] if trusted.kind > 0 or tool else [trusted.vector])
     found, *removed = payloads.posteriors(trusted.information, vectors)
     sign = 1.0
     if removed and removed[0].log_evidence + np.log(_REMOVED) > found.log_evidence:
         found, sign = removed[0], -1.0
-    covariance = calibration.widened(found, trusted)
+    mean, covariance = found.mean, calibration.widened(found, trusted)
+    if known is not None:
+        mean, covariance = known.given(sign * mean, covariance)
+        mean = sign * mean
     if quick:
-        return sign * near_consistent(found.mean, inverse(covariance)), covariance
-    return sign * nearest_body(found.mean, covariance), covariance
+        return sign * near_consistent(mean, inverse(covariance)), covariance
+    return sign * nearest_body(mean, covariance), covariance
 
 
 def without_learned_prior(

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from armload.arms import Arm, rated_effort
 from armload.estimators import ArmMismatch, Estimate, Identifier
 from armload.posterior.evidence import Evidence
+from armload.posterior.known_mass import KnownMass
 from armload.posterior.problem import Posterior, Scales
 from armload.posterior.same_motion import SameMotion
 from armload.posterior.solve import solve
@@ -46,7 +47,8 @@ class PosteriorLeastSquares(Identifier):
             relative to it.
         gain: λ of the lag [1/s].
         prior: what is known about the payload before; None: the weak prior of `solution_prior_std`.
-        drift: by how many daily deviations (`Correction.daily_std`) offsets and friction may have changed since the tare.
+        drift: by how many daily deviations (`Correction.daily_std`) offsets and friction may have changed since the
+            tare.
 
     Attributes:
         reference: an earlier run of the stream with the same mounted as at the tare; it is a tare, too.
@@ -58,6 +60,7 @@ class PosteriorLeastSquares(Identifier):
     _iterations = 12  # of expectation–maximisation in a last solution; with features it settles in five
     _same_motion: SameMotion | None = None
     test_tare = True  # whether an answer asks if the arm is as it was at the tare; episodes of a training do not
+    known_mass: KnownMass | None = None  # of the payload, where it was weighed
     _traits_frame: NDArray[np.float64] | None = None  # see `Evidence.of`: they are about the estimate's own frame
 
     def __init__(
@@ -79,7 +82,7 @@ class PosteriorLeastSquares(Identifier):
         self._tare_time = 0.0 if tare is None else tare.duration
         if tare is not None:
             self._check(tare)
-            self._tare = self._data()
+            self._tare = self.empty_data()
             self._tare.add(tare.t, tare.q, tare.dq, tare.tau)
             self._start = self._from_tare(self._tare)
         self.reset()
@@ -89,7 +92,7 @@ class PosteriorLeastSquares(Identifier):
         """Of the smooth part: none."""
         return JointFeatures(self.arm.n, 0, 0)
 
-    def _data(self) -> RegressionData:
+    def empty_data(self) -> RegressionData:
         """An empty regression of the kind this method accumulates."""
         return RegressionData(self._correction, self.gain, self._features, self._noise.block)
 
@@ -167,7 +170,8 @@ class PosteriorLeastSquares(Identifier):
         concluded: bool = False,  # noqa: ARG002
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """phi and covariance from the stream as it stands, `elapsed` seconds after the run began."""
-        return self.stream.answer()
+        phi, covariance = self.stream.answer()
+        return (phi, covariance) if self.known_mass is None else self.known_mass.given(phi, covariance)
 
     # ------------------------------------------------------------------ what the answer rests on
 

@@ -154,6 +154,10 @@ class StreamingPosterior:
             self.rows += len(rows.t)
             self.seconds += float(rows.h.sum())
 
+    def rows_of(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> Rows:
+        """The rows of samples (N,), (N, n), which count for nothing here."""
+        return self._regression.rows(t, q, dq, tau)
+
     def look(self, t: float, q: NDArray, dq: NDArray, tau: NDArray) -> Row | None:
         """Pass a sample over: the row it completes, if it does, counts for nothing here."""
         return self._regression.row(t, q, dq, tau)

@@ -37,9 +37,9 @@ _MOTOR_FRICTION = {"coulomb": 5.0, "viscous": 5.0}
 # times that the variance of a joint's residual is larger at rest than in motion, link and motor side: friction is
 # anything below stiction there. √10 and √250 of a residual of 1e-3 effort limits are a third of the friction expected
 _PRESLIDING, _MOTOR_PRESLIDING = 10.0, 250.0
-# [effort limits, per rad/s] by how much offsets and friction of an arm differ from one day to the next, 1 sigma: warmth,
-# wear, a controller calibrated again. A stated prior, in the order of `PER_JOINT`: 0.13 N·m of a Panda's large joints,
-# 0.02 of its wrist, 15 % of the friction
+# [effort limits, per rad/s] by how much offsets and friction of an arm differ from one day to the next, 1 sigma:
+# warmth, wear, a controller calibrated again. A stated prior, in the order of `PER_JOINT`: 0.13 N·m of a Panda's large
+# joints, 0.02 of its wrist, 15 % of the friction
 DAILY = {"offset": 1.5e-3, "coulomb": 1.5e-3, "viscous": 7.5e-4}
 _UNMODELLED_INERTIA = 5e-3  # [kg·m²] of every link at least: cables, covers, elastic joints. A stated prior
 
