@@ -34,6 +34,14 @@ DECISIVE = 9.0
 # [rated payloads] a tool that weighs more is in grams, a payload that weighs more is none. Sound logs hold up to twice
 # the rated payload (test_simulated_logs_up_to_twice_the_rated_payload_pass)
 HEAVIEST = 3.0
+# [m] from the payload frame to the centre of mass of anything that an arm holds: the bound where the mass may be zero.
+# A stated prior, longer than the payloads of any family that is simulated
+# (test_where_the_mass_may_be_zero_the_centre_s_interval_is_a_finite_bound)
+FARTHEST = 1.0
+# times 2 % of a link's mass (`Arm.link_spread`): figures so rough are nominal, and a tare is what is missing first.
+# A Panda's have 1, an FR3's 3, those of arms that nobody has identified 10
+# (test_where_figures_are_nominal_the_first_advice_is_a_tare)
+NOMINAL = 5.0
 
 # ---------------------------------------------------------------------- units, columns and limits, `plausibility.py`
 

@@ -13,7 +13,7 @@ from armload.app.cli.arguments import (
     file_name,
     payload_of,
 )
-from armload.app.cli.printing import print_identification, print_json, print_note, working
+from armload.app.cli.printing import print_json, print_note, working
 
 _EXAMPLES = """\
 examples:
@@ -40,6 +40,7 @@ def parser() -> Parser:
     add_identifier_arguments(parser)
     add_tool_and_topic_arguments(parser)
     parser.add_argument("--tare-topic", metavar="T", help="that of the tare's bag, where it is another one")
+    parser.add_argument("--all", action="store_true", help="print the ten parameters about the frame's origin, too")
     parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     return parser
 
@@ -48,6 +49,7 @@ def run(options: argparse.Namespace) -> None:
     """Identify and print."""
     from armload.errors import UsageError
     from armload.identification import identify
+    from armload.identification.text import summary
     from armload.recording import Recording, has_topics, read_recording
 
     with working("reading") as say:
@@ -63,10 +65,9 @@ def run(options: argparse.Namespace) -> None:
         log = read(options.log, options.topic)
         tare = None if options.tare is None else read(options.tare, options.tare_topic or options.topic)
         result = identify(log, arm, tare=tare, tool=tool, method=options.method, progress=say)
-    for note in (*log.notes, *(tare.notes if tare else ()), *result.notes):
+    for note in result.notes:
         print_note(note)
     if options.json:
         print_json(result.to_dict())
-        print_note(f"method {result.method}: {result.why}")
     else:
-        print_identification(result)
+        print(summary(result, options.all))
