@@ -9,7 +9,6 @@ import pytest
 from armload.arms import arm, payload_regressor
 from armload.errors import IdentificationError, RecordingError
 from armload.identification import METHODS, identify
-
 from armload.inertia import Z95, InertialParameters, distance_to_body, is_consistent, nearest_body
 from armload.lab.episodes import Recipe, draw_episodes, simulate_episodes
 from armload.motion import random_motion, taie2024

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
-from armload.identification.thresholds import NOMINAL
+from armload.identification.thresholds import KNOWN, NOMINAL
 from armload.inertia import NAMES, SHRINK
 
-RECORD = "record a tare, the arm as it is without the payload on any motion of 20 s, and name it with --tare"
+RECORD = "record the arm as it is, without the payload, on any motion of 20 s, and name the log with --tare"
 
 
 def lacking(
@@ -29,18 +29,21 @@ def lacking(
     said = []
     nominal = not tared and arm.link_spread >= NOMINAL
     if nominal:
-        said.append(f"{RECORD}: the figures of this arm's links are nominal, and their errors count as payload")
+        said.append(
+            f"record a tare: the figures of this arm's links are nominal, and their errors count as payload ({RECORD})"
+        )
     missing = ~determined
     if known_arm_std is None or tared:
         if missing.any():
             said.append(f"this motion does not determine {_names(missing)}: what was known before is reported for them")
         return said
-    hidden = missing & (known_arm_std <= weak_std / SHRINK)
+    hidden = missing & (known_arm_std <= KNOWN * weak_std / SHRINK)
     still = missing & ~hidden
     if hidden.any():
-        then = "" if nominal else f": {RECORD}"
+        record = "a tare" if nominal else f"a tare ({RECORD})"
         said.append(
-            f"this motion tells {_names(hidden)} only with a tare, as errors of the arm's model hide them{then}"
+            f"errors of the arm's model hide {_names(hidden)} from this log: {record} is missing, or a faster motion "
+            "of the wrist; what was known before is reported for them"
         )
     if still.any():
         said.append(

@@ -42,6 +42,10 @@ FARTHEST = 1.0
 # A Panda's have 1, an FR3's 3, those of arms that nobody has identified 10
 # (test_where_figures_are_nominal_the_first_advice_is_a_tare)
 NOMINAL = 5.0
+# times the standard deviation that counts as determined: what even an arm known exactly would leave beyond lacks
+# motion, what it would leave within may lack a tare. More than 1, as a tare lowers the noise that is found, too
+# (test_what_is_said_to_lack_motion_a_tare_does_not_tell_either)
+KNOWN = 1.5
 
 # ---------------------------------------------------------------------- units, columns and limits, `plausibility.py`
 
@@ -97,3 +101,8 @@ SCALE_HIGH = 1.7
 SCALE_SURE = 2.0
 # [model errors] rms of what the arm's own torque leaves: a sound log's is about 1 by the meaning of `MODEL_ERROR`
 MODEL_MISFIT = 2.5
+# [N·m/A] torque constant of a joint, gear included, at least: the wrist of a small arm. A UR10e's are 10 to 12
+# (test_motor_currents_are_called_so_with_what_to_do)
+CURRENT_LOW = 4.0
+# [N·m/A] the same at most: the shoulder of a large arm (test_motor_currents_are_called_so_with_what_to_do)
+CURRENT_HIGH = 60.0

@@ -69,6 +69,8 @@ def payload_from(content: dict[str, Any], path: str | Path) -> Payload:
 def _without_inertia(content: dict[str, Any], path: Path) -> Payload:
     mass, com = _numbers(content["mass"], (), "mass", path), _numbers(content["com"], (3,), "com", path)
     _require_metres(com, path)
+    if not mass > 0:
+        raise PayloadError(f"the payload in {path} has a mass of {float(mass):g} kg: expected a mass above 0")
     made = Payload.without_inertia(
         _text(content, "name", path) or path.stem, float(mass), com, _text(content, "frame", path)
     )

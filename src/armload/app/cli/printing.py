@@ -21,6 +21,21 @@ def print_json(value: dict[str, Any]) -> None:
     print(json.dumps(value, allow_nan=False))
 
 
+def write_json(path: str, value: dict[str, Any]) -> None:
+    """One JSON object in a file that appears whole or not at all; UsageError where it cannot be written."""
+    from armload.atomic import replacing
+    from armload.errors import UsageError
+
+    text = json.dumps(value, allow_nan=False) + "\n"
+    try:
+        with replacing(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise UsageError(
+            f"{path} cannot be written: {error.strerror or error}; name a file in a folder you can write to"
+        ) from None
+
+
 def finite(value: Any) -> Any:
     """Numbers, however nested in dictionaries and lists, with null for what is not finite."""
     if isinstance(value, dict):
