@@ -95,7 +95,7 @@ def summary(result: Identification, everything: bool = False) -> str:
         lines.append(result.why_not_held)
     if everything:
         lines += ["", f"about the origin of {result.frame}:", *_rows({"": ten(result)})]
-    return "\n".join([*lines, "", _rests_on(result)])
+    return "\n".join([*lines, "", rests_on(result)])
 
 
 def in_short(result: Identification) -> str:
@@ -114,14 +114,15 @@ def html(result: Identification) -> str:
             rows.append(
                 "<tr>" + "".join(f"<td style='text-align:left'>{escape(cell)}</td>" for cell in cells) + "</tr>"
             )
-    below = [text for text in (result.why_not_held, _rests_on(result), *result.notes) if text]
+    below = [text for text in (result.why_not_held, rests_on(result), *result.notes) if text]
     title = f"{result.robot}: payload about {result.frame}, relative to the {result.relative_to}"
     return f"<table><caption style='text-align:left'>{escape(title)}</caption>{''.join(rows)}</table>" + "".join(
         f"<p>{escape(text)}</p>" for text in below
     )
 
 
-def _rests_on(result: Identification) -> str:
+def rests_on(result: Identification) -> str:
+    """What ± means, the method, and how much of a log it saw."""
     why = f" ({result.why})" if result.why else ""
     return (
         f"± is half of the 95 % interval, {result.interval}; method {result.method}{why}, {result.n_samples} samples, "

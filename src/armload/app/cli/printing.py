@@ -83,9 +83,11 @@ def console() -> Console:
 
 def print_table(result: Table) -> None:
     """A table of the evaluation, baselines set apart, and below it what it rests on."""
+    from rich.markup import escape
+
     rows = table(result.title, *result.columns)
     for k, cells in enumerate(result.rows):
-        rows.add_row(*cells, end_section=k + 1 in result.baselines and k not in result.baselines)
+        rows.add_row(*map(escape, cells), end_section=k + 1 in result.baselines and k not in result.baselines)
     out = console()
     out.print(rows)
     out.print(result.note, markup=False)
