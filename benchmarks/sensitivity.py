@@ -56,7 +56,9 @@ GROUPS = {  # home → constants, None: all; what they are tried on
     "posterior.problem": (r"(?m)(^#.*\n)*^(_MOTOR_SIDE|_GAIN_STD) = .*\n", ("streams", "logs")),
     "posterior.hybrid": (r"(?m)(^#.*\n)*^_REMOVED = .*\n", ("streams", "logs")),
 }
-NOT_VARIED = ("LONGEST", "STEP_STD")  # the largest of WINDOWS; decides on a word about a change that was noticed
+# the largest of WINDOWS; a word about a change that was noticed; words of advice and of a refusal; a bound on what does
+# not exist where it holds
+NOT_VARIED = ("LONGEST", "STEP_STD", "NOMINAL", "KNOWN", "CURRENT_LOW", "CURRENT_HIGH", "FARTHEST")
 
 
 # ---------------------------------------------------------------------- the constants, and how to set them

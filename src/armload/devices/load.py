@@ -68,7 +68,10 @@ class Load:
             known = tuple(bool(x) for x in result.determined)
             return cls(result.parameters, known, None if arm is None else arm.name, result.relative_to, result.std)
         std = (result.phi_high - result.phi_low) / (2 * Z95)
-        known, remarks = tuple(result.determined), _leaning(result.determined, result.rests_on_prior)
+        known, remarks = (
+            tuple(result.determined.tolist()),
+            _leaning(result.determined.tolist(), result.rests_on_prior.tolist()),
+        )
         return cls(result.parameters, known, result.robot, result.relative_to, std, remarks)
 
     @property
