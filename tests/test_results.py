@@ -116,8 +116,8 @@ def test_how_often_the_intervals_of_the_centre_and_the_inertia_about_it_held_is_
     }
     assert (
         f"on {found['after']['6 s']['episodes']} new episodes the intervals of the centre of mass held "
-        f"{shares['com']} % of the true values after 1 and 6 s, those of the inertia about it {shares['inertia_com']} %, "
-        f"those of the ten parameters {shares['phi']} %"
+        f"{shares['com']} % of the true values after 1 and 6 s, those of the inertia about it "
+        f"{shares['inertia_com']} %, those of the ten parameters {shares['phi']} %"
     ) in page
 
 
