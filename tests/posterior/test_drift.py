@@ -75,18 +75,21 @@ def test_an_arm_that_has_not_changed_is_answered_as_without_the_question(panda, 
 
 def test_a_tare_of_known_age_is_worth_less_and_its_change_is_expected(panda, old, sound):
     for log in (*old, *sound):
-        same_day, aged = (HybridIdentifier(panda, log.tare, drift=d) for d in (0.0, 3.0))
+        same_day, aged = HybridIdentifier(panda, log.tare), HybridIdentifier(panda, log.tare)
+        aged.allow_for(3.0)
         same_day.test_tare = aged.test_tare = False
         assert aged.run(log.run).std[0] >= 0.99 * same_day.run(log.run).std[0]
     for log in old:
-        aged = HybridIdentifier(panda, log.tare, drift=3.0)
+        aged = HybridIdentifier(panda, log.tare)
+        aged.allow_for(3.0)
         aged.run(log.run)
         assert not aged.stream.drift.changed
 
 
 def test_rows_one_by_one_give_the_posterior_of_the_accumulated_rows_with_a_drift(panda, old):
     log = old[0]
-    identifier = SmoothPosteriorLeastSquares(panda, log.tare, drift=1.0)
+    identifier = SmoothPosteriorLeastSquares(panda, log.tare)
+    identifier.allow_for(1.0)
     for _, sample in zip(range(400), log.run, strict=False):
         identifier.update(sample)
     stream = identifier.stream

@@ -39,6 +39,23 @@ def body_of(estimate: Estimate, mass_determined: bool) -> NDArray[np.float64]:
     return estimate.phi if is_removal(estimate, mass_determined) else nearest_body(estimate.phi, estimate.covariance)
 
 
+_OF_A_SEGMENT = ("mass", "com", "phi", "phi_low", "phi_high", "determined", "held", "interval")
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A part of a log: from start to stop [s] since the log began, and what the arm held meanwhile."""
+
+    start: float
+    stop: float
+    answer: Identification
+
+    def to_dict(self) -> dict[str, Any]:
+        """start, stop, and the answer's main fields, ready for JSON."""
+        answer = self.answer.to_dict()
+        return {"start": self.start, "stop": self.stop} | {name: answer[name] for name in _OF_A_SEGMENT}
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Identification:
     """What the arm holds, with 95 % intervals; the fields are those of `armload identify --json`.
@@ -60,6 +77,8 @@ class Identification:
     rests_on_prior: for each parameter (10,), whether its interval comes from what was known before more than from the
         log; always so of what is not determined.
     notes: what else the user should know, a sentence each.
+    segments: the log's parts, throughout each of which the payload is the same, with their answers; one where it never
+        changes. All else is of the last.
     log, date: name of the log's file, and when it was answered (ISO 8601, UTC).
     why: what is special about the method, in a few words; not in the JSON.
     """
@@ -87,6 +106,7 @@ class Identification:
     covariance: NDArray[np.float64]
     rests_on_prior: NDArray[np.bool_]
     notes: tuple[str, ...] = ()
+    segments: tuple[Segment, ...] = field(default=(), metadata={"json": False})
     log: str = ""
     date: str = ""
     why: str = field(default="", metadata={"json": False})
@@ -105,7 +125,8 @@ class Identification:
             if entry.metadata.get("json", True):
                 value = getattr(self, entry.name)
                 out[entry.name] = value.tolist() if isinstance(value, np.ndarray) else value
-        return out | {"notes": list(self.notes), "parameters": list(NAMES), "version": __version__}
+        said = {"notes": list(self.notes), "parameters": list(NAMES), "version": __version__}
+        return out | said | {"segments": [segment.to_dict() for segment in self.segments]}
 
     @property
     def parameters(self) -> InertialParameters:

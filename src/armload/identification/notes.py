@@ -7,7 +7,9 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.identification.thresholds import KNOWN, NOMINAL
-from armload.inertia import NAMES, SHRINK
+from armload.inertia import NAMES, SHRINK, Z95
+from armload.posterior import KnownMass
+from armload.posterior.drift import Drift
 
 RECORD = "record the arm as it is, without the payload, on any motion of 20 s, and name the log with --tare"
 
@@ -61,6 +63,33 @@ def leaning_on_prior(leaning: NDArray[np.bool_]) -> list[str]:
         f"the intervals of {_names(leaning)} rest on what payloads are usually like more than on this log: of "
         "something wide and thin (a tray, a frame) believe --method map-gp instead"
     ]
+
+
+def changed_since_tare(drift: Drift) -> str:
+    """That the arm is not as it was at its tare, where that shows most, and what to do."""
+    j = drift.joint
+    return (
+        f"the arm is not as it was at its tare: of joint {j + 1} the torque's offset differs by {drift.offset[j]:+.2g} N·m "
+        f"and its friction by {drift.coulomb[j]:+.2g} N·m; the intervals allow for it; record a tare of this arm as it "
+        "is now, with the same base and tool"
+    )
+
+
+def other_than_weighed(mass: KnownMass, found: float, std: float) -> str:
+    """That the log does not bear the mass that was given."""
+    return (
+        f"the mass given, {mass.mass:.4g} ± {Z95 * mass.std:.2g} kg (95 %), is not what the log says, "
+        f"{found:.4g} ± {Z95 * std:.2g} kg: check what was weighed and what was mounted at the tare"
+    )
+
+
+def changed_within(times: list[float], parts: int) -> str:
+    """That the payload changes within a log, when, and which part the answer is of."""
+    when = ", ".join(f"{t:.2f}" for t in times)
+    return (
+        f"the payload changes within the log, {when} s after its start: the answer is of the last of {parts} parts, what "
+        "is held at the end; `segments` has all of them"
+    )
 
 
 def _names(which: NDArray[np.bool_]) -> str:

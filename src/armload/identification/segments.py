@@ -11,6 +11,8 @@ The cut with the largest T is sought more finely, and both parts are cut again.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from armload.arms import Arm
@@ -19,6 +21,7 @@ from armload.posterior import SmoothPosteriorLeastSquares
 from armload.posterior.solve import solve
 from armload.recording import Recording
 from armload.regression import solution_prior_std
+from armload.regression.information import RegressionData
 from armload.regression.lag import GAIN
 from armload.regression.noise import SMOOTH
 from armload.regression.rows import Rows
@@ -61,16 +64,19 @@ class _Search:
 
     def _best(self, start: int, stop: int, cuts: np.ndarray) -> tuple[int, float]:
         """The cut with the largest T, and T."""
-        found = [self._statistic(start, int(cut), stop) for cut in cuts]
+        edges = [start, *cuts.tolist(), stop]
+        stretches = [self._data(slice(a, b)) for a, b in pairwise(edges)]
+        found = [self._statistic(stretches[:k], stretches[k:]) for k in range(1, len(stretches))]
         best = int(np.argmax(found))
         return int(cuts[best]), found[best]
 
-    def _statistic(self, start: int, cut: int, stop: int) -> float:
-        parts = []
-        for rows in (slice(start, cut), slice(cut, stop)):
-            data = self.physics.empty_data()
-            data.take(Rows(*(value[rows] for value in self.rows)))
-            parts.append(data)
+    def _data(self, part: slice) -> RegressionData:
+        data = self.physics.empty_data()
+        data.take(Rows(*(value[part] for value in self.rows)))
+        return data
+
+    def _statistic(self, before: list[RegressionData], after: list[RegressionData]) -> float:
+        parts = [RegressionData.joined(before), RegressionData.joined(after)]
         said = solve(parts, self.weak, None, SMOOTH, _ITERATIONS)
         wide = np.diag(self.weak**-2.0)  # directions that neither part tells
         return float(said.vector @ np.linalg.solve(said.information + wide, said.vector)) / SMOOTH.overrated

@@ -57,7 +57,7 @@ PART_LEAST = 0.5
 # [s] left out after a change: four lags of the regression, 2 % of the old torque is left
 SETTLED = 0.2
 # [s] between two cuts, the least and the most cuts of a log: a payload is seldom held for less
-CUT, CUTS_LEAST, CUTS_MOST = 1.0, 5, 15
+CUT, CUTS_LEAST, CUTS_MOST = 1.0, 5, 9
 
 # ---------------------------------------------------------------------- units, columns and limits, `plausibility.py`
 

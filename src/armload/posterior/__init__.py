@@ -6,6 +6,7 @@ from armload.posterior.calibration import Calibration
 from armload.posterior.cramer_rao import TIMES, Bound, bound, efficiency
 from armload.posterior.evidence import TRAITS, Evidence
 from armload.posterior.hybrid import HybridIdentifier, shipped_model
+from armload.posterior.known_mass import KnownMass
 from armload.posterior.map import PosteriorLeastSquares, SmoothPosteriorLeastSquares
 from armload.posterior.model_file import HybridModel, Training
 from armload.posterior.payload_prior import MixturePosterior, MixturePrior
@@ -20,6 +21,7 @@ __all__ = [
     "Evidence",
     "HybridIdentifier",
     "HybridModel",
+    "KnownMass",
     "MixturePosterior",
     "MixturePrior",
     "Posterior",

@@ -42,7 +42,6 @@ class HybridIdentifier(PosteriorLeastSquares):
         tare: an earlier log of the same arm, on any motion, with whatever was mounted then.
         model: the learned parts; None: those shipped for the arm.
         features: of the smooth mismatch; a model's error bars were calibrated with the default.
-        drift: as for `PosteriorLeastSquares`.
 
     Raises:
         ModelError: no model is shipped for this arm, or it was trained for another one.
@@ -58,7 +57,6 @@ class HybridIdentifier(PosteriorLeastSquares):
         tare: Recording | None = None,
         model: HybridModel | None = None,
         features: JointFeatures | None = None,
-        drift: float = 0.0,
     ) -> None:
         self.model = shipped_model(arm) if model is None else model
         self._payloads = self.model.prior_for(arm)
@@ -66,7 +64,7 @@ class HybridIdentifier(PosteriorLeastSquares):
         self.calibrated = self.model.calibrated
         self.payload_prior = (self._payloads.mean, self._payloads.std)
         self.features = features or JointFeatures(arm.n)
-        super().__init__(arm, tare, drift=drift)
+        super().__init__(arm, tare)
         if tare is not None:
             self._same_motion = SameMotion(arm, tare, self.gain)
 
@@ -100,9 +98,12 @@ class HybridIdentifier(PosteriorLeastSquares):
     def _answer(self, elapsed: float, concluded: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         self._trusted = self.model.calibration.trusted(self.evidence(elapsed))
         tool = self.arm.attached is not None
-        return answer(
-            self._trusted, self.model.calibration, self._payloads, tool, quick=not concluded, known=self.known_mass
-        )
+        how = (self._trusted, self.model.calibration, self._payloads, tool, not concluded)
+        phi, covariance = answer(*how)
+        if self.known_mass is None:
+            return phi, covariance
+        self.mass_alone = float(phi[0]), float(np.sqrt(covariance[0, 0]))
+        return answer(*how, self.known_mass)
 
 
 def answer(

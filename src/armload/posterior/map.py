@@ -47,8 +47,6 @@ class PosteriorLeastSquares(Identifier):
             relative to it.
         gain: λ of the lag [1/s].
         prior: what is known about the payload before; None: the weak prior of `solution_prior_std`.
-        drift: by how many daily deviations (`Correction.daily_std`) offsets and friction may have changed since the
-            tare.
 
     Attributes:
         reference: an earlier run of the stream with the same mounted as at the tare; it is a tare, too.
@@ -61,6 +59,7 @@ class PosteriorLeastSquares(Identifier):
     _same_motion: SameMotion | None = None
     test_tare = True  # whether an answer asks if the arm is as it was at the tare; episodes of a training do not
     known_mass: KnownMass | None = None  # of the payload, where it was weighed
+    mass_alone: tuple[float, float] | None = None  # what the log alone says of it then, and its standard deviation [kg]
     _traits_frame: NDArray[np.float64] | None = None  # see `Evidence.of`: they are about the estimate's own frame
 
     def __init__(
@@ -69,10 +68,8 @@ class PosteriorLeastSquares(Identifier):
         tare: Recording | None = None,
         gain: float = GAIN,
         prior: GaussianPrior | None = None,
-        drift: float = 0.0,
     ) -> None:
-        self.arm, self.gain, self.prior = arm, gain, prior
-        self.session = Session(1, drift) if tare is not None and drift > 0.0 else SAME
+        self.arm, self.gain, self.prior, self.session = arm, gain, prior, SAME
         self._weak = payload_prior_std(arm)
         self._correction = Correction(arm, rated_effort(arm))
         self.reference: PosteriorLeastSquares | None = None
@@ -171,7 +168,10 @@ class PosteriorLeastSquares(Identifier):
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """phi and covariance from the stream as it stands, `elapsed` seconds after the run began."""
         phi, covariance = self.stream.answer()
-        return (phi, covariance) if self.known_mass is None else self.known_mass.given(phi, covariance)
+        if self.known_mass is None:
+            return phi, covariance
+        self.mass_alone = float(phi[0]), float(np.sqrt(covariance[0, 0]))
+        return self.known_mass.given(phi, covariance)
 
     # ------------------------------------------------------------------ what the answer rests on
 
@@ -239,6 +239,11 @@ class PosteriorLeastSquares(Identifier):
 
     # ------------------------------------------------------------------ beside a running robot
 
+    def allow_for(self, drift: float) -> None:
+        """Before the first sample: by how many daily deviations the arm may differ from what it was at its tare."""
+        self.session = Session(1, drift) if self._tare is not None and drift > 0.0 else SAME
+        self._stream = None
+
     def another(self, reference: PosteriorLeastSquares | None = None) -> Self:
         """Another run of the same arm, that has seen nothing yet.
 
@@ -274,7 +279,7 @@ class SmoothPosteriorLeastSquares(PosteriorLeastSquares):
     'map-gp'
 
     Args:
-        arm, tare, gain, prior, drift: as for `PosteriorLeastSquares`.
+        arm, tare, gain, prior: as for `PosteriorLeastSquares`.
         features: of the smooth part; None: 128 of the pose, 12 of the velocity.
         same_motion: whether a tare along the run's own motion takes the posterior's place in the `evidence`.
     """
@@ -291,12 +296,11 @@ class SmoothPosteriorLeastSquares(PosteriorLeastSquares):
         prior: GaussianPrior | None = None,
         features: JointFeatures | None = None,
         same_motion: bool = False,
-        drift: float = 0.0,
     ) -> None:
         self.features = features or JointFeatures(arm.n)
         if same_motion and tare is not None:
             self._same_motion = SameMotion(arm, tare, gain)
-        super().__init__(arm, tare, gain, prior, drift)
+        super().__init__(arm, tare, gain, prior)
 
     @property
     def _features(self) -> JointFeatures:

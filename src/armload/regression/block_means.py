@@ -8,6 +8,8 @@ Source: Conway 1963; Flegal & Jones, Annals of Statistics 2010 (batch means).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -81,6 +83,22 @@ class BlockMeans:
         if not self.ready:
             return np.full(self._sums.shape[1:], np.inf)
         return np.mean(means**2 * times.reshape(-1, *[1] * (means.ndim - 1)), axis=0)
+
+    @classmethod
+    def joined(cls, parts: Sequence[BlockMeans]) -> BlockMeans:
+        """The blocks of several stretches of one signal, one after another, to be read and not to be added to."""
+        out = cls(parts[0]._sums.shape[1:], max(part.block for part in parts))
+        sums = np.concatenate([part._sums[: part._filled + 1] for part in parts])
+        times = np.concatenate([part._times[: part._filled + 1] for part in parts])
+        while len(times) > _MOST_BLOCKS:
+            last = len(times) - len(times) % 2
+            sums = np.concatenate([sums[0:last:2] + sums[1:last:2], sums[last:]])
+            times = np.concatenate([times[0:last:2] + times[1:last:2], times[last:]])
+            out.block *= 2.0
+        out._sums[: len(times)], out._times[: len(times)] = sums, times
+        out._filled = len(times) - 1
+        out._count = sum(part._count for part in parts)
+        return out
 
     def _join_pairs(self) -> None:
         half = _MOST_BLOCKS // 2

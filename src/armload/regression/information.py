@@ -7,7 +7,7 @@ The rows are those of `rows.FilteredRegression`; eta is shared by the joints, g 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,6 +84,15 @@ class RegressionData:
             self.A[j] += products[:-1, :-1]
             self.b[j] += products[:-1, -1]
         self.blocks.extend(rows.h, rooted)
+
+    @classmethod
+    def joined(cls, parts: Sequence[RegressionData]) -> RegressionData:
+        """What several stretches of one recording say together, to be read and not to be added to."""
+        first = parts[0]
+        out = cls(first.correction, first.gain, first.features, first.blocks.block, first.session)
+        out.A, out.b = sum(part.A for part in parts), sum(part.b for part in parts)  # type: ignore[assignment]
+        out.blocks = BlockMeans.joined([part.blocks for part in parts])
+        return out
 
     def selected(self, E: NDArray) -> tuple[NDArray, NDArray]:
         """A and b over the unknowns z, where [phi, eta] = E·z; the features' weights stay out of it."""

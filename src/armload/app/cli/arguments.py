@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from importlib import resources
 from typing import TYPE_CHECKING, NoReturn
 
@@ -119,6 +120,53 @@ def _arms() -> list[str]:
     """The built-in arms, by their sheets: --help must not wait for what `armload.arms` imports."""
     sheets = resources.files("armload").joinpath("arms", "descriptions").iterdir()
     return sorted(sheet.name.removesuffix(".toml") for sheet in sheets if sheet.name.endswith(".toml"))
+
+
+_TIMES = {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0, "w": 7 * 86400.0}
+
+
+def duration(text: str) -> float:
+    """A time with its unit, in seconds.
+
+    >>> duration("1d"), duration("90min")
+    (86400.0, 5400.0)
+    """
+    found = re.fullmatch(r"\s*([0-9]*\.?[0-9]+(?:e[+-]?\d+)?)\s*(s|min|h|d|w)\s*", text)
+    if found is None:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a time: expected a number with s, min, h, d or w, such as 1d"
+        )
+    return float(found[1]) * _TIMES[found[2]]
+
+
+def weighed(text: str) -> tuple[float, float]:
+    """A mass and its standard deviation [kg].
+
+    >>> weighed("1.2±0.002"), weighed("0.5+-0.01")
+    ((1.2, 0.002), (0.5, 0.01))
+    """
+    parts = re.split("±|\\+/?-", text)
+    try:
+        mass, std = (float(part) for part in parts)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a weighed mass: expected kilograms and their standard deviation, such as 1.200±0.002 "
+            "(or 1.200+-0.002)"
+        ) from None
+    return mass, std
+
+
+def add_tare_and_mass_arguments(parser: argparse.ArgumentParser) -> None:
+    """`--tare-age` and `--mass`."""
+    parser.add_argument(
+        "--tare-age",
+        type=duration,
+        metavar="TIME",
+        help="how old the tare is, such as 1d or 8h: the arm may have changed (default: by the logs' clocks)",
+    )
+    parser.add_argument(
+        "--mass", type=weighed, metavar="M±S", help="of the payload, where it was weighed [kg], with its 1 sigma"
+    )
 
 
 def add_identifier_arguments(parser: argparse.ArgumentParser) -> None:

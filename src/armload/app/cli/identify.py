@@ -8,6 +8,7 @@ from armload.app.cli.arguments import (
     Parser,
     add_arm_arguments,
     add_identifier_arguments,
+    add_tare_and_mass_arguments,
     add_tool_and_topic_arguments,
     arm_of,
     file_name,
@@ -22,6 +23,8 @@ examples:
   armload identify run.mcap --robot panda --tool franka-hand
   armload identify loaded.csv --robot my_arm.urdf --frame tool0 --tare unloaded.csv
   armload identify run.csv --robot ur10e --gravity=-9.81,0,0        (on a wall)
+  armload identify run.csv --robot panda --tare yesterday.csv --tare-age 1d
+  armload identify run.csv --robot panda --mass 1.200±0.002         (weighed: what is left is found better)
   armload identify run.csv --robot panda --out payload.json         (the answer as JSON, usable as --tool later)
   armload identify run.csv --robot panda --tool franka-hand --to franka    (what the controller reads)
 
@@ -40,6 +43,7 @@ def parser() -> Parser:
     parser.add_argument("log", type=file_name, metavar="LOG", help="log of a motion with the payload")
     add_arm_arguments(parser)
     add_identifier_arguments(parser)
+    add_tare_and_mass_arguments(parser)
     add_tool_and_topic_arguments(parser)
     parser.add_argument("--tare-topic", metavar="T", help="that of the tare's bag, where it is another one")
     parser.add_argument("--all", action="store_true", help="print the ten parameters about the frame's origin, too")
@@ -78,7 +82,18 @@ def run(options: argparse.Namespace) -> None:
 
         log = read(options.log, options.topic)
         tare = None if options.tare is None else read(options.tare, options.tare_topic or options.topic)
-        result = identify(log, arm, tare=tare, tool=tool, method=options.method, progress=say)
+        if options.tare_age is not None and options.tare is None:
+            raise UsageError("--tare-age says how old a tare is, but there is no --tare")
+        result = identify(
+            log,
+            arm,
+            tare=tare,
+            tare_age=options.tare_age,
+            tool=tool,
+            mass=options.mass,
+            method=options.method,
+            progress=say,
+        )
     if options.to is not None:
         write(Load.of(result), options.to, options.out, arm, options.frame, told=result.notes)
         return

@@ -1,0 +1,128 @@
+"""What a method finds in a log: the estimate, and all that decides how far it may be believed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm
+from armload.errors import IdentificationError
+from armload.estimators import ArmMismatch, Estimate
+from armload.identification.choice import Choice, choose
+from armload.identification.intervals import Before
+from armload.identification.thresholds import LARGEST_OFFSETS, MOVES
+from armload.inertia import distance_to_body
+from armload.posterior import KnownMass, PosteriorLeastSquares
+from armload.posterior.drift import Drift
+from armload.recording import Recording
+from armload.regression import payload_prior_std
+
+
+@dataclass(frozen=True)
+class Asked:
+    """How a log is to be identified.
+
+    method: as of `identify`. drift: by how many daily deviations the arm may differ from what it was at its tare.
+    mass: the payload's, where it was weighed.
+    """
+
+    method: str | Path | None = None
+    drift: float = 0.0
+    mass: KnownMass | None = None
+
+
+class Found(NamedTuple):
+    """What a method found, and what was known before.
+
+    calibrated: whether its error bars were checked on held-out episodes.
+    weak_std: standard deviation (10,) without a learned prior, of a method that has one.
+    unprojected: mean (10,) and covariance (10, 10) of what the log says, before a body was made of it; None: the
+        estimate's.
+    offset_ratio: how many times the arm's torque offsets are what is expected of them, where that is too often.
+    unknown_friction: whether the torques hold gear friction that nobody knew of; `friction_found`: that they did.
+    known_arm_std: standard deviation (10,) of a method that says what it would be, were the arm known exactly.
+    drift: by how much the arm differs from what it was at the tare, of a method that asks.
+    mass: that was given. mass_alone: what the log alone says of it, and its standard deviation [kg].
+    """
+
+    estimate: Estimate
+    before: Before
+    method: str
+    why: str
+    calibrated: bool = False
+    weak_std: NDArray[np.float64] | None = None
+    unprojected: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    offset_ratio: float = 0.0
+    unknown_friction: bool = False
+    friction_found: bool = False
+    known_arm_std: NDArray[np.float64] | None = None
+    drift: Drift | None = None
+    mass: KnownMass | None = None
+    mass_alone: tuple[float, float] | None = None
+
+    @property
+    def misfit(self) -> float:
+        """Standard deviations between what the log says and the nearest body."""
+        return distance_to_body(*(self.unprojected or (self.estimate.phi, self.estimate.covariance)))
+
+    def less(self, tool: NDArray[np.float64]) -> Found:
+        """The same without a tool (10,)."""
+        said = None if self.unprojected is None else (self.unprojected[0] - tool, self.unprojected[1])
+        return self._replace(estimate=replace(self.estimate, phi=self.estimate.phi - tool), unprojected=said)
+
+
+def found_in(recording: Recording, arm: Arm, tare: Recording | None, asked: Asked) -> Found:
+    """What a method finds in a log of an arm."""
+    found = _found(choose(arm, tare, asked.method), arm, recording, asked)
+    if found.unknown_friction:
+        motor_side = replace(arm, motor_torque=True)
+        found = _found(choose(motor_side, tare, asked.method), motor_side, recording, asked)
+        found = found._replace(friction_found=True)
+    return found
+
+
+def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Found:
+    identifier = choice.identifier
+    posterior = identifier if isinstance(identifier, PosteriorLeastSquares) else None
+    if posterior is not None:
+        posterior.allow_for(asked.drift)
+        posterior.known_mass = asked.mass
+    elif asked.mass is not None:
+        raise IdentificationError(
+            f"the method {choice.name} cannot use a known mass: leave --mass out, or use hybrid, map-gp or map"
+        )
+    estimate = identifier.run(recording)
+    mean, std = identifier.payload_prior or (np.zeros(10), payload_prior_std(arm))
+    if not choice.error_known:
+        estimate = replace(estimate, covariance=np.diag(std**2))
+    mismatch = identifier.mismatch
+    # where the payload prior is learned, so are error bars that allow for friction
+    unknown = identifier.payload_prior is None and not arm.motor_torque
+    return Found(
+        estimate=estimate,
+        before=Before(mean, std, choice.prior),
+        method=choice.name,
+        why=choice.why,
+        calibrated=identifier.calibrated,
+        weak_std=identifier.weak_std,
+        unprojected=identifier.unprojected,
+        offset_ratio=0.0 if mismatch is None else _offset_ratio(mismatch, recording),
+        unknown_friction=unknown and mismatch is not None and mismatch.torque == "motor",
+        known_arm_std=identifier.known_arm_std,
+        drift=None if posterior is None else posterior.stream.drift,
+        mass=asked.mass,
+        mass_alone=None if posterior is None else posterior.mass_alone,
+    )
+
+
+def _offset_ratio(mismatch: ArmMismatch, recording: Recording) -> float:
+    """How many times the torque offsets are what is expected of an arm; 0 where that is not too often."""
+    ratios = mismatch.offset_ratios
+    if mismatch.torque == "motor":  # there a joint at rest is held by any friction below stiction
+        ratios = ratios[np.ptp(recording.q, axis=0) > MOVES]
+    times = float(np.sqrt(ratios.mean())) if ratios.size else 0.0
+    return times if times > LARGEST_OFFSETS[mismatch.torque] else 0.0

@@ -1,0 +1,118 @@
+"""What is said of what a method found: a body, its intervals, what the log does not tell, and every doubt."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm
+from armload.identification.answer import Identification, body_of, is_removal
+from armload.identification.found import Found
+from armload.identification.intervals import about_com, intervals, phi_interval
+from armload.identification.notes import changed_since_tare, lacking, leaning_on_prior, other_than_weighed
+from armload.identification.thresholds import LEANS, MISFIT
+from armload.inertia import HELD, InertialParameters, held, is_consistent, vech
+from armload.inertia import determined as determined_by
+from armload.recording import Recording
+from armload.regression import payload_prior_std
+from armload.regression.prior import REACH
+
+_CHECK = "check the robot, the base (--gravity), what is mounted and the torques' signs"
+NO_BODY = f"no body fits within the error bars: {_CHECK}"  # also what a concluded stream says
+
+
+def answered(
+    found: Found,
+    arm: Arm,
+    recording: Recording,
+    tare: Recording | None,
+    relative_to: str,
+    notes: tuple[str, ...] = (),
+    otherwise: NDArray[np.float64] | None = None,
+    unsure: InertialParameters | None = None,
+) -> Identification:
+    """What is said of an estimate.
+
+    otherwise: how far off the truth may be beyond the error bars (10,). unsure: a tool whose own inertia is not known.
+    """
+    estimate, before, weak = found.estimate, found.before, payload_prior_std(arm)
+    determined = determined_by(estimate.std, before.std if before.used else None, found.weak_std, weak)
+    is_held = held(estimate.phi[0], estimate.std[0], determined[0])
+    leaning = np.zeros(10, dtype=bool)
+    if found.weak_std is not None:
+        leaning = determined & (found.weak_std > LEANS * estimate.std)
+    phi = body_of(estimate, determined[0])
+    low, high = phi_interval(phi, estimate.phi, estimate.std, determined, before, otherwise)
+    if unsure is not None:
+        low, high = _with_any_inertia(low, high, unsure)
+    found_of = intervals(phi, low, high, estimate.covariance, otherwise)
+    doubt = _doubt(found, determined[0], relative_to)
+    said = [*notes] if doubt is None else [doubt, *notes]
+    if found.friction_found:
+        said.append("the torque holds the gears' friction, as that of motor currents does: the intervals allow for it")
+    if is_held or not determined[0]:  # an empty hand has no inertia to be determined
+        said += lacking(arm, tare is not None, determined, found.known_arm_std, weak)
+        said += leaning_on_prior(leaning)
+    consistent = is_consistent(phi)
+    trusted = found.calibrated and doubt is None and consistent and otherwise is None and unsure is None
+    mass, com, inertia_com = about_com(phi)
+    return Identification(
+        method=found.method,
+        robot=arm.name,
+        frame=str(arm.frame),
+        relative_to=relative_to,
+        n_samples=estimate.n_samples,
+        duration=recording.duration,
+        phi=phi,
+        interval="calibrated" if trusted else "approximate",
+        determined=determined,
+        mass=mass,
+        com=com,
+        inertia_com=inertia_com,
+        consistent=consistent,
+        held=is_held,
+        **found_of._asdict(),
+        rests_on_prior=~determined | leaning,
+        notes=tuple(said),
+        log=Path(recording.source).name,
+        date=datetime.now(UTC).isoformat(timespec="seconds"),
+        why=found.why,
+    )
+
+
+def _doubt(found: Found, mass_determined: bool, relative_to: str) -> str | None:
+    """What keeps an answer from being believed, in a sentence."""
+    if is_removal(found.estimate, mass_determined):
+        if relative_to == "tare":
+            return "something was taken off since the tare: the added mass is negative, so no body has these parameters"
+        return (
+            "the mass is negative: less is mounted than the model of the arm and its tool assume, or the torque's "
+            "sign is turned"
+        )
+    if found.misfit > MISFIT:
+        return NO_BODY
+    if found.drift is not None and found.drift.changed:
+        return changed_since_tare(found.drift)
+    if found.mass is not None and found.mass_alone is not None:
+        mean, std = found.mass_alone
+        if abs(found.mass.mass - mean) > HELD * np.hypot(found.mass.std, std):
+            return other_than_weighed(found.mass, mean, std)
+    if found.offset_ratio:
+        return f"the torques are {found.offset_ratio:.0f} times as far off as those of an arm should be: {_CHECK}"
+    return None
+
+
+def _with_any_inertia(
+    low: NDArray[np.float64], high: NDArray[np.float64], tool: InertialParameters
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Intervals (10,) of what a tool carries, were the tool's inertia that of any body within `REACH` of its centre.
+
+    0 to mass·REACH² about each axis, products half of that either way, in place of what was assumed.
+    """
+    most, own = tool.mass * REACH**2, vech(tool.inertia_com)
+    diagonal = np.array([True, False, False, True, False, True])
+    less, more = np.where(diagonal, most - own, most / 2.0), np.where(diagonal, own, most / 2.0)
+    return low - np.r_[np.zeros(4), less], high + np.r_[np.zeros(4), more]

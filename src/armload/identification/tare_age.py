@@ -1,0 +1,70 @@
+"""How long ago a tare was recorded, and by how much an arm may have changed since.
+
+Offsets and friction are taken for a random walk: after d days they differ by √d daily deviations (`Correction.daily_std`),
+1 sigma.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+from pathlib import Path
+
+import numpy as np
+
+from armload.errors import IdentificationError
+from armload.posterior.drift import ALLOWED
+from armload.recording import Recording
+
+DAY = 86400.0  # [s]
+# [s] within which a tare is of the same session: an arm that is warm changes little in an hour. A stated prior
+SESSION = 3600.0
+# [s] since 1970 from which a log's clock is taken for the time of day, and not for the time since something began:
+# September 2001
+_CLOCK = 1e9
+
+
+def drift_after(seconds: float) -> float:
+    """By how many daily deviations an arm may differ after so many seconds; none within a session, at most `ALLOWED`."""
+    return 0.0 if seconds <= SESSION else min(sqrt(seconds / DAY), ALLOWED)
+
+
+def drift_since(tare: Recording, recording: Recording, age: float | None) -> tuple[float, tuple[str, ...]]:
+    """By how many daily deviations the arm may differ from what it was at its tare, and what is to be said of it.
+
+    Args:
+        age: [s] as the user says; None: the logs' clocks tell, if both show the time of day. The files' dates change
+            with every copy: where they are days apart, it is said and not believed.
+
+    Raises:
+        IdentificationError: an age that is no time.
+    """
+    if age is not None:
+        if not (np.isfinite(age) and age >= 0.0):
+            raise IdentificationError(f"the tare's age is {age:g} s: expected a time of 0 or more")
+        return drift_after(age), ()
+    if tare.t[0] > _CLOCK and recording.t[0] > _CLOCK:
+        seconds = max(abs(float(recording.t[0] - tare.t[-1])), 0.0)
+        drift = drift_after(seconds)
+        said = f"by the logs' clocks the tare is {in_words(seconds)} old: offsets and friction may have changed since"
+        return drift, (said,) if drift else ()
+    dates = [_date(log) for log in (tare, recording)]
+    if dates[0] is not None and dates[1] is not None and abs(dates[1] - dates[0]) > DAY:
+        apart = in_words(abs(dates[1] - dates[0]))
+        return 0.0, (f"the files' dates are {apart} apart: if the tare is that old, say --tare-age {apart}",)
+    return 0.0, ()
+
+
+def in_words(seconds: float) -> str:
+    """A time as `--tare-age` takes it: 36 h is 36h, three days are 3d."""
+    for unit, size in (("d", DAY), ("h", 3600.0), ("min", 60.0)):
+        if seconds >= 2.0 * size or unit == "min":
+            return f"{seconds / size:.3g}{unit}"
+    raise AssertionError
+
+
+def _date(log: Recording) -> float | None:
+    """When a log's file was last written [s since 1970]; None: it is no file."""
+    try:
+        return Path(log.source).stat().st_mtime
+    except (OSError, ValueError):
+        return None
