@@ -31,15 +31,20 @@ WORDS = {
 }
 CURRENTS = frozenset({"current", "currents", "motor_current", "motor_currents"})
 NEUTRAL = frozenset(
-    "j jnt joint joints axis arm robot field msg header observation observations obs state states measured meas actual "
-    "act franka controller broadcaster".split()
+    (
+        *("j", "jnt", "joint", "joints", "axis", "arm", "robot", "franka", "controller", "broadcaster"),
+        *("field", "msg", "header", "observation", "observations", "obs", "state", "states"),
+        *("measured", "meas", "actual", "act"),
+    )
 )
 # words of what a controller wants or its model expects; of what is left after the arm's own torque is taken out
 DESIRED = frozenset(
-    "d des desired target cmd command commands commanded ref reference goal setpoint computed expected model planned "
-    "nominal ff feedforward".split()
+    (
+        *("d", "des", "desired", "target", "goal", "setpoint", "ref", "reference", "planned", "nominal"),
+        *("cmd", "command", "commands", "commanded", "computed", "expected", "model", "ff", "feedforward"),
+    )
 )
-EXTERNAL = frozenset("ext external residual disturbance".split())
+EXTERNAL = frozenset(("ext", "external", "residual", "disturbance"))
 # whole names that the words alone would misread
 WHOLE = {
     "observation_state": ("q", "measured"),
@@ -49,7 +54,9 @@ WHOLE = {
     "actual_current_as_torque": ("tau", "external"),  # gravity is taken out already: see devices/ur/source.py
 }
 
-TIMES = frozenset("t time timestamp timestamps stamp time_stamp elapsed elapsed_time header_stamp".split())
+TIMES = frozenset(
+    ("t", "time", "timestamp", "timestamps", "stamp", "header_stamp", "time_stamp", "elapsed", "elapsed_time")
+)
 NAMES = frozenset({"name", "names"})
 EPISODE = "episode_index"
 

@@ -106,9 +106,10 @@ class Header:
             return None
         if spec.t is not None:
             place = place_of(spec.t, "t", self.names, self.where)
-            stated = [reading.unit for at, reading in self.times if at == place]
-            by_tool = self.form is not None and spec.t.lower() in self.form.times
-            return self._timed(place, spec.t_unit or (stated + [None])[0] or (self.form.unit if by_tool else None))
+            unit = spec.t_unit or next((reading.unit for at, reading in self.times if at == place), None)
+            if unit is None and self.form is not None and spec.t.lower() in self.form.times:
+                unit = self.form.unit
+            return self._timed(place, unit)
         if self.form is not None:
             lower = [name.lower() for name in self.names]
             known = [lower.index(name) for name in self.form.times if name in lower]
@@ -128,8 +129,8 @@ class Header:
             )
         if not places:
             raise RecordingError(
-                f"{self.where} lacks a column of time: expected t or timestamp [s]; name it with --columns t=…, or give "
-                "the rate of evenly spaced samples with --rate HZ"
+                f"{self.where} lacks a column of time: expected t or timestamp [s]; name it with --columns t=…, or "
+                "give the rate of evenly spaced samples with --rate HZ"
             )
         return self._timed(
             places[0], spec.t_unit or self.times[0][1].unit or ("s" if self.names[places[0]] == "t" else None)
@@ -176,9 +177,10 @@ class Header:
             family = max(partly, key=lambda f: len(f.places))
             if family.by_name and "{joint}" not in self.template(family):  # its names are cells of the table
                 joints = ", ".join(str(key) for key in family.missing(self.n, self.joints))
+                found = ", ".join(str(key) for key in family.places)
                 return RecordingError(
-                    f"{self.where}: {self.shown(family)} are not of {joints}: found {', '.join(map(str, family.places))}; "
-                    "name the robot that made the log"
+                    f"{self.where}: {self.shown(family)} are not of {joints}: found {found}; name the robot that made "
+                    "the log"
                 )
             lacking = [self.name_of(family, key) for key in family.missing(self.n, self.joints)]
             whole = [f for f in self.families if f is family or f.complete(self.n, self.joints)]

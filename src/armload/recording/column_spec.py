@@ -71,6 +71,11 @@ class ColumnSpec:
             return cls(**{key: _value(key, value, str(given)) for key, value in table.items()})
         return cls(**_pairs(given))
 
+    def given(self) -> dict[str, Any]:
+        """What is not left open, as JSON can hold it; `of` reads it back."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {key: value for key, value in values.items() if value is not None}
+
     def over(self, **more: Any) -> ColumnSpec:
         """These columns, with what is given besides.
 

@@ -1,4 +1,4 @@
-"""Logs in HDF5, as ALOHA and DROID write them: arrays of position, velocity and torque in groups, often without times."""
+"""Logs in HDF5, as ALOHA and DROID write them: arrays of position, velocity, torque in groups, often without times."""
 
 from __future__ import annotations
 

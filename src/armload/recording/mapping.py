@@ -77,17 +77,16 @@ def map_columns(
         raise RecordingError(
             f"{where} has no columns named q1, dq1, tau1, …: found {found}; name the columns with --columns"
         )
-    header = Header(names, families, times, form, _joint_count(families, given, names, where, arm), arm, where)
+    header = Header(names, families, times, form, _joint_count(families, given, where, arm), arm, where)
     places, scales, notes = {}, {}, []
     for key in QUANTITIES:
-        family = None if key in given else header.family(key)
-        places[key] = given[key] if family is None else family.order(header.n, header.joints)
+        places[key] = given[key] if key in given else header.family(key).order(header.n, header.joints)
         if len(places[key]) != header.n:
             raise RecordingError(
                 f"{where}: --columns names {len(places[key])} column(s) of {CALLED[key]} for {header.n} joints: "
                 "expected one per joint"
             )
-        scales[key], note = _scale(header, key, places[key], family, spec)
+        scales[key], note = _scale(header, key, places[key], spec)
         notes += note
     if not given:
         _check_bases(header, places)
@@ -116,27 +115,26 @@ def _with_joint_names(
     for family in families:
         if family.quantity == "name" and not family.by_name:
             labels[family.prefix] = {key: text(places[0]) for key, places in family.places.items()}
-            for key, places in family.places.items():
-                if not labels[family.prefix][key]:
+            for key, called in labels[family.prefix].items():
+                if not called:
+                    name = names[family.places[key][0]]
                     raise RecordingError(
-                        f"{where}: column {names[places[0]]!r} does not name the same joint in every row: expected one "
+                        f"{where}: column {name!r} does not name the same joint in every row: expected one "
                         "device on the topic; write it alone, or read the bag itself"
                     )
     out = []
     for family in families:
-        called = labels.get(family.prefix, {})
-        if family.quantity in QUANTITIES and called.keys() == family.places.keys() and all(called.values()):
+        joints = labels.get(family.prefix, {})
+        if family.quantity in QUANTITIES and joints.keys() == family.places.keys():
             places: dict[int | str, list[int]] = {}
             for key, at in family.places.items():
-                places.setdefault(str(called[key]), []).extend(at)
+                places.setdefault(str(joints[key]), []).extend(at)
             family = Family(family.quantity, family.kind, family.stem, True, places, family.units)
         out.append(family)
     return out
 
 
-def _joint_count(
-    families: Sequence[Family], given: dict[str, list[int]], names: Sequence[str], where: str, arm: Arm | None
-) -> int:
+def _joint_count(families: Sequence[Family], given: dict[str, list[int]], where: str, arm: Arm | None) -> int:
     """The number of joints: the arm's, or the largest that the columns speak of.
 
     Raises:
@@ -152,15 +150,13 @@ def _joint_count(
     if arm is None:
         return max(found, 1)
     consistent = {family.quantity for family in sets if family.complete(found, None) and not family.by_name}
-    if found != arm.n and not named and consistent == set(QUANTITIES):
-        if not any(family.complete(arm.n, arm.joint_names) for family in sets):
-            check_joint_count(found, where, arm)  # raises
+    fits = any(family.complete(arm.n, arm.joint_names) for family in sets)
+    if found != arm.n and not named and not fits and consistent == set(QUANTITIES):
+        check_joint_count(found, where, arm)  # raises
     return arm.n
 
 
-def _scale(
-    header: Header, key: str, places: list[int], family: Family | None, spec: ColumnSpec
-) -> tuple[tuple[float, ...], list[str]]:
+def _scale(header: Header, key: str, places: list[int], spec: ColumnSpec) -> tuple[tuple[float, ...], list[str]]:
     """What the columns of a quantity are multiplied with (n,), and a note where that is more than a unit."""
     readings = [
         read_name(header.names[place], () if header.arm is None else header.arm.joint_names) for place in places
@@ -200,8 +196,8 @@ def _torque_constants(header: Header, places: list[int], spec: ColumnSpec) -> tu
         called = "this arm" if arm is None else arm.name
         raise RecordingError(
             f"{header.where}: {some([header.names[place] for place in places])} look like motor currents [A], and no "
-            f"torque constants are known for {called}: give {header.n} numbers in N·m/A, from a scale test with a known "
-            'load, with --columns "torque_constants=12 12 10 11 11 11"'
+            f"torque constants are known for {called}: give {header.n} numbers in N·m/A, from a scale test with a "
+            'known load, with --columns "torque_constants=12 12 10 11 11 11"'
         )
     if len(constants) != header.n:
         raise RecordingError(
@@ -215,7 +211,7 @@ def _check_bases(header: Header, places: dict[str, list[int]]) -> None:
     bases = {}
     for family in header.families:
         order = [] if family.by_name or family.quantity not in QUANTITIES else places[family.quantity]
-        if order and family.places.get(family.base(), [None])[0] == order[0]:
+        if order and order[0] in family.places.get(family.base(), ()):
             bases.setdefault(family.base(), family)
     if len(bases) > 1:
         shown = " and ".join(f"{header.shown(family)} from {base}" for base, family in sorted(bases.items()))
@@ -231,7 +227,7 @@ def _notes(header: Header, places: dict[str, list[int]], time: TimeColumns | Non
     names, canonical = header.names, column_names(header.n)
     taken = {place for key in QUANTITIES for place in places[key]}
     if time is not None:
-        taken |= {time.place} | ({time.nanoseconds} - {None})
+        taken |= {time.place} if time.nanoseconds is None else {time.place, time.nanoseconds}
     left = [name for k, name in enumerate(names) if k not in taken and not name.startswith("Unnamed: ")]
     out = f"; left out {some(left)}" if left else ""
     plain = {re.sub(r"\[([0-9]+)\]$", lambda m: str(int(m[1]) + 1), names[place]) for place in taken}  # an array's q[0]

@@ -22,7 +22,11 @@ class Table(Protocol):
     """A file of rows and named columns."""
 
     names: Sequence[str]
-    notes: Sequence[str]  # what its reader did to it, complete once the numbers are read
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """What its reader did to it, complete once the numbers are read."""
+        ...
 
     def numbers(self, places: Sequence[int]) -> NDArray[np.float64]:
         """The columns at these places (N, k)."""
@@ -83,7 +87,7 @@ def read_table(table: Table, where: str, arm: Arm | None, spec: ColumnSpec, chan
     )
 
 
-def _seconds(table: Table, time: TimeColumns, raw: NDArray[np.float64], where: str) -> NDArray[np.float64]:
+def _seconds(table: Table, time: TimeColumns, raw: NDArray[np.float64], where: str) -> NDArray:
     """The times (N,) [s].
 
     Stamps in nanoseconds are subtracted as whole numbers first: since 1970 a double resolves 0.2 µs. They begin at 0.

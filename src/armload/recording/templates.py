@@ -42,9 +42,10 @@ def named_columns(
         keys = range(base, base + len(there))
         if there != list(keys) or (arm is not None and len(there) != arm.n):
             expected = "0 … n−1 or 1 … n" if arm is None else f"0 … {arm.n - 1} or 1 … {arm.n}"
+            last = base + (len(there) if arm is None else arm.n) - 1
             raise RecordingError(
                 f"{where}: --columns {key}={template} fits columns with the indices {', '.join(map(str, there[:12]))}: "
-                f"expected {expected}; name a range, such as {before}{{{base}..{base + (arm.n if arm else 7) - 1}}}{after}"
+                f"expected {expected}; name a range, such as {before}{{{base}..{last}}}{after}"
             )
     return [place_of(f"{before}{number}{after}", key, names, where) for number in keys]
 
