@@ -78,6 +78,7 @@ UNITS = {
 }
 
 
+_STAMPS = ("field.header.stamp", "%time")
 _POLYMETIS = "observation_robot_state_motor_torques_measured"
 
 
@@ -85,23 +86,25 @@ class Form(NamedTuple):
     """What is known of a log by the tool that wrote it.
 
     marks: names without index that must all be there. times: the columns of time, in the order of preference.
-    unit: of the time. torque: the measured torque among several, as this tool names it.
+    unit: of the time. clocks: pattern of other columns of time that it writes. torque: the measured torque among
+        several, as this tool names it.
     """
 
     tool: str
     marks: tuple[str, ...]
     times: tuple[str, ...]
     unit: str
+    clocks: str = "(?!)"
     torque: str | None = None
 
 
 FORMS = (
-    Form("libfranka", ("state_q", "state_dq", "state_tau_j", "success_rate"), ("time",), "ms", "state_tau_j"),
-    Form("libfranka", ("q", "dq", "tau_j", "success_rate", "sent_commands"), ("duration",), "ms", "tau_j"),
-    Form("rostopic echo -p", ("field_q", "field_tau_j"), ("field.header.stamp", "%time"), "ns", "field_tau_j"),
-    Form("rostopic echo -p", ("field_position",), ("field.header.stamp", "%time"), "ns"),
-    Form("PlotJuggler", ("__time",), ("__time",), "s"),
+    Form("libfranka", ("state_q", "state_dq", "state_tau_j", "success_rate"), ("time",), "ms", torque="state_tau_j"),
+    Form("libfranka", ("q", "dq", "tau_j", "success_rate", "sent_commands"), ("duration",), "ms", torque="tau_j"),
+    Form("rostopic echo -p", ("field_q", "field_tau_j"), _STAMPS, "ns", r"field\..*", "field_tau_j"),
+    Form("rostopic echo -p", ("field_position",), _STAMPS, "ns", r"field\..*"),
+    Form("PlotJuggler", ("__time",), ("__time",), "s", r"/.*/header/stamp(/\w+)?"),
     Form("RTDE", ("actual_q", "actual_qd"), ("timestamp",), "s"),
     Form("LeRobot", ("observation_state", "episode_index"), ("timestamp",), "s"),
-    Form("polymetis", (_POLYMETIS,), (), "s", _POLYMETIS),
+    Form("polymetis", (_POLYMETIS,), (), "s", torque=_POLYMETIS),
 )

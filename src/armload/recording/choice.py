@@ -113,7 +113,8 @@ class Header:
         if self.form is not None:
             lower = [name.lower() for name in self.names]
             known = [lower.index(name) for name in self.form.times if name in lower]
-            if known:
+            strange = [at for at in places if at not in known and not re.fullmatch(self.form.clocks, lower[at])]
+            if known and not strange:
                 unit = spec.t_unit or self.form.unit
                 return TimeColumns(known[0], unit, None, None if spec.t_unit else self.form.tool, (*known[1:], None)[0])
         if len(self.times) == 2:

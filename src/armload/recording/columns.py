@@ -22,13 +22,13 @@ def column_names(n: int) -> list[str]:
     return ["t", *(f"{quantity}{j}" for quantity in QUANTITIES for j in range(1, n + 1))]
 
 
-def check_joint_count(n: int, where: str, arm: Arm) -> None:
-    """Raise RecordingError if the log's n joints are not the arm's."""
+def check_joint_count(n: int, where: str, arm: Arm, also: str = "") -> None:
+    """Raise RecordingError if the log's n joints are not the arm's; `also`: another way to mend it."""
     if n != arm.n:
         has = "1 joint (q1)" if n == 1 else f"{n} joints (q1..q{n})"
         raise RecordingError(
             f"{where}: log has {has}, {arm.name} has {arm.n} up to its frame {arm.frame!r}: name the robot that made "
-            "the log, or its flange with --frame"
+            f"the log, or its flange with --frame{also}"
         )
 
 

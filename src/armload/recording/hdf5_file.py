@@ -16,7 +16,7 @@ from armload.recording.table import read_table
 def read_hdf5(path: Path, where: str, arm: Arm | None = None, spec: ColumnSpec | None = None) -> Recording:
     """Read an HDF5 log; see `read_recording` for what it raises."""
     try:
-        import h5py
+        import h5py  # type: ignore[import-not-found]
     except ImportError:
         raise RecordingError(
             f"{where}: HDF5 is read through h5py, which is missing: pip install 'armload[hdf5]'"

@@ -152,7 +152,8 @@ def _joint_count(families: Sequence[Family], given: dict[str, list[int]], where:
     consistent = {family.quantity for family in sets if family.complete(found, None) and not family.by_name}
     fits = any(family.complete(arm.n, arm.joint_names) for family in sets)
     if found != arm.n and not named and not fits and consistent == set(QUANTITIES):
-        check_joint_count(found, where, arm)  # raises
+        own = f', or the arm\'s own columns with --columns "q=NAME{{0..{arm.n - 1}}}"' if found > arm.n else ""
+        check_joint_count(found, where, arm, own)  # raises
     return arm.n
 
 
