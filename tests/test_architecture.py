@@ -26,6 +26,7 @@ OWNERS = {
     "geometry_msgs": {"devices"},
     "trajectory_msgs": {"devices"},
     "pyarrow": {"recording", "lab"},
+    "h5py": {"recording"},
     "mujoco": {"simulation"},
     "jax": {"ensembles"},
     "sklearn": {"ensembles", "posterior"},
