@@ -12,10 +12,11 @@ from armload.app.cli.arguments import (
     add_tool_and_topic_arguments,
     arm_of,
     file_name,
-    payload_of,
+    payload_named,
     read_logs,
 )
-from armload.app.cli.printing import print_identification, print_json, print_note, working
+from armload.app.cli.export import FORMS, write
+from armload.app.cli.printing import print_json, print_note, working, write_json
 
 _EXAMPLES = """\
 examples:
@@ -23,7 +24,8 @@ examples:
   armload identify run.mcap --robot panda --tool franka-hand
   armload identify loaded.csv --robot my_arm.urdf --frame tool0 --tare unloaded.csv
   armload identify run.csv --robot ur10e --gravity=-9.81,0,0        (on a wall)
-  armload identify run.csv --robot panda --json > payload.json      (usable as --tool later)
+  armload identify run.csv --robot panda --out payload.json         (the answer as JSON, usable as --tool later)
+  armload identify run.csv --robot panda --tool franka-hand --to franka    (what the controller reads)
 
   armload identify flight.csv --robot my_arm.urdf --columns "t=clock,q=enc_{i},dq=rate_{i},tau=load_{i},t_unit=ms"
 
@@ -46,28 +48,46 @@ def parser() -> Parser:
     add_tool_and_topic_arguments(parser)
     parser.add_argument("--tare-topic", metavar="T", help="that of the tare's bag, where it is another one")
     add_column_arguments(parser)
+    parser.add_argument("--all", action="store_true", help="print the ten parameters about the frame's origin, too")
     parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+    parser.add_argument(
+        "--to",
+        choices=FORMS,
+        metavar="FORM",
+        help=f"print it as a controller or simulator reads it, as `armload export` does: {', '.join(FORMS)}",
+    )
+    parser.add_argument(
+        "--out", type=file_name, metavar="FILE", help="write a file, whole or not at all: JSON, or the form of --to"
+    )
     return parser
 
 
 def run(options: argparse.Namespace) -> None:
     """Identify and print."""
+    from armload.devices import Load
     from armload.errors import UsageError
     from armload.identification import identify
+    from armload.identification.text import summary
 
     with working("reading") as say:
         arm = arm_of(options)
-        tool = None if options.tool is None else payload_of(options.tool, arm)
+        tool = None if options.tool is None else payload_named(options.tool, arm)
+        if options.to is not None and (options.json or options.all):
+            raise UsageError("--to prints a controller's form alone: leave out --json and --all")
         if options.tare_topic is not None and options.tare is None:
             raise UsageError("--tare-topic names a topic of the tare's bag, but there is no --tare")
         topics = (options.topic, options.tare_topic or options.topic)
         log, tare = read_logs(options, arm, options.log, options.tare, topics=topics)
         assert log is not None
         result = identify(log, arm, tare=tare, tool=tool, method=options.method, progress=say)
-    for note in (*log.notes, *(tare.notes if tare else ()), *result.notes):
+    if options.to is not None:
+        write(Load.of(result), options.to, options.out, arm, options.frame, told=result.notes)
+        return
+    if options.out is not None:
+        write_json(options.out, result.to_dict())
+    for note in result.notes:
         print_note(note)
     if options.json:
         print_json(result.to_dict())
-        print_note(f"method {result.method}: {result.why}")
     else:
-        print_identification(result)
+        print(summary(result, options.all))
