@@ -10,12 +10,12 @@ The names below are imported when they are first used, so that `import armload` 
 
 from __future__ import annotations
 
-import importlib
 import os
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from armload.lazy import on_first_use
 from armload.version import __version__
 
 if TYPE_CHECKING:
@@ -32,42 +32,6 @@ if TYPE_CHECKING:
     from armload.posterior import HybridIdentifier, PosteriorLeastSquares
     from armload.recording import Recording, Sample, read_recording, write_recording
     from armload.simulation import Sensors, World, simulate
-
-_ROOMS = {
-    "ARMS": "arms",
-    "Arm": "arms",
-    "arm": "arms",
-    "ArmloadError": "errors",
-    "HybridIdentifier": "posterior",
-    "Estimate": "estimators",
-    "Identifier": "estimators",
-    "METHODS": "identification",
-    "Identification": "identification",
-    "InertialParameters": "inertia",
-    "LearnedIdentifier": "ensembles",
-    "load_model": "ensembles",
-    "save_model": "ensembles",
-    "FilteredRecursiveLeastSquares": "estimators",
-    "PosteriorLeastSquares": "posterior",
-    "RecursiveLeastSquares": "estimators",
-    "FourierMotion": "motion",
-    "OnlineIdentifier": "online",
-    "Motion": "motion",
-    "check_motion": "motion",
-    "identify": "identification",
-    "simulate": "simulation",
-    "taie2024": "motion",
-    "Payload": "payloads",
-    "read_payload": "payloads",
-    "write_payload": "payloads",
-    "Recording": "recording",
-    "Sample": "recording",
-    "read_recording": "recording",
-    "write_recording": "recording",
-    "Sensors": "simulation",
-    "World": "simulation",
-    "open_source": "devices",
-}
 
 __all__ = [
     "ARMS",
@@ -133,14 +97,4 @@ def _writable(folder: Path) -> bool:
 
 _let_numba_keep_what_it_compiles()
 
-
-def __getattr__(name: str) -> Any:
-    if name not in _ROOMS:
-        raise AttributeError(f"module 'armload' has no attribute {name!r}")
-    value = getattr(importlib.import_module(f"armload.{_ROOMS[name]}"), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+__getattr__, __dir__ = on_first_use(__name__)

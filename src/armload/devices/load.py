@@ -5,17 +5,19 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm
 from armload.errors import SinkError
-from armload.identification import Identification
-from armload.inertia import NAMES, Z95, InertialParameters, is_consistent, nearest_consistent, to_order
-from armload.online import OnlineEstimate
+from armload.inertia import NAMES, Z95, InertialParameters, is_consistent, to_order
 from armload.payloads.payload_file import payload_from, read_content
+
+if TYPE_CHECKING:
+    from armload.arms import Arm
+    from armload.identification import Identification
+    from armload.online import OnlineEstimate
 
 _KNOWN = (True,) * 10
 _RELATIVE = {"before": "empty arm before"}  # what reads otherwise than it is called
@@ -58,6 +60,8 @@ class Load:
     @classmethod
     def of(cls, result: Load | Identification | OnlineEstimate, arm: Arm | None = None) -> Load:
         """The load that was identified, in a log or, on `arm`, on a live robot; a load is returned as it is."""
+        from armload.online import OnlineEstimate
+
         if isinstance(result, Load):
             return result
         if isinstance(result, OnlineEstimate):
@@ -140,6 +144,8 @@ class Load:
         return tuple(lines)
 
     def _nearest(self) -> NDArray[np.float64]:
+        from armload.inertia import nearest_consistent
+
         information = None if self.std is None else np.diag(1.0 / np.maximum(self.std, 1e-9) ** 2)
         return nearest_consistent(self.parameters.phi, information)
 

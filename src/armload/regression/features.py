@@ -62,11 +62,12 @@ class JointFeatures:
     @cached_property
     def velocity_waves(self) -> NDArray[np.float64]:
         """Waves (velocity/2,) over the stretched velocity."""
-        # quantiles of the half-normal, so that few waves already span the functions evenly
-        from scipy.stats import halfnorm
+        from scipy.special import ndtri
 
+        # quantiles of the half-normal, so that few waves already span the functions evenly
         count = self.velocity // 2
-        return halfnorm.ppf((np.arange(count) + 0.5) / max(count, 1)) / _VELOCITY_SCALE
+        shares = (np.arange(count) + 0.5) / max(count, 1)
+        return ndtri((1.0 + shares) / 2.0) / _VELOCITY_SCALE
 
     def of_pose(self, q: ArrayLike) -> NDArray[np.float64]:
         """f (N, pose) at poses (N, n), the same for all joints; the mean square of a weighted sum is the weights'."""
