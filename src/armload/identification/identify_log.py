@@ -131,9 +131,15 @@ class _Found(NamedTuple):
     unknown_friction: bool = False
 
     @property
-    def misfit(self) -> float:
-        """Standard deviations between what the log says and the nearest body."""
-        return distance_to_body(*(self.unprojected or (self.estimate.phi, self.estimate.covariance)))
+    def explained(self) -> bool:
+        """Whether a body lies within `MISFIT` standard deviations of what the log says: most often the answer does."""
+        mean, covariance = self.unprojected or (self.estimate.phi, self.estimate.covariance)
+        away = self.estimate.phi - mean
+        if is_consistent(self.estimate.phi) and (
+            not away.any() or away @ np.linalg.solve(covariance, away) <= MISFIT**2
+        ):
+            return True  # the nearest body is nearer still, and need not be found
+        return distance_to_body(mean, covariance) <= MISFIT
 
     def less(self, tool: NDArray[np.float64]) -> _Found:
         """The same without a tool (10,)."""
@@ -225,7 +231,7 @@ def _answer(
             else "the mass is negative: less is mounted than the model of the arm and its tool assume, or the torque's "
             "sign is turned"
         )
-    elif found.misfit > MISFIT:
+    elif not found.explained:
         said.append(f"no body fits within the error bars: {_CHECK}")
         trusted = False
     elif found.offset_ratio:

@@ -17,8 +17,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
+
+from armload.kernels import kernel
 
 # [rad] of the pose, mixed, as nobody knows the one of an arm. Stated priors
 # (test_pose_features_have_the_kernel_of_a_gaussian_process)
@@ -84,7 +85,7 @@ class JointFeatures:
         return features_of_sample(q, dq, self.waves, self.velocity_waves)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def features_of_sample(q, dq, waves, velocity_waves):  # pragma: no cover - compiled
     half, few, n = waves.shape[0], velocity_waves.shape[0], q.shape[0]
     pose, velocity = np.empty(2 * half), np.empty((n, 2 * few))

@@ -17,6 +17,7 @@ from __future__ import annotations
 import _thread
 import difflib
 import importlib
+import logging
 import os
 import sys
 import time
@@ -71,7 +72,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure") and (stream.encoding or "").lower().replace("-", "") != "utf8":
             stream.reconfigure(errors="replace")  # a terminal that cannot show "m²" still gets the answer
-    with warnings.catch_warnings(), _no_interruption_lost():
+    with warnings.catch_warnings(), _notes_on_stderr(), _no_interruption_lost():
         warnings.showwarning = _show_warning
         code = _guarded(arguments, show_traceback)
     try:
@@ -117,6 +118,27 @@ def _interrupted(error: BaseException | None) -> bool:
         seen.add(id(error))
         error = error.__cause__ or (None if error.__suppress_context__ else error.__context__)
     return False
+
+
+class _Notes(logging.Handler):
+    """What the library logs, each record as one line on stderr."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        print(f"armload: {record.getMessage()}", file=sys.stderr, flush=True)
+
+
+@contextmanager
+def _notes_on_stderr() -> Iterator[None]:
+    """Show what takes long, as `armload.kernels` says of compiling."""
+    logger, handler = logging.getLogger("armload"), _Notes()
+    level = logger.level
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
+        logger.setLevel(level)
 
 
 @contextmanager
