@@ -28,6 +28,7 @@ from contextlib import contextmanager
 
 from armload.app.cli.arguments import Parser, attach_values
 from armload.errors import ArmloadError, UsageError
+from armload.extras import missing
 from armload.version import __version__
 
 COMMANDS = {
@@ -104,9 +105,15 @@ def _guarded(arguments: list[str], show_traceback: bool) -> int:
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
         return _fail(f"{where}{error.strerror or error}", 2, show_traceback)
+    except ModuleNotFoundError as error:
+        return _bug(error, show_traceback) if (said := missing(error)) is None else _fail(said, 2, show_traceback)
     except Exception as error:
-        hint = "" if show_traceback else "; this is a bug: set ARMLOAD_TRACEBACK=1 (or --traceback) to see where"
-        return _fail(f"{type(error).__name__}: {str(error) or 'no message'}{hint}", 1, show_traceback)
+        return _bug(error, show_traceback)
+
+
+def _bug(error: Exception, show_traceback: bool) -> int:
+    hint = "" if show_traceback else "; this is a bug: set ARMLOAD_TRACEBACK=1 (or --traceback) to see where"
+    return _fail(f"{type(error).__name__}: {str(error) or 'no message'}{hint}", 1, show_traceback)
 
 
 def _interrupted(error: BaseException | None) -> bool:
