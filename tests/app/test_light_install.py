@@ -35,8 +35,8 @@ class Refuse:
         if name.partition(".")[0] in {refused!r}:
             raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
 
-sys.meta_path.insert(0, Refuse())
 site.addsitedir({packages!r})
+sys.meta_path.insert(0, Refuse())
 '''
 
 
@@ -122,11 +122,15 @@ def test_a_wheel_without_extras_identifies_exports_and_follows_a_replay(light, p
         (["demo", "--quick", "--out", "demo"], "mujoco"),
         (["live", "--headless", "--duration", "0.1"], "mujoco"),
         (["live", "panda://127.0.0.1", "--headless"], "panda-python"),
-        (["live", "none.csv", "--robot", "panda"], "viser"),
+        (["live", "{log}", "--robot", "panda"], "viser"),
     ],
 )
-def test_what_needs_an_extra_says_in_one_sentence_how_to_install_it(light, arguments, package):
-    done = light("-m", "armload", *arguments)
+def test_what_needs_an_extra_says_in_one_sentence_how_to_install_it(
+    arguments, package, light, panda, analytic_log, tmp_path
+):
+    log = tmp_path / "log.csv"
+    write_recording(log, analytic_log(panda, duration=0.5))
+    done = light("-m", "armload", *(argument.format(log=log) for argument in arguments))
     assert (done.returncode, done.stdout) == (2, ""), done.stderr
     line = done.stderr.splitlines()[-1]  # what was done until then may stand above
     assert "Traceback" not in done.stderr
@@ -164,7 +168,7 @@ def test_light_commands_import_nothing_of_the_extras(command, absent, panda, ana
     body = payload_of_the_tests().parameters
     write_recording(names["log"], analytic_log(panda, body, duration=0.5))
     write_recording(names["tare"], analytic_log(panda, duration=0.5, phase=1.0))
-    names["held"].write_text(json.dumps({"phi": body.phi.tolist(), "frame": body.frame, "robot": "panda"}))
+    names["held"].write_text(json.dumps({"phi": body.phi.tolist(), "frame": panda.frame, "robot": "panda"}))
     argv = [part.format(**names) for part in command]
     code = (
         f"import sys, json; from armload.app import main; code = main({argv!r}); "
