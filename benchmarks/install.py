@@ -12,7 +12,7 @@ of two simulated logs as in the README (6 s at 1 kHz, with a tare of 20 s), and 
 ARMLOAD_REAL_DATA names its folder. "first" is with no compiled function on disk, "again" the median of the repeats
 after it, with their range. The environment's own pip is not counted.
 
-Written to benchmarks/results/install.json. About five minutes.
+Written to benchmarks/results/install.json and docs/install.md. About five minutes.
 """
 
 from __future__ import annotations
@@ -28,11 +28,12 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from script import ROOT, options, say, write
+from script import ROOT, markdown_table, options, say, write, write_table
 
 _REFERENCE = ["-c", "import numpy, pinocchio"]
 _SHOWN = 5.0  # [MB] a distribution that is smaller is counted in the sum only
 _NOT_OURS = {"pip", "setuptools"}  # the environment's own
+_PAGE = ROOT / "docs" / "install.md"
 _REAL = "panda_unloaded_1khz.csv"
 
 
@@ -47,6 +48,23 @@ def main() -> None:
             say(log)
             result[log] = _measured(python, folder / log, arguments, asked.repeats)
     write("install", result)
+    show(result)
+
+
+def show(result: dict[str, Any]) -> None:
+    """Write the page's tables."""
+    sizes = result["size_MB"]
+    rows = [[name, *(f"{x:.0f}" for x in size)] for name, size in sizes["distributions"].items()]
+    rows.append(["all, the smaller ones too", *(f"{x:.0f}" for x in sizes["total"])])
+    write_table(_PAGE, "size", markdown_table(("package", "bytes of the files", "allocated"), "lrr", rows))
+    rows = []
+    for log in (name for name in ("simulated", "real") if name in result):
+        for command in ("identify", "export", "live"):
+            one = result[log][command]
+            times = [f"{one[when][what]:.1f}" for when in ("first", "again") for what in ("cpu", "wall")]
+            rows.append([f"`{command}`, {log}", *times])
+    columns = ("command", "first: CPU", "first: wall", "again: CPU", "again: wall")
+    write_table(_PAGE, "time", markdown_table(columns, "lrrrr", rows))
 
 
 def _installed(folder: Path) -> Path:
