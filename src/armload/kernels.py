@@ -23,7 +23,8 @@ class _Listener(event.Listener):
     told = False
 
     def on_start(self, event: event.Event) -> None:
-        if not self.told and event.data["dispatcher"].py_func.__module__.startswith("armload."):
+        compiled: Any = event.data
+        if not self.told and compiled["dispatcher"].py_func.__module__.startswith("armload."):
             self.told = True
             logging.getLogger("armload").info(COMPILING)
 
@@ -36,7 +37,8 @@ def kernel(function: Any = None, **options: Any) -> Any:
 
     Arguments are arrays that can be written, in C order, and numbers: for others it is compiled once more.
     """
-    compiled = njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)
+    settings: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+    compiled: Any = njit(**settings, **options)
     return compiled if function is None else compiled(function)
 
 

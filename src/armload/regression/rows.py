@@ -24,13 +24,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armload.arms import Arm
+from armload.arms import FRICTION_WIDTH, Arm
 from armload.arms.momentum_row import MomentumRow, momentum_rows
 from armload.kernels import kernel
 from armload.recording import GAP, JITTERED
 from armload.regression.features import JointFeatures, features_of_sample
 from armload.regression.lag import GAIN
-from armload.regression.mismatch import FRICTION_WIDTH, Correction
+from armload.regression.mismatch import Correction
 
 REGRESSOR_RATE = 200.0  # [Hz] rows are made no more often where a rate is set: they hold nothing above a few hertz
 SPACING = JITTERED / REGRESSOR_RATE  # [s] between rows at least
