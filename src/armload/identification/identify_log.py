@@ -151,9 +151,15 @@ class _Found(NamedTuple):
     known_arm_std: NDArray[np.float64] | None = None
 
     @property
-    def misfit(self) -> float:
-        """Standard deviations between what the log says and the nearest body."""
-        return distance_to_body(*(self.unprojected or (self.estimate.phi, self.estimate.covariance)))
+    def explained(self) -> bool:
+        """Whether a body lies within `MISFIT` standard deviations of what the log says: most often the answer does."""
+        mean, covariance = self.unprojected or (self.estimate.phi, self.estimate.covariance)
+        away = self.estimate.phi - mean
+        if is_consistent(self.estimate.phi) and (
+            not away.any() or away @ np.linalg.solve(covariance, away) <= MISFIT**2
+        ):
+            return True  # the nearest body is nearer still, and need not be found
+        return distance_to_body(mean, covariance) <= MISFIT
 
     def less(self, tool: NDArray[np.float64]) -> _Found:
         """The same without a tool (10,)."""
@@ -282,7 +288,7 @@ def _doubt(found: _Found, mass_determined: bool, relative_to: str) -> str | None
             "the mass is negative: less is mounted than the model of the arm and its tool assume, or the torque's "
             "sign is turned"
         )
-    if found.misfit > MISFIT:
+    if not found.explained:
         return NO_BODY
     if found.offset_ratio:
         return f"the torques are {found.offset_ratio:.0f} times as far off as those of an arm should be: {_CHECK}"
