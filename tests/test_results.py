@@ -410,3 +410,13 @@ def test_a_constant_is_set_wherever_it_is_used_and_put_back(sensitivity):
     with sensitivity.set_to(windows, windows.times(2.0)):
         assert (thresholds.WINDOWS, changes.WINDOWS, watch.LONGEST) == ((32, 96), (32, 96), 96)
     assert (thresholds.WINDOWS, changes.WINDOWS, watch.LONGEST) == ((16, 48), (16, 48), 48)
+
+
+def test_the_page_of_the_install_is_that_of_the_committed_measurement(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    install = importlib.import_module("install")
+    page = tmp_path / "install.md"
+    page.write_text((ROOT / "docs" / "install.md").read_text(encoding="utf-8"), encoding="utf-8")
+    monkeypatch.setattr(install, "_PAGE", page)
+    install.show(json.loads((RESULTS / "install.json").read_text()))
+    assert page.read_text(encoding="utf-8") == (ROOT / "docs" / "install.md").read_text(encoding="utf-8")

@@ -9,12 +9,12 @@ The names below are imported when they are first used, so that `import armload` 
 
 from __future__ import annotations
 
-import importlib
 import os
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from armload.lazy import on_first_use
 from armload.version import __version__
 
 if TYPE_CHECKING:
@@ -31,42 +31,6 @@ if TYPE_CHECKING:
     from armload.posterior import HybridIdentifier, PosteriorLeastSquares
     from armload.recording import Recording, Sample, read_recording, write_recording
     from armload.simulation import Sensors, World, simulate
-
-_ROOMS = {
-    "ARMS": "arms",
-    "Arm": "arms",
-    "arm": "arms",
-    "ArmloadError": "errors",
-    "HybridIdentifier": "posterior",
-    "Estimate": "estimators",
-    "Identifier": "estimators",
-    "METHODS": "identification",
-    "Identification": "identification",
-    "InertialParameters": "inertia",
-    "LearnedIdentifier": "ensembles",
-    "load_model": "ensembles",
-    "save_model": "ensembles",
-    "FilteredRecursiveLeastSquares": "estimators",
-    "PosteriorLeastSquares": "posterior",
-    "RecursiveLeastSquares": "estimators",
-    "FourierMotion": "motion",
-    "OnlineIdentifier": "online",
-    "Motion": "motion",
-    "check_motion": "motion",
-    "identify": "identification",
-    "simulate": "simulation",
-    "taie2024": "motion",
-    "Payload": "payloads",
-    "read_payload": "payloads",
-    "write_payload": "payloads",
-    "Recording": "recording",
-    "Sample": "recording",
-    "read_recording": "recording",
-    "write_recording": "recording",
-    "Sensors": "simulation",
-    "World": "simulation",
-    "open_source": "devices",
-}
 
 __all__ = [
     "ARMS",
@@ -132,13 +96,7 @@ def _writable(folder: Path) -> bool:
 
 _let_numba_keep_what_it_compiles()
 
-
-def __getattr__(name: str) -> Any:
-    if name not in _ROOMS:
-        raise AttributeError(f"module 'armload' has no attribute {name!r}")
-    value = getattr(importlib.import_module(f"armload.{_ROOMS[name]}"), name)
-    globals()[name] = value
-    return value
+__getattr__, _ = on_first_use(__name__)
 
 
 def __dir__() -> list[str]:

@@ -254,6 +254,21 @@ def test_numba_keeps_what_it_compiles_in_a_folder_of_the_user_s_own_where_nothin
     assert other.stat().st_mode & 0o777 == 0o700
 
 
+def test_who_waits_for_the_compiler_is_told_once_and_not_when_all_is_on_disk(tmp_path):
+    code = (
+        "import numpy as np; from armload.app.cli.entry import _notes_on_stderr; "
+        "from armload.inertia.cholesky import inverse\n"
+        "with _notes_on_stderr(): inverse(np.eye(2)); inverse(np.eye(2, dtype=np.float32))"
+    )
+
+    def said():
+        env = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+        return subprocess.run([sys.executable, "-c", code], env=env, check=True, capture_output=True, text=True).stderr
+
+    assert said() == "armload: compiling for this machine, which is done once and takes a while\n"
+    assert said() == ""
+
+
 @pytest.mark.parametrize("closed", ["2>&-", ">&-"])
 def test_a_stream_that_is_closed_is_no_crash(closed):
     """A shell can start a program without standard output or error; Python then has None for them."""

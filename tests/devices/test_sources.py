@@ -777,18 +777,18 @@ def test_a_ur_without_torque_constants_asks_for_them():
 
 
 @pytest.mark.parametrize(
-    ("spec", "robot", "module", "extra"),
+    ("spec", "robot", "module", "package"),
     [
-        ("fr3://127.0.0.1", "panda", "pylibfranka", "franka"),
-        ("panda://127.0.0.1", "panda", "panda_py", "panda"),
-        ("ur://127.0.0.1", "ur10e", "rtde_receive", "ur"),
+        ("fr3://127.0.0.1", "panda", "pylibfranka", "pylibfranka"),
+        ("panda://127.0.0.1", "panda", "panda_py", "panda-python"),
+        ("ur://127.0.0.1", "ur10e", "rtde_receive", "ur-rtde"),
     ],
 )
-def test_a_missing_client_is_an_error_that_names_the_extra(monkeypatch, spec, robot, module, extra):
+def test_a_missing_client_is_an_error_that_says_how_to_install_it(monkeypatch, spec, robot, module, package):
     for name in [name for name in sys.modules if name.split(".")[0] == module]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, module, None)  # what Python does for a module that cannot be imported
-    with pytest.raises(SourceError, match=rf"pip install 'armload\[{extra}\]'"):
+    with pytest.raises(SourceError, match=rf"pip install '?{package}"):
         open_source(spec, arm(robot), detached=False)
 
 

@@ -5,10 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from armload.arms import arm, payload_regressor
 from armload.errors import IdentificationError, RecordingError
+from armload.estimators import Estimate
 from armload.identification import METHODS, identify
+from armload.identification.found import Found
+from armload.identification.intervals import Before
+from armload.identification.thresholds import MISFIT
 from armload.inertia import Z95, InertialParameters, distance_to_body, is_consistent, nearest_body
 from armload.lab.episodes import Recipe, draw_episodes, simulate_episodes
 from armload.motion import random_motion, taie2024
@@ -333,3 +338,23 @@ def test_an_undetermined_interval_of_a_method_without_a_prior_holds_its_own(real
     assert not answer.determined[0]
     assert "does not tell whether anything is held" in str(answer)
     assert answer.phi_high[0] >= answer.phi[0] > Z95 * payload_prior_std(panda)[0]
+
+
+def test_one_sound_log_in_a_thousand_lies_farther_from_all_bodies_than_is_taken():
+    assert chi2.sf(MISFIT**2, 10) == pytest.approx(1e-3, rel=1e-12)
+
+
+def test_an_answer_near_what_the_log_says_spares_the_search_for_the_nearest_body_and_changes_no_verdict():
+    rng, verdicts = np.random.default_rng(5), []
+    body, unit = (
+        nearest_body(np.array([1.0, *[0.01] * 3, *[0.004] * 6]), np.eye(10)),
+        np.array([1.0, *[0.1] * 3] + [0.01] * 6),
+    )
+    for _ in range(40):
+        covariance = np.outer(unit, unit) * 1e-4 * np.exp(rng.normal()) * np.eye(10)
+        mean = body + rng.uniform(0.5, 4.0) * np.sqrt(np.diag(covariance)) * rng.normal(size=10)
+        estimate = Estimate(1.0, body, covariance, 1, "f")
+        found = Found(estimate, Before(body, unit, True), "m", "w", unprojected=(mean, covariance))
+        verdicts.append(found.explained)
+        assert found.explained == (distance_to_body(mean, covariance) <= MISFIT)
+    assert len(set(verdicts)) == 2

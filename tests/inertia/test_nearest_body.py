@@ -265,7 +265,7 @@ def test_rotations_and_reflections_agree_with_lapack(seed):
     A = rng.normal(size=(4, 4)) * 10.0 ** rng.uniform(-4, 4, 4)
     S, V = A @ A.T, np.empty((4, 4))
     left = S.copy()
-    eigen(left, V)
+    eigen(left, V, True)
     np.testing.assert_allclose((V * np.diag(left)) @ V.T, S, atol=1e-14 * np.abs(S).max())
     np.testing.assert_allclose(V.T @ V, np.eye(4), atol=1e-14)
     AV, unit = A.copy(), np.eye(4)

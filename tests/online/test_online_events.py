@@ -5,13 +5,14 @@ import time
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from armload import Recording, arm, read_recording
 from armload.devices import Simulator
 from armload.inertia import InertialParameters
 from armload.motion import random_motion, taie2024
 from armload.online import OnlineIdentifier
-from armload.online.thresholds import LONGEST
+from armload.online.thresholds import LONGEST, SAME_RUN
 from armload.posterior.stream import _LATE
 from armload.simulation import Sensors, World, simulate
 
@@ -240,3 +241,7 @@ def test_the_run_of_the_empty_arm_counts_beside_a_tare_that_was_given():
 def test_all_rows_that_a_change_takes_back_are_still_to_be_had():
     """The posterior holds back the rows that the watch may find to have belonged to the next payload."""
     assert _LATE >= LONGEST
+
+
+def test_nine_of_ten_runs_of_the_same_payload_lie_within_what_counts_as_the_same():
+    assert chi2.cdf(SAME_RUN, 4) == pytest.approx(0.9, rel=1e-12)  # mass and first moments

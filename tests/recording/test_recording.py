@@ -119,8 +119,24 @@ def test_columns_are_taken_by_name(tmp_path):
         lambda s: s.replace(",0", ",+0").replace(",1", ",+1"),
         lambda s: s.rstrip("\n"),
         lambda s: s.replace("e-", "E-"),
+        lambda s: "\n" + s,
+        lambda s: s.replace(",", ";"),
+        lambda s: s.replace(",", "\t"),
+        lambda s: s.replace(",", " "),
+        lambda s: s.replace(",", "  ").replace("\n", "\n  "),
+        lambda s: s.replace(",", ";").replace(".", ","),
+        lambda s: s.replace(",", "\t").replace(".", ","),
+        lambda s: s.replace(",", " ").replace(".", ","),
+        lambda s: "# made on Monday\n% at 4 kHz\n" + s,
+        lambda s: "# " + s,
+        lambda s: "# made on Monday\n# " + s,
+        lambda s: "\ufeff# made on Monday\n" + s.replace(",", ";").replace(".", ","),
     ],
-    ids=["crlf", "cr", "bom", "blank end", "blank lines", "spaces", "quotes", "plus", "no last newline", "capital e"],
+    ids=[
+        *("crlf", "cr", "bom", "blank end", "blank lines", "spaces", "quotes", "plus", "no last newline", "capital e"),
+        *("blank start", "semicolons", "tabs", "parted by spaces", "aligned", "decimal commas; semicolons"),
+        *("decimal commas, tabs", "decimal commas, spaces", "comments", "commented header", "both", "excel"),
+    ],
 )
 def test_harmless_variants_of_csv_read_the_same(tmp_path, change):
     recording = log(n=2, rows=8)
@@ -166,16 +182,8 @@ def cell(line, column, value):
         (lambda s: s.replace("\n", ",9\n").replace(",9", "", 1), r", line 2 has 8 cells: expected 7"),
         (lambda s: s.replace("tau2", "torque2"), r"lacks column 'tau2' \(it has column 'torque2' instead\)"),
         (lambda s: s.replace("tau2", "temperature"), r"lacks column 'tau2' \(it has column 'temperature' instead\)"),
-        (lambda s: s.replace("t,", "time,", 1), r"lacks column 't' \(it has column 'time' instead\)"),
         (lambda s: s.replace("dq2", "dq1"), r"has the column 'dq1' more than once"),
-        (lambda s: s.replace("\n", ",0\n").replace(",0\n", ",ddq1\n", 1), r"has the unexpected column 'ddq1'"),
         (lambda s: s[s.index("\n") + 1 :], r", line 1 holds numbers: expected the header"),
-        (lambda s: "# " + s, r", line 1 begins with '#': expected the header"),
-        (lambda s: "# made on Monday\n" + s, r", line 1 begins with '#': expected the header"),
-        (lambda s: s.replace("q1", "q0").replace("q2", "q1"), r"counts its joints from 0 \(column 'q0'\)"),
-        (lambda s: "\n" + s, r", line 1 is blank: expected the header"),
-        (lambda s: s.replace(",", ";"), r", line 1: the columns are separated by semicolons: expected commas"),
-        (lambda s: s.replace(",", "\t"), r", line 1: the columns are separated by tabs: expected commas"),
         (lambda s: s.replace("q1", "a").replace("q2", "b"), r"lacks columns"),
         (lambda _: "a,b\n1,2\n3,4\n", r"has no columns named q1, dq1, tau1, …: found a, b"),
         (cell(4, "q2", '"1'), r"cannot be read as CSV"),
@@ -237,11 +245,10 @@ def columns(**changed):
 @pytest.mark.parametrize(
     ("table", "says"),
     [
-        (columns(q2=["a"] * 5), r"column q2 holds string: expected numbers"),
+        (columns(q2=["a"] * 5), r"column q2 holds text: expected numbers"),
         (columns(q2=pa.array([1.0, None, 2.0, 3.0, 4.0])), r", row 1: q2 is empty"),
         (columns(q2=[1.0, np.nan, 2.0, 3.0, 4.0]), r", row 1: q2 is NaN"),
         (columns(t=[0.0, 2.0, 1.0, 3.0, 4.0]), r", row 2: t = 1\.000000 s goes back in time from row 1"),
-        (columns(ddq1=np.zeros(5)), r"has the unexpected column 'ddq1'"),
         ({k: v for k, v in columns().items() if k != "dq1"}, r"lacks column 'dq1'"),
         ({k: v[:1] for k, v in columns().items()}, r"holds only 1 row of data"),
     ],
@@ -267,8 +274,7 @@ def stacks(**changed):
         (stacks(tau=log().tau * 1j), r"array tau holds complex128"),
         (stacks(tau=np.array([[None, {}]] * 5)), r"not a NumPy archive that can be read: .*pickle"),
         (stacks(channel="guessed"), r"channel is 'guessed': expected one of measured, desired, external"),
-        ({"t": log().t, "q": log().q}, r"lacks dq, tau: expected the arrays t, q, dq and tau"),
-        (stacks(ddq=log().q), r"has the unexpected ddq"),
+        ({"t": log().t, "q": log().q}, r"lacks columns of velocity"),
     ],
 )
 def test_a_bad_npz_is_refused_by_array(tmp_path, stack, says):
@@ -282,9 +288,9 @@ def test_what_is_no_log_file_is_refused(tmp_path):
         read_recording(tmp_path / "none.csv")
     with pytest.raises(RecordingError, match=r"is a folder without metadata\.yaml, \.db3 or \.mcap"):
         read_recording(tmp_path)
-    (tmp_path / "log.txt").write_text(text(log()))
-    with pytest.raises(RecordingError, match=r"unsupported suffix '\.txt': expected \.csv, \.parquet, \.npz, \.bag"):
-        read_recording(tmp_path / "log.txt")
+    (tmp_path / "log.dat").write_text(text(log()))
+    with pytest.raises(RecordingError, match=r"unsupported suffix '\.dat': expected \.csv, .*\.npz, .*\.bag"):
+        read_recording(tmp_path / "log.dat")
     for suffix in (*SUFFIXES, ".bag", ".db3", ".mcap"):
         (tmp_path / f"nothing{suffix}").touch()
         with pytest.raises(RecordingError, match=r"is empty"):

@@ -1,13 +1,20 @@
 """Robot arms: their rigid-body model, and the regressors through which a payload shows in the joint torques."""
 
-from armload.arms.capsules import NearestCapsules
-from armload.arms.catalogue import arm, facts_of
-from armload.arms.facts import ARMS, ArmFacts, Capsule
-from armload.arms.forward import ForwardDerivatives, ForwardDynamics
-from armload.arms.matching import link_fingerprint, names_among, prefixed_frame
-from armload.arms.model import LINK_SPREAD, Arm, BodyMotion, Limits
-from armload.arms.regressors import MomentumRegressor, full_arm_regressor, momentum_regressor, payload_regressor
-from armload.arms.strength import FRICTION_WIDTH, PAYLOAD_REACH, poses, rated_effort, rated_mass
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from armload.lazy import on_first_use
+
+if TYPE_CHECKING:
+    from armload.arms.capsules import NearestCapsules
+    from armload.arms.catalogue import arm, facts_of
+    from armload.arms.facts import ARMS, ArmFacts, Capsule
+    from armload.arms.forward import ForwardDerivatives, ForwardDynamics
+    from armload.arms.matching import link_fingerprint, names_among, prefixed_frame
+    from armload.arms.model import LINK_SPREAD, Arm, BodyMotion, Limits
+    from armload.arms.regressors import MomentumRegressor, full_arm_regressor, momentum_regressor, payload_regressor
+    from armload.arms.strength import FRICTION_WIDTH, PAYLOAD_REACH, poses, rated_effort, rated_mass
 
 __all__ = [
     "ARMS",
@@ -35,3 +42,5 @@ __all__ = [
     "rated_effort",
     "rated_mass",
 ]
+
+__getattr__, __dir__ = on_first_use(__name__)

@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from numba import njit
 from numpy.typing import NDArray
 
 from armload.arms import Arm
+from armload.kernels import kernel
 
 
 class MomentumRow:
@@ -56,50 +56,51 @@ class MomentumRow:
         return momentum_rows(*self.chain, q, dq)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _cross(a, b, out):  # pragma: no cover - compiled
     out[0] = a[1] * b[2] - a[2] * b[1]
     out[1] = a[2] * b[0] - a[0] * b[2]
     out[2] = a[0] * b[1] - a[1] * b[0]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _moved(R, p, rotation, translation, R_out, p_out):  # pragma: no cover - compiled
-    """The pose (R, p) followed by a placement."""
+    """The pose (R, p) followed by a placement; p_out may be p."""
     for i in range(3):
         p_out[i] = p[i] + R[i, 0] * translation[0] + R[i, 1] * translation[1] + R[i, 2] * translation[2]
         for j in range(3):
             R_out[i, j] = R[i, 0] * rotation[0, j] + R[i, 1] * rotation[1, j] + R[i, 2] * rotation[2, j]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _poses(rotations, translations, axes, turning, q, R, p, lines):  # pragma: no cover - compiled
     """Poses of the payload frame and the joints, R (n + 1, 3, 3) and p (n + 1, 3), and the joints' axes (n, 3)."""
     n = q.shape[0]
-    placed, joint, shift = np.empty((3, 3)), np.empty((3, 3)), np.zeros(3)
-    R[0], p[0] = np.eye(3), 0.0  # of the base, until the end
+    placed, joint, shift = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
+    for i in range(3):  # of the base, until the end
+        p[0, i] = 0.0
+        for j in range(3):
+            R[0, i, j] = 1.0 if i == j else 0.0
     for k in range(n):
         _moved(R[k], p[k], rotations[k], translations[k], placed, p[k + 1])
         a, sin, cos = axes[k], 0.0, 1.0
-        shift[:] = 0.0
         if turning[k]:
             sin, cos = np.sin(q[k]), np.cos(q[k])
-        else:
-            shift[:] = q[k] * a
         for i in range(3):
+            shift[i] = 0.0 if turning[k] else q[k] * a[i]
             for j in range(3):
                 joint[i, j] = (1.0 - cos) * a[i] * a[j]
         for i in range(3):
             joint[i, i] += cos
             joint[(i + 2) % 3, (i + 1) % 3] += sin * a[i]
             joint[(i + 1) % 3, (i + 2) % 3] -= sin * a[i]
-        _moved(placed, p[k + 1].copy(), joint, shift, R[k + 1], p[k + 1])
+        _moved(placed, p[k + 1], joint, shift, R[k + 1], p[k + 1])
         for i in range(3):
             lines[k, i] = placed[i, 0] * a[0] + placed[i, 1] * a[1] + placed[i, 2] * a[2]
     _moved(R[n], p[n], rotations[n], translations[n], R[0], p[0])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def momentum_rows(rotations, translations, axes, turning, gravity, q, dq):  # pragma: no cover - compiled
     n = dq.shape[0]
     bodies = n + 1
@@ -119,8 +120,9 @@ def momentum_rows(rotations, translations, axes, turning, gravity, q, dq):  # pr
             for i in range(3):  # a point of the axis stands still: v_p = omega × (p − p_c)
                 y[i], z[i] = (lines[c, i], p[b, i] - p[c + 1, i]) if turning[c] else (0.0, 0.0)
             _cross(y, z, x)
-            if not turning[c]:
-                x[:] = lines[c]
+            for i in range(3):
+                if not turning[c]:
+                    x[i] = lines[c, i]
             for i in range(3):
                 angular[c, i] = R[b, 0, i] * y[0] + R[b, 1, i] * y[1] + R[b, 2, i] * y[2]
                 linear[c, i] = R[b, 0, i] * x[0] + R[b, 1, i] * x[1] + R[b, 2, i] * x[2]
@@ -130,7 +132,7 @@ def momentum_rows(rotations, translations, axes, turning, gravity, q, dq):  # pr
                     twist[c, i], twist[c, 3 + i] = 0.0, 0.0
                 twist[c, i] += angular[c, i] * dq[c]
                 twist[c, 3 + i] += linear[c, i] * dq[c]
-        omega, v = twist[m - 1, :3].copy(), twist[m - 1, 3:].copy()
+        omega, v = twist[m - 1, :3], twist[m - 1, 3:]
         for c in range(m):
             a, l = angular[c], linear[c]  # noqa: E741
             _project(a, l, omega, v, momentum[c, first : first + 10], 1.0, x, y)
@@ -148,7 +150,7 @@ def momentum_rows(rotations, translations, axes, turning, gravity, q, dq):  # pr
     return momentum, drift
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _project(a, l, omega, v, out, sign, x, y):  # noqa: E741  # pragma: no cover - compiled
     out[0] = sign * (l[0] * v[0] + l[1] * v[1] + l[2] * v[2])
     _cross(v, a, x)

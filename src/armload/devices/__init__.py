@@ -1,21 +1,28 @@
 """Robots, simulators and files: reading their samples, writing a payload to them, one folder for each make."""
 
-from armload.devices.detached import Detached
-from armload.devices.files.source import Replay
-from armload.devices.forms import CONTROLLERS, FORMS, Form, export_load
-from armload.devices.franka.form import FrankaLoad, franka_load
-from armload.devices.franka.source import FrankaSource
-from armload.devices.guard import check_writable, flange_of, is_moving
-from armload.devices.load import Load, about, read_load
-from armload.devices.opening import open_source
-from armload.devices.recorder import Recorded, Recorder
-from armload.devices.ring import Ring, RingReader
-from armload.devices.ros2.connection import Ros2Connection
-from armload.devices.ros2.source import Ros2Source
-from armload.devices.simulator.source import Simulator
-from armload.devices.source import Source
-from armload.devices.ur.form import URPayload, ur_payload
-from armload.devices.ur.source import URSource
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from armload.lazy import on_first_use
+
+if TYPE_CHECKING:
+    from armload.devices.detached import Detached
+    from armload.devices.files.source import Replay
+    from armload.devices.forms import CONTROLLERS, FORMS, Form, export_load
+    from armload.devices.franka.form import FrankaLoad, franka_load
+    from armload.devices.franka.source import FrankaSource
+    from armload.devices.guard import check_writable, flange_of, is_moving
+    from armload.devices.load import Load, about, read_load
+    from armload.devices.opening import open_source
+    from armload.devices.recorder import Recorded, Recorder
+    from armload.devices.ring import Ring, RingReader
+    from armload.devices.ros2.connection import Ros2Connection
+    from armload.devices.ros2.source import Ros2Source
+    from armload.devices.simulator.source import Simulator
+    from armload.devices.source import Source
+    from armload.devices.ur.form import URPayload, ur_payload
+    from armload.devices.ur.source import URSource
 
 __all__ = [
     "CONTROLLERS",
@@ -46,3 +53,5 @@ __all__ = [
     "read_load",
     "ur_payload",
 ]
+
+__getattr__, __dir__ = on_first_use(__name__)

@@ -6,18 +6,20 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm
 from armload.errors import SinkError
-from armload.identification import Identification
-from armload.inertia import NAMES, Z95, InertialParameters, is_consistent, nearest_consistent, to_order
-from armload.online import OnlineEstimate
-from armload.payloads import INERTIA_ASSUMED, Payload
+from armload.inertia import NAMES, Z95, InertialParameters, is_consistent, to_order
 from armload.payloads.payload_file import payload_from, read_content
+
+if TYPE_CHECKING:
+    from armload.arms import Arm
+    from armload.identification import Identification
+    from armload.online import OnlineEstimate
+    from armload.payloads import Payload
 
 _KNOWN = (True,) * 10
 _RELATIVE = {"before": "empty arm before"}  # what reads otherwise than it is called
@@ -62,6 +64,8 @@ class Load:
     @classmethod
     def of(cls, result: Load | Identification | OnlineEstimate, arm: Arm | None = None) -> Load:
         """The load that was identified, in a log or, on `arm`, on a live robot; a load is returned as it is."""
+        from armload.online import OnlineEstimate
+
         if isinstance(result, Load):
             return result
         if isinstance(result, OnlineEstimate):
@@ -148,6 +152,8 @@ class Load:
         return tuple(" ".join(line.replace("--", "- -").split()) for line in (*lines, *self.remarks))
 
     def _nearest(self) -> NDArray[np.float64]:
+        from armload.inertia import nearest_consistent
+
         information = None if self.std is None else np.diag(1.0 / np.maximum(self.std, 1e-9) ** 2)
         return nearest_consistent(self.parameters.phi, information)
 
@@ -221,6 +227,8 @@ def read_load(path: str | Path) -> Load:
 
 def assumed(payload: Payload) -> tuple[str, ...]:
     """A remark on a payload whose inertia is not known."""
+    from armload.payloads import INERTIA_ASSUMED
+
     return () if payload.inertia_known else (INERTIA_ASSUMED,)
 
 

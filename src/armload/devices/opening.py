@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from armload.devices.ur import source as ur
 from armload.devices.ur.source import URSource
 from armload.errors import SourceError
 from armload.payloads import draw_payload
+from armload.recording import ColumnSpec
 from armload.simulation import Sensors, World
 
 SCHEMES = ("fr3", "panda", "ur", "ros2")
@@ -37,6 +38,7 @@ def open_source(
     speed: float | None = 1.0,
     loop: bool = False,
     topic: str | None = None,
+    columns: ColumnSpec | Mapping[str, Any] | None = None,
     torque_constants: Sequence[float] | None = None,
     payloads: Sequence[tuple[float, Any]] | None = None,
     world: str = "real-like",
@@ -68,6 +70,7 @@ def open_source(
         speed: of a replay or the simulator: 1 real time, None as fast as possible.
         loop: replay again and again.
         topic: of a bag.
+        columns: of a recording, where its header leaves them open.
         torque_constants: of a UR arm (6,) [N·m/A].
         payloads: of the simulator: (time [s], payload) pairs; None: another one every 20 s for an hour, with pauses.
         world: of the simulator: "nominal", "real-like" or "beyond".
@@ -97,6 +100,7 @@ def open_source(
             speed=speed,
             loop=loop,
             topic=topic,
+            columns=ColumnSpec.of(columns).given(),
             torque_constants=None if torque_constants is None else [float(x) for x in torque_constants],
             payloads=payloads,
             world=world,
@@ -110,7 +114,7 @@ def open_source(
     elif name == "sim":
         source = simulator()
     else:
-        source = Replay(name, arm, speed=speed, loop=loop, topic=topic)
+        source = Replay(name, arm, speed=speed, loop=loop, topic=topic, columns=columns)
     if record is None:
         return source
     try:

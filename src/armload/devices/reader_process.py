@@ -35,6 +35,7 @@ from armload.devices.recorder import Recorder
 from armload.devices.ring import Ring
 from armload.devices.source import Source
 from armload.errors import ArmloadError, SourceError
+from armload.extras import missing
 
 _CALLS = ("read_once", "set_load")  # what may be asked of the source from outside
 _PATIENCE = 1.0  # [s] a source may take to end before the process does
@@ -75,6 +76,10 @@ class _Reader:
                 self.report(event="ready", name=source.name, n=source.n, rate=source.rate, speed=source.speed)
                 self.pass_on(source, recorder)
             self.report(event="ended")
+        except ModuleNotFoundError as error:
+            if (said := missing(error)) is None:
+                raise
+            self.report(event="error", message=said)
         except (ArmloadError, OSError) as error:
             self.report(event="error", message=str(error))
 

@@ -5,8 +5,9 @@ Names are loaded on first use: predicting with a saved model needs neither sciki
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from armload.lazy import on_first_use
 
 if TYPE_CHECKING:
     from armload.ensembles.artefact import load_model, save_model
@@ -33,22 +34,4 @@ __all__ = [
     "save_model",
 ]
 
-_HOME = {
-    "BaggingEnsemble": "bagging",
-    "Compiled": "compiled",
-    "LearnedIdentifier": "learned",
-    "LearnedModel": "trained_model",
-    "MixedEnsemble": "stages",
-    "NetworkLearner": "network",
-    "Progress": "progress",
-    "TreeLearner": "tree",
-    "TwoStage": "stages",
-    "load_model": "artefact",
-    "save_model": "artefact",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+__getattr__, __dir__ = on_first_use(__name__)

@@ -14,8 +14,9 @@ from functools import cached_property
 from typing import ClassVar, Literal, overload
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
+
+from armload.kernels import kernel
 
 _CHUNK = 2048  # rows predicted at once: bounds the memory of a wide hidden layer
 
@@ -126,7 +127,7 @@ class CompiledTrees(Compiled):
         return _walk(X, self.roots, self.feature, self.threshold, self.left, self.right, self.values)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _walk(X, roots, feature, threshold, left, right, values):  # pragma: no cover - compiled
     out = np.empty((roots.shape[0], X.shape[0], values.shape[1]))
     for m in range(roots.shape[0]):
@@ -214,12 +215,13 @@ class CompiledNetworks(Compiled):
 
 # BLAS takes twice as long for a single row, and may wake other threads for it. The order of each sum is left to the
 # compiler, which then adds several numbers at once.
-@njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
+@kernel(fastmath={"reassoc", "contract", "nsz"})
 def _forward(x, weights):  # pragma: no cover - compiled
     (M, rows, h), d = weights.shape, x.shape[0]
     out, hidden = np.empty((M, rows - 1 - d)), np.empty(h)
     for m in range(M):
-        hidden[:] = weights[m, d]
+        for u in range(h):
+            hidden[u] = weights[m, d, u]
         for i in range(0, d - 1, 2):  # two at a time: half as many passes over the hidden layer
             for u in range(h):
                 hidden[u] += x[i] * weights[m, i, u] + x[i + 1] * weights[m, i + 1, u]

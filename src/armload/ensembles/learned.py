@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.ensembles.trained_model import LearnedModel
 from armload.estimators import Estimate, Identifier
 from armload.inertia import SMALL, Z95
+from armload.kernels import kernel
 from armload.recording import Recording, Sample
 
 
@@ -87,7 +87,7 @@ class LearnedIdentifier(Identifier):
         super()._check(recording)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _fill(row, t, q, dq, tau):  # pragma: no cover - compiled
     """Write a sample into a row (1 + 3n,) of features; whether all of it is finite."""
     n = (row.shape[0] - 1) // 3
@@ -102,7 +102,7 @@ def _fill(row, t, q, dq, tau):  # pragma: no cover - compiled
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _average(averages, predictions, count, model_variance, mean, covariance):  # pragma: no cover - compiled
     """Update each member's running average (M, k) by its prediction (M, k), number `count`; averages are changed.
 

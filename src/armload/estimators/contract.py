@@ -163,7 +163,8 @@ class Identifier(ABC):
 
     def run(self, recording: Recording) -> Estimate:
         """The estimate after the whole recording."""
-        return self.trace(recording, every=len(recording))[-1]
+        self._check(recording)
+        return self._along(recording, [len(recording)])[-1]
 
     def _along(self, recording: Recording, stops: list[int]) -> list[Estimate]:
         """The estimates after so many samples each, from `reset` on; `stops` rise."""

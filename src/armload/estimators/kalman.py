@@ -18,12 +18,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm, ForwardDynamics, rated_effort
+from armload.arms import FRICTION_WIDTH, Arm, ForwardDynamics, rated_effort
 from armload.estimators.contract import Estimate, Identifier
 from armload.inertia import is_consistent, nearest_consistent
 from armload.recording import GAP, Sample
 from armload.regression import solution_prior_std
-from armload.regression.mismatch import FRICTION_WIDTH, PER_JOINT
+from armload.regression.mismatch import PER_JOINT
 from armload.regression.noise import RIGID
 from armload.regression.rows import SPACING
 

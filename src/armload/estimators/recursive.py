@@ -14,11 +14,11 @@ from __future__ import annotations
 from abc import abstractmethod
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from armload.arms import Arm, payload_regressor
 from armload.estimators.contract import Estimate, Identifier
+from armload.kernels import kernel
 from armload.recording import GAP
 from armload.regression import BlockMeans
 from armload.regression.lag import GAIN, Lag
@@ -94,7 +94,7 @@ class _Recursive(Identifier):
         return self._P @ noise @ self._P
 
 
-@njit(cache=True)
+@kernel
 def _recursion(phi: NDArray, P: NDArray, A: NDArray, y: NDArray, Y: NDArray, mu: float) -> NDArray:
     """The recursion over N samples, in place; returns the residuals (N, n) after each update."""
     residual = np.full(y.shape, np.nan)

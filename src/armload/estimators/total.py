@@ -25,7 +25,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 
 from armload.arms import Arm, momentum_regressor, payload_regressor
 from armload.estimators.contract import Estimate
@@ -103,6 +102,8 @@ class RecursiveTotalLeastSquares(NormalLeastSquares):
             self._differences += count
 
     def _estimate(self, t: float) -> Estimate:
+        from scipy.linalg import eigh
+
         if not self._rows_seen:
             return super()._estimate(t)
         phi, _ = self._solve(np.ones(self.arm.n))

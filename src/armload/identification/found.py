@@ -14,8 +14,8 @@ from armload.errors import IdentificationError
 from armload.estimators import ArmMismatch, Estimate
 from armload.identification.choice import Choice, choose
 from armload.identification.intervals import Before
-from armload.identification.thresholds import LARGEST_OFFSETS, MOVES
-from armload.inertia import distance_to_body
+from armload.identification.thresholds import LARGEST_OFFSETS, MISFIT, MOVES
+from armload.inertia import distance_to_body, is_consistent
 from armload.posterior import KnownMass, PosteriorLeastSquares
 from armload.posterior.drift import Drift
 from armload.recording import Recording
@@ -65,9 +65,15 @@ class Found(NamedTuple):
     mass_alone: tuple[float, float] | None = None
 
     @property
-    def misfit(self) -> float:
-        """Standard deviations between what the log says and the nearest body."""
-        return distance_to_body(*(self.unprojected or (self.estimate.phi, self.estimate.covariance)))
+    def explained(self) -> bool:
+        """Whether a body lies within `MISFIT` standard deviations of what the log says: most often the answer does."""
+        mean, covariance = self.unprojected or (self.estimate.phi, self.estimate.covariance)
+        away = self.estimate.phi - mean
+        if is_consistent(self.estimate.phi) and (
+            not away.any() or away @ np.linalg.solve(covariance, away) <= MISFIT**2
+        ):
+            return True  # the nearest body is nearer still, and need not be found
+        return distance_to_body(mean, covariance) <= MISFIT
 
     def less(self, tool: NDArray[np.float64]) -> Found:
         """The same without a tool (10,)."""

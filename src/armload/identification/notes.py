@@ -69,9 +69,9 @@ def changed_since_tare(drift: Drift) -> str:
     """That the arm is not as it was at its tare, where that shows most, and what to do."""
     j = drift.joint
     return (
-        f"the arm is not as it was at its tare: of joint {j + 1} the torque's offset differs by {drift.offset[j]:+.2g} N·m "
-        f"and its friction by {drift.coulomb[j]:+.2g} N·m; the intervals allow for it; record a tare of this arm as it "
-        "is now, with the same base and tool"
+        f"the arm is not as it was at its tare: at joint {j + 1} the torque's offset differs by {drift.offset[j]:+.2g} "
+        f"N·m, the friction by {drift.coulomb[j]:+.2g} N·m; the intervals allow for it; record a tare of this arm as "
+        "it is now, with the same base and tool"
     )
 
 
@@ -87,8 +87,8 @@ def changed_within(times: list[float], parts: int) -> str:
     """That the payload changes within a log, when, and which part the answer is of."""
     when = ", ".join(f"{t:.2f}" for t in times)
     return (
-        f"the payload changes within the log, {when} s after its start: the answer is of the last of {parts} parts, what "
-        "is held at the end; `segments` has all of them"
+        f"the payload changes within the log, {when} s after its start: the answer is of the last of {parts} parts, "
+        "what is held at the end; `segments` of the JSON has them all"
     )
 
 

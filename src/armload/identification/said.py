@@ -13,7 +13,7 @@ from armload.identification.answer import Identification, body_of, is_removal
 from armload.identification.found import Found
 from armload.identification.intervals import about_com, intervals, phi_interval
 from armload.identification.notes import changed_since_tare, lacking, leaning_on_prior, other_than_weighed
-from armload.identification.thresholds import LEANS, MISFIT
+from armload.identification.thresholds import LEANS
 from armload.inertia import HELD, InertialParameters, held, is_consistent, vech
 from armload.inertia import determined as determined_by
 from armload.recording import Recording
@@ -92,7 +92,7 @@ def _doubt(found: Found, mass_determined: bool, relative_to: str) -> str | None:
             "the mass is negative: less is mounted than the model of the arm and its tool assume, or the torque's "
             "sign is turned"
         )
-    if found.misfit > MISFIT:
+    if not found.explained:
         return NO_BODY
     if found.drift is not None and found.drift.changed:
         return changed_since_tare(found.drift)

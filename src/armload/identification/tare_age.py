@@ -1,7 +1,7 @@
 """How long ago a tare was recorded, and by how much an arm may have changed since.
 
-Offsets and friction are taken for a random walk: after d days they differ by √d daily deviations (`Correction.daily_std`),
-1 sigma.
+Offsets and friction are taken for a random walk: after d days they differ by √d daily deviations, 1 sigma
+(`Correction.daily_std`).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _CLOCK = 1e9
 
 
 def drift_after(seconds: float) -> float:
-    """By how many daily deviations an arm may differ after so many seconds; none within a session, at most `ALLOWED`."""
+    """By how many daily deviations an arm may differ after so many seconds; none in a session, at most `ALLOWED`."""
     return 0.0 if seconds <= SESSION else min(sqrt(seconds / DAY), ALLOWED)
 
 

@@ -6,7 +6,6 @@ What half and twice each one would do to sound and to wrong logs: docs/constants
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import chi2
 
 from armload.inertia import SHRINK
 from armload.regression.lag import GAIN
@@ -18,7 +17,7 @@ from armload.regression.lag import GAIN
 LOWEST_RATE = GAIN
 # [standard deviations] between what the log says and the nearest body: the truth of one sound log in a thousand lies
 # farther from what is found (`inertia.distance_to_body`; test_sound_logs_have_a_body_within_the_error_bars)
-MISFIT = float(np.sqrt(chi2.ppf(0.999, 10)))
+MISFIT = 5.439512702905879  # the 99.9 % quantile of a chi distribution of ten degrees of freedom
 # [of the expected offsets, rms] by the side the torque is measured on: about 1 of most simulated arms, more where
 # friction holds the joints (motor currents). A base tilted by 30° is seen in 26 of 28 simulated logs, none of 138 sound
 # ones (tests/identification/test_identify.py has one of each)

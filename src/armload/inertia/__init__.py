@@ -3,30 +3,37 @@
 No other room packs, reorders, moves or projects the 10-vector.
 """
 
-from armload.inertia.about_com import com_interval, inertia_com_std, largest_inertia_com
-from armload.inertia.consistency import (
-    from_log_cholesky,
-    is_consistent,
-    log_cholesky,
-    log_cholesky_curvature,
-    log_cholesky_jacobian,
-    pseudo_inertia,
-    pseudo_inertia_to_phi,
-)
-from armload.inertia.determinacy import HELD, LIGHTEST_HELD, SHRINK, SMALL, Z95, determined, held
-from armload.inertia.orders import ORDERS, from_order, to_order
-from armload.inertia.parameters import (
-    NAMES,
-    UNITS,
-    InertialParameters,
-    com_to_phi,
-    frame_change_matrix,
-    inertia_matrix,
-    phi_to_com,
-    skew,
-    vech,
-)
-from armload.inertia.projection import distance_to_body, near_consistent, nearest_body, nearest_consistent
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from armload.lazy import on_first_use
+
+if TYPE_CHECKING:
+    from armload.inertia.about_com import com_interval, inertia_com_std, largest_inertia_com
+    from armload.inertia.consistency import (
+        from_log_cholesky,
+        is_consistent,
+        log_cholesky,
+        log_cholesky_curvature,
+        log_cholesky_jacobian,
+        pseudo_inertia,
+        pseudo_inertia_to_phi,
+    )
+    from armload.inertia.determinacy import HELD, LIGHTEST_HELD, SHRINK, SMALL, Z95, determined, held
+    from armload.inertia.orders import ORDERS, from_order, to_order
+    from armload.inertia.parameters import (
+        NAMES,
+        UNITS,
+        InertialParameters,
+        com_to_phi,
+        frame_change_matrix,
+        inertia_matrix,
+        phi_to_com,
+        skew,
+        vech,
+    )
+    from armload.inertia.projection import distance_to_body, near_consistent, nearest_body, nearest_consistent
 
 __all__ = [
     "HELD",
@@ -63,3 +70,5 @@ __all__ = [
     "to_order",
     "vech",
 ]
+
+__getattr__, __dir__ = on_first_use(__name__)

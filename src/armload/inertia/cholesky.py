@@ -9,11 +9,12 @@ triangle of A only.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from armload.kernels import kernel
 
 
-@njit(cache=True, nogil=True)
-def factor(A, L, floor=0.0):  # pragma: no cover - compiled
+@kernel
+def factor(A, L, floor):  # pragma: no cover - compiled
     """L (n, n), its lower triangle, of A (n, n); False where a pivot is not positive.
 
     With a floor > 0 a smaller pivot is taken to be the floor.
@@ -35,7 +36,7 @@ def factor(A, L, floor=0.0):  # pragma: no cover - compiled
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def root(A, F, order, floor):  # pragma: no cover - compiled
     """F (n, n) with FᵀF = A (n, n), by the largest pivot first; the size of what is left of A where pivots end.
 
@@ -84,7 +85,7 @@ def root(A, F, order, floor):  # pragma: no cover - compiled
     return left
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def solve(L, b, x):  # pragma: no cover - compiled
     """x (n,) with L·Lᵀ·x = b (n,); x may be b."""
     n = L.shape[0]
@@ -100,7 +101,7 @@ def solve(L, b, x):  # pragma: no cover - compiled
         x[i] = total / L[i, i]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def invert(L, work, out):  # pragma: no cover - compiled
     """out (n, n) = (L·Lᵀ)⁻¹; work (n, n) becomes L⁻¹, its lower triangle."""
     n = L.shape[0]
@@ -120,10 +121,14 @@ def invert(L, work, out):  # pragma: no cover - compiled
             out[j, i] = total
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def inverse(A):  # pragma: no cover - compiled
     """A⁻¹ (n, n); nan where A is not positive definite."""
-    L, out = np.empty(A.shape), np.full(A.shape, np.nan)
-    if factor(A, L):
-        invert(L, np.empty(A.shape), out)
+    L, work, out = np.empty(A.shape), np.empty(A.shape), np.empty(A.shape)
+    if factor(A, L, 0.0):
+        invert(L, work, out)
+        return out
+    for i in range(A.shape[0]):
+        for j in range(A.shape[0]):
+            out[i, j] = np.nan
     return out

@@ -7,12 +7,13 @@ are given.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from armload.kernels import kernel
 
 _ROOT2 = float(np.sqrt(2.0))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def congruent(G, A, T, out):  # pragma: no cover - compiled
     """out = Gᵀ·A·G, A symmetric."""
     for i in range(4):
@@ -29,7 +30,7 @@ def congruent(G, A, T, out):  # pragma: no cover - compiled
             out[i, j] = out[j, i] = total
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def pseudo(x, J):  # pragma: no cover - compiled
     """J(x) (4, 4)."""
     J[0, 0], J[1, 1], J[2, 2] = 0.5 * (x[7] + x[9] - x[4]), 0.5 * (x[4] + x[9] - x[7]), 0.5 * (x[4] + x[7] - x[9])
@@ -41,7 +42,7 @@ def pseudo(x, J):  # pragma: no cover - compiled
     J[3, 3] = x[0]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def primal(J, x):  # pragma: no cover - compiled
     """x (10,) of J(x)."""
     x[0], x[1], x[2], x[3] = J[3, 3], J[0, 3], J[1, 3], J[2, 3]
@@ -49,7 +50,7 @@ def primal(J, x):  # pragma: no cover - compiled
     x[5], x[6], x[8] = -J[0, 1], -J[0, 2], -J[1, 2]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def dual(z, Z):  # pragma: no cover - compiled
     """Z (4, 4) with tr(Z·J(x)) = z·x for every x."""
     Z[0, 0], Z[1, 1], Z[2, 2], Z[3, 3] = z[7] + z[9], z[4] + z[9], z[4] + z[7], z[0]
@@ -60,7 +61,7 @@ def dual(z, Z):  # pragma: no cover - compiled
         Z[i, 3] = Z[3, i] = 0.5 * z[1 + i]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def of_dual(Z, z):  # pragma: no cover - compiled
     """z (10,) with z·x = tr(Z·J(x)) for every x."""
     trace = Z[0, 0] + Z[1, 1] + Z[2, 2]
@@ -69,7 +70,7 @@ def of_dual(Z, z):  # pragma: no cover - compiled
     z[5], z[6], z[8] = -2.0 * Z[0, 1], -2.0 * Z[0, 2], -2.0 * Z[1, 2]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def pack(A, v):  # pragma: no cover - compiled
     """v (10,) with v·w = tr(A·B) for symmetric A and B."""
     at = 0
@@ -80,7 +81,7 @@ def pack(A, v):  # pragma: no cover - compiled
         at += 4 - i
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def unpack(v, A):  # pragma: no cover - compiled
     """The symmetric A (4, 4) of `pack`."""
     at = 0

@@ -23,18 +23,18 @@ solvers, 2010 (updating the scaling); Boyd & Vandenberghe, Convex Optimization, 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from armload.inertia.cholesky import factor
 from armload.inertia.cone import congruent, dual, of_dual, pack, primal, pseudo, unpack
 from armload.inertia.orthogonal import eigen, least_squares, reflect, singular
+from armload.kernels import kernel
 
 _BORDER, _LEAST = 0.1, 1e-3  # a step leaves 0.1 of the way to the border, times what the predictor left, at least 1e-3
 _STALLED = 9  # steps without halving the bound; a badly scaled metric has five in a row
 _ROUNDING = 1e-15  # of x
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def nearest(target, F, order, tolerance, absolute, limit, x):  # pragma: no cover - compiled
     """Fill in x (10,); a bound on its cost above the optimum's, in units of what was asked for, and the steps taken.
 
@@ -133,7 +133,7 @@ def nearest(target, F, order, tolerance, absolute, limit, x):  # pragma: no cove
                     A[i, j], C[i, j] = length * dJ[i, j], length * dZ[i, j]
                 A[i, i] += gaps[i]
                 C[i, i] += gaps[i]
-            if factor(A, L_J) and factor(C, L_Z):
+            if factor(A, L_J, 0.0) and factor(C, L_Z, 0.0):
                 break
             length *= 0.8
         else:
@@ -150,7 +150,7 @@ def nearest(target, F, order, tolerance, absolute, limit, x):  # pragma: no cove
     return bound, taken
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _start(target, F, order, G, inverse, gaps, A, T, away, change):  # pragma: no cover - compiled
     """Fill in the scaling and x − target where J·Z = q·v²·1, v as far as J(target) is outside; ½·ρᵀ·(FᵀF)⁻¹·ρ there."""
     n = 10
@@ -160,7 +160,7 @@ def _start(target, F, order, G, inverse, gaps, A, T, away, change):  # pragma: n
         for j in range(n):
             q += F[i, j] ** 2 / n
     pseudo(target, A)
-    eigen(A, T)
+    eigen(A, T, True)
     v = max(-min(A[0, 0], A[1, 1], A[2, 2], A[3, 3]), _ROUNDING)
     for i in range(4):
         root = np.sqrt(A[i, i] ** 2 + 4.0 * v * v)
@@ -191,7 +191,7 @@ def _start(target, F, order, G, inverse, gaps, A, T, away, change):  # pragma: n
     return off
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _rescale(G, inverse, gaps, L_J, L_Z, A, K, T):  # pragma: no cover - compiled
     """G, its inverse and Λ after a step to L_J·L_Jᵀ and L_Z·L_Zᵀ in the old scaling: L_Zᵀ·L_J = U·Λ·Vᵀ."""
     for i in range(4):
@@ -219,7 +219,7 @@ def _rescale(G, inverse, gaps, L_J, L_Z, A, K, T):  # pragma: no cover - compile
             inverse[i, j] = total / (gaps[i] * root)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _longest(gaps, D, A):  # pragma: no cover - compiled
     """How far Λ can go along D within the cone."""
     for i in range(4):

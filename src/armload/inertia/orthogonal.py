@@ -7,13 +7,14 @@ functions are compiled and write into arrays they are given.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from armload.kernels import kernel
 
 _SWEEPS = 30  # of rotations; a matrix of four rows needs about five
 _ROUNDING = 1e-15
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _rotation(half_difference, product):  # pragma: no cover - compiled
     """Cosine and sine of the rotation that makes [[a, product], [product, b]] diagonal; half_difference: ½·(b − a)."""
     ratio = abs(half_difference)
@@ -24,7 +25,7 @@ def _rotation(half_difference, product):  # pragma: no cover - compiled
     return cosine, cosine * t
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _rotate(A, p, q, cosine, sine):  # pragma: no cover - compiled
     """Columns p and q of A, rotated."""
     for k in range(A.shape[0]):
@@ -33,9 +34,9 @@ def _rotate(A, p, q, cosine, sine):  # pragma: no cover - compiled
         A[k, q] = sine * x + cosine * y
 
 
-@njit(cache=True, nogil=True)
-def eigen(A, V, vectors=True):  # pragma: no cover - compiled
-    """The eigenvalues of symmetric A (n, n) are left on its diagonal, its eigenvectors in the columns of V (n, n)."""
+@kernel
+def eigen(A, V, vectors):  # pragma: no cover - compiled
+    """The eigenvalues of symmetric A (n, n) are left on its diagonal; its eigenvectors, if wanted, are V (n, n)."""
     n = A.shape[0]
     if vectors:
         for i in range(n):
@@ -61,7 +62,7 @@ def eigen(A, V, vectors=True):  # pragma: no cover - compiled
             break
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def singular(A, K):  # pragma: no cover - compiled
     """A becomes A·V with orthogonal columns, as long as its singular values, and K becomes K·V; both (n, n)."""
     n = A.shape[0]
@@ -84,7 +85,7 @@ def singular(A, K):  # pragma: no cover - compiled
             break
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def reflect(A, diagonal):  # pragma: no cover - compiled
     """Q·R of A = [B; 1] (2n, n): reflectors on and below A's diagonal, R above it and in `diagonal` (n,)."""
     n = A.shape[1]
@@ -108,7 +109,7 @@ def reflect(A, diagonal):  # pragma: no cover - compiled
                 A[i, j] -= total * A[i, k]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def least_squares(A, diagonal, b, x):  # pragma: no cover - compiled
     """x (n,) with the smallest |[B; 1]·x − b|, from what `reflect` made of [B; 1]; b (2n,) is used up."""
     n = A.shape[1]

@@ -9,7 +9,6 @@ less and wait for less. Where Λ knows nothing of a direction, the nearest withi
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from armload.errors import InertiaError
@@ -19,6 +18,7 @@ from armload.inertia.consistency import LENGTH, is_consistent
 from armload.inertia.interior_point import nearest
 from armload.inertia.orthogonal import eigen
 from armload.inertia.parameters import InertialParameters
+from armload.kernels import kernel
 
 _SCALE = np.array([1.0] + [1 / LENGTH] * 3 + [1 / LENGTH**2] * 6)
 _BALL = np.array([1.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 2.0, 0.0, 2.0])  # phi·_SCALE of the body whose J is the identity
@@ -104,18 +104,24 @@ def near_consistent(phi: ArrayLike, precision: ArrayLike) -> NDArray[np.float64]
     return x if bound <= 1.0 and left <= _INDEFINITE else nearest_consistent(phi, P, _ANSWER)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _project(phi, information, margin, inside, tolerance, absolute):  # pragma: no cover - compiled
     """x (10,); the bound that `nearest` gives, 0 for phi itself where J(phi) ⪰ inside; what `root` left over."""
     n = 10
     x, target, J, L = np.empty(n), np.empty(n), np.empty((4, 4)), np.empty((4, 4))
-    if not np.isfinite(phi.sum() + information.sum()):
-        return phi, np.inf, 0.0
+    total = 0.0
+    for i in range(n):
+        x[i] = phi[i]
+        total += phi[i]
+        for j in range(n):
+            total += information[i, j]
+    if not np.isfinite(total):
+        return x, np.inf, 0.0
     for i in range(n):
         target[i] = phi[i] * _SCALE[i] - inside * _BALL[i]
     pseudo(target, J)
-    if factor(J, L) and (inside > 0.0 or phi[0] > 0.0):
-        return phi.copy(), 0.0, 0.0
+    if factor(J, L, 0.0) and (inside > 0.0 or phi[0] > 0.0):
+        return x, 0.0, 0.0
     size = 0.0
     for i in range(n):
         target[i] += (inside - margin) * _BALL[i]

@@ -1,13 +1,20 @@
 """Motions: the Fourier excitation, its design and checks, and the files other people's robots read."""
 
-from armload.motion.check import MotionCheck, check_motion, rated_load
-from armload.motion.endless import EndlessMotion
-from armload.motion.export import export_motion
-from armload.motion.fingerprint import MotionFingerprint
-from armload.motion.fourier import FourierMotion, start_and_stop_at_rest
-from armload.motion.motion import Motion
-from armload.motion.motion_file import load_motion, save_motion, taie2024
-from armload.motion.random_fourier import excitation, random_motion
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from armload.lazy import on_first_use
+
+if TYPE_CHECKING:
+    from armload.motion.check import MotionCheck, check_motion, rated_load
+    from armload.motion.endless import EndlessMotion
+    from armload.motion.export import export_motion
+    from armload.motion.fingerprint import MotionFingerprint
+    from armload.motion.fourier import FourierMotion, start_and_stop_at_rest
+    from armload.motion.motion import Motion
+    from armload.motion.motion_file import load_motion, save_motion, taie2024
+    from armload.motion.random_fourier import excitation, random_motion
 
 __all__ = [
     "EndlessMotion",
@@ -25,3 +32,5 @@ __all__ = [
     "start_and_stop_at_rest",
     "taie2024",
 ]
+
+__getattr__, __dir__ = on_first_use(__name__)

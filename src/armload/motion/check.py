@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm
+from armload.arms import PAYLOAD_REACH, Arm
 from armload.errors import MotionError
 from armload.inertia import InertialParameters
-from armload.motion.collision import PAYLOAD_RADIUS, PAYLOAD_REACH, CapsuleArm, capsule_arm
+from armload.motion.collision import PAYLOAD_RADIUS, CapsuleArm, capsule_arm
 from armload.motion.motion import Motion
 
 QUANTITIES = {"position": "rad", "velocity": "rad/s", "acceleration": "rad/s²", "jerk": "rad/s³", "torque": "N·m"}

@@ -1,9 +1,16 @@
 """Payload identification beside a running robot."""
 
-from armload.online.estimate import OnlineEstimate
-from armload.online.event import Event
-from armload.online.gate import Gate, Health
-from armload.online.online_identifier import OnlineIdentifier
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from armload.lazy import on_first_use
+
+if TYPE_CHECKING:
+    from armload.online.estimate import OnlineEstimate
+    from armload.online.event import Event
+    from armload.online.gate import Gate, Health
+    from armload.online.online_identifier import OnlineIdentifier
 
 __all__ = [
     "Event",
@@ -12,3 +19,5 @@ __all__ = [
     "OnlineEstimate",
     "OnlineIdentifier",
 ]
+
+__getattr__, __dir__ = on_first_use(__name__)

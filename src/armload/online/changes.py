@@ -21,9 +21,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from armload.kernels import kernel
 from armload.online.thresholds import (
     ALARM,
     ALARM_ROWS,
@@ -148,11 +148,14 @@ class ChangeDetector:
         return (self._count - 1 - np.arange(rows)) % max(WINDOWS)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _parts(seen, X, scale, root, mean, covariance, A, b, N, B):  # pragma: no cover - compiled
     """One row's share of A and b, in units of a body, and of each joint's own sums."""
-    A[:], b[:] = 0.0, 0.0
     x = np.empty(10)
+    for i in range(10):
+        b[i] = 0.0
+        for k in range(10):
+            A[i, k] = 0.0
     for j in range(seen.shape[0]):
         d, v = seen[j, 10], seen[j, 11]
         for i in range(10):
@@ -171,7 +174,7 @@ def _parts(seen, X, scale, root, mean, covariance, A, b, N, B):  # pragma: no co
                 A[i, k] += x[i] * x[k] / v
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _loudness(N, B):  # pragma: no cover - compiled
     """Mean over the joints of (Σ B)²/Σ N: what the noise is, in units of what it is held to be."""
     total = 0.0
@@ -184,12 +187,18 @@ def _loudness(N, B):  # pragma: no cover - compiled
     return total / N.shape[1]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _weigh(A, b, N, B, count, rows, level, effort, bodies, pushes, best):  # pragma: no cover - compiled
     """ln of both ratios over the last rows, and the likeliest change (10,) in units of a body."""
     longest, n = N.shape
-    S, c = np.zeros((10, 10)), np.zeros(10)
-    weight, pull = np.zeros(n), np.zeros(n)
+    S, c = np.empty((10, 10)), np.empty(10)
+    weight, pull = np.empty(n), np.empty(n)
+    for i in range(10):
+        c[i] = 0.0
+        for k in range(10):
+            S[i, k] = 0.0
+    for j in range(n):
+        weight[j] = pull[j] = 0.0
     for row in range(count - rows, count):
         k = row % longest
         for i in range(10):

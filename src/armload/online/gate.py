@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.identification.thresholds import DEGREES_FROM, EFFORT
+from armload.kernels import kernel
 from armload.recording import GAP, Sample
 
 REASONS = (
@@ -181,7 +181,7 @@ class Gate:
         return "beyond anything this arm can do"
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def all_finite(values):  # pragma: no cover - compiled
     """Whether each of a few numbers (k,) is finite: what numpy takes 2 µs for."""
     for value in values:  # noqa: SIM110 - numba knows no all() of a generator
@@ -190,7 +190,7 @@ def all_finite(values):  # pragma: no cover - compiled
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _beyond(q, before, limits, step):  # pragma: no cover - compiled
     """Whether a joint has moved farther than it can have."""
     for k in range(q.shape[0]):  # noqa: SIM110 - numba knows no any() of a generator
@@ -199,7 +199,7 @@ def _beyond(q, before, limits, step):  # pragma: no cover - compiled
     return False
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _look(t, q, dq, tau, limits, last, before):  # pragma: no cover - compiled
     """Why a sample at t cannot come after the one with q = before at `last` (NaN: there is none); into REASONS."""
     total = t

@@ -19,8 +19,8 @@ from armload.arms import Arm
 from armload.estimators import Estimate, Identifier
 from armload.identification.answer import body_of
 from armload.identification.choice import choose
-from armload.identification.identify_log import NO_BODY
 from armload.identification.intervals import Before
+from armload.identification.said import NO_BODY
 from armload.identification.thresholds import MISFIT
 from armload.inertia import determined, distance_to_body, held
 from armload.online.estimate import OnlineEstimate

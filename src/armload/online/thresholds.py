@@ -8,7 +8,6 @@ single samples stand in `gate.py`, whose compiled code holds them.
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import chi2
 
 from armload.estimators.recursive import AT_REST
 from armload.regression.lag import GAIN
@@ -95,7 +94,7 @@ PATIENCE = 4.0
 
 # [squared standard deviations] of mass and first moments: nine of ten runs of the same payload lie within
 # (test_another_payload_of_another_mass_is_no_return)
-SAME_RUN = float(chi2.ppf(0.9, 4))
+SAME_RUN = 7.779440339734858  # the 90 % quantile of a chi-square distribution of four degrees of freedom
 # [s] an empty run must have lasted to be a tare: with less it knows the arm no better than the prior
 TARE_FROM = 3.0
 # [payloads] standard deviation of the change of mass, below which the first guess is replaced: 150 g of a Panda

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armload.arms import ARMS, Arm
+from armload.arms import ARMS
 from armload.errors import ArmError, PayloadError
 from armload.inertia import InertialParameters
 from armload.payloads.payload import Payload
+
+if TYPE_CHECKING:
+    from armload.arms import Arm
 
 # Franka's published URDF of the hand: in the axes of panda_hand, inertia about the centre of mass.
 MASS = 0.73  # [kg]

@@ -1,16 +1,23 @@
 """The default estimator: scales, sequential solution, payload prior, calibration, model file; and the bound."""
 
-from armload.posterior.advice import Advice, advise
-from armload.posterior.bound_worlds import scales_of
-from armload.posterior.calibration import Calibration
-from armload.posterior.cramer_rao import TIMES, Bound, bound, efficiency
-from armload.posterior.evidence import TRAITS, Evidence
-from armload.posterior.hybrid import HybridIdentifier, shipped_model
-from armload.posterior.known_mass import KnownMass
-from armload.posterior.map import PosteriorLeastSquares, SmoothPosteriorLeastSquares
-from armload.posterior.model_file import HybridModel, Training
-from armload.posterior.payload_prior import MixturePosterior, MixturePrior
-from armload.posterior.problem import Posterior
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from armload.lazy import on_first_use
+
+if TYPE_CHECKING:
+    from armload.posterior.advice import Advice, advise
+    from armload.posterior.bound_worlds import scales_of
+    from armload.posterior.calibration import Calibration
+    from armload.posterior.cramer_rao import TIMES, Bound, bound, efficiency
+    from armload.posterior.evidence import TRAITS, Evidence
+    from armload.posterior.hybrid import HybridIdentifier, shipped_model
+    from armload.posterior.known_mass import KnownMass
+    from armload.posterior.map import PosteriorLeastSquares, SmoothPosteriorLeastSquares
+    from armload.posterior.model_file import HybridModel, Training
+    from armload.posterior.payload_prior import MixturePosterior, MixturePrior
+    from armload.posterior.problem import Posterior
 
 __all__ = [
     "TIMES",
@@ -34,3 +41,5 @@ __all__ = [
     "scales_of",
     "shipped_model",
 ]
+
+__getattr__, __dir__ = on_first_use(__name__)

@@ -11,11 +11,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm
+from armload.arms import FRICTION_WIDTH, Arm
 from armload.errors import IdentificationError
 from armload.posterior.problem import Scales
 from armload.regression import JointFeatures
-from armload.regression.mismatch import FRICTION_WIDTH
 from armload.simulation import Sensors, World
 
 _SPEEDS = np.concatenate([-np.geomspace(1.5, 0.01, 60), np.geomspace(0.01, 1.5, 60)])  # [rad/s]

@@ -19,11 +19,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from armload.ensembles import Compiled
 from armload.inertia import Z95
+from armload.kernels import kernel
 from armload.posterior.evidence import Evidence
 from armload.posterior.payload_prior import MixturePosterior, MixturePrior
 
@@ -77,7 +77,7 @@ class Calibration:
         return found._replace(covariance=self.widened(found, trusted))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _spread(covariance, mean, gain_std, d):  # pragma: no cover - compiled
     """Covariance (10, 10) in units of 1/d (10,), widened by the torque's own calibration."""
     out = np.empty((10, 10))
@@ -87,12 +87,14 @@ def _spread(covariance, mean, gain_std, d):  # pragma: no cover - compiled
     return out
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _between(table, times, t):  # pragma: no cover - compiled
-    if t <= times[0]:
-        return table[0].copy()
-    for k in range(1, len(times)):
-        if t < times[k]:
-            share = np.log(t / times[k - 1]) / np.log(times[k] / times[k - 1])
-            return (1.0 - share) * table[k - 1] + share * table[k]
-    return table[-1].copy()
+    """A row of the table at t: linear in log t between its times, the first and the last beyond them."""
+    k, share, out = 0, 1.0, np.empty(table.shape[1])
+    while k < len(times) - 1 and t > times[k]:
+        k += 1
+    if k > 0 and t < times[k]:
+        share = np.log(t / times[k - 1]) / np.log(times[k] / times[k - 1])
+    for i in range(len(out)):
+        out[i] = table[k, i] if share == 1.0 else (1.0 - share) * table[k - 1, i] + share * table[k, i]
+    return out

@@ -8,10 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from armload.inertia.cholesky import factor
+from armload.kernels import kernel
 from armload.posterior.problem import Posterior
 
 _RATIOS = ("noise", "pose", "velocity", "friction")
@@ -80,25 +80,33 @@ class Evidence:
         return cls(Λ, vector, posterior.gain_std, traits, float(t), kind)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _traits(information, weak, ratios, time, tare_time, motor, speed, same):  # pragma: no cover - compiled
     """The numbers that `TRAITS` names, in its order."""
-    tared = 1.0 if tare_time > 0.0 else 0.0
-    of_ratios = np.empty(2 * len(ratios))  # mean and largest of each one's logarithm
-    for k in range(len(ratios)):
-        logs = np.log10(np.maximum(ratios[k], 1e-6))
-        of_ratios[2 * k], of_ratios[2 * k + 1] = logs.mean(), logs.max()
-    scaled, gains = np.empty((10, 10)), np.empty(10)
+    kinds, n = ratios.shape
+    traits = np.empty(10 + 2 * kinds)
+    traits[0], traits[1] = np.log10(max(time, 1e-2)), 1.0 if tare_time > 0.0 else 0.0
+    traits[2], traits[3] = np.log10(1.0 + tare_time), motor
+    for k in range(kinds):  # mean and largest of each one's logarithm
+        total, largest = 0.0, -np.inf
+        for j in range(n):
+            one = np.log10(max(ratios[k, j], 1e-6))
+            total, largest = total + one, max(largest, one)
+        traits[4 + 2 * k], traits[5 + 2 * k] = total / n, largest
+    scaled, gains, root = np.empty((10, 10)), np.empty(10), np.empty((10, 10))
     for i in range(10):
         for j in range(i + 1):
             scaled[i, j] = weak[i] * information[i, j] * weak[j]
         gains[i] = np.log10(1.0 + max(scaled[i, i], 0.0))
         scaled[i, i] += 1.0
-    root = np.empty((10, 10))
     factor(scaled, root, 1.0)  # an eigenvalue of the information below nothing is rounding
     volume = 0.0
     for i in range(10):  # a tenth of log10 det(1 + Λ), in units
         volume += 0.2 * np.log10(root[i, i])
-    before = np.array([np.log10(max(time, 1e-2)), tared, np.log10(1.0 + tare_time), motor])
-    informed = np.array([gains[0], gains[1:4].mean(), gains[4:].mean()])
-    return np.concatenate((before, of_ratios, np.array([speed]), informed, np.array([volume, same])))
+    moments, inertia = gains[1] + gains[2] + gains[3], 0.0
+    for i in range(4, 10):
+        inertia += gains[i]
+    last = 4 + 2 * kinds
+    traits[last], traits[last + 1], traits[last + 2] = speed, gains[0], moments / 3.0
+    traits[last + 3], traits[last + 4], traits[last + 5] = inertia / 6.0, volume, same
+    return traits

@@ -6,13 +6,13 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.errors import ModelError
 from armload.inertia import near_consistent, nearest_body
 from armload.inertia.cholesky import inverse
+from armload.kernels import kernel
 from armload.posterior.calibration import Calibration
 from armload.posterior.evidence import Evidence
 from armload.posterior.known_mass import KnownMass
@@ -147,13 +147,14 @@ def without_learned_prior(
     return mean, 0.5 * (P + P.T) + trusted.gain_std**2 * np.outer(mean, mean)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def std_under_weak_prior(information, weak):  # pragma: no cover - compiled
     """Standard deviation (10,) under a weak prior of standard deviations `weak`, evidence trusted as far as it is."""
-    unit, out = np.eye(10), np.empty(10)
+    unit, out = np.empty((10, 10)), np.empty(10)
     for i in range(10):
         for j in range(10):
-            unit[i, j] += weak[i] * information[i, j] * weak[j]
+            unit[i, j] = weak[i] * information[i, j] * weak[j]
+        unit[i, i] += 1.0
     P = inverse(unit)
     for i in range(10):
         out[i] = weak[i] * np.sqrt(P[i, i])

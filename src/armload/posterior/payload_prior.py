@@ -19,10 +19,10 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from armload.errors import ModelError
+from armload.kernels import kernel
 
 _COMPONENTS = 12  # per family: a container's loadings, a box's sizes and places; trained models hold them
 _FLOOR = np.array([2e-3] + [2e-4] * 3 + [2e-5] * 6)  # [kg, kg·m, kg·m²] no component is narrower than this
@@ -159,12 +159,14 @@ class MixturePrior:
 
 # Several components are computed at once: they lie beside each other, each innermost loop runs over them, and the order
 # of sums is left to the compiler.
-@njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz"})
+@kernel(fastmath={"contract", "reassoc", "nsz"})
 def _components(precisions, pulls, constants, information, vectors):  # pragma: no cover - compiled
     """P_k (10, 10, K), its lower triangle, m_k (V, 10, K) and ln w_k' (V, K)."""
     V, d, K = len(vectors), len(pulls), len(constants)
-    L, y, root = np.empty((d, d, K)), np.empty((d, K)), np.ones(K)
-    P, means, log = np.empty((d, d, K)), np.zeros((V, d, K)), np.empty((V, K))
+    L, y, root = np.empty((d, d, K)), np.empty((d, K)), np.empty(K)
+    for k in range(K):
+        root[k] = 1.0
+    P, means, log = np.empty((d, d, K)), np.empty((V, d, K)), np.empty((V, K))
     for j in range(d):  # L·Lᵀ = Λ + C_k⁻¹, the diagonal inverted: a product is sooner had than a quotient
         for i in range(j, d):
             out, one, known = L[i, j], precisions[i, j], 0.5 * (information[i, j] + information[j, i])
@@ -186,7 +188,8 @@ def _components(precisions, pulls, constants, information, vectors):  # pragma: 
     for i in range(d):  # L⁻¹ in its place
         for j in range(i):
             total, last, out = y[0], L[i, i], L[i, j]
-            total[:] = 0.0
+            for k in range(K):
+                total[k] = 0.0
             for m in range(j, i):
                 one, other = L[i, m], L[m, j]
                 for k in range(K):
@@ -196,7 +199,8 @@ def _components(precisions, pulls, constants, information, vectors):  # pragma: 
     for i in range(d):
         for j in range(i + 1):
             out = P[i, j]
-            out[:] = 0.0
+            for k in range(K):
+                out[k] = 0.0
             for m in range(i, d):
                 one, other = L[m, i], L[m, j]
                 for k in range(K):
@@ -205,9 +209,12 @@ def _components(precisions, pulls, constants, information, vectors):  # pragma: 
         weight = log[v]
         for k in range(K):
             weight[k] = constants[k] - np.log(root[k])
+            for i in range(d):
+                means[v, i, k] = 0.0
         for i in range(d):
             total = y[i]
-            total[:] = 0.0
+            for k in range(K):
+                total[k] = 0.0
             for j in range(i + 1):
                 one, pull, known = L[i, j], pulls[j], vectors[v, j]
                 for k in range(K):
@@ -221,7 +228,7 @@ def _components(precisions, pulls, constants, information, vectors):  # pragma: 
     return P, means, log
 
 
-@njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz"})
+@kernel(fastmath={"contract", "reassoc", "nsz"})
 def _posteriors(precisions, pulls, constants, scale, information, vectors):  # pragma: no cover - compiled
     """Means (V, 10), covariances (V, 10, 10), weights (V, K) and ln p(evidence) + const (V,)."""
     (V, d), K = vectors.shape, len(constants)
@@ -234,18 +241,21 @@ def _posteriors(precisions, pulls, constants, scale, information, vectors):  # p
     P, m, weights = _components(precisions, pulls, constants, Λ, h)
     mean, covariance, totals = np.empty((V, d)), np.empty((V, d, d)), np.empty(V)
     for v in range(V):
-        w, largest = weights[v], weights[v].max()
-        total = 0.0
+        w, largest, total = weights[v], weights[v, 0], 0.0
+        for k in range(K):
+            largest = max(largest, w[k])
         for k in range(K):
             w[k] = np.exp(w[k] - largest)
             total += w[k]
         totals[v] = largest + np.log(total)
-        w /= total
+        for k in range(K):
+            w[k] /= total
         for i in range(d):
             away, total = m[v, i], 0.0
             for k in range(K):
                 total += w[k] * away[k]
-            away -= total
+            for k in range(K):
+                away[k] -= total
             mean[v, i] = total * scale[i]
         for i in range(d):
             for j in range(i + 1):

@@ -25,9 +25,9 @@ from dataclasses import dataclass, field
 from typing import Self
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from armload.kernels import kernel
 from armload.regression.rows import Row
 
 
@@ -86,7 +86,7 @@ class SequentialPosterior:
         return deepcopy(self)
 
 
-@njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz"})
+@kernel(fastmath={"contract", "reassoc", "nsz"})
 def _product(lower, x, c):  # pragma: no cover - compiled
     """c = C·x from the lower triangle of a symmetric C."""
     for i in range(x.shape[0]):
@@ -97,7 +97,7 @@ def _product(lower, x, c):  # pragma: no cover - compiled
         c[i] = total + row[i] * xi
 
 
-@njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz"})
+@kernel(fastmath={"contract", "reassoc", "nsz"})
 def _condition(
     X, r, scale, tares, drifts, C, own, slope, shared_C, shared_own, shared_slope, information, vector, seen, condition
 ):  # pragma: no cover - compiled
@@ -149,7 +149,9 @@ def _condition(
             e -= shared_own[i] * u
             for k in range(10):
                 w[k] -= shared_slope[i, k] * u
-        seen[j, :10], seen[j, 10], seen[j, 11] = w, e, v
+        seen[j, 10], seen[j, 11] = e, v
+        for k in range(10):
+            seen[j, k] = w[k]
         if condition:
             for i in range(m):
                 g = c[i] / v

@@ -16,9 +16,10 @@ from collections.abc import Sequence
 from copy import deepcopy
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from armload.inertia.cholesky import factor, invert
+from armload.kernels import kernel
 from armload.posterior.drift import ALLOWED, Drift, drift_since_tare
 from armload.posterior.handover import Handover, Result
 from armload.posterior.problem import Posterior, Scales
@@ -310,15 +311,43 @@ class StreamingPosterior:
         self._handover.close()
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _answer(information, vector, mean, root, turned, overrated, gain):  # pragma: no cover - compiled
     """The Gaussian posterior under N(mean, root·rootᵀ), its covariance widened as stated."""
-    if not np.isfinite(information.sum() + vector.sum()):
-        return mean.copy(), root @ turned
-    covariance = root @ np.linalg.inv(np.eye(10) + turned @ information @ root) @ turned
-    phi = mean + covariance @ (vector - information @ mean)
-    out = np.empty((10, 10))
-    for i in range(10):
-        for j in range(10):
-            out[i, j] = 0.5 * overrated * (covariance[i, j] + covariance[j, i]) + gain * phi[i] * phi[j]
+    n, total = 10, 0.0
+    phi, out, left = np.empty(n), np.empty((n, n)), np.empty(n)
+    work, K, L = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+    for i in range(n):
+        phi[i], left[i] = mean[i], vector[i]
+        total += vector[i]
+        for j in range(n):
+            total += information[i, j]
+            left[i] -= information[i, j] * mean[j]
+    if not np.isfinite(total):
+        _product(root, turned, out)
+        return phi, out
+    _product(information, root, work)
+    _product(turned, work, K)
+    for i in range(n):
+        K[i, i] += 1.0
+    factor(K, L, 1.0)  # a pivot below 1 is rounding
+    invert(L, work, K)
+    _product(root, K, work)
+    _product(work, turned, K)  # the covariance
+    for i in range(n):
+        for j in range(n):
+            phi[i] += K[i, j] * left[j]
+    for i in range(n):
+        for j in range(n):
+            out[i, j] = 0.5 * overrated * (K[i, j] + K[j, i]) + gain * phi[i] * phi[j]
     return phi, out
+
+
+@kernel
+def _product(A, B, out):  # pragma: no cover - compiled
+    for i in range(A.shape[0]):
+        for j in range(B.shape[1]):
+            total = 0.0
+            for k in range(A.shape[1]):
+                total += A[i, k] * B[k, j]
+            out[i, j] = total

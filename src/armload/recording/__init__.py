@@ -1,15 +1,18 @@
 """Recordings: what a robot's joints did, the files they come in, and whether their data are valid."""
 
 from armload.recording.alignment import Alignment, same_motion
+from armload.recording.column_spec import ColumnSpec
 from armload.recording.copies import check_own_measurements, shared_samples
-from armload.recording.files import has_topics, read_recording, write_recording
+from armload.recording.files import LOG_SUFFIXES, has_topics, read_recording, write_recording
 from armload.recording.recording import CHANNELS, GAP, JITTERED, Recording, Sample
 
 __all__ = [
     "CHANNELS",
     "GAP",
     "JITTERED",
+    "LOG_SUFFIXES",
     "Alignment",
+    "ColumnSpec",
     "Recording",
     "Sample",
     "check_own_measurements",

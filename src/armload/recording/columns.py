@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -10,10 +9,8 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.errors import RecordingError
+from armload.recording.aliases import QUANTITIES
 from armload.recording.recording import Recording
-
-QUANTITIES = ("q", "dq", "tau")
-_JOINT = re.compile(r"(q|dq|tau)([1-9][0-9]{0,2})")
 
 
 def column_names(n: int) -> list[str]:
@@ -25,42 +22,13 @@ def column_names(n: int) -> list[str]:
     return ["t", *(f"{quantity}{j}" for quantity in QUANTITIES for j in range(1, n + 1))]
 
 
-def joint_count(names: Sequence[str], where: str, arm: Arm | None = None) -> int:
-    """Number of joints n of a log with these column names, in any order.
-
-    Raises:
-        RecordingError: a name is missing, unexpected or there twice, or the arm has another number of joints.
-    """
-    names = list(names)
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise RecordingError(f"{where} has the column {twice[0]!r} more than once: expected {_header(arm)}")
-    if "q0" in names:
-        raise RecordingError(f"{where} counts its joints from 0 (column 'q0'): expected {_header(arm)}; rename them")
-    n = max((int(m[2]) for m in map(_JOINT.fullmatch, names) if m), default=0)
-    if n == 0:
-        found = ", ".join(names[:6]) + (", …" if len(names) > 6 else "")
-        raise RecordingError(f"{where} has no columns named q1, dq1, tau1, …: found {found}; expected {_header(arm)}")
-    expected = column_names(n)
-    missing = [name for name in expected if name not in names]
-    unexpected = [name for name in names if name not in expected]
-    if arm is not None and n != arm.n and not any(_JOINT.fullmatch(name) for name in missing):
-        check_joint_count(n, where, arm)
-    if missing:
-        also = f" (it has {_some(unexpected)} instead)" if unexpected else ""
-        raise RecordingError(f"{where} lacks {_some(missing)}{also}: expected {_header(arm)}")
-    if unexpected:
-        raise RecordingError(f"{where} has the unexpected {_some(unexpected)}: expected only {_header(arm)}; remove it")
-    return n
-
-
-def check_joint_count(n: int, where: str, arm: Arm) -> None:
-    """Raise RecordingError if the log's n joints are not the arm's."""
+def check_joint_count(n: int, where: str, arm: Arm, also: str = "") -> None:
+    """Raise RecordingError if the log's n joints are not the arm's; `also`: another way to mend it."""
     if n != arm.n:
         has = "1 joint (q1)" if n == 1 else f"{n} joints (q1..q{n})"
         raise RecordingError(
             f"{where}: log has {has}, {arm.name} has {arm.n} up to its frame {arm.frame!r}: name the robot that made "
-            "the log, or its flange with --frame"
+            f"the log, or its flange with --frame{also}"
         )
 
 
@@ -69,6 +37,7 @@ def checked_recording(
     where: str,
     row_name: Callable[[int], str],
     *,
+    labels: Sequence[str] | None = None,
     channel: str = "measured",
     joint_names: tuple[str, ...] | None = None,
     notes: tuple[str, ...] = (),
@@ -79,11 +48,12 @@ def checked_recording(
 
     Args:
         row_name: how to call row k in a message ("line 7").
+        labels: how to call the columns in a message; None: by `column_names`.
 
     Raises:
         RecordingError: fewer than two rows, a number that is not finite, times out of order; names row and column.
     """
-    names = column_names((table.shape[1] - 1) // 3)
+    names = labels or column_names((table.shape[1] - 1) // 3)
     if not np.isfinite(table).all():
         row, column = np.argwhere(~np.isfinite(table))[0]
         kind = "NaN" if np.isnan(table[row, column]) else "infinite"
@@ -114,13 +84,3 @@ def checked_recording(
         raise RecordingError(f"{where} holds {rows}: expected at least 2, one per sample")
     q, dq, tau = np.split(table[:, 1:], 3, axis=1)
     return Recording(table[:, 0], q, dq, tau, channel, joint_names, where, notes)
-
-
-def _header(arm: Arm | None) -> str:
-    n = "n" if arm is None else str(arm.n)
-    return f"t,q1..q{n},dq1..dq{n},tau1..tau{n}"
-
-
-def _some(names: Sequence[str]) -> str:
-    shown = ", ".join(repr(name) for name in names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
-    return f"column{'s' if len(names) > 1 else ''} {shown}"

@@ -1,6 +1,6 @@
-"""Logs as comma-separated text with the header t,q1..qn,dq1..dqn,tau1..taun.
+"""Logs as text: comma-separated, or by semicolons, tabs or spaces, with decimal points or commas.
 
-A file without flaw is read at once (pyarrow). Any other is read again line by line, to say which line and column is
+A file without flaw is read at once (NumPy). Any other is read again line by line, to say which line and column is
 wrong, or to find that a person would have read it the same way (blank lines, quotes, a plus sign).
 
 A last line that was cut off (no line end, and no row of numbers) is dropped with a note: that is how a log ends whose
@@ -10,8 +10,9 @@ writer was killed or whose machine lost its power.
 from __future__ import annotations
 
 import csv
-import io
 import re
+from collections.abc import Sequence
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -19,59 +20,196 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.errors import RecordingError
-from armload.recording.columns import checked_recording, column_names, joint_count
+from armload.recording.column_spec import ColumnSpec
+from armload.recording.columns import column_names
+from armload.recording.csv_layout import NUMBER, layout_of
 from armload.recording.recording import Recording
+from armload.recording.table import read_table
 
-_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,5})?")
 _BEGINS_A_NUMBER = re.compile(r"[+-]?[0-9]*\.?[0-9]*([eE][+-]?[0-9]*)?")
+_DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+([eE][+-]?[0-9]{1,5})?")
+_WHOLE = re.compile(r"[+-]?[0-9]{1,18}|[1-8][0-9]{18}")
 _NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)", re.IGNORECASE)
 
 
-def read_csv(path: Path, where: str, arm: Arm | None = None) -> Recording:
-    """Read a CSV log; see `read_recording` for what it raises."""
-    data, notes = _without_torn_end(path.read_bytes(), where)
-    text = _text(data, where)
-    names = _header(text, where)
-    n = joint_count(names, where, arm)
-    order = [names.index(name) for name in column_names(n)]
-    joints = None if arm is None else arm.joint_names
-    table = _read_fast(data, names)
-    if table is not None:
-        table = np.ascontiguousarray(table[:, order])
-        if len(table) > 1 and np.isfinite(table).all() and np.all(np.diff(table[:, 0]) > 0):
-            return checked_recording(table, where, lambda k: f"line {k + 2}", joint_names=joints, notes=notes)
-    table, lines = _read_slowly(text, names, where)
-    return checked_recording(table[:, order], where, lambda k: f"line {lines[k]}", joint_names=joints, notes=notes)
+def read_csv(path: Path, where: str, arm: Arm | None = None, spec: ColumnSpec | None = None) -> Recording:
+    """Read a text log; see `read_recording` for what it raises."""
+    return read_table(_Csv(path.read_bytes(), where), where, arm, spec or ColumnSpec())
 
 
 def write_csv(path: Path, recording: Recording) -> None:
     """Write a CSV log; each number as the shortest text that reads back as the same double (up to 17 digits)."""
-    import pyarrow as pa
-    from pyarrow import csv as arrow_csv
-
     table = np.hstack([recording.t[:, None], recording.q, recording.dq, recording.tau])
-    names = column_names(recording.n)
-    arrays = [pa.array(column) for column in table.T]
-    with path.open("wb") as file:
-        file.write((",".join(names) + "\n").encode())  # Arrow would put the names in quotes
-        options = arrow_csv.WriteOptions(include_header=False, quoting_style="none")
-        arrow_csv.write_csv(pa.Table.from_arrays(arrays, names=names), file, options)
+    with path.open("w", encoding="ascii", newline="") as file:
+        file.write(",".join(column_names(recording.n)) + "\n")
+        file.writelines(",".join(map(repr, row)) + "\n" for row in table.tolist())
 
 
-def _without_torn_end(data: bytes, where: str) -> tuple[bytes, tuple[str, ...]]:
-    """The file without a last line that was cut off, and a note if there was one."""
-    whole = data.rstrip(b"\0")  # a file system may have promised blocks that it never wrote
-    end = max(whole.rfind(b"\n"), whole.rfind(b"\r")) + 1
-    columns = re.split(rb"[\r\n]", whole, maxsplit=1)[0].count(b",") + 1
-    *cells, last = (cell.strip().decode("latin-1") for cell in whole[end:].split(b","))
-    complete = len(cells) + 1 == columns and _NUMBER.fullmatch(last) and whole == data
-    begins_a_row = len(cells) < columns and all(map(_NUMBER.fullmatch, cells)) and _BEGINS_A_NUMBER.fullmatch(last)
-    if end == 0 or complete or not begins_a_row or (not whole[end:].strip() and whole == data):
-        return data, ()
-    return whole[:end], (f"{where}: dropped the last line, which was cut off: {len(data) - end} bytes",)
+class _Csv:
+    """A text file as a table (`table.Table`)."""
+
+    def __init__(self, data: bytes, where: str) -> None:
+        self.where = where
+        lines = _lines(data, where)
+        self.layout = layout_of(lines, where)
+        self.names: Sequence[str] = self.layout.names
+        self.notes: list[str] = []
+        self._body = lines[self.layout.first - 1 :]
+        self._drop_torn_end(data)
+        while self._body and not self._body[-1].strip():
+            self._body.pop()
+        self._rows: list[tuple[int, list[str]]] | None = None  # line and cells, once it was read line by line
+        self._comma, self._point = 0, 0  # the first line with a decimal comma, and with a decimal point
+
+    def numbers(self, places: Sequence[int]) -> NDArray[np.float64]:
+        """The columns at these places (N, k)."""
+        table = self._fast(places)
+        if table is not None and len(table) > 1 and np.isfinite(table).all():
+            return table
+        self._rows = rows = self._with_values(self._read_rows(), places)
+        values = [[self._number(cells[place], place, line) for place in places] for line, cells in rows]
+        if self._comma and self._point:
+            raise RecordingError(
+                f"{self.where}: line {self._comma} has decimal commas and line {self._point} decimal points: expected "
+                "one of them; write the numbers without separators of thousands"
+            )
+        return np.array(values, dtype=float).reshape(len(values), len(places))
+
+    def whole_numbers(self, place: int) -> NDArray[np.int64] | None:
+        """A column of whole numbers (N,), exactly; None: they are not whole, or longer than 18 digits hold."""
+        cells = self._column(place)
+        if not all(map(_WHOLE.fullmatch, cells)):
+            return None
+        return np.array([int(cell) for cell in cells], dtype=np.int64)
+
+    def text(self, place: int) -> str | None:
+        """The one text that a column holds in all rows."""
+        cells = set(self._column(place))
+        text = cells.pop() if len(cells) == 1 else ""
+        return None if not text or NUMBER.fullmatch(text) else text
+
+    def row_name(self, row: int) -> str:
+        """The line of the file, the first being 1."""
+        return f"line {self.layout.first + row if self._rows is None else self._rows[row][0]}"
+
+    def _column(self, place: int) -> list[str]:
+        if self._rows is None and self._plain:
+            separator = None if self.layout.separator == " " else self.layout.separator
+            return [line.split(separator, place + 1)[place].strip() for line in self._body]
+        return [cells[place] for _, cells in self._rows or self._read_rows()]
+
+    @cached_property
+    def _plain(self) -> bool:
+        """Whether every line has the header's number of cells, and none has quotes."""
+        separator, count = self.layout.separator, len(self.names)
+        if any('"' in line for line in self._body):
+            return False
+        if separator == " ":
+            return all(len(line.split()) == count for line in self._body)
+        return all(line.count(separator) == count - 1 for line in self._body)
+
+    def _fast(self, places: Sequence[int]) -> NDArray[np.float64] | None:
+        """The columns, or None if anything at all is unusual."""
+        if not self._body or not self._plain:
+            return None
+        separator = None if self.layout.separator == " " else self.layout.separator
+        try:
+            return np.loadtxt(self._body, delimiter=separator, comments=None, usecols=places, ndmin=2)
+        except ValueError:
+            pass
+        if separator == "," or any("." in line for line in self._body):
+            return None
+        try:
+            lines = [line.replace(",", ".") for line in self._body]
+            return np.loadtxt(lines, delimiter=separator, comments=None, usecols=places, ndmin=2)
+        except ValueError:
+            return None
+
+    def _read_rows(self) -> list[tuple[int, list[str]]]:
+        """Line number and cells of each row.
+
+        Raises:
+            RecordingError: the first line that has not as many cells as the header.
+        """
+        rows = []
+        for line, text in enumerate(self._body, start=self.layout.first):
+            if not text.strip():
+                continue
+            try:
+                cells = [cell.strip() for cell in self.layout.cells(text)]
+            except csv.Error as error:
+                raise RecordingError(f"{self.where}, line {line} cannot be read as CSV: {error}") from None
+            if not any(cells):
+                continue
+            if len(cells) != len(self.names):
+                at_end = line == self.layout.first + len(self._body) - 1
+                last = " (the last line: the file may be cut off)" if at_end else ""
+                raise RecordingError(
+                    f"{self.where}, line {line} has {len(cells)} cells{last}: expected {len(self.names)}, as the "
+                    "header has"
+                )
+            rows.append((line, cells))
+        return rows
+
+    def _with_values(self, rows: list[tuple[int, list[str]]], places: Sequence[int]) -> list[tuple[int, list[str]]]:
+        """The rows without those that are empty but for the time: PlotJuggler writes a row for every topic's time."""
+        kept = [row for row in rows if any(row[1][place] for place in places[1:])]
+        if len(kept) < len(rows) and kept:
+            self.notes.append(
+                f"{self.where}: left out {len(rows) - len(kept)} row(s) without position, velocity and torque"
+            )
+            return kept
+        return rows
+
+    def _number(self, cell: str, place: int, line: int) -> float:
+        if NUMBER.fullmatch(cell) or _NOT_FINITE.fullmatch(cell):
+            self._point = self._point or ("." in cell) * line
+            return float(cell)
+        if self.layout.separator != "," and _DECIMAL_COMMA.fullmatch(cell):
+            self._comma = self._comma or line
+            return float(cell.replace(",", "."))
+        if not cell:
+            raise RecordingError(f"{self.where}, line {line}: {self.names[place]} is empty: expected a number")
+        shown = cell if len(cell) <= 24 else cell[:24] + "…"
+        raise RecordingError(
+            f"{self.where}, line {line}: {self.names[place]} is {shown!r}: expected a number with a decimal point"
+        )
+
+    def _drop_torn_end(self, data: bytes) -> None:
+        """Leave out a last line that was cut off: no line end, and the beginning of a row like the one before it."""
+        zeros = len(data) - len(data.rstrip(b"\0"))
+        last = self._body[-1].rstrip("\0").strip() if self._body else ""
+        if not self._body or (not last and not zeros):
+            return
+        comma = self.layout.separator != ","
+        *cells, end = (
+            cell.strip() for cell in last.split(None if self.layout.separator == " " else self.layout.separator)
+        )
+        like = next((line for line in reversed(self._body[:-1]) if line.strip()), "").split(self.layout.separator)
+        texts = {k for k, cell in enumerate(like) if cell.strip() and not _is_number(cell.strip(), comma)}
+        whole = len(cells) + 1 == len(self.names) and (len(cells) in texts or _is_number(end, comma)) and not zeros
+        begun = len(cells) < len(self.names) and all(
+            k in texts or _is_number(cell, comma) for k, cell in enumerate(cells)
+        )
+        end = end.replace(",", ".") if comma else end
+        if not whole and begun and (len(cells) in texts or _BEGINS_A_NUMBER.fullmatch(end)):
+            self._body.pop()
+            cut = len(last.encode()) + zeros
+            self.notes.append(f"{self.where}: dropped the last line, which was cut off: {cut} bytes")
+        elif zeros:
+            _refuse_zeros(self.where, self.layout.first + len(self._body) - 1)
 
 
-def _text(data: bytes, where: str) -> str:
+def _is_number(cell: str, comma: bool) -> bool:
+    return NUMBER.fullmatch(cell) is not None or (comma and _DECIMAL_COMMA.fullmatch(cell) is not None)
+
+
+def _refuse_zeros(where: str, line: int) -> None:
+    raise RecordingError(f"{where}, line {line}: the file holds zero bytes: expected text; it is binary or damaged")
+
+
+def _lines(data: bytes, where: str) -> list[str]:
+    """The lines of a file, without their ends; the last is what follows the last line end."""
     if not data.strip():
         raise RecordingError(f"{where} is empty: expected a header line and one line per sample")
     try:
@@ -82,90 +220,7 @@ def _text(data: bytes, where: str) -> str:
             f"{where}, line {line}: byte 0x{data[error.start]:02x} is not text: expected a CSV file in UTF-8; the file "
             "is binary, damaged or in another encoding"
         ) from None
-    if "\0" in text:
-        line = text.count("\n", 0, text.index("\0")) + 1
-        raise RecordingError(f"{where}, line {line}: the file holds zero bytes: expected text; it is binary or damaged")
-    return text
-
-
-def _header(text: str, where: str) -> list[str]:
-    """The names in the header line."""
-    header = re.split(r"\r\n|\r|\n", text, maxsplit=1)[0]
-    try:
-        cells = next(csv.reader([header], strict=True), [])
-    except csv.Error as error:
-        raise RecordingError(f"{where}, line 1: the header cannot be read ({error}): expected t,q1,…") from None
-    names = [cell.strip() for cell in cells]
-    if not any(names):
-        raise RecordingError(f"{where}, line 1 is blank: expected the header t,q1..qn,dq1..dqn,tau1..taun")
-    if all(_NUMBER.fullmatch(name) for name in names):
-        raise RecordingError(
-            f"{where}, line 1 holds numbers: expected the header t,q1..qn,dq1..dqn,tau1..taun before the data"
-        )
-    if names[0].startswith("#"):
-        raise RecordingError(
-            f"{where}, line 1 begins with '#': expected the header t,q1..qn,dq1..dqn,tau1..taun; remove the '#', or "
-            "the line if it is a comment"
-        )
-    if len(names) == 1:
-        for separator, called in ((";", "semicolons"), ("\t", "tabs"), (" ", "spaces")):
-            if separator in names[0]:
-                raise RecordingError(f"{where}, line 1: the columns are separated by {called}: expected commas")
-    return names
-
-
-def _read_fast(data: bytes, names: list[str]) -> NDArray[np.float64] | None:
-    """The table in the file's own column order, or None if anything at all is unusual."""
-    import pyarrow as pa
-    from pyarrow import csv as arrow_csv
-
-    try:
-        table = arrow_csv.read_csv(
-            pa.BufferReader(data.rstrip()),  # blank lines at the end are no reason to read slowly
-            # parallel blocks cost more than they gain below some 10 MB, and one thread is one order of events
-            read_options=arrow_csv.ReadOptions(column_names=names, skip_rows=1, use_threads=len(data) > 10_000_000),
-            parse_options=arrow_csv.ParseOptions(ignore_empty_lines=False),
-            convert_options=arrow_csv.ConvertOptions(
-                column_types=dict.fromkeys(names, pa.float64()), null_values=[], quoted_strings_can_be_null=False
-            ),
-        )
-    except (pa.ArrowException, ValueError):
-        return None
-    if any(column.null_count for column in table.columns):
-        return None
-    return np.column_stack([column.to_numpy() for column in table.columns])
-
-
-def _read_slowly(text: str, names: list[str], where: str) -> tuple[NDArray[np.float64], list[int]]:
-    """The table, in the file's own column order, and the file's line number of each row.
-
-    Raises:
-        RecordingError: the first line that is no row of numbers.
-    """
-    rows: list[list[float]] = []
-    lines: list[int] = []
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-    try:
-        for cells in reader:
-            line = reader.line_num
-            if line == 1 or not any(cell.strip() for cell in cells):
-                continue
-            if len(cells) != len(names):
-                last = " (the last line: the file may be cut off)" if line > text.rstrip().count("\n") else ""
-                raise RecordingError(
-                    f"{where}, line {line} has {len(cells)} cells{last}: expected {len(names)}, as the header has"
-                )
-            rows.append([_number(cell.strip(), name, line, where) for cell, name in zip(cells, names, strict=True)])
-            lines.append(line)
-    except csv.Error as error:
-        raise RecordingError(f"{where}, line {reader.line_num} cannot be read as CSV: {error}") from None
-    return np.array(rows, dtype=float).reshape(len(rows), len(names)), lines
-
-
-def _number(cell: str, name: str, line: int, where: str) -> float:
-    if _NUMBER.fullmatch(cell) or _NOT_FINITE.fullmatch(cell):
-        return float(cell)
-    if not cell:
-        raise RecordingError(f"{where}, line {line}: {name} is empty: expected a number")
-    shown = cell if len(cell) <= 24 else cell[:24] + "…"
-    raise RecordingError(f"{where}, line {line}: {name} is {shown!r}: expected a number with a decimal point")
+    whole = text.rstrip("\0")  # a file system may have promised blocks that it never wrote
+    if "\0" in whole:
+        _refuse_zeros(where, text.count("\n", 0, text.index("\0")) + 1)
+    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")

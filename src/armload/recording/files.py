@@ -2,53 +2,84 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from armload.arms import Arm
 from armload.atomic import replacing
 from armload.errors import RecordingError
+from armload.recording.column_spec import ColumnSpec
 from armload.recording.csv_file import read_csv, write_csv
+from armload.recording.hdf5_file import read_hdf5
 from armload.recording.npz_file import read_npz, write_npz
 from armload.recording.parquet_file import read_parquet, write_parquet
 from armload.recording.recording import Recording
 from armload.recording.ros_bag import BAG_SUFFIXES, read_bag
 
-_READERS = {".csv": read_csv, ".parquet": read_parquet, ".npz": read_npz}
+_READERS = {
+    **dict.fromkeys((".csv", ".tsv", ".txt"), read_csv),
+    ".parquet": read_parquet,
+    ".npz": read_npz,
+    **dict.fromkeys((".hdf5", ".h5"), read_hdf5),
+}
+LOG_SUFFIXES = (*_READERS, *BAG_SUFFIXES)
+_FORMS = "CSV, Parquet, NPZ, HDF5 or ROS bag"
 _WRITERS = {".csv": write_csv, ".parquet": write_parquet, ".npz": write_npz}
 _SIGNATURES = {
     b"PAR1": (".parquet",),
     b"PK\x03\x04": (".npz",),
+    b"\x89HDF\r\n\x1a\n": (".hdf5", ".h5"),
     b"SQLite format 3\x00": (".db3",),
     b"\x89MCAP0\r\n": (".mcap",),
     b"#ROSBAG V": (".bag",),
 }
 
 
-def read_recording(path: str | Path, arm: Arm | None = None, *, topic: str | None = None) -> Recording:
-    """Read the log of an arm: CSV, Parquet, NPZ, ROS 1 bag, ROS 2 bag (folder, .db3 or .mcap).
+def read_recording(
+    path: str | Path,
+    arm: Arm | None = None,
+    *,
+    topic: str | None = None,
+    columns: ColumnSpec | Mapping[str, Any] | str | Path | None = None,
+    rate: float | None = None,
+    episode: int | None = None,
+) -> Recording:
+    """Read the log of an arm: a table (CSV, Parquet, NPZ, HDF5), a ROS 1 bag or a ROS 2 bag (folder, .db3 or .mcap).
 
     Args:
-        path: the file, or the folder of a ROS 2 bag; SI units, columns t, q1..qn, dq1..dqn, tau1..taun or JointState.
-        arm: the arm that made the log, if known: the number of joints is checked, and joints in a bag are taken by
-            their names in the arm's order.
+        path: the file, or the folder of a ROS 2 bag. Columns of a table are known by the names that tools give them
+            (docs/recordings.md); SI units, unless the header, the tool or `columns` says otherwise.
+        arm: the arm that made the log, if known: the number of joints is checked, and joints that have names are taken
+            by them, in the arm's order.
         topic: the JointState topic of a bag, where several have the arm's joints.
+        columns: names and units of a table's columns (`ColumnSpec.of`), where its header leaves them open.
+        rate: samples per second [Hz] of a table without times.
+        episode: which one of a table that holds several.
 
     Raises:
-        RecordingError: the file cannot be read, or a line of it is not valid; one sentence that names the place
-            (for CSV the line of the file, the header being line 1).
+        RecordingError: the file cannot be read, its columns are not clear, or a line of it is not valid; one sentence
+            that names the place (for CSV the line of the file, the first being 1).
     """
     path, where = Path(path), str(path)
+    spec = ColumnSpec.of(columns).over(rate=rate, episode=episode)
     try:
         if not path.exists():
-            raise RecordingError(f"{where} does not exist: expected the path of a log (CSV, Parquet, NPZ or ROS bag)")
-        if path.is_dir():
-            return read_bag(path, where, arm, topic)
-        if not path.is_file():
-            raise RecordingError(f"{where} is not a regular file: expected a log (CSV, Parquet, NPZ or ROS bag)")
+            raise RecordingError(f"{where} does not exist: expected the path of a log ({_FORMS})")
+        if not path.is_file() and not path.is_dir():
+            raise RecordingError(f"{where} is not a regular file: expected a log ({_FORMS})")
         suffix = path.suffix.lower()
-        if suffix not in (*_READERS, *BAG_SUFFIXES):
+        if has_topics(path):
+            if spec != ColumnSpec():
+                raise RecordingError(
+                    f"{where}: columns, a rate or an episode were named, but a ROS bag has its joints by name; leave "
+                    "them out"
+                )
+            if path.is_dir():
+                return read_bag(path, where, arm, topic)
+        elif suffix not in _READERS:
             raise RecordingError(
-                f"{where}: unsupported suffix {path.suffix!r}: expected {', '.join((*_READERS, *BAG_SUFFIXES))}"
+                f"{where}: unsupported suffix {path.suffix!r}: expected {', '.join(LOG_SUFFIXES)}"
                 f"{_looks_like(path, suffix)}"
             )
         if path.stat().st_size == 0:
@@ -57,7 +88,7 @@ def read_recording(path: str | Path, arm: Arm | None = None, *, topic: str | Non
             raise RecordingError(f"{where}: a topic ({topic!r}) was named, but only ROS bags have topics; leave it out")
         if hint := _looks_like(path, suffix):
             raise RecordingError(f"{where} is not a {suffix} file{hint}")
-        return read_bag(path, where, arm, topic) if suffix in BAG_SUFFIXES else _READERS[suffix](path, where, arm)
+        return read_bag(path, where, arm, topic) if has_topics(path) else _READERS[suffix](path, where, arm, spec)
     except OSError as error:
         raise RecordingError(f"{where} cannot be read: {error.strerror or error}") from None
 

@@ -1,59 +1,51 @@
-"""Logs as NumPy archives with the arrays t (N,), q, dq, tau (N, n); never with pickled objects."""
+"""Logs as NumPy archives, such as one with the arrays t (N,), q, dq, tau (N, n); never with pickled objects."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.errors import RecordingError, one_line
-from armload.recording.columns import QUANTITIES, check_joint_count, checked_recording
+from armload.recording.aliases import QUANTITIES
+from armload.recording.array_table import WIDEST, ArrayTable, Column
+from armload.recording.column_spec import ColumnSpec
 from armload.recording.recording import CHANNELS, Recording
+from armload.recording.table import read_table
 
 _ARRAYS = ("t", *QUANTITIES)
 _LABELS = ("channel", "joint_names")
 
 
-def read_npz(path: Path, where: str, arm: Arm | None = None) -> Recording:
+def read_npz(path: Path, where: str, arm: Arm | None = None, spec: ColumnSpec | None = None) -> Recording:
     """Read an NPZ log; see `read_recording` for what it raises."""
     try:
         # opened here, because numpy leaves a file open that it cannot read
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             if not isinstance(archive, np.lib.npyio.NpzFile):
                 raise RecordingError(f"{where} holds one bare array: expected an archive with t, q, dq and tau")
-            _check_names(archive.files, where)
             arrays = {name: archive[name] for name in archive.files}
     except RecordingError:
         raise
     except Exception as error:  # a damaged archive can fail anywhere between zip, zlib and the array header
         raise RecordingError(f"{where} is not a NumPy archive that can be read: {one_line(error)[:160]}") from None
-
-    for name in _ARRAYS:
-        if arrays[name].dtype.kind not in "iuf":
-            raise RecordingError(f"{where}: array {name} holds {arrays[name].dtype}: expected real numbers")
-    t, q = arrays["t"], arrays["q"]
-    if t.ndim != 1 or q.ndim != 2 or 0 in q.shape[1:]:
-        raise RecordingError(f"{where}: t has shape {t.shape} and q {q.shape}: expected (N,) and (N, n)")
-    n = q.shape[1]
-    for name in QUANTITIES:
-        if arrays[name].shape != (len(t), n):
-            turned = "; transpose it" if arrays[name].shape[::-1] == (len(t), n) else ""
-            raise RecordingError(
-                f"{where}: {name} has shape {arrays[name].shape}: expected {(len(t), n)}, one row per time{turned}"
-            )
-    if arm is not None:
-        check_joint_count(n, where, arm)
-
-    matrix = np.hstack([t[:, None], *(arrays[name] for name in QUANTITIES)]).astype(float)
+    if arrays.keys() >= set(_ARRAYS) and spec in (None, ColumnSpec()):
+        _check_shapes(arrays, where)
     channel = str(arrays.get("channel", "measured"))
     if channel not in CHANNELS:
         raise RecordingError(f"{where}: channel is {channel[:24]!r}: expected one of {', '.join(CHANNELS)}")
     joints = tuple(str(name) for name in np.ravel(arrays["joint_names"])) if "joint_names" in arrays else None
-    if joints is None or len(joints) != n:
-        joints = None if arm is None else arm.joint_names
-    return checked_recording(matrix, where, lambda k: f"row {k}", channel=channel, joint_names=joints)
+    columns = {
+        name: Column(array.shape[1] if array.ndim == 2 else None, lambda array=array: array)
+        for name, array in arrays.items()
+        if name not in _LABELS and (array.ndim == 1 or (array.ndim == 2 and 0 < array.shape[1] <= WIDEST))
+    }
+    log = read_table(ArrayTable(columns, where), where, arm, spec or ColumnSpec(), channel=channel)
+    return log if joints is None or len(joints) != log.n else replace(log, joint_names=joints)
 
 
 def write_npz(path: Path, recording: Recording) -> None:
@@ -66,10 +58,18 @@ def write_npz(path: Path, recording: Recording) -> None:
         np.savez_compressed(file, **arrays)
 
 
-def _check_names(names: list[str], where: str) -> None:
-    missing = [name for name in _ARRAYS if name not in names]
-    unexpected = [name for name in names if name not in (*_ARRAYS, *_LABELS)]
-    if missing or unexpected:
-        faults = [f"lacks {', '.join(missing)}"] if missing else []
-        faults += [f"has the unexpected {', '.join(name[:24] for name in unexpected[:4])}"] if unexpected else []
-        raise RecordingError(f"{where} {' and '.join(faults)}: expected the arrays t, q, dq and tau")
+def _check_shapes(arrays: dict[str, NDArray], where: str) -> None:
+    """Refuse arrays t, q, dq, tau that do not fit each other, by their shapes."""
+    for name in _ARRAYS:
+        if arrays[name].dtype.kind not in "iuf":
+            raise RecordingError(f"{where}: array {name} holds {arrays[name].dtype}: expected real numbers")
+    t, q = arrays["t"], arrays["q"]
+    if t.ndim != 1 or q.ndim != 2 or 0 in q.shape[1:]:
+        raise RecordingError(f"{where}: t has shape {t.shape} and q {q.shape}: expected (N,) and (N, n)")
+    for name in QUANTITIES:
+        if arrays[name].shape != (len(t), q.shape[1]):
+            turned = "; transpose it" if arrays[name].shape[::-1] == (len(t), q.shape[1]) else ""
+            raise RecordingError(
+                f"{where}: {name} has shape {arrays[name].shape}: expected {(len(t), q.shape[1])}, one row per "
+                f"time{turned}"
+            )

@@ -1,55 +1,101 @@
-"""Logs as Parquet, one column of doubles per column of the log; channel and joint names in the file's metadata."""
+"""Logs as Parquet: one column of numbers per column of the log, or lists of numbers as in LeRobot's data sets.
+
+A file written here holds channel and joint names in its metadata. pyarrow is imported by those who have Parquet files.
+"""
 
 from __future__ import annotations
 
 import json
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.errors import RecordingError, one_line
-from armload.recording.columns import checked_recording, column_names, joint_count
+from armload.recording.array_table import WIDEST, ArrayTable, Column
+from armload.recording.column_spec import ColumnSpec
+from armload.recording.columns import column_names
 from armload.recording.recording import CHANNELS, Recording
+from armload.recording.table import read_table
 
 _METADATA = b"armload.recording"
 
 
-def read_parquet(path: Path, where: str, arm: Arm | None = None) -> Recording:
+def read_parquet(path: Path, where: str, arm: Arm | None = None, spec: ColumnSpec | None = None) -> Recording:
     """Read a Parquet log; see `read_recording` for what it raises."""
-    import pyarrow as pa
-    from pyarrow import parquet
-
+    pa, parquet = _pyarrow(where)
     try:
         with parquet.ParquetFile(path, page_checksum_verification=True) as file:
-            names = file.schema_arrow.names
-            n = joint_count(names, where, arm)
-            table = file.read(column_names(n), use_threads=False)
-            about = (file.schema_arrow.metadata or {}).get(_METADATA)
-        columns = []
-        for name in column_names(n):
-            column = table.column(name)
-            if not (pa.types.is_floating(column.type) or pa.types.is_integer(column.type)):
-                raise RecordingError(f"{where}: column {name} holds {column.type}: expected numbers")
-            if column.null_count:
-                row = int(np.flatnonzero(np.asarray(column.is_null()))[0])
-                raise RecordingError(f"{where}, row {row}: {name} is empty: expected a number")
-            columns.append(np.asarray(column.to_numpy(), dtype=float))
-        matrix = np.column_stack(columns)
+            columns = {}
+            for entry in file.schema_arrow:
+                read = partial(_column, file, entry.name, where)
+                if _is_list(pa, entry.type):
+                    lists = read()
+                    if lists.shape[1] <= WIDEST:
+                        columns[entry.name] = Column(lists.shape[1], lambda lists=lists: lists)
+                else:
+                    columns[entry.name] = Column(None, read)
+            channel, joints = _about((file.schema_arrow.metadata or {}).get(_METADATA))
+            log = read_table(ArrayTable(columns, where), where, arm, spec or ColumnSpec(), channel=channel)
     except RecordingError:
         raise
     except Exception as error:  # a damaged file can fail anywhere in the decoder
         raise RecordingError(f"{where} is not a Parquet file that can be read: {one_line(error)[:160]}") from None
-    channel, joints = _about(about, n)
-    joints = joints or (arm.joint_names if arm is not None else None)
-    return checked_recording(matrix, where, lambda k: f"row {k}", channel=channel, joint_names=joints)
+    return log if joints is None or len(joints) != log.n else replace(log, joint_names=joints)
+
+
+def _pyarrow(where: str | Path) -> tuple[Any, Any]:
+    """pyarrow and its Parquet module.
+
+    Raises:
+        RecordingError: it is not installed.
+    """
+    try:
+        import pyarrow
+        from pyarrow import parquet
+    except ImportError:
+        raise RecordingError(
+            f"{where}: Parquet is read and written through pyarrow, which is missing: pip install 'armload[parquet]'"
+        ) from None
+    return pyarrow, parquet
+
+
+def _is_list(pa: Any, kind: Any) -> bool:
+    lists = pa.types.is_list(kind) or pa.types.is_fixed_size_list(kind) or pa.types.is_large_list(kind)
+    return lists and (pa.types.is_floating(kind.value_type) or pa.types.is_integer(kind.value_type))
+
+
+def _column(file: Any, name: str, where: str) -> NDArray:
+    """One column: numbers (N,), or lists of numbers (N, width).
+
+    Raises:
+        RecordingError: text, a cell that is empty, or lists of different lengths.
+    """
+    pa, _ = _pyarrow(where)
+    column = file.read([name], use_threads=False).column(name)
+    if column.null_count:
+        row = int(np.flatnonzero(np.asarray(column.is_null()))[0])
+        raise RecordingError(f"{where}, row {row}: {name} is empty: expected a number")
+    if _is_list(pa, column.type):
+        lengths = {len(cell) for cell in column.to_pylist()} if len(column) else {0}
+        values = column.combine_chunks().flatten()
+        if len(lengths) > 1 or values.null_count:
+            raise RecordingError(f"{where}: column {name} holds lists of {sorted(lengths)[:4]} numbers, or with gaps")
+        return values.to_numpy(zero_copy_only=False).reshape(len(column), lengths.pop())
+    if pa.types.is_string(column.type) or pa.types.is_large_string(column.type):
+        return np.array(column.to_pylist(), dtype=object)
+    if not (pa.types.is_floating(column.type) or pa.types.is_integer(column.type)):
+        raise RecordingError(f"{where}: column {name} holds {column.type}: expected numbers")
+    return column.to_numpy()
 
 
 def write_parquet(path: Path, recording: Recording) -> None:
     """Write a Parquet log with a checksum on every page."""
-    import pyarrow as pa
-    from pyarrow import parquet
-
+    pa, parquet = _pyarrow(path)
     matrix = np.hstack([recording.t[:, None], recording.q, recording.dq, recording.tau])
     about = {"channel": recording.channel, "joint_names": recording.joint_names}
     schema = pa.schema(
@@ -59,12 +105,12 @@ def write_parquet(path: Path, recording: Recording) -> None:
     parquet.write_table(table, path, compression="zstd", write_page_checksum=True)
 
 
-def _about(raw: bytes | None, n: int) -> tuple[str, tuple[str, ...] | None]:
+def _about(raw: bytes | None) -> tuple[str, tuple[str, ...] | None]:
     """Channel and joint names from the metadata, where they are there and make sense."""
     try:
         about = json.loads(raw or b"{}")
         channel, joints = about.get("channel"), about.get("joint_names")
     except (ValueError, AttributeError):
         return "measured", None
-    named = isinstance(joints, list) and len(joints) == n and all(isinstance(name, str) for name in joints)
+    named = isinstance(joints, list) and all(isinstance(name, str) for name in joints)
     return channel if channel in CHANNELS else "measured", tuple(joints) if named else None

@@ -17,8 +17,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
+
+from armload.kernels import kernel
 
 # [rad] of the pose, mixed, as nobody knows the one of an arm. Stated priors
 # (test_pose_features_have_the_kernel_of_a_gaussian_process)
@@ -62,11 +63,12 @@ class JointFeatures:
     @cached_property
     def velocity_waves(self) -> NDArray[np.float64]:
         """Waves (velocity/2,) over the stretched velocity."""
-        # quantiles of the half-normal, so that few waves already span the functions evenly
-        from scipy.stats import halfnorm
+        from scipy.special import ndtri
 
+        # quantiles of the half-normal, so that few waves already span the functions evenly
         count = self.velocity // 2
-        return halfnorm.ppf((np.arange(count) + 0.5) / max(count, 1)) / _VELOCITY_SCALE
+        shares = (np.arange(count) + 0.5) / max(count, 1)
+        return ndtri((1.0 + shares) / 2.0) / _VELOCITY_SCALE
 
     def of_pose(self, q: ArrayLike) -> NDArray[np.float64]:
         """f (N, pose) at poses (N, n), the same for all joints; the mean square of a weighted sum is the weights'."""
@@ -83,7 +85,7 @@ class JointFeatures:
         return features_of_sample(q, dq, self.waves, self.velocity_waves)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def features_of_sample(q, dq, waves, velocity_waves):  # pragma: no cover - compiled
     half, few, n = waves.shape[0], velocity_waves.shape[0], q.shape[0]
     pose, velocity = np.empty(2 * half), np.empty((n, 2 * few))

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
+
+from armload.kernels import kernel
 
 # λ [1/s], a lag of 50 ms: slow against the joints' vibration (15 Hz and more) and the sensors' skew, fast against the
 # motion and a change of payload. What the lag takes from r it takes from W, exactly: the choice costs noise, no bias
 GAIN = 20.0
 
 
-@njit(cache=True)
+@kernel
 def _lag(u: NDArray, h: NDArray, gain: float, state: NDArray, last: NDArray) -> NDArray:
     out = np.empty_like(u)
     for k in range(u.shape[0]):

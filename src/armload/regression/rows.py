@@ -22,15 +22,15 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from armload.arms import Arm
+from armload.arms import FRICTION_WIDTH, Arm
 from armload.arms.momentum_row import MomentumRow, momentum_rows
+from armload.kernels import kernel
 from armload.recording import GAP, JITTERED
 from armload.regression.features import JointFeatures, features_of_sample
 from armload.regression.lag import GAIN
-from armload.regression.mismatch import FRICTION_WIDTH, Correction
+from armload.regression.mismatch import Correction
 
 REGRESSOR_RATE = 200.0  # [Hz] rows are made no more often where a rate is set: they hold nothing above a few hertz
 SPACING = JITTERED / REGRESSOR_RATE  # [s] between rows at least
@@ -153,18 +153,18 @@ _FRESH = (
 )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _lag_torque(t, tau, settings, clock, joints):  # pragma: no cover - compiled
     """Take one sample's torque (n,) into its lag; whether a row is due, and in clock[3] what it stands for [s]."""
     gain, apart = settings[0], settings[1]
     fresh = t - clock[0] > GAP
-    if fresh:
-        joints[0] = 0.0
-    else:
-        x = gain * (t - clock[0])
-        for j in range(tau.shape[0]):
+    x = gain * (t - clock[0])
+    for j in range(tau.shape[0]):
+        if fresh:
+            joints[0, j] = 0.0
+        else:
             joints[0, j] += x / (2.0 + x) * (tau[j] + joints[1, j] - 2.0 * joints[0, j])
-    joints[1] = tau
+        joints[1, j] = tau[j]
     clock[0] = t
     if not fresh and t - clock[1] < apart:
         return 0
@@ -173,20 +173,22 @@ def _lag_torque(t, tau, settings, clock, joints):  # pragma: no cover - compiled
     return _FRESH if fresh else 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _lag_torques(t, tau, settings, clock, joints):  # pragma: no cover - compiled
     """The same of N samples: index, step, whether the lags start, and lagged torque of those that complete a row."""
-    index, steps, fresh, torque = np.empty(len(t), np.int64), np.empty(len(t)), np.empty(len(t), np.bool_), tau.copy()
-    count = 0
-    for k in range(len(t)):
+    N, count = len(t), 0
+    index, steps, fresh, torque = np.empty(N, np.int64), np.empty(N), np.empty(N, np.bool_), np.empty(tau.shape)
+    for k in range(N):
         done = _lag_torque(t[k], tau[k], settings, clock, joints)
         if done:
-            index[count], steps[count], fresh[count], torque[count] = k, clock[3], done == _FRESH, joints[0]
+            index[count], steps[count], fresh[count] = k, clock[3], done == _FRESH
+            for j in range(tau.shape[1]):
+                torque[count, j] = joints[0, j]
             count += 1
     return index[:count], steps[:count], fresh[:count], torque[:count]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _make(
     t,
     q,
@@ -226,12 +228,13 @@ def _make(
             moved |= abs(q[m, j] - joints[4, j]) > _STILL
         if moved:
             clock[2] = t[m]
-            joints[4] = q[m]
+            for j in range(n):
+                joints[4, j] = q[m, j]
         h[m] = 0.0 if t[m] - clock[2] > settling else steps[m]
     return h, X, r, weights
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _lagged(inputs, gain, h, fresh, joints, regressor, pose_lag, velocity_lag, X, r):  # pragma: no cover - compiled
     """One row from what goes into its lags, h seconds after the last; `fresh`: the lags start here."""
     momentum, drift, links, dq, torque, pose, velocity = inputs

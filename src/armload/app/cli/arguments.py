@@ -16,10 +16,12 @@ if TYPE_CHECKING:
     from armload.lab.dataset import Dataset
     from armload.motion import Motion
     from armload.payloads import Payload
+    from armload.recording import ColumnSpec, Recording
     from armload.simulation import World
 
 # options whose value may begin with a minus sign: argparse would take "-1,0,-9.7" for an option
 _SIGNED = ("--gravity",)
+COLUMNS = 'names and units of columns, such as "t=time,q=joint_pos_{i},t_unit=ms", or a TOML file'
 
 
 class Parser(argparse.ArgumentParser):
@@ -133,9 +135,7 @@ def duration(text: str) -> float:
     """
     found = re.fullmatch(r"\s*([0-9]*\.?[0-9]+(?:e[+-]?\d+)?)\s*(s|min|h|d|w)\s*", text)
     if found is None:
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is not a time: expected a number with s, min, h, d or w, such as 1d"
-        )
+        raise argparse.ArgumentTypeError(f"{text!r} is not a time: expected a number and s, min, h, d or w, such as 1d")
     return float(found[1]) * _TIMES[found[2]]
 
 
@@ -194,6 +194,56 @@ def add_tool_and_topic_arguments(parser: argparse.ArgumentParser) -> None:
         help="a mounted tool that is known (JSON, or franka-hand); the answer is what it carries",
     )
     parser.add_argument("--topic", metavar="T", help="JointState topic of a bag, where it has several")
+
+
+def add_column_arguments(parser: argparse.ArgumentParser) -> None:
+    """`--columns`, `--effort-key`, `--rate` and `--episode`: what the header of a log leaves open."""
+    add = parser.add_argument_group("logs that are tables (CSV, Parquet, NPZ, HDF5)").add_argument
+    add("--columns", type=file_name, metavar="SPEC", help=COLUMNS)
+    add("--effort-key", type=file_name, metavar="K", help="list-valued column of the joint torques (--columns tau=K)")
+    add("--rate", dest="log_rate", type=at_least(1e-3, float), metavar="HZ", help="of a log without times")
+    add("--episode", type=at_least(0), metavar="K", help="which one of a file that holds several")
+
+
+def columns_of(options: argparse.Namespace) -> ColumnSpec:
+    """What `--columns` and its companions say of the logs."""
+    from armload.recording import ColumnSpec
+
+    companions = {"tau": "effort_key", "rate": "log_rate", "episode": "episode"}
+    more = {key: getattr(options, name, None) for key, name in companions.items()}
+    return ColumnSpec.of(options.columns).over(**more)
+
+
+def read_logs(
+    options: argparse.Namespace, arm: Arm, *logs: str | None, topics: tuple[str | None, ...] = ()
+) -> list[Recording | None]:
+    """The logs at some paths; None stays None.
+
+    Topics are for bags, columns for tables. Where there is none of the kind, reading says that they were named in vain.
+
+    Args:
+        options: of the command.
+        arm: whose logs they are.
+        logs: paths.
+        topics: of each log (default: `--topic`).
+    """
+    from armload.recording import has_topics, read_recording
+
+    columns = columns_of(options)
+    bags = [log is not None and has_topics(log) for log in logs]
+    tables = [log is not None and not bag for log, bag in zip(logs, bags, strict=True)]
+    given = topics or (getattr(options, "topic", None),) * len(logs)
+    return [
+        None
+        if log is None
+        else read_recording(
+            log,
+            arm,
+            topic=topic if bag or not any(bags) else None,
+            columns=columns if not bag or not any(tables) else None,
+        )
+        for log, bag, topic in zip(logs, bags, given, strict=True)
+    ]
 
 
 def arm_of(options: argparse.Namespace) -> Arm:

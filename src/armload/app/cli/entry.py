@@ -17,6 +17,7 @@ from __future__ import annotations
 import _thread
 import difflib
 import importlib
+import logging
 import os
 import sys
 import time
@@ -27,6 +28,7 @@ from contextlib import contextmanager
 
 from armload.app.cli.arguments import Parser, attach_values
 from armload.errors import ArmloadError, UsageError
+from armload.extras import missing
 from armload.version import __version__
 
 COMMANDS = {
@@ -71,7 +73,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure") and (stream.encoding or "").lower().replace("-", "") != "utf8":
             stream.reconfigure(errors="replace")  # a terminal that cannot show "m²" still gets the answer
-    with warnings.catch_warnings(), _no_interruption_lost():
+    with warnings.catch_warnings(), _notes_on_stderr(), _no_interruption_lost():
         warnings.showwarning = _show_warning
         code = _guarded(arguments, show_traceback)
     try:
@@ -103,9 +105,15 @@ def _guarded(arguments: list[str], show_traceback: bool) -> int:
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
         return _fail(f"{where}{error.strerror or error}", 2, show_traceback)
+    except ModuleNotFoundError as error:
+        return _bug(error, show_traceback) if (said := missing(error)) is None else _fail(said, 2, show_traceback)
     except Exception as error:
-        hint = "" if show_traceback else "; this is a bug: set ARMLOAD_TRACEBACK=1 (or --traceback) to see where"
-        return _fail(f"{type(error).__name__}: {str(error) or 'no message'}{hint}", 1, show_traceback)
+        return _bug(error, show_traceback)
+
+
+def _bug(error: Exception, show_traceback: bool) -> int:
+    hint = "" if show_traceback else "; this is a bug: set ARMLOAD_TRACEBACK=1 (or --traceback) to see where"
+    return _fail(f"{type(error).__name__}: {str(error) or 'no message'}{hint}", 1, show_traceback)
 
 
 def _interrupted(error: BaseException | None) -> bool:
@@ -117,6 +125,27 @@ def _interrupted(error: BaseException | None) -> bool:
         seen.add(id(error))
         error = error.__cause__ or (None if error.__suppress_context__ else error.__context__)
     return False
+
+
+class _Notes(logging.Handler):
+    """What the library logs, each record as one line on stderr."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        print(f"armload: {record.getMessage()}", file=sys.stderr, flush=True)
+
+
+@contextmanager
+def _notes_on_stderr() -> Iterator[None]:
+    """Show what takes long, as `armload.kernels` says of compiling."""
+    logger, handler = logging.getLogger("armload"), _Notes()
+    level = logger.level
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
+        logger.setLevel(level)
 
 
 @contextmanager

@@ -78,14 +78,14 @@ def parser() -> Parser:
 def run(options: argparse.Namespace) -> None:
     """Read, combine, move, write."""
     from armload.arms import ARMS
-    from armload.arms import arm as arm_named
     from armload.devices import Load, read_load
 
-    arm = None if options.robot is None else arm_named(options.robot, options.frame)
+    arm = None if options.robot is None else _arm(options.robot, options.frame)
     built_in = options.result in ("franka-hand", "test")
     load = Load(payload_of(options.result, arm)) if built_in else read_load(options.result)
-    if arm is None and load.robot is not None and load.robot in ARMS:
-        arm = arm_named(load.robot)
+    facts = ARMS.get(load.robot or "")
+    if arm is None and facts is not None and _moves(options, load.frame, facts.flange):
+        arm = _arm(facts.name)
     doubts = _doubts(options.minus, load)
     for part in options.minus:
         load = load - _part(part, load, arm)
@@ -154,6 +154,17 @@ def _no_flange(load: Load) -> SinkError:
         f"the payload is about {load.frame!r} and a controller counts from its flange ({flanges}): "
         "name the arm and its flange with --robot FILE.urdf --frame FLANGE"
     )
+
+
+def _arm(robot: str, frame: str | None = None) -> Arm:
+    from armload.arms import arm  # with Pinocchio: only for who needs it
+
+    return arm(robot, frame)
+
+
+def _moves(options: argparse.Namespace, frame: str | None, flange: str) -> bool:
+    """Whether something may have to be told of another frame: what is about the flange and stays there needs no arm."""
+    return frame != flange or options.frame not in (None, flange) or bool(options.minus or options.plus)
 
 
 def _is_flange(frame: str) -> bool:

@@ -7,12 +7,14 @@ import argparse
 from armload.app.cli.arguments import (
     Parser,
     add_arm_arguments,
+    add_column_arguments,
     add_identifier_arguments,
     add_tare_and_mass_arguments,
     add_tool_and_topic_arguments,
     arm_of,
     file_name,
     payload_named,
+    read_logs,
 )
 from armload.app.cli.export import FORMS, write
 from armload.app.cli.printing import print_json, print_note, working, write_json
@@ -28,8 +30,11 @@ examples:
   armload identify run.csv --robot panda --out payload.json         (the answer as JSON, usable as --tool later)
   armload identify run.csv --robot panda --tool franka-hand --to franka    (what the controller reads)
 
-A log has the columns t, q1…qn, dq1…dqn, tau1…taun in seconds, radians, rad/s and N·m (CSV, Parquet, NPZ), or is a ROS 1
-or ROS 2 bag of sensor_msgs/JointState. tau is the measured joint torque, with gravity in it.
+  armload identify flight.csv --robot my_arm.urdf --columns "t=clock,q=enc_{i},dq=rate_{i},tau=load_{i},t_unit=ms"
+
+A log is a table (CSV, Parquet, NPZ, HDF5) with time, position, velocity and torque of each joint under the names that
+tools give them (docs/recordings.md), in seconds, radians, rad/s and N·m, or a ROS 1 or ROS 2 bag of
+sensor_msgs/JointState. Torque is the measured joint torque, with gravity in it.
 """
 
 
@@ -46,6 +51,7 @@ def parser() -> Parser:
     add_tare_and_mass_arguments(parser)
     add_tool_and_topic_arguments(parser)
     parser.add_argument("--tare-topic", metavar="T", help="that of the tare's bag, where it is another one")
+    add_column_arguments(parser)
     parser.add_argument("--all", action="store_true", help="print the ten parameters about the frame's origin, too")
     parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     parser.add_argument(
@@ -66,7 +72,6 @@ def run(options: argparse.Namespace) -> None:
     from armload.errors import UsageError
     from armload.identification import identify
     from armload.identification.text import summary
-    from armload.recording import Recording, has_topics, read_recording
 
     with working("reading") as say:
         arm = arm_of(options)
@@ -75,15 +80,11 @@ def run(options: argparse.Namespace) -> None:
             raise UsageError("--to prints a controller's form alone: leave out --json and --all")
         if options.tare_topic is not None and options.tare is None:
             raise UsageError("--tare-topic names a topic of the tare's bag, but there is no --tare")
-        bags = [path for path in (options.log, options.tare) if path is not None and has_topics(path)]
-
-        def read(path: str, topic: str | None) -> Recording:
-            return read_recording(path, arm, topic=topic if path in bags or not bags else None)
-
-        log = read(options.log, options.topic)
-        tare = None if options.tare is None else read(options.tare, options.tare_topic or options.topic)
         if options.tare_age is not None and options.tare is None:
             raise UsageError("--tare-age says how old a tare is, but there is no --tare")
+        topics = (options.topic, options.tare_topic or options.topic)
+        log, tare = read_logs(options, arm, options.log, options.tare, topics=topics)
+        assert log is not None
         result = identify(
             log,
             arm,

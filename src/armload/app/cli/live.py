@@ -9,12 +9,15 @@ from urllib.parse import urlsplit
 from armload.app.cli.arguments import (
     Parser,
     add_arm_arguments,
+    add_column_arguments,
     add_identifier_arguments,
     add_tool_and_topic_arguments,
     arm_of,
     at_least,
+    columns_of,
     file_name,
     payload_of,
+    read_logs,
 )
 from armload.app.cli.printing import print_note
 from armload.errors import ArmloadError, UsageError
@@ -61,6 +64,7 @@ def parser() -> Parser:
     add_arm_arguments(parser, required=False)
     add_identifier_arguments(parser)
     add_tool_and_topic_arguments(parser)
+    add_column_arguments(parser)
     add("--headless", action="store_true", help="no page: one JSON object per line on stdout")
     add(
         "--every",
@@ -95,13 +99,16 @@ def run(options: argparse.Namespace) -> int | None:
     from armload.app.cli.headless import lines
     from armload.app.page.session import Session
     from armload.devices import open_source
-    from armload.recording import check_own_measurements, read_recording
+    from armload.recording import ColumnSpec, check_own_measurements, has_topics
 
     options.robot = options.robot or _robot_of(options.source)
     arm = _arm_of(options)
-    tare = None if options.tare is None else read_recording(options.tare, arm, topic=options.topic)
-    if tare is not None and options.source != "sim" and "://" not in options.source:  # a log
-        check_own_measurements(read_recording(options.source, arm, topic=options.topic), tare)
+    of_log, columns = options.source != "sim" and "://" not in options.source, columns_of(options)
+    if columns != ColumnSpec() and not of_log and options.tare is None:
+        raise UsageError("--columns and its companions are for logs, but neither SOURCE nor --tare is one")
+    log, tare = read_logs(options, arm, options.source if of_log and options.tare is not None else None, options.tare)
+    if log is not None and tare is not None:
+        check_own_measurements(log, tare)
     # the page takes time from its own process: what runs on the clock is read in another one
     detached = True if not options.headless and options.speed is not None and options.speed <= 1.0 else None
     source = open_source(
@@ -112,6 +119,7 @@ def run(options: argparse.Namespace) -> int | None:
         speed=options.speed,
         loop=options.loop,
         topic=options.topic,
+        columns=columns if of_log and not (has_topics(options.source) and options.tare is not None) else None,
     )
     with source:
         session = Session(source, arm, tare, options.method, _warn)

@@ -5,7 +5,16 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from armload.app.cli.arguments import Parser, add_arm_arguments, arm_of, at_least, file_name, motion_of, payload_of
+from armload.app.cli.arguments import (
+    Parser,
+    add_arm_arguments,
+    add_column_arguments,
+    arm_of,
+    at_least,
+    file_name,
+    motion_of,
+    payload_of,
+)
 from armload.app.cli.printing import console, print_json, print_note, table, working
 from armload.errors import UsageError
 
@@ -25,7 +34,7 @@ examples:
   armload motion export taie2024 --format ros2 --robot panda --out excite.yaml
 
 MOTION is taie2024, a JSON file, or random:SEED. `check` says whether the arm may run a motion, exits with 3 if not, and
-says which parameters of a payload it can tell, and how well; it takes a log (CSV, Parquet, NPZ, ROS bag) as well.
+says which parameters of a payload it can tell, and how well; it takes a log (CSV, Parquet, NPZ, HDF5, ROS bag) as well.
 """
 
 
@@ -60,6 +69,7 @@ def parser() -> Parser:
         metavar="LOG|MOTION",
         help="an earlier run of the arm, with anything mounted (default: the same motion again)",
     )
+    add_column_arguments(check)
     check.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
 
     export = actions.add_parser(
@@ -122,8 +132,8 @@ def _check(options: argparse.Namespace) -> int:
     from armload.recording import Recording
 
     arm = arm_of(options)
-    run = motion_check.run_of(options.motion, arm)
-    tare = run if options.tare is None else motion_check.run_of(options.tare, arm)
+    run = motion_check.run_of(options, options.motion, arm)
+    tare = run if options.tare is None else motion_check.run_of(options, options.tare, arm)
     result, carried = None, ""
     with working("checking"):
         if isinstance(run, Recording):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,19 +15,18 @@ if TYPE_CHECKING:
     from armload.posterior import Advice, Bound
     from armload.recording import Recording
 
-_LOGS = (".csv", ".parquet", ".npz", ".bag", ".db3", ".mcap")
 
-
-def run_of(name: str, arm: Arm) -> Recording | Motion:
+def run_of(options: argparse.Namespace, name: str, arm: Arm) -> Recording | Motion:
     """A log by the suffix of its file (or the folder of a bag), else a motion."""
-    from armload.app.cli.arguments import motion_of
+    from armload.app.cli.arguments import motion_of, read_logs
     from armload.identification import check_plausible
-    from armload.recording import read_recording
+    from armload.recording import LOG_SUFFIXES
 
     path = Path(name)
-    if path.suffix.lower() not in _LOGS and not path.is_dir():
+    if path.suffix.lower() not in LOG_SUFFIXES and not path.is_dir():
         return motion_of(name, arm)
-    log = read_recording(path, arm)
+    (log,) = read_logs(options, arm, name)
+    assert log is not None
     check_plausible(log, arm)
     return log
 

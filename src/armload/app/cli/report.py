@@ -8,7 +8,17 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armload.app.cli.arguments import Parser, add_arm_arguments, arm_of, arm_of_dataset, at_least, file_name, payload_of
+from armload.app.cli.arguments import (
+    Parser,
+    add_arm_arguments,
+    add_column_arguments,
+    arm_of,
+    arm_of_dataset,
+    at_least,
+    file_name,
+    payload_of,
+    read_logs,
+)
 from armload.app.cli.printing import print_note, print_table, working
 from armload.errors import UsageError
 
@@ -50,6 +60,7 @@ def parser() -> Parser:
     add("--seed", type=at_least(0), default=0, metavar="N", help="of the data set's split (default: 0)")
     add("--model", nargs="+", default=[], metavar="FILE", help="trained models to show too")
     add("--topic", metavar="T", help="JointState topic of a bag, where it has several")
+    add_column_arguments(parser)
     add("--out", required=True, type=file_name, metavar="FILE.html", help="file to write")
     return parser
 
@@ -76,12 +87,11 @@ def _of_log(options: argparse.Namespace, say: Callable[[str], None]) -> tuple[li
     from armload.identification import identify
     from armload.lab.evaluation import EvaluationRun, compare
     from armload.lab.report import answer_section, default_report, log_report
-    from armload.recording import read_recording
 
     arm = arm_of(options)
     truth = None if options.truth is None else arm.in_frame(payload_of(options.truth, arm))
-    log = read_recording(options.log, arm, topic=options.topic)
-    tare = None if options.tare is None else read_recording(options.tare, arm, topic=options.topic)
+    log, tare = read_logs(options, arm, options.log, options.tare)
+    assert log is not None
     say("identifying")
     found = identify(log, arm, tare=tare)
     for note in found.notes:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from armload.app.cli.arguments import (
+    COLUMNS,
     Parser,
     add_arm_arguments,
     add_identifier_arguments,
@@ -13,6 +14,7 @@ from armload.app.cli.arguments import (
     file_name,
     motion_of,
     payload_of,
+    read_logs,
     world_of,
 )
 from armload.app.cli.printing import print_note
@@ -52,6 +54,7 @@ def parser() -> Parser:
         "--publish", type=file_name, default="/payload/inertia", metavar="T", help="of the payload (/payload/inertia)"
     )
     add_identifier_arguments(node)
+    node.add_argument("--columns", type=file_name, metavar="SPEC", help=f"of the tare: {COLUMNS}")
     node.add_argument(
         "--rate", type=at_least(0.01, float, 1000.0), default=10.0, metavar="HZ", help="messages per second (10)"
     )
@@ -110,10 +113,9 @@ def _node(options: argparse.Namespace) -> None:
     from armload.devices.ros2 import PayloadNode
     from armload.inertia import InertialParameters
     from armload.online import OnlineIdentifier
-    from armload.recording import read_recording
 
     arm = arm_of(options)
-    tare = None if options.tare is None else read_recording(options.tare, arm)
+    (tare,) = read_logs(options, arm, options.tare, topics=(None,))
     identifier = OnlineIdentifier(arm, tare, options.method)
     begun = False
 

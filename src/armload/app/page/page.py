@@ -20,6 +20,7 @@ from armload.app.page.scene import Scene
 from armload.app.page.session import Session
 from armload.arms import Arm
 from armload.errors import ArmloadError, ModelError, UsageError
+from armload.extras import install
 from armload.identification import METHODS, default_for
 
 _NUMBERS, _CURVES = 3, 8  # pictures from which on numbers and curves follow
@@ -191,7 +192,7 @@ def _serve(host: str, port: int, label: str) -> Any:
         viser: Any = importlib.import_module("viser")
     except ImportError:
         raise UsageError(
-            "the page needs viser, which is not installed: pip install 'armload[live]', or use --headless"
+            f"the page needs viser, which is not installed: {install('viser')}; or use --headless"
         ) from None
     try:
         socket.create_server((host, 0)).close()  # viser would try one port after another, for ever

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from armload.devices.pace import Pace
 from armload.devices.source import Source
 from armload.errors import SourceError
 from armload.inertia import InertialParameters
-from armload.recording import Recording, Sample, read_recording
+from armload.recording import ColumnSpec, Recording, Sample, read_recording
 
 
 class Replay(Source):
@@ -30,6 +31,7 @@ class Replay(Source):
             The arm jumps there unless it ended where it began.
         payload: what the arm held, where known; returned by `truth`.
         topic: the topic of a bag.
+        columns: of a table, where its header leaves them open (`ColumnSpec`).
 
     Raises:
         RecordingError: the file cannot be read.
@@ -45,9 +47,10 @@ class Replay(Source):
         loop: bool = False,
         payload: InertialParameters | None = None,
         topic: str | None = None,
+        columns: ColumnSpec | Mapping[str, Any] | None = None,
     ) -> None:
         if not isinstance(recording, Recording):
-            recording = read_recording(recording, arm, topic=topic)
+            recording = read_recording(recording, arm, topic=topic, columns=columns)
         if recording.channel != "measured":
             raise SourceError(
                 f"{recording.source} holds {recording.channel} torque: expected measured torque, gravity included"

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from armload.arms import Arm
 from armload.devices.source import Source
 from armload.errors import SourceError, one_line
+from armload.extras import install
 from armload.recording import Sample
 
 
@@ -27,13 +28,12 @@ class _System(NamedTuple):
     called: str
     module: str
     package: str
-    extra: str
     other: str
 
 
 SYSTEMS = {
-    "fr3": _System("FR3", "pylibfranka", "pylibfranka", "franka", "a Panda is panda://ADDRESS"),
-    "panda": _System("Panda", "panda_py.libfranka", "panda-python", "panda", "an FR3 is fr3://ADDRESS"),
+    "fr3": _System("FR3", "pylibfranka", "pylibfranka", "a Panda is panda://ADDRESS"),
+    "panda": _System("Panda", "panda_py.libfranka", "panda-python", "an FR3 is fr3://ADDRESS"),
 }
 
 
@@ -139,7 +139,7 @@ def load_client(system: str) -> Any:
     except ImportError as error:
         raise SourceError(
             f"a {facts.called} is read through {facts.package}, which cannot be imported ({error}): "
-            f"pip install 'armload[{facts.extra}]'"
+            f"{install(facts.module)}"
         ) from None
 
 

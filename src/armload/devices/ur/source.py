@@ -23,6 +23,7 @@ import numpy as np
 from armload.arms import ARMS, Arm
 from armload.devices.source import Source
 from armload.errors import SourceError, one_line
+from armload.extras import install
 from armload.recording import Sample
 
 _FIELDS = ["timestamp", "actual_q", "actual_qd", "actual_current"]
@@ -107,7 +108,7 @@ def load_client() -> Any:
         from rtde_receive import RTDEReceiveInterface  # type: ignore[import-not-found]
     except ImportError as error:
         raise SourceError(
-            f"a UR arm is read through ur-rtde, which cannot be imported ({error}): pip install 'armload[ur]'"
+            f"a UR arm is read through ur-rtde, which cannot be imported ({error}): {install('rtde_receive')}"
         ) from None
     return RTDEReceiveInterface
 

@@ -15,7 +15,7 @@ from armload.lab.report import Section
 from armload.lab.report.shown import GROUPS, Table
 
 if TYPE_CHECKING:
-    from armload.lab.report.style import Figure
+    from matplotlib.figure import Figure
 
 TITLE = "Benchmark"
 APPENDIX = "Benchmark: all tables"

@@ -19,7 +19,7 @@ from armload.lab.report.shown import GROUPS, SHOWN_SCALE, SHOWN_UNITS
 from armload.lab.report.style import look, new_figure, styles_of
 
 if TYPE_CHECKING:
-    from armload.lab.report.style import Figure
+    from matplotlib.figure import Figure
 
 Summary = Mapping[str, Any]  # `results.summary_json`
 _RIVALS = ("map-gp", "rls-filter")

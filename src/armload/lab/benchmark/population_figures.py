@@ -13,7 +13,7 @@ from armload.lab.report.shown import SHOWN_SCALE
 from armload.lab.report.style import look, styles_of
 
 if TYPE_CHECKING:
-    from armload.lab.report.style import Figure
+    from matplotlib.figure import Figure
 
 
 def figures(results: Results) -> dict[str, tuple[tuple[Figure, str], ...]]:

@@ -15,7 +15,7 @@ from armload.lab.study.numbers import Cells
 from armload.lab.study.study_tables import BASELINES, LEARNERS, LEAST_SQUARES, TRAINING_MEAN, Row, ensemble_shown
 
 if TYPE_CHECKING:
-    from armload.lab.report.style import Figure
+    from matplotlib.figure import Figure
 
 _METHODS = (
     LEARNERS["network"],

@@ -26,7 +26,7 @@ from armload.lab.study.statements import RULES
 from armload.lab.study.study_tables import COMMAND, PROTOCOLS, claims_table, epochs_table, main_tables, parameter_table
 
 if TYPE_CHECKING:
-    from armload.lab.report.style import Figure
+    from matplotlib.figure import Figure
 
 TITLE = "The study of Taie et al. 2024, measured again"
 _CAPTIONS = {

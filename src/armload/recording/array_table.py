@@ -1,0 +1,75 @@
+"""Named arrays as a table: what Parquet, NPZ and HDF5 hold."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.errors import RecordingError
+
+WIDEST = 64  # elements a row; a longer one is no list of joints but an image, or lies across
+
+
+class Column(NamedTuple):
+    """One array that is read when it is needed: numbers (N,) or, where width says so, (N, width)."""
+
+    width: int | None
+    load: Callable[[], NDArray]
+
+
+class ArrayTable:
+    """Arrays by name (`table.Table`); elements of a list-valued one are columns `name[0]`, `name[1]`, …
+
+    Args:
+        columns: the arrays that could be columns.
+        where: the file.
+    """
+
+    def __init__(self, columns: Mapping[str, Column], where: str) -> None:
+        self.where = where
+        self.notes: Sequence[str] = ()
+        self._columns = columns
+        self._elements: list[tuple[str, int | None]] = []
+        for name, column in columns.items():
+            self._elements += [(name, k) for k in (range(column.width) if column.width is not None else (None,))]
+        self.names: Sequence[str] = [name if k is None else f"{name}[{k}]" for name, k in self._elements]
+        self._load = cache(lambda name: columns[name].load())
+
+    def numbers(self, places: Sequence[int]) -> NDArray[np.float64]:
+        """The columns at these places (N, k)."""
+        found = [self._column(place) for place in places]
+        lengths = {len(column): self.names[place] for place, column in zip(places, found, strict=True)}
+        if len(lengths) > 1:
+            (one, name), (other, second) = list(lengths.items())[:2]
+            raise RecordingError(
+                f"{self.where}: {name} has {one} rows and {second} {other}: expected the same number in all columns"
+            )
+        return np.column_stack(found).astype(float)
+
+    def whole_numbers(self, place: int) -> NDArray[np.int64] | None:
+        """A column of integers (N,), exactly; None: it holds other numbers."""
+        column = self._column(place)
+        return column.astype(np.int64) if column.dtype.kind in "iu" else None
+
+    def text(self, place: int) -> str | None:
+        """The one text that a column holds in all rows."""
+        name, element = self._elements[place]
+        values = self._load(name)
+        texts = {str(text) for text in (values if element is None else values[:, element])}
+        return texts.pop() if values.dtype.kind in "UO" and len(texts) == 1 else None
+
+    def row_name(self, row: int) -> str:
+        """The row, the first being 0."""
+        return f"row {row}"
+
+    def _column(self, place: int) -> NDArray:
+        name, element = self._elements[place]
+        array = self._load(name)
+        if array.dtype.kind not in "iuf":
+            held = "text" if array.dtype.kind in "USO" else array.dtype
+            raise RecordingError(f"{self.where}: column {name} holds {held}: expected numbers")
+        return array if element is None else array[:, element]

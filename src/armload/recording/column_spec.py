@@ -1,0 +1,134 @@
+"""What the user says about a log's columns: names, units, and what the file does not hold."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from armload.errors import RecordingError, one_line
+from armload.recording.aliases import QUANTITIES, UNITS
+
+_COLUMNS = ("t", *QUANTITIES)
+_HINT = 'expected KEY=VALUE pairs such as "t=time,q=joint_pos_{i},dq=joint_vel_{i},tau=effort_{i}", or a .toml file'
+
+
+@dataclass(frozen=True)
+class ColumnSpec:
+    """Names of columns, their units, and what else a table leaves open; None: found out from the header.
+
+    A name may hold `{i}` (0 … n−1 or 1 … n, whichever is there), `{joint}` (the arm's joint names) or a range such as
+    `{0..6}`; without any it is the name of a list-valued column. Several names are one per joint.
+
+    >>> ColumnSpec.of("q=pos_{i},t=stamp,t_unit=ms").t_unit
+    'ms'
+
+    Args:
+        t: the column of time. q, dq, tau: those of position, velocity and torque.
+        t_unit: s, ms, us or ns. q_unit: rad or deg. dq_unit: rad/s or deg/s. tau_unit: Nm, or A for motor currents.
+        torque_constants: joint torque per motor current (n,) [N·m/A], where tau is in A.
+        rate: samples per second [Hz] of a file without times.
+        episode: which one of a file that holds several.
+    """
+
+    t: str | None = None
+    q: str | tuple[str, ...] | None = None
+    dq: str | tuple[str, ...] | None = None
+    tau: str | tuple[str, ...] | None = None
+    t_unit: str | None = None
+    q_unit: str | None = None
+    dq_unit: str | None = None
+    tau_unit: str | None = None
+    torque_constants: tuple[float, ...] | None = None
+    rate: float | None = None
+    episode: int | None = None
+
+    def __post_init__(self) -> None:
+        for key in _COLUMNS:
+            unit = getattr(self, f"{key}_unit")
+            if unit is not None and unit.strip().lower() not in UNITS[key]:
+                raise RecordingError(f"columns: {key}_unit is {unit!r}: expected one of {', '.join(UNITS[key])}")
+        if self.rate is not None and not 0.0 < self.rate < float("inf"):
+            raise RecordingError(f"columns: rate is {self.rate:g}: expected a positive number of samples per second")
+
+    @classmethod
+    def of(cls, given: ColumnSpec | Mapping[str, Any] | str | Path | None) -> ColumnSpec:
+        """From a mapping, from text `t=…,q=…`, or from a TOML file (its table `columns`, or the file itself).
+
+        Raises:
+            RecordingError: an unknown key, a value of the wrong kind, or a file that cannot be read.
+        """
+        if given is None:
+            return cls()
+        if isinstance(given, ColumnSpec):
+            return given
+        if isinstance(given, Mapping):
+            return cls(**{key: _value(key, value, "columns") for key, value in given.items()})
+        if isinstance(given, Path) or (given.endswith(".toml") and "=" not in given):
+            table = _toml(Path(given))
+            return cls(**{key: _value(key, value, str(given)) for key, value in table.items()})
+        return cls(**_pairs(given))
+
+    def given(self) -> dict[str, Any]:
+        """What is not left open, as JSON can hold it; `of` reads it back."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {key: value for key, value in values.items() if value is not None}
+
+    def over(self, **more: Any) -> ColumnSpec:
+        """These columns, with what is given besides.
+
+        Raises:
+            RecordingError: something is given twice, and not the same.
+        """
+        more = {key: value for key, value in more.items() if value is not None}
+        for key, value in more.items():
+            if getattr(self, key) not in (None, value):
+                raise RecordingError(f"columns: {key} is given twice, as {getattr(self, key)!r} and as {value!r}")
+        return replace(self, **more)
+
+
+def _pairs(text: str) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for pair in text.split(","):
+        key, equals, value = pair.partition("=")
+        key, value = key.strip(), value.strip()
+        if not equals or not value:
+            raise RecordingError(f"columns {text!r}: {pair.strip()!r} is not KEY=VALUE: {_HINT}")
+        if key in found:
+            raise RecordingError(f"columns {text!r}: {key} is given twice")
+        found[key] = _value(key, value, "columns")
+    return found
+
+
+def _toml(path: Path) -> dict[str, Any]:
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise RecordingError(f"columns {path} cannot be read: {error.strerror or error}") from None
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise RecordingError(f"columns {path} is not TOML: {one_line(error)[:160]}") from None
+    inner = table.get("columns")
+    return inner if isinstance(inner, dict) else table
+
+
+def _value(key: str, value: Any, where: str) -> Any:
+    """A value of the right kind; numbers may come as text."""
+    known = [field.name for field in fields(ColumnSpec)]
+    if key not in known:
+        raise RecordingError(f"{where}: unknown key {key!r}: expected {', '.join(known)}")
+    try:
+        if key == "torque_constants":
+            return tuple(float(x) for x in (value.split() if isinstance(value, str) else value))
+        if key == "rate":
+            return float(value)
+        if key == "episode":
+            return int(value)
+    except (TypeError, ValueError):
+        raise RecordingError(f"{where}: {key} is {value!r}: expected numbers") from None
+    if key in QUANTITIES and isinstance(value, (list, tuple)) and value and all(isinstance(x, str) for x in value):
+        return tuple(value)
+    if not isinstance(value, str) or not value.strip():
+        raise RecordingError(f"{where}: {key} is {value!r}: expected the name of a column, or a unit")
+    return value

@@ -1,0 +1,180 @@
+"""A wheel without extras identifies, follows a stream and exports; what is missing is one sentence.
+
+The environment of these tests holds the wheel as pip installs it. What it depends on is that of the running tests,
+less every module of a distribution that the wheel does not require: importing one of those fails as if it were not
+installed. So this shows that armload gets along without them. That pip finds what is required shows
+`benchmarks/install.py`, which needs the network.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import sysconfig
+import tomllib
+import zipfile
+from importlib.metadata import Distribution, PackageNotFoundError, distribution, packages_distributions
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+from armload import extras
+from armload.payloads import test_payload as payload_of_the_tests
+from armload.recording import write_recording
+
+ROOT = Path(__file__).resolve().parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+HOOK = '''\
+"""Refuses to import what is not required."""
+import site, sys
+
+class Refuse:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {refused!r}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+
+site.addsitedir({packages!r})
+sys.meta_path.insert(0, Refuse())
+'''
+
+
+def required(names):
+    """Canonical names of all that these distributions require, themselves included."""
+    found, left = set(), list(names)
+    while left:
+        name = canonicalize_name(left.pop())
+        if name in found:
+            continue
+        found.add(name)
+        try:
+            lines = distribution(name).requires or []
+        except PackageNotFoundError:
+            continue
+        wanted = [Requirement(line) for line in lines]
+        left += [r.name for r in wanted if r.marker is None or r.marker.evaluate({"extra": ""})]
+    return found
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("wheel")
+    build = [sys.executable, "-m", "hatchling", "build", "--target", "wheel", "--directory", str(folder)]
+    subprocess.run(build, cwd=ROOT, check=True, capture_output=True)
+    (built,) = folder.glob("*.whl")
+    return built
+
+
+@pytest.fixture(scope="module")
+def light(wheel, tmp_path_factory):
+    """Runs Python in an environment with the wheel and what it requires, and nothing else."""
+    folder = tmp_path_factory.mktemp("light")
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(folder / "venv")], check=True)
+    python = folder / "venv" / "bin" / "python"
+    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet", "--python", str(python)]
+    subprocess.run([*pip, "install", "--no-deps", "--no-index", str(wheel)], check=True, cwd=folder)
+    (place,) = (folder / "venv" / "lib").glob("python*/site-packages")
+    (info,) = place.glob("armload-*.dist-info")
+    core = [Requirement(line) for line in Distribution.at(info).requires or []]
+    allowed = required(r.name for r in core if r.marker is None or r.marker.evaluate({"extra": ""}))
+    refused = {
+        module
+        for module, owners in packages_distributions().items()
+        if module != "armload" and not {canonicalize_name(owner) for owner in owners} & allowed
+    }
+    assert {"mujoco", "sklearn", "jax", "matplotlib", "jinja2", "joblib", "trimesh", "viser", "rosbags"} <= refused
+    (place / "only_required.py").write_text(HOOK.format(refused=refused, packages=sysconfig.get_path("purelib")))
+    (place / "only_required.pth").write_text("import only_required\n")
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "NUMBA"))}
+
+    def run(*arguments):
+        command = [str(python), *map(str, arguments)]
+        return subprocess.run(command, cwd=folder, env=kept, capture_output=True, text=True, timeout=300)
+
+    return run
+
+
+def test_a_wheel_without_extras_identifies_exports_and_follows_a_replay(light, panda, analytic_log, tmp_path):
+    body = payload_of_the_tests()
+    log, held = tmp_path / "log.csv", tmp_path / "held.json"
+    write_recording(log, analytic_log(panda, body.parameters, duration=2.0))
+    assert "venv" in light("-c", "import armload; print(armload.__file__)").stdout
+    assert "'mujoco'" in light("-c", "import mujoco").stderr
+
+    done = light("-m", "armload", "identify", log, "--robot", "panda", "--json")
+    assert done.returncode == 0, done.stderr
+    held.write_text(done.stdout)
+    assert json.loads(done.stdout)["mass"] == pytest.approx(body.parameters.mass, abs=0.1)
+
+    assert "1.4" in light("-m", "armload", "export", held, "--to", "franka").stdout
+
+    done = light("-m", "armload", "live", log, "--robot", "panda", "--headless", "--speed", "max")
+    assert done.returncode == 0, done.stderr
+    last = json.loads(done.stdout.splitlines()[-1])
+    assert last["t"] == pytest.approx(2.0, abs=0.1)
+    assert last["mass"] == pytest.approx(body.parameters.mass, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "package"),
+    [
+        (["demo", "--quick", "--out", "demo"], "mujoco"),
+        (["live", "--headless", "--duration", "0.1"], "mujoco"),
+        (["live", "panda://127.0.0.1", "--headless"], "panda-python"),
+        (["live", "{log}", "--robot", "panda"], "viser"),
+    ],
+)
+def test_what_needs_an_extra_says_in_one_sentence_how_to_install_it(
+    arguments, package, light, panda, analytic_log, tmp_path
+):
+    log = tmp_path / "log.csv"
+    write_recording(log, analytic_log(panda, duration=0.5))
+    done = light("-m", "armload", *(argument.format(log=log) for argument in arguments))
+    assert (done.returncode, done.stdout) == (2, ""), done.stderr
+    line = done.stderr.splitlines()[-1]  # what was done until then may stand above
+    assert "Traceback" not in done.stderr
+    (wanted,) = [r for e in PROJECT["optional-dependencies"].values() for r in e if r.startswith(f"{package}>")][:1]
+    assert f"'{wanted.partition(';')[0].strip()}'" in line.partition("pip install ")[2]
+
+
+def test_each_extra_and_each_package_of_it_is_known_and_named_as_in_pyproject():
+    of = {e: {Requirement(r).name for r in rs} for e, rs in PROJECT["optional-dependencies"].items()}
+    assert of.pop("all") == {"armload"}
+    of.pop("dev")
+    stated = {(package, extra) for package, extra in extras.MODULES.values()}
+    assert {(p, e) for e, packages in of.items() for p in packages} - stated == {("trimesh", "live")}
+    assert all(package in of[extra] for package, extra in stated)
+
+
+def test_the_wheel_holds_the_mark_of_typed_packages_and_the_shipped_models(wheel):
+    names = zipfile.ZipFile(wheel).namelist()
+    assert "armload/py.typed" in names
+    assert any(name.startswith("armload/posterior/models/") for name in names)
+    assert not [name for name in names if not name.startswith("armload")]
+
+
+@pytest.mark.parametrize(
+    ("command", "absent"),
+    [
+        (["identify", "{log}", "--robot", "panda", "--tare", "{tare}"], set()),
+        (["live", "{log}", "--robot", "panda", "--headless", "--speed", "max"], set()),
+        (["export", "{held}", "--to", "franka"], {"numba", "pinocchio", "scipy", "pyarrow"}),
+    ],
+    ids=["identify", "live", "export"],
+)
+def test_light_commands_import_nothing_of_the_extras(command, absent, panda, analytic_log, tmp_path):
+    names = {name: tmp_path / f"{name}.csv" for name in ("log", "tare")} | {"held": tmp_path / "held.json"}
+    body = payload_of_the_tests().parameters
+    write_recording(names["log"], analytic_log(panda, body, duration=0.5))
+    write_recording(names["tare"], analytic_log(panda, duration=0.5, phase=1.0))
+    names["held"].write_text(json.dumps({"phi": body.phi.tolist(), "frame": panda.frame, "robot": "panda"}))
+    argv = [part.format(**names) for part in command]
+    code = (
+        f"import sys, json; from armload.app import main; code = main({argv!r}); "
+        "print('\\n' + json.dumps([code, [m for m in sys.modules if '.' not in m]]))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    status, loaded = json.loads(done.stdout.splitlines()[-1])
+    assert status == 0, done.stderr
+    assert not set(loaded) & (set(extras.MODULES) | absent)
