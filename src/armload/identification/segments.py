@@ -11,6 +11,7 @@ The cut with the largest T is sought more finely, and both parts are cut again.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -32,9 +33,13 @@ _FINER = 4  # cuts on either side of the best one, twice
 
 def changes_of_payload(recording: Recording, arm: Arm) -> list[float]:
     """Times [s, on the log's clock] at which the payload changes; none: it is the same throughout."""
-    physics = SmoothPosteriorLeastSquares(arm)
-    search = _Search(physics, physics.stream.rows_of(recording.t, recording.q, recording.dq, recording.tau))
-    return search.within(0, len(search.rows.t))
+    found = _Search.of(recording, arm).all()
+    if found and not arm.motor_torque:  # friction of gears that nobody knew of looks like a change
+        physics = SmoothPosteriorLeastSquares(arm)
+        physics.run(recording)
+        if physics.posterior.torque == "motor":
+            found = _Search.of(recording, replace(arm, motor_torque=True)).all()
+    return found
 
 
 class _Search:
@@ -43,6 +48,15 @@ class _Search:
     def __init__(self, physics: SmoothPosteriorLeastSquares, rows: Rows) -> None:
         self.physics, self.rows = physics, rows
         self.weak = solution_prior_std(physics.arm)
+
+    @classmethod
+    def of(cls, recording: Recording, arm: Arm) -> _Search:
+        physics = SmoothPosteriorLeastSquares(arm)
+        return cls(physics, physics.stream.rows_of(recording.t, recording.q, recording.dq, recording.tau))
+
+    def all(self) -> list[float]:
+        """Changes of the whole log."""
+        return self.within(0, len(self.rows.t))
 
     def within(self, start: int, stop: int) -> list[float]:
         """Changes between two rows."""
