@@ -56,7 +56,9 @@ GROUPS = {  # home → constants, None: all; what they are tried on
     "posterior.problem": (r"(?m)(^#.*\n)*^(_MOTOR_SIDE|_GAIN_STD) = .*\n", ("streams", "logs")),
     "posterior.hybrid": (r"(?m)(^#.*\n)*^_REMOVED = .*\n", ("streams", "logs")),
 }
-NOT_VARIED = ("LONGEST", "STEP_STD")  # the largest of WINDOWS; decides on a word about a change that was noticed
+# the largest of WINDOWS; a word about a change that was noticed; words of advice and of a refusal; a bound on what does
+# not exist where it holds
+NOT_VARIED = ("LONGEST", "STEP_STD", "NOMINAL", "KNOWN", "CURRENT_LOW", "CURRENT_HIGH", "FARTHEST")
 
 
 # ---------------------------------------------------------------------- the constants, and how to set them
@@ -309,7 +311,7 @@ def on_logs(all_logs: list[Log]) -> tuple[dict[str, Any], list[bytes]]:
     for one in all_logs:
         try:
             answer: Any = identify(one.log, one.robot, **one.told)
-            answers.append(json.dumps([answer.to_dict(), answer.notes]).encode())
+            answers.append(json.dumps(answer.to_dict() | {"date": ""}).encode())
         except ArmloadError as error:
             answer = None
             answers.append(str(error).encode())
@@ -318,7 +320,7 @@ def on_logs(all_logs: list[Log]) -> tuple[dict[str, Any], list[bytes]]:
     wrong = [(one, a) for one, a in found if one.wrong]
     doubts = ("no body fits", "as far off", "taken off", "mass is negative")
     told = {id(a): any(word in note for note in a.notes for word in doubts) for _, a in found if a is not None}
-    inside = [(a.phi_low <= one.truth) & (one.truth <= a.phi_high) for one, a in _arrays(sound)]
+    inside = [(a.phi_low <= one.truth) & (one.truth <= a.phi_high) for one, a in sound]
     return {
         "refused": sum(not one.wrong and a is None for one, a in found),
         "doubted": sum(told[id(a)] for _, a in sound),
@@ -332,11 +334,6 @@ def on_logs(all_logs: list[Log]) -> tuple[dict[str, Any], list[bytes]]:
             bool(a is not None and a.phi_low[0] <= one.truth[0] <= a.phi_high[0]) for one, a in wrong
         ),
     }, answers
-
-
-def _arrays(found: list[tuple[Log, Any]]) -> Iterator[tuple[Log, Any]]:
-    for one, answer in found:
-        yield one, replace(answer, phi_low=np.array(answer.phi_low), phi_high=np.array(answer.phi_high))
 
 
 # ---------------------------------------------------------------------- the page

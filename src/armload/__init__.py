@@ -1,9 +1,8 @@
 """armload: tell a robot arm what it is holding, from joint position, velocity and torque.
 
-    from armload import arm, identify, read_recording
+    from armload import identify
 
-    panda = arm("panda")
-    print(identify(read_recording("run.csv", panda), panda))
+    print(identify("run.csv", "panda"))
 
 The names below are imported when they are first used, so that `import armload` is instant.
 """
@@ -143,4 +142,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return list(__all__)

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from armload.app.cli import main
-from armload.app.cli.export import _EXAMPLES, _FORMS
+from armload.app.cli.export import _EXAMPLES
+from armload.app.cli.export import FORMS as NAMED
 from armload.arms import arm
 from armload.devices import FORMS
 from armload.inertia import InertialParameters
@@ -63,12 +64,12 @@ def mjcf_numbers(text):
 
 
 def test_the_forms_of_the_command_are_those_of_the_room():
-    assert tuple(FORMS) == _FORMS
+    assert tuple(FORMS) == NAMED
     listed = re.search(r"forms:\n(.*?)\n\n", _EXAMPLES, re.DOTALL).group(1)
     assert all(form in listed for form in FORMS)
 
 
-@pytest.mark.parametrize("form", _FORMS)
+@pytest.mark.parametrize("form", NAMED)
 def test_every_form_is_printed_without_a_word_beside_it(export, form):
     out, err = export(
         of_arm("ur10e") if form in ("ur", "ur-payload") else result_of(HELD, relative_to="tare"), "--to", form

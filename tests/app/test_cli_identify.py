@@ -1,6 +1,8 @@
 """What `armload identify` answers: the contract's JSON, and answers that are right on simulated and on real logs."""
 
 import json
+import re
+from datetime import UTC, datetime
 from importlib import resources
 
 import numpy as np
@@ -8,11 +10,12 @@ import pytest
 
 from armload.app.cli import main
 from armload.arms import arm
-from armload.inertia import InertialParameters, com_to_phi
+from armload.inertia import NAMES, InertialParameters, com_to_phi
 from armload.motion import taie2024
 from armload.payloads import Payload, franka_hand, write_payload
 from armload.recording import Recording, write_recording
 from armload.simulation import simulate
+from armload.version import __version__
 
 KEYS = [
     "method",
@@ -31,6 +34,17 @@ KEYS = [
     "inertia_com",
     "consistent",
     "held",
+    "com_low",
+    "com_high",
+    "inertia_com_low",
+    "inertia_com_high",
+    "covariance",
+    "rests_on_prior",
+    "notes",
+    "log",
+    "date",
+    "parameters",
+    "version",
 ]
 BODY = InertialParameters(com_to_phi(1.2, [0.02, -0.03, 0.09], np.diag([4e-3, 5e-3, 3e-3])), "panda_link8")
 TILTED = (-4.905, 0.0, -9.81 * np.sqrt(0.75))  # base tilted by 30° about y
@@ -46,6 +60,11 @@ def logs(panda, tmp_path_factory):
         write_recording(folder / f"{name}.csv", simulate(panda, motion, payload, rate=200.0))
     write_recording(folder / "tilted.npz", simulate(arm("panda", gravity=TILTED), motion, BODY, rate=200.0))
     return folder
+
+
+def numbers(found):
+    """An answer without what names the run: the same samples give the same."""
+    return {key: value for key, value in found.items() if key not in ("log", "date")}
 
 
 @pytest.fixture
@@ -72,10 +91,19 @@ def test_json_has_the_contracts_keys_in_order_and_finite_numbers(answer, logs):
     assert [len(found[key]) for key in ("phi", "phi_low", "phi_high", "determined")] == [10] * 4
     assert np.shape(found["com"]) == (3,)
     assert np.shape(found["inertia_com"]) == (3, 3)
-    for key in ("phi", "phi_low", "phi_high", "com", "inertia_com", "mass", "duration"):
+    for key in ("com_low", "com_high"):
+        assert np.shape(found[key]) == (3,)
+    for key in ("inertia_com_low", "inertia_com_high"):
+        assert np.shape(found[key]) == (3, 3)
+    assert np.shape(found["covariance"]) == (10, 10)
+    for key in ("phi", "com", "inertia_com"):
         assert np.all(np.isfinite(found[key]))
-    assert np.all(np.array(found["phi_low"]) <= found["phi"])
-    assert np.all(np.array(found["phi"]) <= found["phi_high"])
+        assert np.all(np.array(found[f"{key}_low"]) <= found[key])
+        assert np.all(np.array(found[key]) <= found[f"{key}_high"])
+    assert np.all(np.isfinite([found["mass"], found["duration"]]))
+    assert found["parameters"] == list(NAMES)
+    assert (found["version"], found["log"]) == (__version__, "body.csv")
+    assert abs((datetime.fromisoformat(found["date"]) - datetime.now(UTC)).total_seconds()) < 600.0
     assert found["method"] == "hybrid"
     assert found["robot"] == "panda"
     assert found["frame"] == "panda_link8"
@@ -103,7 +131,7 @@ def test_the_answer_is_relative_to_the_arm_the_tool_or_the_tare(answer, logs, tm
     named = answer(logs / "both.csv", "--robot", "panda", "--tool", "franka-hand")
     write_payload(tmp_path / "hand.json", franka_hand())
     filed = answer(logs / "both.csv", "--robot", "panda", "--tool", tmp_path / "hand.json")
-    assert named == filed
+    assert numbers(named) == numbers(filed)
     assert named["relative_to"] == "tool"
     tared = answer(logs / "both.csv", "--robot", "panda", "--tare", logs / "hand.csv")
     assert tared["relative_to"] == "tare"
@@ -134,9 +162,8 @@ def test_a_tilted_base_is_told_by_gravity(answer, logs, spelling):
 
 
 def test_standard_gravity_may_be_said(answer, logs):
-    assert answer(logs / "body.csv", "--robot", "panda", "--gravity", "0,0,-9.81") == answer(
-        logs / "body.csv", "--robot", "panda"
-    )
+    said = answer(logs / "body.csv", "--robot", "panda", "--gravity", "0,0,-9.81")
+    assert numbers(said) == numbers(answer(logs / "body.csv", "--robot", "panda"))
 
 
 @pytest.mark.parametrize(("method", "tolerance"), [("rls-filter", 1e-4), ("map", 1e-3), ("hybrid", 2e-3)])
@@ -156,11 +183,11 @@ def test_the_built_in_arm_and_its_urdf_file_give_the_same(answer, logs, tmp_path
     path.write_text(resources.files("armload.arms").joinpath("descriptions/panda.urdf").read_text())
     built_in = answer(logs / "body.csv", "--robot", "panda", "--method", "rls-filter")
     filed = answer(logs / "body.csv", "--robot", path, "--frame", "panda_link8", "--method", "rls-filter")
-    assert filed == built_in
+    assert numbers(filed) == numbers(built_in)
     # a file with the links of a built-in arm is that arm: what is known of it holds, too
     mine = path.rename(tmp_path / "my_cell.urdf")
     default = answer(logs / "body.csv", "--robot", mine, "--frame", "panda_link8")
-    assert default == answer(logs / "body.csv", "--robot", "panda") | {"robot": "my_cell"}
+    assert numbers(default) == numbers(answer(logs / "body.csv", "--robot", "panda")) | {"robot": "my_cell"}
 
 
 def test_an_arm_that_never_moves_tells_what_gravity_tells(answer, panda, tmp_path):
@@ -177,12 +204,126 @@ def test_an_arm_that_never_moves_tells_what_gravity_tells(answer, panda, tmp_pat
     assert explained == pytest.approx(loaded.torque(pose) - panda.torque(pose), abs=0.5)
 
 
-def test_the_table_has_units_intervals_and_the_reason(capsys, logs):
+def test_mass_and_centre_of_mass_come_first_with_their_intervals_then_the_inertia_about_it(capsys, answer, logs):
+    found = answer(logs / "body.csv", "--robot", "panda")
     assert main(["identify", str(logs / "body.csv"), "--robot", "panda"]) == 0
     out, err = capsys.readouterr()
-    for word in ("kg·m²", "m·rx", "95 %", "method hybrid:", "relative to the arm", "mm"):
-        assert word in out
+    lines = out.splitlines()
+    half = {
+        name: (np.array(found[f"{name}_high"]) - found[f"{name}_low"]) / 2 for name in ("phi", "com", "inertia_com")
+    }
+    assert re.fullmatch(rf"mass +{found['mass']:.3f} ± {half['phi'][0]:.3f} +kg", lines[2])
+    assert lines[3].startswith("centre of mass")
+    for k, axis in enumerate("xyz"):
+        value = f"{1e3 * found['com'][k]:+.1f} ± {1e3 * half['com'][k]:.1f}"
+        assert lines[3 + k].removeprefix("centre of mass").split() == [axis, *value.split(), "mm"]
+    six = np.array(found["inertia_com"])[np.triu_indices(3)]
+    for name, value, line in zip(NAMES[4:], six, lines[6:12], strict=True):
+        shown = re.search(rf"{name} +([+-][\d.]+) .*kg·m²", line)
+        assert float(shown[1]) == pytest.approx(value, abs=5.1e-5)
+    assert out.count("95 %") == 1
+    assert "m·rx" not in out
     assert "hybrid" not in err
+
+
+def test_the_ten_parameters_are_printed_on_request(capsys, logs):
+    assert main(["identify", str(logs / "body.csv"), "--robot", "panda", "--all"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    first = lines.index("about the origin of panda_link8:") + 1
+    assert [line.split()[0] for line in lines[first : first + 10]] == list(NAMES)
+
+
+def test_nothing_has_no_centre_of_mass_and_no_advice(capsys, logs):
+    assert main(["identify", str(logs / "bare.csv"), "--robot", "panda"]) == 0
+    out, err = capsys.readouterr()
+    assert "nothing seems to be held" in out
+    assert "centre of mass" not in out
+    assert "inertia" not in out
+    assert err == ""
+
+
+def test_the_notes_in_the_json_are_those_on_stderr(capsys, answer, logs):
+    found = answer(logs / "both.csv", "--robot", "panda", "--tool", "franka-hand", "--tare", logs / "hand.csv")
+    main(
+        [
+            "identify",
+            str(logs / "both.csv"),
+            "--robot",
+            "panda",
+            "--tool",
+            "franka-hand",
+            "--tare",
+            str(logs / "hand.csv"),
+        ]
+    )
+    err = capsys.readouterr().err
+    assert found["notes"]
+    assert [line.removeprefix("armload: ") for line in err.splitlines()] == found["notes"]
+
+
+def test_out_writes_the_json_whole_or_not_at_all(capsys, answer, logs, tmp_path):
+    log, path = str(logs / "body.csv"), tmp_path / "held.json"
+    assert main(["identify", log, "--robot", "panda", "--out", str(path)]) == 0
+    assert "mass" in capsys.readouterr().out  # the answer is printed as well
+    assert numbers(json.loads(path.read_text())) == numbers(answer(log, "--robot", "panda"))
+    refused = main(["identify", log, "--robot", "panda", "--out", str(tmp_path / "no" / "such.json")])
+    out, err = capsys.readouterr()
+    assert (refused, out, err.count("\n")) == (2, "", 1)
+    assert "cannot be written" in err
+    assert [file.name for file in tmp_path.iterdir()] == ["held.json"]
+
+
+@pytest.mark.parametrize("form", ["franka", "mjcf"])
+def test_to_prints_what_export_makes_of_the_saved_answer(capsys, logs, tmp_path, form):
+    log, path = str(logs / "body.csv"), tmp_path / "held.json"
+    assert main(["identify", log, "--robot", "panda", "--out", str(path)]) == 0
+    capsys.readouterr()
+    assert main(["export", str(path), "--to", form]) == 0
+    exported = capsys.readouterr().out
+    assert main(["identify", log, "--robot", "panda", "--to", form]) == 0
+    assert capsys.readouterr().out == exported
+    assert main(["identify", log, "--robot", "panda", "--to", form, "--out", str(tmp_path / "load")]) == 0
+    assert capsys.readouterr().out == ""
+    assert (tmp_path / "load").read_text() == exported
+
+
+def test_an_inertia_that_rests_on_the_prior_is_exported_with_a_note_and_a_comment(capsys, answer, logs, tmp_path):
+    found = answer(logs / "body.csv", "--robot", "panda")
+    leaning = [
+        n
+        for n, known, prior in zip(NAMES, found["determined"], found["rests_on_prior"], strict=True)
+        if known and prior
+    ]
+    assert leaning
+    (tmp_path / "held.json").write_text(json.dumps(found))
+    for form in ("franka", "ur", "urdf", "ros2"):
+        assert main(["export", str(tmp_path / "held.json"), "--to", form, "--frame", "panda_link8"]) == 0
+        out, err = capsys.readouterr()
+        for text in (out, err):
+            assert f"rests on what payloads are usually like more than on the log: {', '.join(leaning)}" in text
+
+
+def test_a_tool_s_file_of_mass_and_centre_alone_is_taken_with_wider_intervals(answer, logs, tmp_path):
+    hand = franka_hand().parameters
+    (tmp_path / "hand.json").write_text(json.dumps({"mass": hand.mass, "com": hand.com.tolist(), "frame": hand.frame}))
+    partly = answer(logs / "both.csv", "--robot", "panda", "--tool", tmp_path / "hand.json")
+    known = answer(logs / "both.csv", "--robot", "panda", "--tool", "franka-hand")
+    assert any("inertia is not given" in note for note in partly["notes"])
+    assert partly["interval"] == "approximate"
+    assert partly["mass"] == pytest.approx(known["mass"], abs=0.01)
+    width = [np.array(x["phi_high"]) - x["phi_low"] for x in (partly, known)]
+    assert np.all(width[0][4:] > width[1][4:] + 5e-3)
+    truth = BODY.phi
+    assert np.all((partly["phi_low"] <= truth) & (truth <= partly["phi_high"]))
+
+
+@pytest.mark.parametrize("form", ["ur", "urdf", "mjcf", "franka"])
+def test_a_file_of_mass_and_centre_alone_is_exported_with_the_assumption_said(capsys, tmp_path, form):
+    (tmp_path / "part.json").write_text(json.dumps({"mass": 0.5, "com": [0, 0, 0.05], "frame": "panda_link8"}))
+    assert main(["export", str(tmp_path / "part.json"), "--to", form]) == 0
+    out, err = capsys.readouterr()
+    for text in (out, err):
+        assert "inertia is not given" in text
 
 
 def test_notes_of_the_reader_go_to_stderr(capsys, logs, tmp_path):

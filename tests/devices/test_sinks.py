@@ -33,6 +33,7 @@ from armload.devices.franka.form import desk_text
 from armload.devices.ur import writer as ur_robot
 from armload.errors import ArmError, ArmloadError, InertiaError, PayloadError, SinkError
 from armload.identification import Identification
+from armload.identification.intervals import intervals
 from armload.inertia import InertialParameters, is_consistent
 from armload.payloads import franka_hand, hand_on, random_payload, test_payload, write_payload
 
@@ -313,16 +314,16 @@ def identification(parameters, robot="panda", relative_to="arm", determined=(Tru
         relative_to=relative_to,
         n_samples=600,
         duration=6.0,
-        phi=phi.tolist(),
-        phi_low=(phi - 0.02).tolist(),
-        phi_high=(phi + 0.02).tolist(),
+        phi=phi,
         interval="approximate",
-        determined=list(determined),
+        determined=np.array(determined),
         mass=parameters.mass,
-        com=parameters.com.tolist(),
-        inertia_com=parameters.inertia_com.tolist(),
+        com=parameters.com,
+        inertia_com=parameters.inertia_com,
         consistent=other.pop("consistent", is_consistent(phi)),
         held=True,
+        rests_on_prior=np.array(other.pop("rests_on_prior", (False,) * 10)),
+        **intervals(phi, phi - 0.02, phi + 0.02, np.eye(10))._asdict(),
     )
 
 

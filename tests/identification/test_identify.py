@@ -9,8 +9,7 @@ import pytest
 from armload.arms import arm, payload_regressor
 from armload.errors import IdentificationError, RecordingError
 from armload.identification import METHODS, identify
-from armload.identification.identify_log import Z95
-from armload.inertia import InertialParameters, distance_to_body, is_consistent, nearest_body
+from armload.inertia import Z95, InertialParameters, distance_to_body, is_consistent, nearest_body
 from armload.lab.episodes import Recipe, draw_episodes, simulate_episodes
 from armload.motion import random_motion, taie2024
 from armload.posterior import PosteriorLeastSquares, shipped_model
@@ -78,7 +77,7 @@ def test_an_arm_that_does_not_move_determines_the_mass_and_not_the_inertia(panda
     assert not any(answer.determined[4:])
     assert np.all(np.array(answer.phi_low)[4:] <= BOX.phi[4:])
     assert np.all(BOX.phi[4:] <= np.array(answer.phi_high)[4:])
-    assert "Izz" in answer.notes[0]
+    assert any("does not determine" in note and "Izz" in note for note in answer.notes)
 
 
 def test_undetermined_parameters_carry_the_interval_of_what_was_known_before(panda, still):

@@ -14,7 +14,7 @@ from armload.inertia import InertialParameters
 from armload.motion import random_motion, taie2024
 from armload.recording import Recording, read_recording
 from armload.recording.windows import integrals, windows
-from armload.simulation import Run, Sensors, World, simulate_many
+from armload.simulation import Run, Sensors, World, simulate, simulate_many
 
 DEGREE = 180.0 / np.pi
 
@@ -312,3 +312,22 @@ def test_friction_that_keeps_hold_of_resting_joints_is_no_wrong_robot(seed):
     check_plausible(Recording(t, q, dq, tau), robot)
     with pytest.raises(RecordingError, match=r"opposite sign|does not fit|holds only"):
         check_plausible(Recording(t, q, dq, -tau), robot)
+
+
+@pytest.mark.parametrize("name", ["ur10e_unloaded.csv", "ur10e_loaded_2805g.csv"])
+def test_motor_currents_are_called_so_with_what_to_do(real_data, name):
+    """The real logs' torque is current times these constants: divided by them again it is what the robot measured."""
+    robot, constants = arm("ur10e"), np.array([11.98, 11.976, 9.836, 10.70, 10.70, 10.70])
+    log = read_recording(real_data / name, robot)
+    with pytest.raises(RecordingError, match=r"look like currents, in A.*multiply each .*11\.98, 11\.976, 9\.836"):
+        check_plausible(replace(log, tau=log.tau / constants), robot)
+    stranger = replace(robot, known_as=None)
+    with pytest.raises(RecordingError, match=r"look like currents, in A.*torque constant .*from the maker"):
+        check_plausible(replace(log, tau=log.tau / constants), stranger)
+
+
+def test_a_torque_that_is_no_current_is_not_called_one(panda):
+    log = simulate(panda, taie2024(), None, rate=200.0)
+    with pytest.raises(RecordingError, match="of the torque panda needs") as caught:
+        check_plausible(replace(log, tau=0.1 * log.tau), panda)
+    assert "current" not in str(caught.value)

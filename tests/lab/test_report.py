@@ -2,6 +2,8 @@
 
 import base64
 import re
+import shutil
+import subprocess
 from html.parser import HTMLParser
 from io import BytesIO
 from xml.etree import ElementTree
@@ -11,13 +13,17 @@ import matplotlib.colors
 import numpy as np
 import pytest
 
+from armload.identification import identify
+from armload.identification.text import quantities, shown
 from armload.inertia import NAMES, InertialParameters
 from armload.lab.evaluation import Comparison, EvaluationRun, Table
-from armload.lab.report import ReportError, Section, default_report, render, write_report
+from armload.lab.report import ReportError, Section, answer_section, default_report, render, write_report
 from armload.lab.report import comparison_figures as figures
 from armload.lab.report import recording_figures as recordings
 from armload.lab.report.style import method_styles
+from armload.motion import taie2024
 from armload.regression import first_order_lag
+from armload.simulation import simulate
 
 BODY = InertialParameters.from_com(1.3, (0.03, -0.02, 0.06), np.diag([4e-3, 5e-3, 3e-3]))
 METHODS = ("tree ensemble", "network <ensemble>", "rls", "rls-filter", "training mean", "same-prior least squares")
@@ -279,3 +285,42 @@ def test_torques_drawn_are_the_lagged_torques(panda, analytic_log):
     loaded = recordings.lagged_torques(analytic_log(panda, BODY, duration=2.0), panda)
     assert loaded[2] == pytest.approx(bare, abs=0.05)
     assert np.abs(loaded[1] - loaded[2]).max() > 3.0
+
+
+# ---------------------------------------------------------------------------- the answer first, and everything visible
+
+
+def test_the_answer_comes_first_and_says_what_the_answer_says(panda):
+    found = identify(simulate(panda, taie2024(), BODY, rate=200.0), panda)
+    section = answer_section(found, BODY)
+    (table,) = section.tables
+    cells = {row[0]: row for row in table}
+    assert cells["mass"][1] == shown(quantities(found)["mass"])[0]
+    assert cells["mass"][2] == f"{BODY.mass:+.4f}"
+    assert float(cells["centre of mass z"][2]) == pytest.approx(1e3 * BODY.com[2], abs=0.06)
+    assert float(cells["inertia about it Iyy"][2]) == pytest.approx(BODY.inertia_com[1, 1], abs=6e-6)
+    assert f"**{found.mass:.3f} ± " in section.text
+    for note in found.notes:
+        assert note[1:] in section.text
+    nothing = answer_section(identify(simulate(panda, taie2024(), None, rate=200.0), panda))
+    assert [row[0] for row in nothing.tables[0]] == ["mass"]
+    assert "nothing seems to be held" in nothing.text
+
+
+@pytest.mark.full
+def test_no_table_of_a_report_is_wider_than_a_page_of_1280_pixels(tmp_path):
+    browser = shutil.which("chromium-headless-shell") or shutil.which("chromium")
+    if browser is None:
+        pytest.skip("no Chromium is installed: expected chromium-headless-shell")
+    ask = "document.title=[...document.querySelectorAll('div.wide')].map(d=>d.scrollWidth-d.clientWidth).join(' ')"
+    page = render(default_report(made_up(runs=24, off=6000.0)), "wide").replace(
+        "</body>", f"<script>{ask}</script></body>"
+    )
+    (tmp_path / "r.html").write_text(page)
+    flags = ["--no-sandbox", "--headless", "--disable-gpu", "--window-size=1280,2000", "--dump-dom"]
+    dom = subprocess.run(
+        [browser, *flags, f"file://{tmp_path}/r.html"], capture_output=True, text=True, timeout=120
+    ).stdout
+    beyond = [float(x) for x in re.search("<title>(.*)</title>", dom)[1].split()]
+    assert len(beyond) >= 8
+    assert max(beyond) <= 0

@@ -218,3 +218,15 @@ def test_the_command_stops_in_time_names_what_is_missing_and_writes_the_page(tmp
     assert "not measured yet" in (tmp_path / "paper.md").read_text(encoding="utf-8")
     assert main([*command, "--real-log", str(tmp_path / "none.csv")]) == 2
     assert "no real log at" in capsys.readouterr().err
+
+
+def test_a_quick_run_says_on_top_of_its_page_and_report_that_its_verdicts_mean_nothing(small, tmp_path):
+    _, _, cells, _ = small
+    said = "This was a quick run: its verdicts mean nothing."
+    for quick in (True, False):
+        written = write_results(cells, tmp_path / "s.json", tmp_path / "p.md", tmp_path / "r.html", quick=quick)
+        for name, heading in (("page", "## "), ("report", "<h2>")):
+            text = written[name].read_text(encoding="utf-8")
+            first = text.split(heading)[1 if name == "report" else 0]  # before the first heading, or under it
+            assert (said in first) == quick
+            assert (said in text) == quick

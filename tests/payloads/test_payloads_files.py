@@ -65,7 +65,9 @@ PHI = InertialParameters.from_com(1.0, TRIPLE["com"], TRIPLE["inertia_com"]).phi
         ("[" * 100_000, "cannot be read as JSON"),
         ("[1, 2]", "holds a JSON list"),
         ({}, "lacks mass and com and inertia_com.*no keys at all"),
-        ({"mass": 1, "com": [0, 0, 0]}, "lacks inertia_com.*found: mass, com"),
+        ({"mass": 1}, "lacks com and inertia_com.*found: mass"),
+        ({"mass": 1, "com": [0, 0, 100]}, "100 m from the frame.*millimetres"),
+        ({"mass": -1, "com": [0, 0, 0]}, "mass of -1 kg: expected a mass above 0"),
         ({"phi": [1, 2, 3]}, r"phi is \[1, 2, 3\], expected 10 numbers"),
         ({"phi": "heavy"}, "expected 10 numbers"),
         ({"phi": [*PHI[:9], "x"]}, "expected 10 numbers"),
@@ -168,3 +170,16 @@ def test_a_folder_that_is_missing_is_said_under_the_name_that_was_given(tmp_path
             pass
         assert raised.value.filename == str(path)
     assert [p.name for p in tmp_path.iterdir()] == ["round"]
+
+
+def test_of_mass_and_centre_alone_the_inertia_is_a_ball_s_and_said_to_be_unknown(tmp_path):
+    path, copy = tmp_path / "gripper.json", tmp_path / "copy.json"
+    path.write_text(json.dumps({"mass": 0.9, "com": [0.01, 0.0, 0.06], "frame": "tool0"}))
+    found = read_payload(path)
+    radius = (3 * 0.9 / 1000 / (4 * np.pi)) ** (1 / 3)
+    assert (found.name, found.inertia_known, found.parameters.frame) == ("gripper", False, "tool0")
+    assert found.parameters.inertia_com == pytest.approx(0.4 * 0.9 * radius**2 * np.eye(3), abs=1e-12)
+    write_payload(copy, found)
+    assert "phi" not in json.loads(copy.read_text())
+    assert read_payload(copy).parameters.phi == pytest.approx(found.parameters.phi, abs=1e-15)
+    assert not read_payload(copy).inertia_known

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from armload.errors import SinkError
 from armload.identification import Identification
 from armload.inertia import NAMES, Z95, InertialParameters, is_consistent, nearest_consistent, to_order
 from armload.online import OnlineEstimate
+from armload.payloads import INERTIA_ASSUMED, Payload
 from armload.payloads.payload_file import payload_from, read_content
 
 _KNOWN = (True,) * 10
@@ -41,6 +43,7 @@ class Load:
         relative_to: "arm" (everything on the flange), "tool", "tare" or "before" (what was added), None: not
             known.
         std: standard deviation of phi (10,), where it was measured.
+        remarks: what else its reader should know, a line each.
     """
 
     parameters: InertialParameters
@@ -48,6 +51,7 @@ class Load:
     robot: str | None = None
     relative_to: str | None = None
     std: NDArray[np.float64] | None = field(default=None, repr=False)
+    remarks: tuple[str, ...] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
         determined = tuple(bool(x) for x in self.determined)
@@ -63,8 +67,12 @@ class Load:
         if isinstance(result, OnlineEstimate):
             known = tuple(bool(x) for x in result.determined)
             return cls(result.parameters, known, None if arm is None else arm.name, result.relative_to, result.std)
-        std = (np.array(result.phi_high) - np.array(result.phi_low)) / (2 * Z95)
-        return cls(result.parameters, tuple(result.determined), result.robot, result.relative_to, std)
+        std = (result.phi_high - result.phi_low) / (2 * Z95)
+        known, remarks = (
+            tuple(result.determined.tolist()),
+            _leaning(result.determined.tolist(), result.rests_on_prior.tolist()),
+        )
+        return cls(result.parameters, known, result.robot, result.relative_to, std, remarks)
 
     @property
     def frame(self) -> str | None:
@@ -133,11 +141,11 @@ class Load:
             what += f" about {self.frame}"
         if self.relative_to:
             what += f", relative to the {_RELATIVE.get(self.relative_to, self.relative_to)}"
-        # on one line, and without what would end a comment
-        lines = [" ".join(what.replace("--", "- -").split())]
+        lines = [what]
         if self.undetermined:
             lines.append(f"not determined by the log: {', '.join(self.undetermined)}; known beforehand, not measured")
-        return tuple(lines)
+        # each on one line, and without what would end a comment
+        return tuple(" ".join(line.replace("--", "- -").split()) for line in (*lines, *self.remarks))
 
     def _nearest(self) -> NDArray[np.float64]:
         information = None if self.std is None else np.diag(1.0 / np.maximum(self.std, 1e-9) ** 2)
@@ -191,12 +199,15 @@ def read_load(path: str | Path) -> Load:
         SinkError: the fields of an identification in it are malformed.
     """
     content = read_content(path)
-    parameters = payload_from(content, path).parameters
-    determined = content.get("determined")
+    payload = payload_from(content, path)
+    parameters, robot, relative_to = (
+        payload.parameters,
+        _text(content, "robot", path),
+        _text(content, "relative_to", path),
+    )
+    determined = _flags(content, "determined", path)
     if determined is None:
-        return Load(parameters, robot=_text(content, "robot", path), relative_to=_text(content, "relative_to", path))
-    if not isinstance(determined, list) or len(determined) != 10 or any(not isinstance(x, bool) for x in determined):
-        raise SinkError(f"{path}: determined is {json.dumps(determined)[:80]}, expected 10 times true or false")
+        return Load(parameters, robot=robot, relative_to=relative_to, remarks=assumed(payload))
     std = None
     try:
         low, high = (np.array(content[key], dtype=float) for key in ("phi_low", "phi_high"))
@@ -204,7 +215,28 @@ def read_load(path: str | Path) -> Load:
             std = (high - low) / (2 * Z95)
     except (KeyError, TypeError, ValueError):
         pass  # written by hand: the numbers themselves are enough
-    return Load(parameters, tuple(determined), _text(content, "robot", path), _text(content, "relative_to", path), std)
+    resting = _flags(content, "rests_on_prior", path) or (False,) * 10
+    return Load(parameters, determined, robot, relative_to, std, _leaning(determined, resting) + assumed(payload))
+
+
+def assumed(payload: Payload) -> tuple[str, ...]:
+    """A remark on a payload whose inertia is not known."""
+    return () if payload.inertia_known else (INERTIA_ASSUMED,)
+
+
+def _leaning(determined: Sequence[bool], rests_on_prior: Sequence[bool]) -> tuple[str, ...]:
+    """A remark on parameters that the log determines, though less than what payloads are usually like does."""
+    names = [n for n, known, prior in zip(NAMES, determined, rests_on_prior, strict=True) if known and prior]
+    return (f"rests on what payloads are usually like more than on the log: {', '.join(names)}",) if names else ()
+
+
+def _flags(content: dict[str, Any], key: str, path: str | Path) -> tuple[bool, ...] | None:
+    value = content.get(key)
+    if value is None:
+        return None
+    if not isinstance(value, list) or len(value) != 10 or any(not isinstance(x, bool) for x in value):
+        raise SinkError(f"{path}: {key} is {json.dumps(value)[:80]}, expected 10 times true or false")
+    return tuple(value)
 
 
 def _text(content: dict[str, Any], key: str, path: str | Path) -> str | None:

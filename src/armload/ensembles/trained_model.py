@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from armload.arms import Arm
 from armload.ensembles.compiled import Compiled
 from armload.errors import ModelError
-from armload.inertia import NAMES, UNITS
+from armload.inertia import NAMES, UNITS, Z95
 from armload.motion import MotionFingerprint
 from armload.recording import Recording
 from armload.recording.columns import column_names
@@ -106,11 +106,11 @@ class LearnedModel:
 
     def __str__(self) -> str:
         rows = [
-            f"{n:>5} = {m:+.5f} ± {s:.5f} {u}"
+            f"{n:>5} = {m:+.5f} ± {Z95 * s:.5f} {u}"
             for n, m, s, u in zip(NAMES, self.phi_mean, self.phi_std, UNITS, strict=True)
         ]
         tied = f"{len(self.motions)} motion(s)" if self.motions else "any motion"
         return (
             f"{self.kind} ensemble of {self.compiled.n_members} for {self.arm_name}, {tied}, payload about "
-            f"{self.frame}; training payloads:\n" + "\n".join(rows)
+            f"{self.frame}; training payloads, ± 95 %:\n" + "\n".join(rows)
         )

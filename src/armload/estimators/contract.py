@@ -20,11 +20,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
 from armload.errors import IdentificationError
-from armload.inertia import NAMES, UNITS, InertialParameters
+from armload.inertia import NAMES, UNITS, Z95, InertialParameters
 from armload.recording import Recording, Sample
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Estimate:
     """What is known about the payload after the samples up to time t.
 
@@ -52,8 +52,13 @@ class Estimate:
         return InertialParameters(self.phi, self.frame)
 
     def __str__(self) -> str:
-        rows = [f"{n:>5} = {v:+.5f} ± {s:.5f} {u}" for n, v, s, u in zip(NAMES, self.phi, self.std, UNITS, strict=True)]
-        return f"payload about {self.frame} after {self.n_samples} samples:\n" + "\n".join(rows)
+        half = Z95 * self.std
+        rows = [f"{n:>5} = {v:+.5f} ± {h:.5f} {u}" for n, v, h, u in zip(NAMES, self.phi, half, UNITS, strict=True)]
+        return f"payload about {self.frame} after {self.n_samples} samples, ± 95 %:\n" + "\n".join(rows)
+
+    def __repr__(self) -> str:
+        mass = f"{self.phi[0]:.3f} ± {Z95 * self.std[0]:.3f} kg"
+        return f"<{type(self).__name__}: {mass} about {self.frame}, {self.n_samples} samples>"
 
 
 class ArmMismatch(NamedTuple):
@@ -101,9 +106,20 @@ class Identifier(ABC):
         return None
 
     @property
+    def known_arm_std(self) -> NDArray[np.float64] | None:
+        """Standard deviation (10,) of the last solution under a weak payload prior, were the arm known exactly.
+
+        What even then is not determined a tare does not tell either. None: the method does not say.
+        """
+        return None
+
+    @property
     def mismatch(self) -> ArmMismatch | None:
         """What was found of the arm with the last solution; None: the method asks nothing of it."""
         return None
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.name} for {self.arm.name} about {self.arm.frame}>"
 
     @abstractmethod
     def reset(self) -> None:

@@ -2,13 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armload.estimators import Estimate
-from armload.inertia import HELD, NAMES, UNITS, InertialParameters, nearest_body
+from armload.identification import text
+from armload.inertia import HELD, NAMES, InertialParameters, nearest_body
+from armload.version import __version__
+
+_ARRAYS = {
+    "phi": (10,),
+    "phi_low": (10,),
+    "phi_high": (10,),
+    "determined": (10,),
+    "com": (3,),
+    "inertia_com": (3, 3),
+    "com_low": (3,),
+    "com_high": (3,),
+    "inertia_com_low": (3, 3),
+    "inertia_com_high": (3, 3),
+    "covariance": (10, 10),
+    "rests_on_prior": (10,),
+}
 
 
 def is_removal(estimate: Estimate, mass_determined: bool) -> bool:
@@ -16,25 +34,34 @@ def is_removal(estimate: Estimate, mass_determined: bool) -> bool:
     return bool(mass_determined and estimate.phi[0] < -HELD * estimate.std[0])
 
 
-def body_of(estimate: Estimate, mass_determined: bool) -> np.ndarray:
+def body_of(estimate: Estimate, mass_determined: bool) -> NDArray[np.float64]:
     """phi (10,) of the likeliest body in the estimate's metric; the estimate's own where something was taken off."""
     return estimate.phi if is_removal(estimate, mass_determined) else nearest_body(estimate.phi, estimate.covariance)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Identification:
     """What the arm holds, with 95 % intervals; the fields are those of `armload identify --json`.
 
     method: the method's name; robot, frame: whose payload, about which frame's origin and axes.
     relative_to: "arm" (the bare arm), "tool" (what `--tool` describes) or "tare" (what was mounted at the tare).
     n_samples, duration: samples used and the time they span [s].
-    phi, phi_low, phi_high: ten parameters in the paper's order, and their 95 % interval.
-    interval: "calibrated" or "approximate".
-    determined: for each parameter, whether the log itself says more than was known before.
-    mass, com, inertia_com: the same payload about its centre of mass [kg, m, kg·m²], in the frame's axes.
+    phi, phi_low, phi_high: ten parameters (10,) in the paper's order, and their 95 % interval.
+    interval: "calibrated" or "approximate"; what is in doubt is never called calibrated.
+    determined: for each parameter (10,), whether the log itself says more than was known before.
+    mass, com, inertia_com: the same payload about its centre of mass [kg], (3,) [m], (3, 3) [kg·m²], in the frame's
+        axes; of a mass of exactly 0 the centre is the origin.
     consistent: whether a body with these parameters can exist.
     held: whether anything is there at all (the mass lies at least three standard deviations above zero).
-    why: why this method, in a sentence; notes: what else the user should know. Neither is in the JSON.
+    com_low, com_high, inertia_com_low, inertia_com_high: their 95 % intervals. Where the mass may be zero, that of the
+        centre is a stated bound of 1 m about the origin, and the inertia's what a body can have.
+    covariance: (10, 10) of phi: ±1.96 standard deviations are the intervals of phi where they are symmetric, and as
+        wide as they are where they are not.
+    rests_on_prior: for each parameter (10,), whether its interval comes from what was known before more than from the
+        log; always so of what is not determined.
+    notes: what else the user should know, a sentence each.
+    log, date: name of the log's file, and when it was answered (ISO 8601, UTC).
+    why: what is special about the method, in a few words; not in the JSON.
     """
 
     method: str
@@ -43,29 +70,47 @@ class Identification:
     relative_to: str
     n_samples: int
     duration: float
-    phi: list[float]
-    phi_low: list[float]
-    phi_high: list[float]
+    phi: NDArray[np.float64]
+    phi_low: NDArray[np.float64]
+    phi_high: NDArray[np.float64]
     interval: str
-    determined: list[bool]
+    determined: NDArray[np.bool_]
     mass: float
-    com: list[float]
-    inertia_com: list[list[float]]
+    com: NDArray[np.float64]
+    inertia_com: NDArray[np.float64]
     consistent: bool
     held: bool
-    why: str = field(default="", repr=False)
-    notes: tuple[str, ...] = field(default=(), repr=False)
+    com_low: NDArray[np.float64]
+    com_high: NDArray[np.float64]
+    inertia_com_low: NDArray[np.float64]
+    inertia_com_high: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    rests_on_prior: NDArray[np.bool_]
+    notes: tuple[str, ...] = ()
+    log: str = ""
+    date: str = ""
+    why: str = field(default="", metadata={"json": False})
+
+    def __post_init__(self) -> None:
+        for name, shape in _ARRAYS.items():
+            flags = name in ("determined", "rests_on_prior")
+            value = np.array(getattr(self, name), dtype=bool if flags else float).reshape(shape)
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
 
     def to_dict(self) -> dict[str, Any]:
         """The contract's fields, ready for JSON; every number is finite."""
-        out = asdict(self)
-        del out["why"], out["notes"]
-        return out
+        out: dict[str, Any] = {}
+        for entry in fields(self):
+            if entry.metadata.get("json", True):
+                value = getattr(self, entry.name)
+                out[entry.name] = value.tolist() if isinstance(value, np.ndarray) else value
+        return out | {"notes": list(self.notes), "parameters": list(NAMES), "version": __version__}
 
     @property
     def parameters(self) -> InertialParameters:
         """phi with its frame, ready to move, add, subtract or reorder."""
-        return InertialParameters(np.array(self.phi), self.frame)
+        return InertialParameters(self.phi, self.frame)
 
     @property
     def why_not_held(self) -> str:
@@ -79,17 +124,10 @@ class Identification:
         return "nothing seems to be held: the mass is within three standard deviations of zero"
 
     def __str__(self) -> str:
-        lines = [
-            f"{self.robot}: payload about {self.frame}, relative to the {self.relative_to}, "
-            f"method {self.method}, {self.n_samples} samples, {self.duration:.2f} s"
-        ]
-        rows = zip(NAMES, self.phi, self.phi_low, self.phi_high, UNITS, self.determined, strict=True)
-        for name, value, low, high, unit, known in rows:
-            lines.append(
-                f"{name:>5} = {value:+.5f} [{low:+.5f}, {high:+.5f}] {unit}" + ("" if known else "  undetermined")
-            )
-        com = ", ".join(f"{x:+.4f}" for x in self.com)
-        lines.append(f" mass {self.mass:.4f} kg, centre of mass ({com}) m, intervals {self.interval}")
-        if not self.held:
-            lines.append(f" {self.why_not_held}")
-        return "\n".join(lines)
+        return text.summary(self)
+
+    def __repr__(self) -> str:
+        return f"<Identification: {text.in_short(self)}>"
+
+    def _repr_html_(self) -> str:
+        return text.html(self)

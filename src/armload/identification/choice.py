@@ -20,14 +20,14 @@ class Choice:
     """A method made ready for an arm.
 
     name: of the method. identifier: it has seen nothing of the run yet.
-    prior: whether it starts from a prior on the payload. why: why this one, in a sentence.
+    prior: whether it starts from a prior on the payload. why: the trained model's file, if it is one.
     error_known: whether its covariance says how large its errors are: how far an ensemble's members disagree does not.
     """
 
     name: str
     identifier: Identifier
     prior: bool
-    why: str
+    why: str = ""
     error_known: bool = True
 
 
@@ -50,10 +50,7 @@ def choose(arm: Arm, tare: Recording | None = None, method: str | Path | None = 
                 f"the method {name} cannot follow a live stream: expected one of {', '.join(LIVE)}, or the file of a "
                 "trained model"
             )
-        why = f"{name} holds for any motion and payload" if method is None else "asked for"
-        if method is None and tare is None:
-            why += "; without a tare the error bars allow for the model's errors"
-        return Choice(name, entry.make(arm, tare), entry.prior, why)
+        return Choice(name, entry.make(arm, tare), entry.prior)
     return _trained(arm, tare, model_file(name, LIVE if live else tuple(METHODS)))
 
 
@@ -62,7 +59,7 @@ def _trained(arm: Arm, tare: Recording | None, file: Path) -> Choice:
 
     if HybridModel.wrote(file):
         made = HybridIdentifier(arm, tare, HybridModel.load(file))
-        return Choice(made.name, made, True, f"asked for; {file} was trained for this arm")
+        return Choice(made.name, made, True, str(file))
     from armload.ensembles import LearnedIdentifier, load_model
 
     model = load_model(file)
@@ -71,5 +68,4 @@ def _trained(arm: Arm, tare: Recording | None, file: Path) -> Choice:
             f"the trained model {file} cannot use a tare (an empty arm lies outside its training): leave the tare "
             "out, or use the method map"
         )
-    why = f"asked for; {file} was trained on this arm and motion"
-    return Choice(model.kind, LearnedIdentifier(model, arm), True, why, error_known=model.error_std is not None)
+    return Choice(model.kind, LearnedIdentifier(model, arm), True, str(file), error_known=model.error_std is not None)

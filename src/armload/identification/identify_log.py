@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,46 +12,57 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm, rated_mass
+from armload.arms import arm as arm_named
 from armload.errors import IdentificationError
 from armload.estimators import ArmMismatch, Estimate
 from armload.identification.answer import Identification, body_of, is_removal
 from armload.identification.choice import Choice, choose
+from armload.identification.intervals import Before, about_com, intervals, phi_interval
+from armload.identification.notes import lacking, leaning_on_prior
 from armload.identification.plausibility import check_plausible
 from armload.identification.thresholds import DECISIVE, HEAVIEST, LARGEST_OFFSETS, LEANS, LOWEST_RATE, MISFIT, MOVES
-from armload.inertia import NAMES, Z95, InertialParameters, distance_to_body, held, is_consistent, phi_to_com
+from armload.inertia import InertialParameters, distance_to_body, held, is_consistent, vech
 from armload.inertia import determined as determined_by
-from armload.recording import Recording, check_own_measurements
+from armload.payloads import INERTIA_ASSUMED, Payload, read_payload
+from armload.recording import Recording, check_own_measurements, read_recording
 from armload.regression import payload_prior_std
+from armload.regression.prior import REACH
 
 _CHECK = "check the robot, the base (--gravity), what is mounted and the torques' signs"
+NO_BODY = f"no body fits within the error bars: {_CHECK}"  # also what a concluded stream says
 
 
 def identify(
-    recording: Recording,
-    arm: Arm,
+    recording: Recording | str | Path,
+    arm: Arm | str | Path,
     *,
-    tare: Recording | None = None,
-    tool: InertialParameters | None = None,
+    tare: Recording | str | Path | None = None,
+    tool: InertialParameters | Payload | str | Path | None = None,
     method: str | Path | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Identification:
     """Identify the payload of a log.
 
     Args:
-        recording: measured joint torque (rigid body + friction, gravity included), position and velocity.
-        arm: the bare arm, with the frame and gravity wanted.
+        recording: measured joint torque (rigid body + friction, gravity included), position and velocity; or the path
+            of such a log.
+        arm: the bare arm, with the frame and gravity wanted; or the name of a built-in one, or the path of a URDF.
         tare: an earlier log of the same arm, on any motion, with whatever was mounted then; the answer is what was
             added since. It shares no samples with the recording.
-        tool: a tool mounted in the recording whose parameters are known; the answer is what it carries. Whether it was
-            mounted at the tare too is found from the tare.
+        tool: a tool mounted in the recording whose parameters are known, or the path of its file; the answer is what it
+            carries. Whether it was mounted at the tare too is found from the tare.
         method: a name in `armload.METHODS`, or the path of a trained model; None: the most trustworthy for the arm,
             "hybrid" where one is shipped, "map-gp" elsewhere.
         progress: told in a few words what is being done.
 
     Raises:
-        ArmloadError: the log is not plausible for this arm, or the method cannot be used on it.
+        ArmloadError: a file cannot be read, the log is not plausible for this arm, or the method cannot be used on it.
     """
     say = progress or (lambda _: None)
+    arm = arm if isinstance(arm, Arm) else arm_named(arm)
+    recording = recording if isinstance(recording, Recording) else read_recording(recording, arm)
+    tare = tare if tare is None or isinstance(tare, Recording) else read_recording(tare, arm)
+    notes = (*recording.notes, *(() if tare is None else tare.notes))
     for log in (recording, tare):
         if log is not None:
             _check(log, arm)
@@ -58,26 +70,33 @@ def identify(
         check_own_measurements(recording, tare)
     say("identifying")
     if tool is None:
-        return _answer(_run(recording, arm, tare, method), arm, recording, "arm" if tare is None else "tare")
-    tool = plausible_tool(arm.in_frame(tool), arm)
+        return _answer(
+            _run(recording, arm, tare, method), arm, recording, tare, "arm" if tare is None else "tare", notes
+        )
+    mounted = read_payload(tool) if isinstance(tool, str | Path) else tool
+    known = plausible_tool(arm.in_frame(mounted.parameters if isinstance(mounted, Payload) else mounted), arm)
+    unsure = None
+    if isinstance(mounted, Payload) and not mounted.inertia_known:
+        notes = (*notes, f"tool {mounted.name}: {INERTIA_ASSUMED}; the intervals allow for any other")
+        unsure = known
     if tare is None:
-        arm = arm.with_payload(tool)
-        return _answer(_run(recording, arm, None, method), arm, recording, "tool")
-    carried, sure = _carries(tare, arm, tool)
+        arm = arm.with_payload(known)
+        return _answer(_run(recording, arm, None, method), arm, recording, None, "tool", notes, unsure=unsure)
+    carried, sure = _carries(tare, arm, known)
     if carried:
-        arm = arm.with_payload(tool)
+        arm = arm.with_payload(known)
         found, relative_to = _run(recording, arm, tare, method), "tare"
-        note, otherwise = "the tool was mounted at the tare already", -tool.phi
+        note, otherwise = "the tool was mounted at the tare already", -known.phi
     else:
-        found, relative_to = _run(recording, arm, tare, method).less(tool.phi), "tool"
+        found, relative_to = _run(recording, arm, tare, method).less(known.phi), "tool"
         note, otherwise = (
             "the tool was mounted after the tare: the answer is what was added since, less the tool",
-            tool.phi,
+            known.phi,
         )
     if sure:
-        return _answer(found, arm, recording, relative_to, (note,))
+        return _answer(found, arm, recording, tare, relative_to, (*notes, note), unsure=unsure)
     note = f"it seems that {note}; the tare does not tell for sure, the intervals hold the other case, too"
-    return _answer(found, arm, recording, relative_to, (note,), otherwise)
+    return _answer(found, arm, recording, tare, relative_to, (*notes, note), otherwise, unsure)
 
 
 def plausible_tool(tool: InertialParameters, arm: Arm) -> InertialParameters:
@@ -108,20 +127,19 @@ def _carries(log: Recording, arm: Arm, tool: InertialParameters) -> tuple[bool, 
 
 
 class _Found(NamedTuple):
-    """What a method found, and what was known before: mean and standard deviation (10,), used as a prior or not.
+    """What a method found, and what was known before.
 
     calibrated: whether its error bars were checked on held-out episodes.
     weak_std: standard deviation (10,) without a learned prior, of a method that has one.
     unprojected: mean (10,) and covariance (10, 10) of what the log says, before a body was made of it; None: the
         estimate's.
     offset_ratio: how many times the arm's torque offsets are what is expected of them, where that is too often.
-    unknown_friction: whether the torques hold gear friction that nobody knew of.
+    unknown_friction: whether the torques hold gear friction that nobody knew of; `friction_found`: that they did.
+    known_arm_std: standard deviation (10,) of a method that says what it would be, were the arm known exactly.
     """
 
     estimate: Estimate
-    before: NDArray[np.float64]
-    before_std: NDArray[np.float64]
-    prior: bool
+    before: Before
     method: str
     why: str
     calibrated: bool = False
@@ -129,6 +147,8 @@ class _Found(NamedTuple):
     unprojected: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     offset_ratio: float = 0.0
     unknown_friction: bool = False
+    friction_found: bool = False
+    known_arm_std: NDArray[np.float64] | None = None
 
     @property
     def misfit(self) -> float:
@@ -158,7 +178,7 @@ def _run(recording: Recording, arm: Arm, tare: Recording | None, method: str | P
     if found.unknown_friction:
         motor_side = replace(arm, motor_torque=True)
         found = _found(choose(motor_side, tare, method), motor_side, recording)
-        found = found._replace(why=f"{found.why}; the torque holds the gears' friction, as that of motor currents does")
+        found = found._replace(friction_found=True)
     return found
 
 
@@ -173,9 +193,7 @@ def _found(choice: Choice, arm: Arm, recording: Recording) -> _Found:
     unknown = identifier.payload_prior is None and not arm.motor_torque
     return _Found(
         estimate=estimate,
-        before=mean,
-        before_std=std,
-        prior=choice.prior,
+        before=Before(mean, std, choice.prior),
         method=choice.name,
         why=choice.why,
         calibrated=identifier.calibrated,
@@ -183,6 +201,7 @@ def _found(choice: Choice, arm: Arm, recording: Recording) -> _Found:
         unprojected=identifier.unprojected,
         offset_ratio=0.0 if mismatch is None else _offset_ratio(mismatch, recording),
         unknown_friction=unknown and mismatch is not None and mismatch.torque == "motor",
+        known_arm_std=identifier.known_arm_std,
     )
 
 
@@ -199,49 +218,37 @@ def _answer(
     found: _Found,
     arm: Arm,
     recording: Recording,
+    tare: Recording | None,
     relative_to: str,
     notes: tuple[str, ...] = (),
     otherwise: NDArray[np.float64] | None = None,
+    unsure: InertialParameters | None = None,
 ) -> Identification:
-    """What is said of an estimate; `otherwise` (10,): how far off the truth may be beyond the error bars."""
-    estimate, before = found.estimate, found.before
-    phi, half, half_before = estimate.phi.copy(), Z95 * estimate.std, Z95 * found.before_std
-    determined = determined_by(
-        estimate.std, found.before_std if found.prior else None, found.weak_std, payload_prior_std(arm)
-    )
-    is_held = held(phi[0], estimate.std[0], determined[0])
-    # what the log does not tell keeps the interval of what was known before, stretched to an estimate that lies beyond
-    reach = np.minimum(half, half_before) if found.prior else half
-    low = np.where(determined, phi - half, np.minimum(before - half_before, phi - reach))
-    high = np.where(determined, phi + half, np.maximum(before + half_before, phi + reach))
-    if otherwise is not None:
-        low, high = np.minimum(low, low + otherwise), np.maximum(high, high + otherwise)
+    """What is said of an estimate.
+
+    otherwise: how far off the truth may be beyond the error bars (10,). unsure: a tool whose own inertia is not known.
+    """
+    estimate, before, weak = found.estimate, found.before, payload_prior_std(arm)
+    determined = determined_by(estimate.std, before.std if before.used else None, found.weak_std, weak)
+    is_held = held(estimate.phi[0], estimate.std[0], determined[0])
+    leaning = np.zeros(10, dtype=bool)
+    if found.weak_std is not None:
+        leaning = determined & (found.weak_std > LEANS * estimate.std)
     phi = body_of(estimate, determined[0])
-    said, trusted = list(notes), found.calibrated and otherwise is None
-    if is_removal(estimate, determined[0]):
-        said.append(
-            "something was taken off since the tare: the added mass is negative, so no body has these parameters"
-            if relative_to == "tare"
-            else "the mass is negative: less is mounted than the model of the arm and its tool assume, or the torque's "
-            "sign is turned"
-        )
-    elif found.misfit > MISFIT:
-        said.append(f"no body fits within the error bars: {_CHECK}")
-        trusted = False
-    elif found.offset_ratio:
-        said.append(f"the torques are {found.offset_ratio:.0f} times as far off as those of an arm should be: {_CHECK}")
-        trusted = False
-    low, high = np.minimum(low, phi), np.maximum(high, phi)
-    if not determined.all():
-        missing = ", ".join(n for n, known in zip(NAMES, determined, strict=True) if not known)
-        said.append(f"this motion does not determine {missing}: what was known before is reported for them")
-    if found.weak_std is not None and np.any(leaning := determined & (found.weak_std > LEANS * estimate.std)):
-        names = ", ".join(n for n, one in zip(NAMES, leaning, strict=True) if one)
-        said.append(
-            f"the error bars of {names} rest on what payloads are usually like more than on this log: of something "
-            "wide and thin (a tray, a frame) believe --method map-gp instead"
-        )
-    mass, com, inertia_com = phi_to_com(phi)
+    low, high = phi_interval(phi, estimate.phi, estimate.std, determined, before, otherwise)
+    if unsure is not None:
+        low, high = _with_any_inertia(low, high, unsure)
+    found_of = intervals(phi, low, high, estimate.covariance, otherwise)
+    doubt = _doubt(found, determined[0], relative_to)
+    said = [*notes] if doubt is None else [doubt, *notes]
+    if found.friction_found:
+        said.append("the torque holds the gears' friction, as that of motor currents does: the intervals allow for it")
+    if is_held or not determined[0]:  # an empty hand has no inertia to be determined
+        said += lacking(arm, tare is not None, determined, found.known_arm_std, weak)
+        said += leaning_on_prior(leaning)
+    consistent = is_consistent(phi)
+    trusted = found.calibrated and doubt is None and consistent and otherwise is None and unsure is None
+    mass, com, inertia_com = about_com(phi)
     return Identification(
         method=found.method,
         robot=arm.name,
@@ -249,16 +256,47 @@ def _answer(
         relative_to=relative_to,
         n_samples=estimate.n_samples,
         duration=recording.duration,
-        phi=phi.tolist(),
-        phi_low=low.tolist(),
-        phi_high=high.tolist(),
+        phi=phi,
         interval="calibrated" if trusted else "approximate",
-        determined=[bool(x) for x in determined],
+        determined=determined,
         mass=mass,
-        com=com.tolist(),
-        inertia_com=inertia_com.tolist(),
-        consistent=is_consistent(phi),
+        com=com,
+        inertia_com=inertia_com,
+        consistent=consistent,
         held=is_held,
-        why=found.why,
+        **found_of._asdict(),
+        rests_on_prior=~determined | leaning,
         notes=tuple(said),
+        log=Path(recording.source).name,
+        date=datetime.now(UTC).isoformat(timespec="seconds"),
+        why=found.why,
     )
+
+
+def _doubt(found: _Found, mass_determined: bool, relative_to: str) -> str | None:
+    """What keeps an answer from being believed, in a sentence."""
+    if is_removal(found.estimate, mass_determined):
+        if relative_to == "tare":
+            return "something was taken off since the tare: the added mass is negative, so no body has these parameters"
+        return (
+            "the mass is negative: less is mounted than the model of the arm and its tool assume, or the torque's "
+            "sign is turned"
+        )
+    if found.misfit > MISFIT:
+        return NO_BODY
+    if found.offset_ratio:
+        return f"the torques are {found.offset_ratio:.0f} times as far off as those of an arm should be: {_CHECK}"
+    return None
+
+
+def _with_any_inertia(
+    low: NDArray[np.float64], high: NDArray[np.float64], tool: InertialParameters
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Intervals (10,) of what a tool carries, were the tool's inertia that of any body within `REACH` of its centre.
+
+    0 to mass·REACH² about each axis, products half of that either way, in place of what was assumed.
+    """
+    most, own = tool.mass * REACH**2, vech(tool.inertia_com)
+    diagonal = np.array([True, False, False, True, False, True])
+    less, more = np.where(diagonal, most - own, most / 2.0), np.where(diagonal, own, most / 2.0)
+    return low - np.r_[np.zeros(4), less], high + np.r_[np.zeros(4), more]

@@ -6,13 +6,17 @@ payloads up to twice the rated one, and to refuse what would give a wrong answer
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm
+from armload.arms import ARMS, Arm
 from armload.errors import RecordingError
 from armload.identification.thresholds import (
     ANY_SPEED,
+    CURRENT_HIGH,
+    CURRENT_LOW,
     DEGREES_FROM,
     EFFORT,
     EFFORT_EVER,
@@ -225,6 +229,7 @@ def _check_torque_is_the_arms(recording: Recording, arm: Arm) -> None:
     if fit is None:
         return
     if fit.is_wrong:
+        _check_for_currents(recording, arm, fit.scale)
         if fit.is_negative:
             what = "has the opposite sign of"
         elif fit.scale < 0.25:
@@ -240,6 +245,31 @@ def _check_torque_is_the_arms(recording: Recording, arm: Arm) -> None:
             f"{recording.source}: tau does not fit {arm.name} with any payload (misfit {fit.misfit:.1f} times a sound "
             "robot's): expected a log of this robot; check the robot, the order of the joints and the base (--gravity)"
         )
+
+
+def _check_for_currents(recording: Recording, arm: Arm, scale: float) -> None:
+    """Refuse motor currents in A by name: of a known arm what its torque constants make a sound log of.
+
+    Of an arm whose gears or sensors nobody has described the size alone says so.
+    """
+    facts = ARMS.get(arm.known_as or "")
+    constants = None if facts is None else facts.torque_constants
+    if constants is not None:
+        torque = replace(recording, tau=recording.tau * np.array(constants))
+        fit = torque_scale(torque, arm)
+        if fit is None or fit.is_wrong or fit.misfit > MODEL_MISFIT:
+            return
+        how = f"multiply each by its joint's torque constant ({', '.join(f'{k:g}' for k in constants)} N·m/A)"
+    elif facts is not None and facts.torque_side == "link":
+        return  # sensors in the joints: there is no current to be logged
+    elif not 1.0 / CURRENT_HIGH < scale < 1.0 / CURRENT_LOW:
+        return
+    else:
+        how = "multiply each by its joint's torque constant [N·m/A, at the joint], from the maker"
+    raise RecordingError(
+        f"{recording.source}: tau holds only {scale:.0%} of the torque {arm.name} needs to carry itself: these look "
+        f"like currents, in A; expected joint torque in N·m: {how}"
+    )
 
 
 def _likeness(a: NDArray, b: NDArray) -> float:

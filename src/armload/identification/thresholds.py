@@ -34,6 +34,18 @@ DECISIVE = 9.0
 # [rated payloads] a tool that weighs more is in grams, a payload that weighs more is none. Sound logs hold up to twice
 # the rated payload (test_simulated_logs_up_to_twice_the_rated_payload_pass)
 HEAVIEST = 3.0
+# [m] from the payload frame to the centre of mass of anything that an arm holds: the bound where the mass may be zero.
+# A stated prior, longer than the payloads of any family that is simulated
+# (test_where_the_mass_may_be_zero_the_centre_s_interval_is_a_finite_bound)
+FARTHEST = 1.0
+# times 2 % of a link's mass (`Arm.link_spread`): figures so rough are nominal, and a tare is what is missing first.
+# A Panda's have 1, an FR3's 3, those of arms that nobody has identified 10
+# (test_where_figures_are_nominal_the_first_advice_is_a_tare)
+NOMINAL = 5.0
+# times the standard deviation that counts as determined: what even an arm known exactly would leave beyond lacks
+# motion, what it would leave within may lack a tare. More than 1, as a tare lowers the noise that is found, too
+# (test_what_is_said_to_lack_motion_a_tare_does_not_tell_either)
+KNOWN = 1.5
 
 # ---------------------------------------------------------------------- units, columns and limits, `plausibility.py`
 
@@ -89,3 +101,8 @@ SCALE_HIGH = 1.7
 SCALE_SURE = 2.0
 # [model errors] rms of what the arm's own torque leaves: a sound log's is about 1 by the meaning of `MODEL_ERROR`
 MODEL_MISFIT = 2.5
+# [N·m/A] torque constant of a joint, gear included, at least: the wrist of a small arm. A UR10e's are 10 to 12
+# (test_motor_currents_are_called_so_with_what_to_do)
+CURRENT_LOW = 4.0
+# [N·m/A] the same at most: the shoulder of a large arm (test_motor_currents_are_called_so_with_what_to_do)
+CURRENT_HIGH = 60.0

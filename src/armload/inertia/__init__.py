@@ -3,6 +3,7 @@
 No other room packs, reorders, moves or projects the 10-vector.
 """
 
+from armload.inertia.about_com import com_interval, inertia_com_std, largest_inertia_com
 from armload.inertia.consistency import (
     from_log_cholesky,
     is_consistent,
@@ -37,6 +38,7 @@ __all__ = [
     "UNITS",
     "Z95",
     "InertialParameters",
+    "com_interval",
     "com_to_phi",
     "determined",
     "distance_to_body",
@@ -44,8 +46,10 @@ __all__ = [
     "from_log_cholesky",
     "from_order",
     "held",
+    "inertia_com_std",
     "inertia_matrix",
     "is_consistent",
+    "largest_inertia_com",
     "log_cholesky",
     "log_cholesky_curvature",
     "log_cholesky_jacobian",

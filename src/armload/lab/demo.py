@@ -118,7 +118,7 @@ def run_demo(
 
     clock.start("reporting", "tables and figures")
     table = _table(comparison)
-    report = _report(folder / "report.html", comparison, runs, robot, table)
+    report = _report(folder / "report.html", answer, comparison, runs, robot, table)
     write_json(folder / "comparison.json", comparison.to_dict())
     clock.stop()
     return DemoResult(table, comparison, answer, folder, report, clock.seconds)
@@ -232,8 +232,10 @@ def _millimetres(vector: np.ndarray) -> str:
     return ", ".join(f"{1e3 * x:+.1f}" for x in vector)
 
 
-def _report(path: Path, comparison: Comparison, runs: list[EvaluationRun], robot: Arm, table: Table) -> Path:
-    from armload.lab.report import default_report, write_report
+def _report(
+    path: Path, answer: Identification, comparison: Comparison, runs: list[EvaluationRun], robot: Arm, table: Table
+) -> Path:
+    from armload.lab.report import answer_section, default_report, write_report
 
     introduction = (
         f"A simulated {robot.name} that differs from its model as real ones do ran one excitation with a payload that "
@@ -242,7 +244,8 @@ def _report(path: Path, comparison: Comparison, runs: list[EvaluationRun], robot
         "earlier log of the empty arm on another motion."
     )
     first, *others = default_report(comparison, runs, robot, introduction=introduction)
-    return write_report(path, [replace(first, tables=(table, *first.tables[1:])), *others], "armload demo")
+    found = answer_section(answer, runs[0].truth)
+    return write_report(path, [found, replace(first, tables=(table, *first.tables[1:])), *others], "armload demo")
 
 
 class _Clock:

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.estimators import Estimate
-from armload.inertia import Z95, is_consistent, phi_to_com
+from armload.identification.intervals import Before, phi_interval
+from armload.inertia import is_consistent, phi_to_com
 from armload.online.event import Event
 from armload.online.gate import Health
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class OnlineEstimate(Estimate):
     """An `Estimate` with what a controller has to know of it.
 
@@ -28,7 +29,9 @@ class OnlineEstimate(Estimate):
     relative_to: "arm", "tool" (which the arm was given with), "tare", or "before": the run of the empty arm before the
         last change was taken for a tare. method: its name.
     determined: which parameters (10,) the data determine. held: whether anything is there at all.
-    calibrated: whether ±1.96 std were checked to be 95 % intervals.
+    around: (10,) the posterior's mean, about which the intervals are; phi is the nearest body, on a concluded stream.
+    before: what was known of the payload before the data.
+    calibrated: whether ±1.96 std were checked to be 95 % intervals, and nothing speaks against it.
     moving: whether the arm was seen to move in the last half second: a standing arm cannot tell an inertia.
     settling: whether the payload changed so shortly ago that phi is still what was known beforehand.
     event: the last change of payload noticed, if any.
@@ -43,6 +46,8 @@ class OnlineEstimate(Estimate):
     method: str
     determined: NDArray[np.bool_]
     held: bool
+    around: NDArray[np.float64]
+    before: Before
     calibrated: bool
     moving: bool
     settling: bool
@@ -68,23 +73,32 @@ class OnlineEstimate(Estimate):
 
     @property
     def low(self) -> NDArray[np.float64]:
-        """Lower ends (10,) of the 95 % intervals."""
-        return self.phi - Z95 * self.std
+        """Lower ends (10,) of the 95 % intervals; of what is not determined, of what was known before."""
+        return self._ends[0]
 
     @property
     def high(self) -> NDArray[np.float64]:
-        """Upper ends (10,) of the 95 % intervals."""
-        return self.phi + Z95 * self.std
+        """Upper ends (10,) of the 95 % intervals; of what is not determined, of what was known before."""
+        return self._ends[1]
+
+    @property
+    def _ends(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        return phi_interval(self.phi, self.around, self.std, self.determined, self.before)
+
+    @property
+    def interval(self) -> str:
+        """ "calibrated" or "approximate"; of what no body can be it is never calibrated."""
+        return "calibrated" if self.calibrated and is_consistent(self.phi) else "approximate"
 
     def to_dict(self) -> dict[str, Any]:
         """One JSON object, its names those of `armload identify --json` where they mean the same.
 
-        Intervals are the method's own, also of what is not determined: there `identify` gives the prior's. Numbers are
-        finite: the end of an interval of which the method knows nothing is null, and so are the centre of mass and the
-        inertia about it where there is no mass.
+        Numbers are finite: the end of an interval of which the method knows nothing is null, and so are the centre of
+        mass and the inertia about it where there is no mass.
         """
         mass = float(self.phi[0])
         com, inertia_com = (None, None) if mass == 0.0 else (x.tolist() for x in phi_to_com(self.phi)[1:])
+        low, high = self._ends
         return {
             "t": self.t,
             "method": self.method,
@@ -95,9 +109,9 @@ class OnlineEstimate(Estimate):
             "lag": self.lag,
             "since": self.since,
             "phi": self.phi.tolist(),
-            "phi_low": _finite(self.low),
-            "phi_high": _finite(self.high),
-            "interval": "calibrated" if self.calibrated else "approximate",
+            "phi_low": _finite(low),
+            "phi_high": _finite(high),
+            "interval": self.interval,
             "determined": self.determined.tolist(),
             "mass": mass,
             "com": com,

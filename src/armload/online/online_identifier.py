@@ -14,13 +14,15 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.estimators import Estimate, Identifier
 from armload.identification.answer import body_of
 from armload.identification.choice import choose
-from armload.inertia import determined, held
+from armload.identification.identify_log import NO_BODY
+from armload.identification.intervals import Before
+from armload.identification.thresholds import MISFIT
+from armload.inertia import determined, distance_to_body, held
 from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
 from armload.online.gate import Gate, Health, all_finite
@@ -70,9 +72,8 @@ class OnlineIdentifier:
         self._weak = payload_prior_std(arm)
         self._step = MassStep(float(self._weak[0]))
         known = first.payload_prior
-        self._before: NDArray | None = None
-        if choice.prior:
-            self._before = self._weak if known is None else known[1]
+        mean, std = (np.zeros(10), self._weak) if known is None else known
+        self._before = Before(mean, std, choice.prior)
         self.reset()
 
     @property
@@ -123,9 +124,13 @@ class OnlineIdentifier:
         self._published = -np.inf
         self._event: Event | None = None
         self._estimate = self._nothing()
+        self._around, self._doubted = self._estimate.phi, False  # where the intervals are; what `conclude` found
         self._source: Identifier | None = None  # the run it is of
         self._determined, self._held = np.zeros(10, dtype=bool), False
         self._notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"<OnlineIdentifier {self.method} for {self.arm.name} about {self.arm.frame}>"
 
     def update(self, t: Any, q: Any, dq: Any, tau: Any) -> OnlineEstimate:
         """Take one sample and say what is known; a sample that cannot be right is counted and left out.
@@ -160,7 +165,11 @@ class OnlineIdentifier:
                 self._told = self._internal
                 self._judge(estimate, run, False)
                 self._estimate = replace(estimate, phi=body_of(estimate, bool(self._determined[0])))
-                self._source = run
+                self._source, self._around = run, estimate.phi
+                said, covariance = run.unprojected or (estimate.phi, estimate.covariance)
+                self._doubted = distance_to_body(said, covariance) > MISFIT
+                if self._doubted:
+                    self._notes = (*self._notes, NO_BODY)
         return self._said()
 
     def close(self) -> None:
@@ -223,7 +232,7 @@ class OnlineIdentifier:
         if fresh:
             self._published = sample.t
             self._judge(estimate, run, stands)
-        self._estimate, self._source = estimate, run
+        self._estimate, self._source, self._around, self._doubted = estimate, run, estimate.phi, False
 
     def _counted(self, sample: Sample, run: Identifier) -> bool:
         """Remember how old the answer is; whether what was seen lately told it nothing, as the arm stands."""
@@ -252,18 +261,19 @@ class OnlineIdentifier:
         if self._watch.settling:
             self._since = self._stream.clock
             self._estimate, self._source, self._told = self._nothing(), None, -np.inf
+            self._around, self._doubted = self._estimate.phi, False
             self._stream.forget_pauses()
             self._determined, self._held, self._notes = np.zeros(10, dtype=bool), False, ("the payload has changed",)
 
     def _nothing(self) -> Estimate:
         """What is known beforehand."""
-        mean, std = (np.zeros(10), self._weak) if self.engine.payload_prior is None else self.engine.payload_prior
+        mean, std, _ = self._before
         return Estimate(0.0, mean, np.diag(std**2), 0, str(self.arm.frame))
 
     def _judge(self, estimate: Estimate, run: Identifier, stands: bool) -> None:
         """What the data determine, and whether anything is there."""
-        std = estimate.std
-        self._determined = determined(std, self._before, run.weak_std, self._weak)
+        std, before = estimate.std, self._before
+        self._determined = determined(std, before.std if before.used else None, run.weak_std, self._weak)
         self._held = held(float(estimate.phi[0]), float(std[0]), bool(self._determined[0]))
         notes = []
         if not self._moving:
@@ -290,7 +300,9 @@ class OnlineIdentifier:
                 "method": self.method,
                 "determined": self._determined,
                 "held": self._held,
-                "calibrated": engine.calibrated,
+                "around": self._around,
+                "before": self._before,
+                "calibrated": engine.calibrated and not self._doubted,
                 "moving": self._moving,
                 "settling": watch is not None and watch.settling,
                 "event": self._event,

@@ -7,11 +7,12 @@ from armload.payloads.container import container, container_loadings, test_paylo
 from armload.payloads.families import FAMILIES, draw_payload, random_payload, random_payloads
 from armload.payloads.hand import franka_hand, hand_on
 from armload.payloads.mesh import from_mesh
-from armload.payloads.payload import Box, Payload
+from armload.payloads.payload import INERTIA_ASSUMED, Box, Payload
 from armload.payloads.payload_file import read_payload, write_payload
 
 __all__ = [
     "FAMILIES",
+    "INERTIA_ASSUMED",
     "Box",
     "Payload",
     "container",

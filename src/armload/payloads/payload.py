@@ -6,10 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from armload.errors import PayloadError
 from armload.inertia import InertialParameters, is_consistent
 from armload.payloads import solids
+
+_WATER = 1000.0  # [kg/m³]
+INERTIA_ASSUMED = "its inertia is not given, a ball's as dense as water about its centre of mass is taken"
 
 
 @dataclass(frozen=True)
@@ -64,6 +68,7 @@ class Payload:
         name: what to call it in tables.
         parameters: phi about the origin and in the axes of the arm's payload frame.
         boxes: what it looks like, if known; pictures only, the parameters are what counts.
+        inertia_known: False where only mass and centre of mass are known, and the inertia is `without_inertia`'s.
 
     Raises:
         PayloadError: no body can have these parameters.
@@ -72,6 +77,7 @@ class Payload:
     name: str
     parameters: InertialParameters
     boxes: tuple[Box, ...] = ()
+    inertia_known: bool = True
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "boxes", tuple(self.boxes))
@@ -83,6 +89,21 @@ class Payload:
         if not boxes:
             raise PayloadError(f"payload {name!r} is made of no boxes: expected at least one")
         return cls(name, solids.compose((b.parameters for b in boxes), frame), tuple(boxes))
+
+    @classmethod
+    def without_inertia(cls, name: str, mass: float, com: ArrayLike, frame: str | None = None) -> Payload:
+        """Mass [kg] and centre of mass (3,) [m] alone: the inertia about it is taken to be a ball's, as dense as water.
+
+        I = ⅖·m·R², R = (3·m / (4π·ρ))^⅓: about the least that something solid of the mass can have.
+
+        >>> tool = Payload.without_inertia("tool", 0.73, (0.0, 0.0, 0.03))
+        >>> round(1e3 * float(tool.parameters.inertia_com[0, 0]), 3), tool.inertia_known
+        (0.909, False)
+        """
+        mass = solids.positive(mass, "mass of the payload")
+        radius = (3.0 * mass / (4.0 * np.pi * _WATER)) ** (1.0 / 3.0)
+        ball = 0.4 * mass * radius**2 * np.eye(3)
+        return cls(name, InertialParameters.from_com(mass, com, ball, frame), inertia_known=False)
 
     def __str__(self) -> str:
         return f"{self.name}: {self.parameters}"

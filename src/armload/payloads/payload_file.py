@@ -6,13 +6,15 @@
      "boxes": [{"size": [x, y, z], "centre": [x, y, z], "mass": 0.73}]}
 
 phi or the three (mass, com, inertia_com) are enough, SI units; phi is about the frame's origin, inertia_com about the
-centre of mass. Everything else is optional and unknown keys are ignored, so that the JSON result of an identification
+centre of mass. Of what only mass and com are known, the inertia is assumed (`Payload.without_inertia`), and users of it
+say so. Everything else is optional and unknown keys are ignored, so that the JSON result of an identification
 reads as the payload it found.
 """
 
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +48,9 @@ def payload_from(content: dict[str, Any], path: str | Path) -> Payload:
     """The payload in the content of a file (`read_content`), for those who read more of it; path: for the errors."""
     path = Path(path)
     try:
+        given = {key for key in ("phi", *_TRIPLE) if content.get(key) is not None}
+        if given == {"mass", "com"}:
+            return _without_inertia(content, path)
         parameters = _parameters(content, path)
         require_consistent(parameters, f"the payload in {path}")
         reach = _gyration(parameters) if parameters.mass > _LIGHT else 0.0
@@ -61,8 +66,21 @@ def payload_from(content: dict[str, Any], path: str | Path) -> Payload:
         raise PayloadError(f"payload file {path}: {error}") from None
 
 
+def _without_inertia(content: dict[str, Any], path: Path) -> Payload:
+    mass, com = _numbers(content["mass"], (), "mass", path), _numbers(content["com"], (3,), "com", path)
+    _require_metres(com, path)
+    if not mass > 0:
+        raise PayloadError(f"the payload in {path} has a mass of {float(mass):g} kg: expected a mass above 0")
+    made = Payload.without_inertia(
+        _text(content, "name", path) or path.stem, float(mass), com, _text(content, "frame", path)
+    )
+    return replace(made, boxes=_boxes(content, path))
+
+
 def write_payload(path: str | Path, payload: Payload) -> None:
     """Write a payload as JSON, complete or not at all; `read_payload` gives back the same phi to the last bit.
+
+    Of one whose inertia is not known only mass and centre of mass are written: an assumption is no knowledge.
 
     Raises:
         PayloadError: the file cannot be written.
@@ -77,6 +95,8 @@ def write_payload(path: str | Path, payload: Payload) -> None:
     }
     if p.mass > 0:  # nothing at all has no centre of mass
         content |= {"com": p.com.tolist(), "inertia_com": p.inertia_com.tolist()}
+    if not payload.inertia_known:
+        del content["phi"], content["inertia_com"]
     if payload.boxes:
         content["boxes"] = [{"size": b.size, "centre": b.centre, "mass": b.mass} for b in payload.boxes]
     try:
@@ -129,20 +149,25 @@ def _parameters(content: dict[str, Any], path: Path) -> InertialParameters:
         if from_triple is None:
             found = ", ".join(map(str, content)) or "no keys at all"
             raise PayloadError(
-                f"payload file {path} lacks {' and '.join(missing)} (found: {found}): expected phi, or mass, com and "
-                "inertia_com"
+                f"payload file {path} lacks {' and '.join(missing)} (found: {found}): expected phi, or mass and "
+                "com, with inertia_com where it is known"
             )
         parameters = from_triple
     else:
         parameters = InertialParameters(_numbers(content["phi"], (10,), "phi", path), frame)
         if from_triple is not None and parameters.mass > 0:
             _require_agreement(parameters, from_triple, path)
-    if parameters.mass > 0 and np.linalg.norm(parameters.com) > _FARTHEST:
+    if parameters.mass > 0:
+        _require_metres(parameters.com, path)
+    return parameters
+
+
+def _require_metres(com: NDArray[np.float64], path: Path) -> None:
+    if np.linalg.norm(com) > _FARTHEST:
         raise PayloadError(
-            f"payload file {path} puts the centre of mass {np.linalg.norm(parameters.com):.3g} m from the frame: "
+            f"payload file {path} puts the centre of mass {np.linalg.norm(com):.3g} m from the frame: "
             "expected metres; is it in millimetres?"
         )
-    return parameters
 
 
 def _gyration(parameters: InertialParameters) -> float:

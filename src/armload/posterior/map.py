@@ -197,6 +197,17 @@ class PosteriorLeastSquares(Identifier):
         return self.stream.posterior
 
     @property
+    def known_arm_std(self) -> NDArray[np.float64] | None:
+        """Standard deviation (10,) of the last solution under the weak prior, were the arm known exactly.
+
+        (Σ_j ∫ W_jᵀ·W_j dt / S_j + diag(weak)⁻²)⁻¹: noise alone is left of what the rows do not fit.
+        """
+        if not self._count:
+            return None
+        unit = self._weak[:, None] * self.stream.information_of_known_arm * self._weak
+        return self._weak * np.sqrt(np.diag(np.linalg.inv(np.eye(10) + unit)))
+
+    @property
     def mismatch(self) -> ArmMismatch | None:
         """The side the torque seems to be measured on, and the arm's offsets, by the last solution."""
         return ArmMismatch(self.posterior.torque, self.posterior.ratios["offset"]) if self._count else None

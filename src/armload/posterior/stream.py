@@ -161,6 +161,11 @@ class StreamingPosterior:
         return self._current.information
 
     @property
+    def information_of_known_arm(self) -> NDArray[np.float64]:
+        """Λ (10, 10) of the run's accumulated rows, were nothing of the arm unknown: Σ_j ∫ W_jᵀ·W_j dt / S_j."""
+        return np.einsum("jab,j->ab", self._run.A[:, :10, :10], 1.0 / self.posterior.scales.noise[-1])
+
+    @property
     def vector(self) -> NDArray[np.float64]:
         """Λ·phi_ML (10,)."""
         return self._current.vector

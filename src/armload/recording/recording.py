@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from html import escape
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +27,7 @@ class Sample(NamedTuple):
     tau: NDArray[np.float64]  # (n,) [N·m]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Recording:
     """Joint position, velocity and torque over time.
 
@@ -85,6 +86,23 @@ class Recording:
                 f"{self.source}: time goes from {self.t[k]:.6f} s to {self.t[k + 1]:.6f} s at row {k + 1}: expected "
                 "strictly increasing times; sort the log or drop repeated rows"
             )
+
+    def __repr__(self) -> str:
+        return (
+            f"<Recording: {self.source}, {self.n} joints, {len(self)} samples, {self.duration:.2f} s, "
+            f"{self.rate:.4g} Hz, {self.channel} torque>"
+        )
+
+    def _repr_html_(self) -> str:
+        """A small table for notebooks: range of each joint's position, velocity and torque."""
+        names = self.joint_names or [str(j + 1) for j in range(self.n)]
+        heads = ("joint", "q [rad]", "dq [rad/s]", "tau [N·m]")
+        rows = ["".join(f"<th>{head}</th>" for head in heads)]
+        for j, name in enumerate(names):
+            spans = (f"{x[:, j].min():.3g} … {x[:, j].max():.3g}" for x in (self.q, self.dq, self.tau))
+            rows.append("".join(f"<td>{escape(str(cell))}</td>" for cell in (name, *spans)))
+        caption = escape(repr(self).strip("<>"))
+        return f"<table><caption>{caption}</caption>{''.join(f'<tr>{row}</tr>' for row in rows)}</table>"
 
     def __len__(self) -> int:
         return len(self.t)

@@ -6,6 +6,7 @@ import argparse
 from importlib import resources
 from typing import TYPE_CHECKING, NoReturn
 
+from armload.app.cli.printing import print_note
 from armload.errors import UsageError
 
 if TYPE_CHECKING:
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from armload.inertia import InertialParameters
     from armload.lab.dataset import Dataset
     from armload.motion import Motion
+    from armload.payloads import Payload
     from armload.simulation import World
 
 # options whose value may begin with a minus sign: argparse would take "-1,0,-9.7" for an option
@@ -165,13 +167,23 @@ def arm_of_dataset(dataset: Dataset, robot: str | None) -> Arm:
     return made_with
 
 
-def payload_of(name: str, arm: Arm | None = None) -> InertialParameters:
-    """The parameters of a payload file, or of a built-in one by name; the hand is about the arm's own flange."""
+def payload_named(name: str, arm: Arm | None = None) -> Payload:
+    """A payload file, or a built-in payload by name; the hand is about the arm's own flange."""
     from armload.payloads import franka_hand, hand_on, read_payload, test_payload
 
     if name == "franka-hand":
-        return (franka_hand() if arm is None else hand_on(arm)).parameters
-    return (test_payload() if name == "test" else read_payload(name)).parameters
+        return franka_hand() if arm is None else hand_on(arm)
+    return test_payload() if name == "test" else read_payload(name)
+
+
+def payload_of(name: str, arm: Arm | None = None) -> InertialParameters:
+    """Its parameters; a note says so where the inertia among them is an assumption."""
+    from armload.payloads import INERTIA_ASSUMED
+
+    payload = payload_named(name, arm)
+    if not payload.inertia_known:
+        print_note(f"{name}: {INERTIA_ASSUMED}")
+    return payload.parameters
 
 
 def motion_of(name: str, arm: Arm) -> Motion:

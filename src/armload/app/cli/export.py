@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from armload.app.cli.arguments import Parser, file_name, payload_of
@@ -11,10 +12,11 @@ from armload.app.cli.printing import print_note
 if TYPE_CHECKING:
     from armload.arms import Arm
     from armload.devices import Load
+    from armload.errors import SinkError
     from armload.inertia import InertialParameters
 
 # the names of armload.devices.FORMS, so that --help need not import them; a test compares
-_FORMS = ("franka", "franka-desk", "ur", "ur-payload", "urdf", "mjcf", "sdf", "ros2")
+FORMS = ("franka", "franka-desk", "ur", "ur-payload", "urdf", "mjcf", "sdf", "ros2")
 _EXAMPLES = """\
 examples:
   armload identify run.csv --robot panda --json > held.json
@@ -49,7 +51,7 @@ def parser() -> Parser:
         metavar="RESULT",
         help="what `armload identify --json` printed, a payload file, or franka-hand",
     )
-    add("--to", required=True, choices=_FORMS, metavar="FORM", help=", ".join(_FORMS))
+    add("--to", required=True, choices=FORMS, metavar="FORM", help=", ".join(FORMS))
     add("--out", type=file_name, metavar="FILE", help="write a file instead of printing")
     add(
         "--minus",
@@ -77,9 +79,7 @@ def run(options: argparse.Namespace) -> None:
     """Read, combine, move, write."""
     from armload.arms import ARMS
     from armload.arms import arm as arm_named
-    from armload.devices import CONTROLLERS, Load, export_load, read_load
-    from armload.errors import SinkError
-    from armload.inertia import held
+    from armload.devices import Load, read_load
 
     arm = None if options.robot is None else arm_named(options.robot, options.frame)
     built_in = options.result in ("franka-hand", "test")
@@ -91,38 +91,69 @@ def run(options: argparse.Namespace) -> None:
         load = load - _part(part, load, arm)
     for part in options.plus:
         load = load + _part(part, load, arm)
+    write(load, options.to, options.out, arm, options.frame, options.name, doubts)
+
+
+def write(
+    load: Load,
+    to: str,
+    out: str | None = None,
+    arm: Arm | None = None,
+    frame: str | None = None,
+    name: str = "payload",
+    doubts: Sequence[str] = (),
+    told: Sequence[str] = (),
+) -> None:
+    """Write a load in a form, to a file or to stdout, about the frame asked for, else the one the form wants.
+
+    doubts: notes to print beside those on the load. told: notes of its identification, which say already what was not
+    determined and what rests on the prior.
+
+    Raises:
+        SinkError: the form's frame is not known, or no body has the load's parameters and a mass above 0.
+    """
+    from armload.devices import CONTROLLERS, export_load
+    from armload.inertia import held
+
     nothing = load.std is not None and load.determined[0] and not held(load.parameters.mass, load.std[0], True)
-    frame = options.frame
-    if frame is None and arm is not None:
+    about = frame
+    if about is None and arm is not None:
         # a load about a flange that the arm knows by another name stays as it is
         on_flange = load.frame is not None and load.frame not in arm.frames and _is_flange(load.frame)
-        if load.frame is None or (options.to in CONTROLLERS and not on_flange):
-            frame = arm.frame
-    load = load.about(frame, arm)
-    elsewhere = options.to in CONTROLLERS and load.frame is not None and not _is_flange(load.frame)
-    if elsewhere and options.frame is None:
-        flanges = ", ".join(sorted({facts.flange for facts in ARMS.values()}))
-        raise SinkError(
-            f"the payload is about {load.frame!r} and a controller counts from its flange ({flanges}): "
-            "name the arm and its flange with --robot FILE.urdf --frame FLANGE"
-        )
+        if load.frame is None or (to in CONTROLLERS and not on_flange):
+            about = arm.frame
+    load = load.about(about, arm)
+    elsewhere = to in CONTROLLERS and load.frame is not None and not _is_flange(load.frame)
+    if elsewhere and frame is None:
+        raise _no_flange(load)
     body = load.as_body()
     if body is not load:
         print_note(
             "no body has the parameters that are left: the nearest one is written, with a mass of "
             f"{body.parameters.mass:.4f} kg instead of {load.parameters.mass:.4f} kg"
         )
-    text = export_load(body, options.to, options.out, options.name)
+    text = export_load(body, to, out, name)
     if nothing:
         print_note("nothing seems to be held: the mass is within three standard deviations of zero")
     if elsewhere:
         print_note(f"a controller counts from its flange; these numbers are about {load.frame}, as was asked for")
-    for note in (*doubts, *_notes(body, options.to)):
+    for note in (*told, *doubts, *([] if told else _on_numbers(body)), *_on_use(body, to)):
         print_note(note)
-    if options.out is None:
+    if out is None:
         print(text, end="")
     else:
-        print_note(f"{options.out}: {'; '.join(body.description())}")
+        print_note(f"{out}: {'; '.join(body.description())}")
+
+
+def _no_flange(load: Load) -> SinkError:
+    from armload.arms import ARMS
+    from armload.errors import SinkError
+
+    flanges = ", ".join(sorted({facts.flange for facts in ARMS.values()}))
+    return SinkError(
+        f"the payload is about {load.frame!r} and a controller counts from its flange ({flanges}): "
+        "name the arm and its flange with --robot FILE.urdf --frame FLANGE"
+    )
 
 
 def _is_flange(frame: str) -> bool:
@@ -154,13 +185,18 @@ def _doubts(parts: list[str], load: Load) -> list[str]:
     return doubts
 
 
-def _notes(load: Load, to: str) -> list[str]:
+def _on_numbers(load: Load) -> list[str]:
+    """What the numbers rest on."""
+    missing = ", ".join(load.undetermined)
+    return [*([f"not determined by the log: {missing}; written as known beforehand"] if missing else []), *load.remarks]
+
+
+def _on_use(load: Load, to: str) -> list[str]:
+    """What to see to where they are used."""
     from armload.arms import ARMS
     from armload.devices import CONTROLLERS
 
     notes = []
-    if load.undetermined:
-        notes.append(f"not determined by the log: {', '.join(load.undetermined)}; written as known beforehand")
     facts = ARMS.get(load.robot or "")
     if facts is not None and to in CONTROLLERS and not (facts.controller and to.startswith(facts.controller)):
         notes.append(f"it was identified on a {load.robot}: another maker's flange may have other axes")

@@ -13,13 +13,27 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table as RichTable
 
-    from armload.identification import Identification
     from armload.lab.evaluation import Table
 
 
 def print_json(value: dict[str, Any]) -> None:
     """One JSON object on one line; a number that is not finite is a bug and raises ValueError."""
     print(json.dumps(value, allow_nan=False))
+
+
+def write_json(path: str, value: dict[str, Any]) -> None:
+    """One JSON object in a file that appears whole or not at all; UsageError where it cannot be written."""
+    from armload.atomic import replacing
+    from armload.errors import UsageError
+
+    text = json.dumps(value, allow_nan=False) + "\n"
+    try:
+        with replacing(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise UsageError(
+            f"{path} cannot be written: {error.strerror or error}; name a file in a folder you can write to"
+        ) from None
 
 
 def finite(value: Any) -> Any:
@@ -69,44 +83,11 @@ def console() -> Console:
 
 def print_table(result: Table) -> None:
     """A table of the evaluation, baselines set apart, and below it what it rests on."""
+    from rich.markup import escape
+
     rows = table(result.title, *result.columns)
     for k, cells in enumerate(result.rows):
-        rows.add_row(*cells, end_section=k + 1 in result.baselines and k not in result.baselines)
+        rows.add_row(*map(escape, cells), end_section=k + 1 in result.baselines and k not in result.baselines)
     out = console()
     out.print(rows)
     out.print(result.note, markup=False)
-
-
-def print_identification(result: Identification) -> None:
-    """The ten parameters with their intervals, the body they make, and why this method was taken."""
-    from armload.inertia import NAMES, UNITS
-
-    out = console()
-    rows = table(
-        f"{result.robot}: payload about {result.frame}, relative to the {result.relative_to}",
-        "parameter",
-        "unit",
-        "value",
-        "95 % low",
-        "95 % high",
-        "",
-        left=2,
-    )
-    for name, unit, value, low, high, known in zip(
-        NAMES, UNITS, result.phi, result.phi_low, result.phi_high, result.determined, strict=True
-    ):
-        rows.add_row(name, unit, f"{value:+.5f}", f"{low:+.5f}", f"{high:+.5f}", "" if known else "undetermined")
-    out.print(rows)
-    com = ", ".join(f"{1000 * x:+.1f}" for x in result.com)
-    moments = ", ".join(f"{result.inertia_com[k][k]:.6f}" for k in range(3))
-    lines = [f"mass {result.mass:.4f} kg, centre of mass ({com}) mm"]
-    lines.append(f"inertia about the centre of mass (Ixx, Iyy, Izz) = ({moments}) kg·m²")
-    if not result.consistent:
-        lines.append("no body can have these parameters")
-    if not result.held:
-        lines.append(result.why_not_held)
-    lines.append(
-        f"method {result.method}: {result.why}; intervals are {result.interval}; {result.n_samples} samples, "
-        f"{result.duration:.2f} s"
-    )
-    out.print("\n".join(lines), markup=False)

@@ -64,40 +64,42 @@ def run(options: argparse.Namespace) -> None:
         raise UsageError("the following arguments are required: --robot; see 'armload report --help'")
     with working("reading") as say:
         sections, title = (_of_log if options.dataset is None else _of_dataset)(options, say)
+        say("drawing and writing")
         write_report(options.out, sections, title)
-    for table in sections[0].tables:
+    first = sections[: 1 if options.log is None else 2]  # of a log, the answer and the table of all methods
+    for table in (table for section in first for table in section.tables):
         print_table(table)
     print(f"wrote {options.out}")
 
 
 def _of_log(options: argparse.Namespace, say: Callable[[str], None]) -> tuple[list[Section], str]:
-    from armload.identification import check_plausible
+    from armload.identification import identify
     from armload.lab.evaluation import EvaluationRun, compare
-    from armload.lab.report import default_report, log_report
+    from armload.lab.report import answer_section, default_report, log_report
     from armload.recording import read_recording
 
     arm = arm_of(options)
     truth = None if options.truth is None else arm.in_frame(payload_of(options.truth, arm))
     log = read_recording(options.log, arm, topic=options.topic)
     tare = None if options.tare is None else read_recording(options.tare, arm, topic=options.topic)
-    for recording in (log, tare):
-        if recording is not None:
-            check_plausible(recording, arm)
-            for note in recording.notes:
-                print_note(note)
+    say("identifying")
+    found = identify(log, arm, tare=tare)
+    for note in found.notes:
+        print_note(note)
+    answer = answer_section(found, truth)
     methods, title = _methods(arm, log, options.model), f"{Path(options.log).name} on {arm.name}"
     about = f"The log `{options.log}`" + (
         f", relative to what was mounted in the tare `{options.tare}`." if tare else ", without a tare."
     )
     if truth is None:
         traces = {}
-        for name, make in methods.items():
-            say(name)
+        for k, (name, make) in enumerate(methods.items(), start=1):
+            say(f"{name}, method {k} of {len(methods)}")
             traces[name] = make(tare).trace(log, every=max(1, len(log) // _POINTS))
-        return log_report(log, arm, traces, introduction=about), title
+        return [answer, *log_report(log, arm, traces, introduction=about)], title
     runs = [EvaluationRun(log, truth, Path(options.log).name, tare)]
     comparison = compare(methods, runs, split="the log is in nobody's training, as far as known", progress=say)
-    return default_report(comparison, runs, arm, introduction=about), title
+    return [answer, *default_report(comparison, runs, arm, introduction=about)], title
 
 
 def _of_dataset(options: argparse.Namespace, say: Callable[[str], None]) -> tuple[list[Section], str]:

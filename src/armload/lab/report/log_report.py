@@ -35,7 +35,7 @@ def log_report(
     """
     where = f"{arm.name}, about {arm.frame}; {len(recording)} samples, {recording.duration:.2f} s."
     return [
-        Section("Summary", introduction, (_table(traces, where),)),
+        Section("Every method", introduction, (_table(traces, where),)),
         Section(
             "Estimates over time",
             "Bands are the 95 % intervals the methods themselves state. No truth is known: methods that agree may "
@@ -87,11 +87,11 @@ def over_time(traces: Mapping[str, Sequence[Estimate]], part: slice) -> Figure:
 
 
 def _table(traces: Mapping[str, Sequence[Estimate]], where: str) -> Table:
+    """A row for each parameter, a column for each method: as many as there are fit beside each other."""
     rows = []
-    for method, trace in traces.items():
-        last = trace[-1]
-        half = Z95 * last.std
-        cells = (f"{v:+.4f} ± {h:.4f}" if np.isfinite(h) else f"{v:+.4f}" for v, h in zip(last.phi, half, strict=True))
-        rows.append((method, *cells))
-    columns = ("method", *(f"{name} [{unit}]" for name, unit in zip(NAMES, UNITS, strict=True)))
-    return Table("Estimates at the end", columns, tuple(rows), f"± is half of the method's own 95 % interval. {where}")
+    for k, (name, unit) in enumerate(zip(NAMES, UNITS, strict=True)):
+        last = [(float(trace[-1].phi[k]), Z95 * float(trace[-1].std[k])) for trace in traces.values()]
+        cells = (f"{value:+.4f} ± {half:.4f}" if np.isfinite(half) else f"{value:+.4f}" for value, half in last)
+        rows.append((f"{name} [{unit}]", *cells))
+    note = f"± is half of the method's own 95 % interval. {where}"
+    return Table("Estimates at the end", ("parameter", *traces), tuple(rows), note)

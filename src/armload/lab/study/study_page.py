@@ -60,6 +60,11 @@ links, friction, offsets and a smooth residual. Where a log of a real unloaded P
 the test payload's torque added. Read "real robot" in a claim as the paper's, "real-like" as ours."""
 
 
+_QUICK = """**This was a quick run: its verdicts mean nothing.** It goes through every table at a small part of the
+size, with ensembles hardly trained: it shows that the study runs, not what is true. Run `armload reproduce taie2024`
+without `--quick` for numbers."""
+
+
 def sections(cells: Cells, claims: Sequence[dict[str, Any]], figures: dict[int, Figure] | None = None) -> list[Section]:
     """The study as sections for `write_report`; without figures for Markdown."""
     drawn = figures or {}
@@ -80,24 +85,28 @@ def sections(cells: Cells, claims: Sequence[dict[str, Any]], figures: dict[int, 
     ]
 
 
-def write_page(cells: Cells, claims: Sequence[dict[str, Any]], path: str | Path) -> Path:
+def write_page(cells: Cells, claims: Sequence[dict[str, Any]], path: str | Path, quick: bool = False) -> Path:
     """Write the study as Markdown (docs/paper.md); the file appears whole or not at all.
 
     Args:
         cells: finished cells by name. claims: `evaluate(cells)`. path: the file; its folder must exist.
+        quick: whether the cells are of reduced size.
 
     Raises:
         ReportError: the file cannot be written.
     """
-    note = f"Written by `{COMMAND}`; every measured number on this page comes from its cells."
-    return write_markdown(path, sections(cells, claims), TITLE, note)
+    note = (
+        f"Written by `{COMMAND}{' --quick' if quick else ''}`; every measured number on this page comes from its cells."
+    )
+    return write_markdown(path, sections(cells, claims), TITLE, f"{_QUICK}\n\n{note}" if quick else note)
 
 
-def html_report(cells: Cells, claims: Sequence[dict[str, Any]], path: str | Path) -> Path:
+def html_report(cells: Cells, claims: Sequence[dict[str, Any]], path: str | Path, quick: bool = False) -> Path:
     """Write the study as one HTML file with Fig. 4 to 8; raises `ReportError` if it cannot be written."""
     from armload.lab.study.paper_figures import figures
 
-    return write_report(path, sections(cells, claims, figures(cells)), TITLE)
+    first = [Section("A quick run", _QUICK)] if quick else []
+    return write_report(path, [*first, *sections(cells, claims, figures(cells))], TITLE)
 
 
 def summary_json(cells: Cells, claims: Sequence[dict[str, Any]]) -> dict[str, Any]:

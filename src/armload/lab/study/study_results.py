@@ -9,12 +9,15 @@ from armload.lab.study.claims import evaluate
 from armload.lab.study.study_page import html_report, summary_json, write_page
 
 
-def write_results(cells: Cells, summary: str | Path, page: str | Path, report: str | Path) -> dict[str, Path]:
+def write_results(
+    cells: Cells, summary: str | Path, page: str | Path, report: str | Path, quick: bool = False
+) -> dict[str, Path]:
     """Write the summary (JSON), the page (Markdown) and the report (HTML); each appears whole or not at all.
 
     Args:
         cells: finished cells by name (`run_study`, `load_cells`).
         summary, page, report: the files to write; folders are made.
+        quick: whether the cells are of reduced size, so that page and report say first that verdicts mean nothing.
 
     Returns:
         what was written, by what it is.
@@ -24,6 +27,6 @@ def write_results(cells: Cells, summary: str | Path, page: str | Path, report: s
         path.parent.mkdir(parents=True, exist_ok=True)
     claims = evaluate(cells)
     write_json(written["summary"], summary_json(cells, claims))
-    write_page(cells, claims, written["page"])
-    html_report(cells, claims, written["report"])
+    write_page(cells, claims, written["page"], quick)
+    html_report(cells, claims, written["report"], quick)
     return written

@@ -1,0 +1,67 @@
+"""What is said beside an answer: what is missing, a tare or another motion, and what rests on the prior."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm
+from armload.identification.thresholds import KNOWN, NOMINAL
+from armload.inertia import NAMES, SHRINK
+
+RECORD = "record the arm as it is, without the payload, on any motion of 20 s, and name the log with --tare"
+
+
+def lacking(
+    arm: Arm,
+    tared: bool,
+    determined: NDArray[np.bool_],
+    known_arm_std: NDArray[np.float64] | None,
+    weak_std: NDArray[np.float64],
+) -> list[str]:
+    """What to do about what the log does not determine, the first thing first.
+
+    Args:
+        tared: whether there was a tare. determined: which parameters (10,) the log determines.
+        known_arm_std: standard deviation (10,), were the arm known exactly: a tare can tell no more. None: not known.
+        weak_std: standard deviation (10,) before the log.
+    """
+    said = []
+    nominal = not tared and arm.link_spread >= NOMINAL
+    if nominal:
+        said.append(
+            f"record a tare: the figures of this arm's links are nominal, and their errors count as payload ({RECORD})"
+        )
+    missing = ~determined
+    if known_arm_std is None or tared:
+        if missing.any():
+            said.append(f"this motion does not determine {_names(missing)}: what was known before is reported for them")
+        return said
+    hidden = missing & (known_arm_std <= KNOWN * weak_std / SHRINK)
+    still = missing & ~hidden
+    if hidden.any():
+        record = "a tare" if nominal else f"a tare ({RECORD})"
+        said.append(
+            f"errors of the arm's model hide {_names(hidden)} from this log: {record} is missing, or a faster motion "
+            "of the wrist; what was known before is reported for them"
+        )
+    if still.any():
+        said.append(
+            f"this motion does not determine {_names(still)}, with a tare or without: move the wrist faster and "
+            "further; what was known before is reported for them"
+        )
+    return said
+
+
+def leaning_on_prior(leaning: NDArray[np.bool_]) -> list[str]:
+    """That the intervals of some parameters (10,) rest on a learned prior."""
+    if not leaning.any():
+        return []
+    return [
+        f"the intervals of {_names(leaning)} rest on what payloads are usually like more than on this log: of "
+        "something wide and thin (a tray, a frame) believe --method map-gp instead"
+    ]
+
+
+def _names(which: NDArray[np.bool_]) -> str:
+    return ", ".join(name for name, one in zip(NAMES, which, strict=True) if one)
