@@ -4,12 +4,12 @@ Links that work in the repository work in the site: a page that is named is link
 """
 
 import html
-import os
 import posixpath
 import re
 from pathlib import Path
 
 import griffe
+from docstrings import Shown
 from latex2mathml.converter import convert
 from mkdocs.structure.files import File
 from notebook import run
@@ -40,11 +40,13 @@ def on_files(files, config):
 
 def on_page_markdown(markdown, page, config, files):
     """Links as the site needs them, and fences without the marks of the tests."""
-    home = posixpath.dirname(_home.get(page.file.src_uri, f"docs/{page.file.src_uri}"))
+    source = _home.get(page.file.src_uri, f"docs/{page.file.src_uri}")
+    home = posixpath.dirname(source)
+    pages = PAGES if source == NOTEBOOK else PAGES | {NOTEBOOK: "tutorial.md"}
 
     def target(match):
         path = posixpath.normpath(posixpath.join(home, match[2]))
-        there = PAGES.get(path) or ("tutorial.md" if path == NOTEBOOK else path.removeprefix("docs/"))
+        there = pages.get(path) or path.removeprefix("docs/")
         if there == path and (ROOT / path).is_file():  # a file of the repository that is no page
             there = f"files/{path}"
             if files.get_file_from_path(there) is None:
@@ -60,7 +62,9 @@ def on_page_content(content, **_):
     """Formulas as MathML, which browsers show by themselves."""
 
     def formula(match):
-        return convert(html.unescape(match[2]), display="block" if match[1] == "div" else "inline")
+        block = match[1] == "div"
+        mathml = convert(html.unescape(match[2]), display="block" if block else "inline")
+        return f'<div class="formula">{mathml}</div>' if block else mathml
 
     return FORMULA.sub(formula, content)
 
@@ -92,16 +96,16 @@ def _tutorial():
 
 def _rooms():
     """(name, text) of the pages of names: the front door's table, then what each room has."""
-    package = griffe.load("armload", search_paths=[str(ROOT / "src")])
+    package = griffe.load("armload", search_paths=[str(ROOT / "src")], extensions=griffe.load_extensions(Shown))
     rows = ["| name | what it is |", "|---|---|"]
     for name in sorted(package.exports, key=str.lower):
         thing = package.members[name].final_target
         room = thing.path.split(".")[1]
         there = f"armload.{room}.{name}"
         about = thing.docstring.value.splitlines()[0] if thing.docstring else ""
-        label = f"[`{name}`][{there}]" if name in (package[room].exports or []) else f"`{name}`"
+        label = f"`{name}`" if room == "version" else f"[`{name}`][{there}]"
         rows.append(f'| <a id="armload.{name}"></a>{label} | {about} |')
     yield "armload", "\n".join(["# armload", "", package.docstring.value, "", *rows, ""])
     for room, module in sorted(package.modules.items()):
-        if module.exports and room != "app":
+        if room == "errors" or (module.exports and room != "app"):
             yield room, f"# armload.{room}\n\n::: armload.{room}\n"
