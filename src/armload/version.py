@@ -2,7 +2,7 @@
 
 from importlib.metadata import PackageNotFoundError, version
 
-__version__ = "0.1.0"
+__version__ = "0.1.0"  # of the package
 
 
 def package_versions(*packages: str) -> dict[str, str]:

@@ -154,4 +154,4 @@ def _frozen(value: Any) -> Any:
     return tuple(_frozen(x) for x in value) if isinstance(value, list) else value
 
 
-ARMS: Mapping[str, ArmFacts] = _read_all()
+ARMS: Mapping[str, ArmFacts] = _read_all()  # the built-in arms: their facts, by name

@@ -22,6 +22,7 @@ class Form(NamedTuple):
     text: Callable[[Load, str], str]
 
 
+# What `export_load` can write, by name.
 FORMS = {
     "franka": Form("Python for libfranka's setLoad, on top of Desk's end effector", lambda a, _: set_load_text(a)),
     "franka-desk": Form("end effector for Franka's Desk (JSON)", lambda a, _: desk_text(a)),

@@ -298,8 +298,9 @@ _CATALOGUE = (
         needs="training",
     ),
 )
+# The catalogue: every method by its name, in the order of recommendation.
 METHODS: dict[str, Method] = {method.name: method for method in _CATALOGUE}
-DEFAULT = "hybrid"
+DEFAULT = "hybrid"  # the method where nothing is named and the arm has a trained model
 _ELSEWHERE = "map-gp"
 
 

@@ -23,6 +23,7 @@ from armload.inertia.parameters import InertialParameters, inertia_matrix, phi_t
 # position of each of the other program's six inertia numbers in (xx, xy, xz, yy, yz, zz)
 _ABOUT_ORIGIN = {"paper": [0, 1, 2, 3, 4, 5], "pinocchio": [0, 1, 3, 2, 4, 5]}
 _ABOUT_COM = {"mujoco": [0, 3, 5, 1, 2, 4], "ur": [0, 3, 5, 1, 2, 4], "urdf": [0, 1, 2, 3, 4, 5]}
+# What `to_order` and `from_order` know: the orders of other programs and of the paper.
 ORDERS = ("paper", "pinocchio", "mujoco", "ur", "franka", "urdf")
 
 

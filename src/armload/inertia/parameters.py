@@ -16,7 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from armload.errors import InertiaError
 
+# Names of the ten parameters, in the order of Taie et al. 2024.
 NAMES = ("m", "m·rx", "m·ry", "m·rz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
+# Units of the ten parameters, in the order of `NAMES`.
 UNITS = ("kg", "kg·m", "kg·m", "kg·m", "kg·m²", "kg·m²", "kg·m²", "kg·m²", "kg·m²", "kg·m²")
 
 _ROWS = np.array([0, 0, 0, 1, 1, 2])

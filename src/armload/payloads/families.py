@@ -90,6 +90,7 @@ def draw_payload(family: str, seed: int, rated: float = RATED) -> Payload:
     return Payload(f"{name}, {kind}", shapes[kind](rng, mass, float(np.cbrt(scale))))
 
 
+# The families that `draw_payload` draws from.
 FAMILIES = ("boxes", "shapes", "tools", "container", "nothing", "odd", "light")
 
 

@@ -15,6 +15,7 @@ from armload.kernels import kernel
 from armload.posterior.problem import Posterior
 
 _RATIOS = ("noise", "pose", "velocity", "friction")
+# What a calibration may know of a log, in this order: `Evidence.traits`.
 TRAITS = (
     "log10 time",
     "tare",
