@@ -7,13 +7,13 @@ changes   a payload of 0.2, 0.5 and 1.5 kg taken up or put down somewhere in the
           and how far off the time is [s, median]; two changes: taken up after 2 s and put down after 4 s
 
 Pandas that differ from their model as real ones do, and UR10e where it is said. Written to
-benchmarks/results/changed_logs.json.
+benchmarks/results/changed_logs.json and a table of docs/hybrid.md.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from script import options, say, write
+from script import ROOT, markdown_table, options, say, write, write_table
 
 from armload import Recording, arm
 from armload.devices import Simulator
@@ -40,6 +40,17 @@ def log_with_changes(mass: float, seed: int, twice: bool = False) -> tuple[Recor
     return Recording(*map(np.array, zip(*source, strict=True))), [t for t, _ in held[1:]]  # type: ignore[arg-type]
 
 
+def table(found: dict[str, dict[str, float]]) -> str:
+    """The cases as rows."""
+    rows = [
+        [name, f"{100 * case.get('called changed', np.nan):.0f} %", "", ""]
+        if "called changed" in case
+        else [name, "", f"{100 * case['found']:.0f} %", f"{case['off [s]']:.2f}"]
+        for name, case in found.items()
+    ]
+    return markdown_table(["log", "called changed", "changes found", "off [s]"], "lrrr", rows)
+
+
 def main() -> None:
     asked = options(__doc__, logs=24, seed=0)
     found: dict[str, dict[str, float]] = {}
@@ -61,7 +72,8 @@ def main() -> None:
         name = f"{mass} kg{', up and down' if twice else ''}"
         found[name] = {"found": float(np.mean(right)), "off [s]": float(np.median(off)) if off else float("nan")}
         say(f"{name}: {found[name]}")
-    asked.logs >= 24 and write("changed_logs", {"logs": asked.logs, "seed": asked.seed, "cases": found})
+    write("changed_logs", {"logs": asked.logs, "seed": asked.seed, "cases": found})
+    write_table(ROOT / "docs" / "hybrid.md", "changed logs", table(found))
 
 
 if __name__ == "__main__":

@@ -1,0 +1,167 @@
+"""A payload that changes within a log is found, said, and each part answered; a sound log is left whole."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from armload import Recording, arm, write_recording
+from armload.app.cli import main
+from armload.devices import Simulator
+from armload.errors import IdentificationError
+from armload.identification import identify
+from armload.identification.tare_age import DAY, SESSION, drift_after, drift_since, in_words
+from armload.motion import taie2024
+from armload.payloads import draw_payload
+from armload.posterior.drift import ALLOWED
+from armload.recording import read_recording
+from armload.simulation import Sensors, World, simulate
+
+MASS = 1.5  # [kg]
+
+
+@pytest.fixture(scope="module")
+def panda():
+    return arm("panda")
+
+
+@pytest.fixture(scope="module")
+def payload():
+    return draw_payload("boxes", 3, MASS)
+
+
+def log_of(panda, held, seed=5, clock=0.0):
+    how = {"world": World.real_like(panda, 900 + seed), "sensors": Sensors.panda(panda), "rate": 200.0}
+    source = Simulator(panda, taie2024(), held, speed=None, duration=6.0, seed=seed, **how)
+    t, *rest = map(np.array, zip(*source, strict=True))
+    return Recording(t + clock, *rest)
+
+
+@pytest.fixture(scope="module")
+def taken_up(panda, payload):
+    return log_of(panda, [(0.0, None), (2.5, payload)])
+
+
+def test_a_payload_taken_up_within_a_log_is_found_and_each_part_answered(panda, payload, taken_up):
+    found = identify(taken_up, panda)
+    assert len(found.segments) == 2
+    before, after = found.segments
+    assert before.stop == after.start == pytest.approx(2.5, abs=0.15)
+    assert after.answer.held
+    assert not before.answer.held
+    assert after.answer.mass == pytest.approx(payload.parameters.mass, abs=0.25)
+    assert found.mass == after.answer.mass
+    assert any("the payload changes within the log" in note for note in found.notes)
+    assert json.loads(json.dumps(found.to_dict()))["segments"][1]["mass"] == found.mass
+
+
+def test_a_log_that_begins_at_any_time_says_when_since_its_start(panda, payload):
+    late = log_of(panda, [(0.0, None), (2.5, payload)], clock=1.7e9)
+    assert identify(late, panda).segments[1].start == pytest.approx(2.5, abs=0.15)
+
+
+@pytest.mark.parametrize("held", [None, "payload"])
+def test_a_log_whose_payload_stays_is_one_part(panda, payload, held):
+    log = log_of(panda, [(0.0, None if held is None else payload)], seed=6)
+    found = identify(log, panda)
+    assert len(found.segments) == 1
+    assert (found.segments[0].start, found.segments[0].stop) == (0.0, pytest.approx(log.duration))
+    assert not any("changes within" in note for note in found.notes)
+
+
+def test_real_logs_are_one_part(real_data):
+    for name, robot in (("panda_unloaded_1khz.csv", "panda"), ("ur10e_loaded_2805g.csv", "ur10e")):
+        known = arm(robot)
+        assert len(identify(read_recording(real_data / name, known), known).segments) == 1
+
+
+# ------------------------------------------------------------------ how old a tare is
+
+
+def test_an_age_allows_for_more_the_older_it_is_and_for_nothing_within_a_session():
+    assert drift_after(SESSION) == 0.0
+    assert drift_after(DAY) == 1.0
+    assert drift_after(4 * DAY) == 2.0
+    assert drift_after(1000 * DAY) == ALLOWED
+
+
+def test_clocks_that_show_the_time_of_day_tell_the_age_and_others_do_not(panda):
+    log, tare = (log_of(panda, [(0.0, None)], seed=k, clock=c) for k, c in ((7, 1.7e9), (8, 1.7e9 - 4 * DAY)))
+    drift, notes = drift_since(tare, log, None)
+    assert drift == pytest.approx(2.0, abs=0.01)
+    assert "4d old" in notes[0]
+    assert drift_since(log_of(panda, [(0.0, None)], seed=8), log_of(panda, [(0.0, None)], seed=7), None) == (0.0, ())
+    assert drift_since(tare, log, DAY) == (1.0, ())
+
+
+@pytest.mark.parametrize(("seconds", "words"), [(90.0, "1.5min"), (7200.0, "2h"), (3 * DAY, "3d")])
+def test_an_age_is_said_as_it_can_be_given(seconds, words):
+    from armload.app.cli.arguments import duration
+
+    assert in_words(seconds) == words
+    assert duration(words) == seconds
+
+
+@pytest.mark.parametrize("age", [-1.0, np.nan, np.inf])
+def test_an_age_that_is_no_time_is_refused(panda, age):
+    log = log_of(panda, [(0.0, None)])
+    with pytest.raises(IdentificationError, match="expected a time of 0 or more"):
+        drift_since(log, log, age)
+
+
+# ------------------------------------------------------------------ on the command line
+
+
+@pytest.fixture(scope="module")
+def files(panda, payload, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("logs")
+    world, sensors = World.real_like(panda, 31), Sensors.panda(panda)
+    how = {"world": world, "sensors": sensors, "rate": 200.0}
+    write_recording(folder / "loaded.csv", simulate(panda, taie2024(), payload, seed=1, **how))
+    write_recording(folder / "empty.csv", simulate(panda, taie2024(), None, seed=2, duration=6.0, **how))
+    return folder
+
+
+def answer(capsys, *arguments):
+    assert main(["identify", *map(str, arguments), "--robot", "panda", "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_a_weighed_mass_is_in_the_answer_and_one_that_the_log_contradicts_is_said(files, capsys):
+    truth = draw_payload("boxes", 3, MASS).parameters.mass
+    log, tare = files / "loaded.csv", files / "empty.csv"
+    right = answer(capsys, log, "--tare", tare, "--mass", f"{truth:.4f}±0.002")
+    assert right["mass"] == pytest.approx(truth, abs=4e-3)
+    wrong = answer(capsys, log, "--tare", tare, "--mass", f"{truth + 0.6:.4f}+-0.002")
+    assert wrong["interval"] == "approximate"
+    assert any("is not what the log says" in note for note in wrong["notes"])
+
+
+def test_an_old_tare_widens_the_interval(files, capsys):
+    log, tare = files / "loaded.csv", files / "empty.csv"
+
+    def width(*more):
+        found = answer(capsys, log, "--tare", tare, "--method", "map-gp", *more)
+        return found["phi_high"][0] - found["phi_low"][0]
+
+    assert width("--tare-age", "9d") > 1.02 * width()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--tare-age", "1d"], "there is no --tare"),
+        (["--tare-age", "soon"], "is not a time"),
+        (["--mass", "heavy"], "is not a weighed mass"),
+        (["--mass", "1.2"], "is not a weighed mass"),
+        (["--mass", "1.2±0"], "above zero"),
+        (["--mass", "1.2±0.1", "--method", "rls"], "cannot use a known mass"),
+    ],
+)
+def test_what_makes_no_sense_is_one_sentence(files, capsys, arguments, said):
+    assert main(["identify", str(files / "loaded.csv"), "--robot", "panda", *arguments]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert said in printed.err
