@@ -14,13 +14,16 @@ test test-all test-robots: export OPENBLAS_NUM_THREADS = 1
 test test-all test-robots: export MPLBACKEND = agg
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all test-robots parts lint format lock clean
+.PHONY: help demo docs test test-all test-robots parts lint format lock clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
 demo: $(VENV)/.stamp ## simulate, train small ensembles, identify an unseen payload; writes out/demo
 	$(BIN)/armload demo --out out/demo
+
+docs: $(VENV)/.stamp ## the pages as a site, strictly: build/site/index.html
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet
 
 test: lint ## lint, types and every test that needs nothing but Python (this is what CI runs)
 	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile -m "not full"

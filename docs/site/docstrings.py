@@ -1,4 +1,4 @@
-"""Docstrings as the pages of names show them: doctests as code, lists of fields as lists; a constant's is its comment."""
+"""Docstrings as the pages of names show them: doctests as code, fields as lists; a constant's is its comment."""
 
 import re
 

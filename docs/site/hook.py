@@ -1,4 +1,4 @@
-"""What the site has beyond docs/*.md: the README as its start page, a page of names for each room, the tutorial as it runs.
+"""What the site has beyond docs/*.md: the README as its start page, a page of names for each room, the tutorial, run.
 
 Links that work in the repository work in the site: a page that is named is linked, any other file is copied.
 """
@@ -108,4 +108,12 @@ def _rooms():
     yield "armload", "\n".join(["# armload", "", package.docstring.value, "", *rows, ""])
     for room, module in sorted(package.modules.items()):
         if room == "errors" or (module.exports and room != "app"):
-            yield room, f"# armload.{room}\n\n::: armload.{room}\n"
+            yield room, f"# armload.{room}\n\n::: armload.{room}\n" + "".join(_shadowed(module))
+
+
+def _shadowed(room):
+    """Entries of the names that a module of the room has, too: griffe shows a room's modules by these."""
+    for name in room.exports or []:
+        if room.members[name].is_module:
+            options = "{ show_root_heading: true, show_root_full_path: false, show_root_toc_entry: true }"
+            yield f'\n<a id="{room.path}.{name}"></a>\n\n::: {room.path}.{name}.{name}\n    options: {options}\n'

@@ -14,7 +14,7 @@ matplotlib.use("agg")
 
 @dataclass(frozen=True)
 class Cell:
-    """kind: "markdown" or "code". printed: its text output. html: of its last value. pictures: SVG, one for each figure."""
+    """kind: "markdown" or "code". printed: its text output. html: of its last value. pictures: SVG, one a figure."""
 
     kind: str
     source: str

@@ -98,7 +98,7 @@ class Payload:
 
         >>> tool = Payload.without_inertia("tool", 0.73, (0.0, 0.0, 0.03))
         >>> round(1e3 * float(tool.parameters.inertia_com[0, 0]), 3), tool.inertia_known
-        (0.909, False)
+        (0.911, False)
         """
         mass = solids.positive(mass, "mass of the payload")
         radius = (3.0 * mass / (4.0 * np.pi * _WATER)) ** (1.0 / 3.0)
