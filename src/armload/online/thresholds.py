@@ -61,9 +61,6 @@ TRANSIENT = 4.0 / GAIN
 # [s] of a run not judged yet, below which it may have been a push: the run before it may come back. Pushes last up to
 # 3 s (`benchmarks/events.py`)
 PASSING = 3.0
-# [runs] in a row that may pass: a person who pushes on and on must not keep the watch from the present. A stated guard,
-# no scene or test pushes so often
-MOST_PASSING = 4
 # [s] of a new run from which its kind is told: before, the prior alone says whether something is held
 KIND_FROM = 0.25
 # [s] of a new run after which its kind is told, however little is known of the mass

@@ -42,7 +42,6 @@ from armload.online.thresholds import (
     KIND_STD,
     LEARNT,
     LONGEST,
-    MOST_PASSING,
     PASSING,
     PATIENCE,
     RETURN_STD,
@@ -103,7 +102,6 @@ class PayloadWatch:
         self._change: _Change | None = None
         self._judging = False  # whether the run is new, and may give way to the earlier one
         self._held_before = False
-        self._short_runs = 0  # in a row
 
     @property
     def run(self) -> PosteriorLeastSquares:
@@ -197,7 +195,7 @@ class PayloadWatch:
         since = sample.t - self._doubted_at
         if found is not None and since < DECIDED:
             self._begin_change(sample, found, held)
-        elif self._judging and self._short_runs < MOST_PASSING and since > BACK_AFTER and self._earlier_explains():
+        elif self._judging and since > BACK_AFTER and self._earlier_explains():
             self._begin_change(sample, detector.last, held)
         knows_its_arm = bool(stream.tares) or stream.seconds > LEARNT
         self._gave_up = since > (PATIENCE if knows_its_arm else DECIDED)
@@ -217,7 +215,6 @@ class PayloadWatch:
         assert self._detector is not None
         run = self.run
         passing = self._judging and run.stream.seconds < PASSING
-        self._short_runs = self._short_runs + 1 if passing else 0
         self.event = Event("change", sample.t, sample.t - self._detector.seconds(found.rows), float(found.delta[0]))
         self._held_before, self._judging = held, False
         following = self._beside(self._made, run, self._runs.reference_for_next(held))
