@@ -19,6 +19,8 @@ MODULES = {
     "trimesh": ("trimesh", "lab"),
     "matplotlib": ("matplotlib", "lab"),
     "jinja2": ("jinja2", "lab"),
+    "pyarrow": ("pyarrow", "parquet"),
+    "h5py": ("h5py", "hdf5"),
     "viser": ("viser", "live"),
     "rosbags": ("rosbags", "bags"),
     "pylibfranka": ("pylibfranka", "franka"),

@@ -45,6 +45,7 @@ KEYS = [
     "date",
     "parameters",
     "version",
+    "segments",
 ]
 BODY = InertialParameters(com_to_phi(1.2, [0.02, -0.03, 0.09], np.diag([4e-3, 5e-3, 3e-3])), "panda_link8")
 TILTED = (-4.905, 0.0, -9.81 * np.sqrt(0.75))  # base tilted by 30° about y
@@ -144,7 +145,8 @@ def test_a_saved_answer_is_a_tool_for_the_next_one(answer, logs, tmp_path):
     hand = answer(logs / "hand.csv", "--robot", "panda")
     (tmp_path / "hand.json").write_text(json.dumps(hand))
     found = answer(logs / "both.csv", "--robot", "panda", "--tool", tmp_path / "hand.json")
-    assert found["mass"] == pytest.approx(BODY.mass, rel=0.01)
+    assert found["mass"] == pytest.approx(BODY.mass, rel=0.02)
+    assert found["phi_low"][0] <= BODY.mass <= found["phi_high"][0]
 
 
 def test_an_empty_arm_holds_nothing(answer, logs):
@@ -376,7 +378,6 @@ def test_real_empty_ur10e_without_a_tare_holds_nothing(answer, real_data):
     assert found["held"] is False
 
 
-@pytest.mark.xfail(strict=True, reason="this arm is 0.9 kg off its description: 3.69 ± 0.82 kg, a twelfth too narrow")
 def test_real_loaded_ur10e_without_a_tare_is_within_its_interval(answer, real_data):
     found = answer(real_data / "ur10e_loaded_2805g.csv", "--robot", "ur10e")
     assert found["held"] is True

@@ -119,7 +119,7 @@ def test_a_wheel_without_extras_identifies_exports_and_follows_a_replay(light, p
 @pytest.mark.parametrize(
     ("arguments", "package"),
     [
-        (["demo", "--quick", "--out", "demo"], "mujoco"),
+        (["demo", "--quick", "--out", "demo"], "pyarrow"),
         (["live", "--headless", "--duration", "0.1"], "mujoco"),
         (["live", "panda://127.0.0.1", "--headless"], "panda-python"),
         (["live", "{log}", "--robot", "panda"], "viser"),
@@ -143,7 +143,10 @@ def test_each_extra_and_each_package_of_it_is_known_and_named_as_in_pyproject():
     assert of.pop("all") == {"armload"}
     of.pop("dev")
     stated = {(package, extra) for package, extra in extras.MODULES.values()}
-    assert {(p, e) for e, packages in of.items() for p in packages} - stated == {("trimesh", "live")}
+    assert {(p, e) for e, packages in of.items() for p in packages} - stated == {
+        ("trimesh", "live"),
+        ("pyarrow", "lab"),
+    }
     assert all(package in of[extra] for package, extra in stated)
 
 

@@ -722,7 +722,7 @@ def test_nothing_is_downloaded_before_the_mass_is_known(held):
 
 def test_a_page_without_viser_says_what_to_install(held, monkeypatch):
     monkeypatch.setitem(sys.modules, "viser", None)
-    with pytest.raises(UsageError, match=r"armload\[live\]"):
+    with pytest.raises(UsageError, match=r"the page needs viser.*pip install .*viser>="):
         Page(held)
 
 

@@ -213,7 +213,7 @@ class StreamingPosterior:
         runs = [*self.tares, self._run]
         self._adopt(self._solved(runs, self.start, self.iterations - 1))
         self.drift = None
-        if self.tares and self._test_tare:
+        if self.tares and self._test_tare and self.posterior.torque == "link":
             self.drift = drift_since_tare(runs, self.prior_std, self.prior, self.noise, self.posterior)
             if self.drift.changed:
                 self._run.session = Session(1, max(ALLOWED, self.session.drift))
