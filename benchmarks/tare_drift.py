@@ -11,9 +11,9 @@ a third, old offsets by ±0.1 (wrist 0.03) N·m and friction by 10 %; by ±0.3 (
 other arm    the tare is of another arm of the same kind
 
 Each log is answered by the hybrid (or `map-gp`, where none is shipped) with and without the test of
-`armload.posterior.drift`; arms that measure motor current are not asked. doubted: share that are told to have changed. said or inside: share whose mass lies in its
-interval, or that are doubted. Printed, and written to benchmarks/results/tare_drift.json
-and a table of docs/hybrid.md; six minutes of one core.
+`armload.posterior.drift`; arms that measure motor current are not asked. doubted: share that are told to have changed.
+said or inside: share whose mass lies in its interval, or that are doubted. Printed, and written
+to benchmarks/results/tare_drift.json and a table of docs/hybrid.md; six minutes of one core.
 """
 
 from __future__ import annotations

@@ -115,9 +115,9 @@ def test_a_hybrid_of_another_arm_is_refused_in_a_sentence(call, small, analytic_
 @pytest.mark.parametrize("state", ["is missing", "cannot be read"])
 @pytest.mark.parametrize("name", SHIPPED)
 def test_a_model_that_is_part_of_armload_and_not_there_is_an_error_and_no_other_method(
-    call, analytic_log, tmp_path, monkeypatch, name, state
+    call, tmp_path, monkeypatch, name, state
 ):
-    write_recording(tmp_path / "run.csv", analytic_log(arm(name), duration=1.0, rate=50.0))
+    write_recording(tmp_path / "run.csv", simulate(arm(name), excitation(arm(name)), duration=2.0, rate=50.0))
     monkeypatch.setattr("armload.posterior.model_file.__file__", str(tmp_path / "model.py"))
     if state == "cannot be read":
         (tmp_path / "models").mkdir()
