@@ -17,7 +17,7 @@ from armload.lab.training import Coverage, train_hybrid
 from armload.lab.training import hybrid as training
 from armload.lab.training.hybrid import EPISODES
 from armload.lab.training.records import TIMES
-from armload.motion import random_motion
+from armload.motion import excitation, random_motion
 from armload.posterior import Calibration, HybridModel, MixturePrior, Training
 from armload.posterior import model_file as model
 from armload.posterior.evidence import KINDS
