@@ -82,7 +82,9 @@ class Package:
         while todo:
             node = todo.pop()
             later = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and not lazy
-            if later or (isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)):
+            # what a package names there it imports when it is first asked for (`armload.lazy`)
+            on_use = lazy and self.paths[name].name == "__init__.py"
+            if later or (isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test) and not on_use):
                 continue
             found |= set(self.imported(name, node))
             todo += [child for child in ast.iter_child_nodes(node) if isinstance(child, ast.stmt | ast.ExceptHandler)]

@@ -9,7 +9,6 @@ __getattr__, __dir__ = on_first_use(__name__)
 
 from __future__ import annotations
 
-import ast
 import importlib
 import sys
 from collections.abc import Callable
@@ -31,6 +30,8 @@ def on_first_use(package: str) -> tuple[Callable[[str], Any], Callable[[], list[
 
     @cache
     def homes() -> dict[str, str]:
+        import ast  # costs as much as all of `import armload` else
+
         tree = ast.parse(Path(str(module.__file__)).read_text(encoding="utf-8"))
         blocks = (node for node in tree.body if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING")
         imports = (node for block in blocks for node in block.body if isinstance(node, ast.ImportFrom))
