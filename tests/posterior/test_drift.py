@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from armload import arm
+from armload.identification import identify
 from armload.inertia import Z95
 from armload.lab.episodes import draw_episodes, simulate_episodes
+from armload.online import OnlineIdentifier
 from armload.posterior import HybridIdentifier, SmoothPosteriorLeastSquares
 from armload.posterior.drift import CHANGED
 from armload.posterior.problem import Problem
@@ -102,3 +104,16 @@ def test_rows_one_by_one_give_the_posterior_of_the_accumulated_rows_with_a_drift
     whole = problem.sequential(scales)
     assert running[0] == pytest.approx(whole.information, rel=1e-6, abs=1e-6 * np.abs(whole.information).max())
     assert running[1] == pytest.approx(whole.vector, rel=1e-6, abs=1e-6 * np.abs(whole.vector).max())
+
+
+def test_a_stream_that_is_concluded_doubts_an_old_tare_as_a_log_does(panda, old):
+    log = old[0]
+    identifier = OnlineIdentifier(panda, log.tare)
+    for sample in log.run:
+        identifier.update(*sample)
+    said, whole = identifier.conclude(), identify(log.run, panda, tare=log.tare)
+    identifier.close()
+    assert not said.calibrated
+    assert whole.interval == "approximate"
+    assert any("not as it was at its tare" in note for note in said.notes)
+    assert said.phi == pytest.approx(whole.phi, rel=1e-6, abs=1e-9)

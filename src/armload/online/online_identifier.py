@@ -20,6 +20,7 @@ from armload.estimators import Estimate, Identifier
 from armload.identification.answer import body_of
 from armload.identification.choice import choose
 from armload.identification.intervals import Before
+from armload.identification.notes import changed_since_tare
 from armload.identification.said import NO_BODY
 from armload.identification.thresholds import MISFIT
 from armload.inertia import determined, distance_to_body, held
@@ -170,6 +171,9 @@ class OnlineIdentifier:
                 self._doubted = distance_to_body(said, covariance) > MISFIT
                 if self._doubted:
                     self._notes = (*self._notes, NO_BODY)
+                drift = run.stream.drift if isinstance(run, PosteriorLeastSquares) else None
+                if drift is not None and drift.changed:
+                    self._doubted, self._notes = True, (*self._notes, changed_since_tare(drift))
         return self._said()
 
     def close(self) -> None:
