@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from test_recording import log
 from test_recording_bags import samples, storage, write_bag
@@ -54,6 +54,7 @@ def read_or_refuse(path, arm=None):
 
 @fuzz
 @given(signature=st.sampled_from(SIGNATURES), rest=st.binary(max_size=200))
+@example(signature=b"", rest=b"\x1c")  # a line of nothing that Python's strip removes
 def test_any_bytes_are_read_or_refused(sound, signature, rest):
     path, _ = sound
     path.write_bytes(signature + rest)

@@ -53,6 +53,8 @@ def layout_of(lines: Sequence[str], where: str) -> Layout:
     comments = [k for k in range(header) if lines[k].strip()]
     if comments and (header == len(lines) or _numeric(lines[header])):
         header = comments[-1]
+    if header == len(lines):
+        raise RecordingError(f"{where} has no header: expected a line that names the columns, then rows of numbers")
     text = lines[header].strip(" \r\n")
     if header in comments and text.startswith("#"):
         text = text.lstrip("# ")
