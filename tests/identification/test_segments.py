@@ -13,8 +13,9 @@ from armload.devices import Simulator
 from armload.errors import IdentificationError
 from armload.identification import identify
 from armload.identification.tare_age import DAY, SESSION, drift_after, drift_since, in_words
+from armload.inertia import InertialParameters
 from armload.motion import taie2024
-from armload.payloads import draw_payload
+from armload.payloads import draw_payload, franka_hand
 from armload.posterior.drift import ALLOWED
 from armload.recording import read_recording
 from armload.simulation import Sensors, World, simulate
@@ -165,3 +166,17 @@ def test_what_makes_no_sense_is_one_sentence(files, capsys, arguments, said):
     printed = capsys.readouterr()
     assert printed.out == ""
     assert said in printed.err
+
+
+def test_a_weighed_mass_is_that_of_what_the_tool_carries_and_of_what_is_held_at_the_end(panda, payload, taken_up):
+    mass, tool = payload.parameters.mass, franka_hand()
+    how = {"world": World.real_like(panda, 31), "sensors": Sensors.panda(panda), "rate": 200.0}
+    both = InertialParameters(payload.parameters.phi) + InertialParameters(tool.parameters.phi)
+    log, tare = simulate(panda, taie2024(), both, seed=1, **how), simulate(panda, taie2024(), None, seed=2, **how)
+    found = identify(log, panda, tare=tare, tool=tool, mass=(mass, 2e-3))
+    assert found.relative_to == "tool"
+    assert found.mass == pytest.approx(mass, abs=4e-3)
+    assert not any("is not what the log says" in note for note in found.notes)
+    before, after = identify(taken_up, panda, mass=(mass, 2e-3)).segments
+    assert after.answer.mass == pytest.approx(mass, abs=4e-3)
+    assert not before.answer.held

@@ -78,7 +78,10 @@ class Found(NamedTuple):
     def less(self, tool: NDArray[np.float64]) -> Found:
         """The same without a tool (10,)."""
         said = None if self.unprojected is None else (self.unprojected[0] - tool, self.unprojected[1])
-        return self._replace(estimate=replace(self.estimate, phi=self.estimate.phi - tool), unprojected=said)
+        mass = self.mass and KnownMass(self.mass.mass - float(tool[0]), self.mass.std)
+        alone = self.mass_alone and (self.mass_alone[0] - float(tool[0]), self.mass_alone[1])
+        estimate = replace(self.estimate, phi=self.estimate.phi - tool)
+        return self._replace(estimate=estimate, unprojected=said, mass=mass, mass_alone=alone)
 
 
 def found_in(recording: Recording, arm: Arm, tare: Recording | None, asked: Asked) -> Found:

@@ -79,7 +79,9 @@ def identify(
     if times:
         parts = [recording.between(a + SETTLED * (k > 0), b) for k, (a, b) in enumerate(pairwise(edges))]
         notes = (*notes, changed_within([t - recording.t[0] for t in times], len(parts)))
-    answers = [_of_one_payload(part, arm, tare, mounted, asked, notes) for part in parts]
+    others = replace(asked, mass=None)  # what was weighed is what is held at the end
+    answers = [_of_one_payload(part, arm, tare, mounted, others, notes) for part in parts[:-1]]
+    answers.append(_of_one_payload(parts[-1], arm, tare, mounted, asked, notes))
     segments = tuple(
         Segment(float(a - recording.t[0]), float(b - recording.t[0]), answer)
         for (a, b), answer in zip(pairwise(edges), answers, strict=True)
@@ -113,7 +115,8 @@ def _of_one_payload(
         found, relative_to = found_in(recording, arm, tare, asked), "tare"
         note, otherwise = "the tool was mounted at the tare already", -known.phi
     else:
-        found, relative_to = found_in(recording, arm, tare, asked).less(known.phi), "tool"
+        both = asked.mass and KnownMass(asked.mass.mass + known.mass, asked.mass.std)  # what was added since the tare
+        found, relative_to = found_in(recording, arm, tare, replace(asked, mass=both)).less(known.phi), "tool"
         note, otherwise = (
             "the tool was mounted after the tare: the answer is what was added since, less the tool",
             known.phi,
