@@ -1,23 +1,13 @@
-"""What the commands share: a parser with one-sentence errors, and the arguments that name an arm, a tool and so on."""
+"""What the commands share: a parser with one-sentence errors, and the options that several of them have."""
 
 from __future__ import annotations
 
 import argparse
 import re
 from importlib import resources
-from typing import TYPE_CHECKING, NoReturn
+from typing import NoReturn
 
-from armload.app.cli.printing import print_note
 from armload.errors import UsageError
-
-if TYPE_CHECKING:
-    from armload.arms import Arm
-    from armload.inertia import InertialParameters
-    from armload.lab.dataset import Dataset
-    from armload.motion import Motion
-    from armload.payloads import Payload
-    from armload.recording import ColumnSpec, Recording
-    from armload.simulation import World
 
 # options whose value may begin with a minus sign: argparse would take "-1,0,-9.7" for an option
 _SIGNED = ("--gravity",)
@@ -203,116 +193,3 @@ def add_column_arguments(parser: argparse.ArgumentParser) -> None:
     add("--effort-key", type=file_name, metavar="K", help="list-valued column of the joint torques (--columns tau=K)")
     add("--rate", dest="log_rate", type=at_least(1e-3, float), metavar="HZ", help="of a log without times")
     add("--episode", type=at_least(0), metavar="K", help="which one of a file that holds several")
-
-
-def columns_of(options: argparse.Namespace) -> ColumnSpec:
-    """What `--columns` and its companions say of the logs."""
-    from armload.recording import ColumnSpec
-
-    companions = {"tau": "effort_key", "rate": "log_rate", "episode": "episode"}
-    more = {key: getattr(options, name, None) for key, name in companions.items()}
-    return ColumnSpec.of(options.columns).over(**more)
-
-
-def read_logs(
-    options: argparse.Namespace, arm: Arm, *logs: str | None, topics: tuple[str | None, ...] = ()
-) -> list[Recording | None]:
-    """The logs at some paths; None stays None.
-
-    Topics are for bags, columns for tables. Where there is none of the kind, reading says that they were named in vain.
-
-    Args:
-        options: of the command.
-        arm: whose logs they are.
-        logs: paths.
-        topics: of each log (default: `--topic`).
-    """
-    from armload.recording import has_topics, read_recording
-
-    columns = columns_of(options)
-    bags = [log is not None and has_topics(log) for log in logs]
-    tables = [log is not None and not bag for log, bag in zip(logs, bags, strict=True)]
-    given = topics or (getattr(options, "topic", None),) * len(logs)
-    return [
-        None
-        if log is None
-        else read_recording(
-            log,
-            arm,
-            topic=topic if bag or not any(bags) else None,
-            columns=columns if not bag or not any(tables) else None,
-        )
-        for log, bag, topic in zip(logs, bags, given, strict=True)
-    ]
-
-
-def arm_of(options: argparse.Namespace) -> Arm:
-    """The arm that `--robot`, `--frame` and `--gravity` name."""
-    from armload.arms import arm
-
-    settings = {} if options.gravity is None else {"gravity": options.gravity}
-    return arm(options.robot, options.frame, **settings)
-
-
-def arm_of_dataset(dataset: Dataset, robot: str | None) -> Arm:
-    """The arm a data set was made with; `robot` names it where it is not a built-in one."""
-    from armload.arms import arm
-
-    about = dataset.provenance["arm"]
-    made_with = arm(robot or about["name"], about["frame"], tuple(about["gravity"]))
-    if made_with.fingerprint != about["fingerprint"]:
-        raise UsageError(f"{dataset.path} was made with another {about['name']}: name its URDF with --robot")
-    return made_with
-
-
-def payload_named(name: str, arm: Arm | None = None) -> Payload:
-    """A payload file, or a built-in payload by name; the hand is about the arm's own flange."""
-    from armload.payloads import franka_hand, hand_on, read_payload, test_payload
-
-    if name == "franka-hand":
-        return franka_hand() if arm is None else hand_on(arm)
-    return test_payload() if name == "test" else read_payload(name)
-
-
-def payload_of(name: str, arm: Arm | None = None) -> InertialParameters:
-    """Its parameters; a note says so where the inertia among them is an assumption."""
-    from armload.payloads import INERTIA_ASSUMED
-
-    payload = payload_named(name, arm)
-    if not payload.inertia_known:
-        print_note(f"{name}: {INERTIA_ASSUMED}")
-    return payload.parameters
-
-
-def motion_of(name: str, arm: Arm) -> Motion:
-    """A motion by name (`taie2024`), from a JSON file, or drawn for the arm (`random:SEED`)."""
-    from armload.motion import load_motion, random_motion, taie2024
-
-    if name == "taie2024":
-        return taie2024()
-    if name.startswith("random:"):
-        return random_motion(arm, whole_number(name, "motion"))
-    return load_motion(name)
-
-
-def world_of(name: str, arm: Arm) -> World:
-    """A world by name: `nominal`, or `real-like:SEED`."""
-    from armload.simulation import World
-
-    if name == "nominal":
-        return World.nominal(arm)
-    if name.startswith("real-like:"):
-        return World.real_like(arm, whole_number(name, "world"))
-    raise UsageError(f"unknown world {name!r}: expected nominal or real-like:SEED")
-
-
-def whole_number(text: str, what: str) -> int:
-    """The number behind the colon of `random:3`.
-
-    >>> whole_number("random:3", "motion")
-    3
-    """
-    kind, _, number = text.partition(":")
-    if not number.isdecimal():
-        raise UsageError(f"{what} {text!r} has no whole number behind the colon: expected one, such as {kind}:3")
-    return int(number)

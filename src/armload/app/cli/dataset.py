@@ -5,16 +5,8 @@ from __future__ import annotations
 import argparse
 import sys
 
-from armload.app.cli.arguments import (
-    Parser,
-    add_arm_arguments,
-    arm_of,
-    at_least,
-    file_name,
-    motion_of,
-    whole_number,
-    world_of,
-)
+from armload.app.cli.arguments import Parser, add_arm_arguments, at_least, file_name
+from armload.app.cli.named import arm_of, motion_of, whole_number, world_of
 
 _EXAMPLES = """\
 examples:

@@ -6,7 +6,8 @@ import argparse
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from armload.app.cli.arguments import Parser, file_name, payload_of
+from armload.app.cli.arguments import Parser, file_name
+from armload.app.cli.named import payload_of
 from armload.app.cli.printing import print_note
 
 if TYPE_CHECKING:

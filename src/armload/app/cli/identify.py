@@ -11,12 +11,10 @@ from armload.app.cli.arguments import (
     add_identifier_arguments,
     add_tare_and_mass_arguments,
     add_tool_and_topic_arguments,
-    arm_of,
     file_name,
-    payload_named,
-    read_logs,
 )
 from armload.app.cli.export import FORMS, write
+from armload.app.cli.named import arm_of, payload_named, read_logs
 from armload.app.cli.printing import print_json, print_note, working, write_json
 
 _EXAMPLES = """\

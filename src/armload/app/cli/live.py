@@ -12,13 +12,10 @@ from armload.app.cli.arguments import (
     add_column_arguments,
     add_identifier_arguments,
     add_tool_and_topic_arguments,
-    arm_of,
     at_least,
-    columns_of,
     file_name,
-    payload_of,
-    read_logs,
 )
+from armload.app.cli.named import arm_of, columns_of, payload_of, read_logs
 from armload.app.cli.printing import print_note
 from armload.errors import ArmloadError, UsageError
 

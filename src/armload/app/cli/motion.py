@@ -5,16 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from armload.app.cli.arguments import (
-    Parser,
-    add_arm_arguments,
-    add_column_arguments,
-    arm_of,
-    at_least,
-    file_name,
-    motion_of,
-    payload_of,
-)
+from armload.app.cli.arguments import Parser, add_arm_arguments, add_column_arguments, at_least, file_name
+from armload.app.cli.named import arm_of, motion_of, payload_of
 from armload.app.cli.printing import console, print_json, print_note, table, working
 from armload.errors import UsageError
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def run_of(options: argparse.Namespace, name: str, arm: Arm) -> Recording | Motion:
     """A log by the suffix of its file (or the folder of a bag), else a motion."""
-    from armload.app.cli.arguments import motion_of, read_logs
+    from armload.app.cli.named import motion_of, read_logs
     from armload.identification import check_plausible
     from armload.recording import LOG_SUFFIXES
 

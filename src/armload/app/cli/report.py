@@ -8,17 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armload.app.cli.arguments import (
-    Parser,
-    add_arm_arguments,
-    add_column_arguments,
-    arm_of,
-    arm_of_dataset,
-    at_least,
-    file_name,
-    payload_of,
-    read_logs,
-)
+from armload.app.cli.arguments import Parser, add_arm_arguments, add_column_arguments, at_least, file_name
+from armload.app.cli.named import arm_of, arm_of_dataset, payload_of, read_logs
 from armload.app.cli.printing import print_note, print_table, working
 from armload.errors import UsageError
 

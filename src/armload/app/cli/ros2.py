@@ -4,19 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from armload.app.cli.arguments import (
-    COLUMNS,
-    Parser,
-    add_arm_arguments,
-    add_identifier_arguments,
-    arm_of,
-    at_least,
-    file_name,
-    motion_of,
-    payload_of,
-    read_logs,
-    world_of,
-)
+from armload.app.cli.arguments import COLUMNS, Parser, add_arm_arguments, add_identifier_arguments, at_least, file_name
+from armload.app.cli.named import arm_of, motion_of, payload_of, read_logs, world_of
 from armload.app.cli.printing import print_note
 
 _EXAMPLES = """\

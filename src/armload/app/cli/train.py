@@ -6,7 +6,8 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
-from armload.app.cli.arguments import Parser, arm_of_dataset, at_least, file_name, motion_of
+from armload.app.cli.arguments import Parser, at_least, file_name
+from armload.app.cli.named import arm_of_dataset, motion_of
 from armload.app.cli.printing import print_note, print_table
 from armload.errors import UsageError
 
