@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from armload.posterior.map import PosteriorLeastSquares, SmoothPosteriorLeastSquares
     from armload.posterior.model_file import HybridModel, Training
     from armload.posterior.payload_prior import MixturePosterior, MixturePrior
-    from armload.posterior.problem import Posterior
+    from armload.posterior.scales import Posterior
 
 __all__ = [
     "TIMES",

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from armload.arms import FRICTION_WIDTH, Arm
 from armload.errors import IdentificationError
-from armload.posterior.problem import Scales
+from armload.posterior.scales import Scales
 from armload.regression import JointFeatures
 from armload.simulation import Sensors, World
 

@@ -25,7 +25,7 @@ from armload.arms import Arm, rated_effort
 from armload.errors import IdentificationError
 from armload.inertia import NAMES, SHRINK, UNITS, Z95
 from armload.motion import Motion
-from armload.posterior.problem import Scales
+from armload.posterior.scales import Scales
 from armload.posterior.solve import solve
 from armload.recording import Recording
 from armload.regression import Correction, GaussianPrior, JointFeatures, payload_prior_std

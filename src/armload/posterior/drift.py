@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.posterior.problem import Posterior
+from armload.posterior.scales import Posterior
 from armload.posterior.solve import solve
 from armload.regression import Correction, GaussianPrior
 from armload.regression.information import RegressionData, Session

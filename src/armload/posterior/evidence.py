@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from armload.inertia.cholesky import factor
 from armload.kernels import kernel
-from armload.posterior.problem import Posterior
+from armload.posterior.scales import Posterior
 
 _RATIOS = ("noise", "pose", "velocity", "friction")
 # What a calibration may know of a log, in this order: `Evidence.traits`.

@@ -17,8 +17,8 @@ from armload.arms import Arm, rated_effort
 from armload.estimators import ArmMismatch, Estimate, Identifier
 from armload.posterior.evidence import Evidence
 from armload.posterior.known_mass import KnownMass
-from armload.posterior.problem import Posterior, Scales
 from armload.posterior.same_motion import SameMotion
+from armload.posterior.scales import Posterior, Scales
 from armload.posterior.solve import solve
 from armload.posterior.stream import StreamingPosterior
 from armload.recording import GAP, Recording, Sample

@@ -23,7 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
-from armload.posterior.problem import Posterior, Problem, Scales
+from armload.posterior.problem import Problem
+from armload.posterior.scales import Posterior, Scales
 from armload.posterior.sequential import SequentialPosterior
 from armload.regression import GaussianPrior
 from armload.regression.information import RegressionData

@@ -22,8 +22,8 @@ from armload.inertia.cholesky import factor, invert
 from armload.kernels import kernel
 from armload.posterior.drift import ALLOWED, Drift, drift_since_tare
 from armload.posterior.handover import Handover, Result
-from armload.posterior.problem import Posterior, Scales
 from armload.posterior.same_motion import Difference, SameMotion
+from armload.posterior.scales import Posterior, Scales
 from armload.posterior.sequential import SequentialPosterior
 from armload.posterior.solve import Solution, solve_to_go_on
 from armload.regression import Correction, GaussianPrior, JointFeatures
