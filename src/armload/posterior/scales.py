@@ -1,0 +1,54 @@
+"""What a solution of the MAP problem finds: the scales, and the posterior of the payload and of the arm."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Scales:
+    """What expectation–maximisation finds.
+
+    noise: S of each run (K, n) [N²·m²·s]. eta: prior variance (p,). features: prior variance of the weights (n, R).
+    payloads: prior variance (10,) of the payload, or (20,) of the tares' and of what was added.
+    drifts: prior variance (K', d) of each session that drifts.
+    """
+
+    noise: NDArray[np.float64]
+    eta: NDArray[np.float64]
+    features: NDArray[np.float64]
+    payloads: NDArray[np.float64]
+    drifts: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Mean and covariance of phi, and of what else was found along the way.
+
+    phi, covariance: (10,), (10, 10) of the payload (relative to the tare, if there was one).
+    information, vector: Λ (10, 10) and Λ·phi_ML (10,): what the logs alone say, all else integrated out.
+    eta: (p,) the arm's mismatch, in session 0.
+    drift, drift_covariance: (d,), (d, d) by which the run's session differs from session 0; (0,) where it does not.
+    residual: √S (n,) of the run [N·m·√s].
+    torque: "link" or "motor", the side the torque seems to be measured on.
+    gain_std: relative standard deviation of the torque's calibration.
+    scales: what expectation–maximisation found; another solution may start there.
+    ratios: the scales (n,) of "noise", "pose", "velocity" and "friction", and the squared offsets ("offset"), over what
+        was expected of them, as variances.
+    """
+
+    phi: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    information: NDArray[np.float64]
+    vector: NDArray[np.float64]
+    eta: NDArray[np.float64]
+    drift: NDArray[np.float64]
+    drift_covariance: NDArray[np.float64]
+    residual: NDArray[np.float64]
+    torque: str
+    gain_std: float
+    scales: Scales
+    ratios: dict[str, NDArray[np.float64]]
