@@ -116,6 +116,9 @@ def check_writable(
     return replace(arm, frame=flange, attached=None).in_frame(load.parameters)
 
 
+_SINCE = {"tare": "the tare", "profile": "the profile", "before": "its last change"}
+
+
 def _check_counted_once(load: Load, end_effector: float) -> None:
     """Refuse a load that contains what the controller counts already, or lacks what it does not count."""
     if not (np.isfinite(end_effector) and end_effector >= 0):
@@ -130,9 +133,9 @@ def _check_counted_once(load: Load, end_effector: float) -> None:
             "the load is relative to a tool, and the robot counts nothing on the flange but the load: add the tool "
             "(Load.of(result) + tool)"
         )
-    if end_effector == 0 and load.relative_to in ("tare", "before"):
+    if end_effector == 0 and load.relative_to in ("tare", "profile", "before"):
         raise SinkError(
-            f"the load is what was added since {'the tare' if load.relative_to == 'tare' else 'its last change'}, and "
+            f"the load is what was added since {_SINCE[load.relative_to]}, and "
             "the robot counts nothing on the flange but the load: add what was mounted then (Load.of(result) + "
             "gripper; InertialParameters.zero() if nothing was)"
         )

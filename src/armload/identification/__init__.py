@@ -2,7 +2,7 @@
 
 from armload.identification.answer import Identification
 from armload.identification.choice import Choice, choose
-from armload.identification.identify_log import identify, plausible_tool
+from armload.identification.identify_log import check_usable, identify, plausible_tool
 from armload.identification.methods import DEFAULT, LEFT_OUT, METHODS, Method, default_for
 from armload.identification.plausibility import check_plausible
 
@@ -14,6 +14,7 @@ __all__ = [
     "Identification",
     "Method",
     "check_plausible",
+    "check_usable",
     "choose",
     "default_for",
     "identify",

@@ -9,6 +9,7 @@ from armload.arms import Arm
 from armload.errors import IdentificationError
 from armload.estimators import Identifier
 from armload.identification.methods import METHODS, default_for, model_file
+from armload.posterior import Profile
 from armload.recording import Recording
 
 # names of the catalogue that need neither a motion known beforehand nor a model of their own
@@ -31,13 +32,21 @@ class Choice:
     error_known: bool = True
 
 
-def choose(arm: Arm, tare: Recording | None = None, method: str | Path | None = None, *, live: bool = False) -> Choice:
+def choose(
+    arm: Arm,
+    tare: Recording | None = None,
+    method: str | Path | None = None,
+    *,
+    live: bool = False,
+    profile: Profile | None = None,
+) -> Choice:
     """The method for a log or a live stream.
 
     Args:
         arm: the bare arm. tare: an earlier log of it, if there is one.
         method: a name of the catalogue, or a trained model's file; None: the most trustworthy for the arm.
         live: for a stream, where no motion is known beforehand.
+        profile: what many logs said of this arm.
 
     Raises:
         ArmloadError: an unknown method, a model that is missing or of another arm, or a tare the method has no use for.
@@ -50,19 +59,21 @@ def choose(arm: Arm, tare: Recording | None = None, method: str | Path | None = 
                 f"the method {name} cannot follow a live stream: expected one of {', '.join(LIVE)}, or the file of a "
                 "trained model"
             )
-        return Choice(name, entry.make(arm, tare), entry.prior)
-    return _trained(arm, tare, model_file(name, LIVE if live else tuple(METHODS)))
+        return Choice(name, entry.make(arm, tare, profile), entry.prior)
+    return _trained(arm, tare, model_file(name, LIVE if live else tuple(METHODS)), profile)
 
 
-def _trained(arm: Arm, tare: Recording | None, file: Path) -> Choice:
+def _trained(arm: Arm, tare: Recording | None, file: Path, profile: Profile | None) -> Choice:
     from armload.posterior import HybridIdentifier, HybridModel
 
     if HybridModel.wrote(file):
-        made = HybridIdentifier(arm, tare, HybridModel.load(file))
+        made = HybridIdentifier(arm, tare, HybridModel.load(file), profile=profile)
         return Choice(made.name, made, True, str(file))
     from armload.ensembles import LearnedIdentifier, load_model
 
     model = load_model(file)
+    if profile is not None:
+        raise IdentificationError(f"the trained model {file} cannot use a profile: leave --profile out")
     if tare is not None:
         raise IdentificationError(
             f"the trained model {file} cannot use a tare (an empty arm lies outside its training): leave the tare "

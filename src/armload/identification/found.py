@@ -16,7 +16,7 @@ from armload.identification.choice import Choice, choose
 from armload.identification.intervals import Before
 from armload.identification.thresholds import LARGEST_OFFSETS, MISFIT, MOVES
 from armload.inertia import distance_to_body, is_consistent
-from armload.posterior import KnownMass, PosteriorLeastSquares
+from armload.posterior import KnownMass, PosteriorLeastSquares, Profile
 from armload.posterior.drift import Drift
 from armload.recording import Recording
 from armload.regression import payload_prior_std
@@ -27,12 +27,13 @@ class Asked:
     """How a log is to be identified.
 
     method: as of `identify`. drift: by how many daily deviations the arm may differ from what it was at its tare.
-    mass: the payload's, where it was weighed.
+    mass: the payload's, where it was weighed. profile: what many logs said of the arm.
     """
 
     method: str | Path | None = None
     drift: float = 0.0
     mass: KnownMass | None = None
+    profile: Profile | None = None
 
 
 class Found(NamedTuple):
@@ -86,10 +87,10 @@ class Found(NamedTuple):
 
 def found_in(recording: Recording, arm: Arm, tare: Recording | None, asked: Asked) -> Found:
     """What a method finds in a log of an arm."""
-    found = _found(choose(arm, tare, asked.method), arm, recording, asked)
+    found = _found(choose(arm, tare, asked.method, profile=asked.profile), arm, recording, asked)
     if found.unknown_friction:
         motor_side = replace(arm, motor_torque=True)
-        found = _found(choose(motor_side, tare, asked.method), motor_side, recording, asked)
+        found = _found(choose(motor_side, tare, asked.method, profile=asked.profile), motor_side, recording, asked)
         found = found._replace(friction_found=True)
     return found
 

@@ -21,9 +21,9 @@ from armload.identification.said import answered
 from armload.identification.segments import changes_of_payload
 from armload.identification.tare_age import drift_since
 from armload.identification.thresholds import DECISIVE, HEAVIEST, LOWEST_RATE, SETTLED
-from armload.inertia import InertialParameters
+from armload.inertia import HELD, Z95, InertialParameters
 from armload.payloads import INERTIA_ASSUMED, Payload, read_payload
-from armload.posterior import KnownMass
+from armload.posterior import KnownMass, Profile, load_profile
 from armload.recording import Recording, check_own_measurements, read_recording
 
 
@@ -35,6 +35,7 @@ def identify(
     tare_age: float | None = None,
     tool: InertialParameters | Payload | str | Path | None = None,
     mass: KnownMass | tuple[float, float] | None = None,
+    profile: Profile | str | Path | None = None,
     method: str | Path | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Identification:
@@ -51,6 +52,8 @@ def identify(
         tool: a tool mounted in the recording whose parameters are known, or the path of its file; the answer is what it
             carries. Whether it was mounted at the tare too is found from the tare.
         mass: of what is identified, where it was weighed, and its standard deviation [kg].
+        profile: what many logs said of this arm (`armload.posterior.learn_profile`), or the path of its file; the
+            answer is what was added since. With a tare beside, that is of the recording's own day.
         method: a name in `armload.METHODS`, or the path of a trained model; None: the most trustworthy for the arm,
             "hybrid" where one is shipped, "map-gp" elsewhere.
         progress: told in a few words what is being done.
@@ -65,12 +68,15 @@ def identify(
     notes = (*recording.notes, *(() if tare is None else tare.notes))
     for log in (recording, tare):
         if log is not None:
-            _check(log, arm)
+            check_usable(log, arm)
     if tare is not None:
         check_own_measurements(recording, tare)
     drift, aged = (0.0, ()) if tare is None else drift_since(tare, recording, tare_age)
     known_mass = mass if mass is None or isinstance(mass, KnownMass) else KnownMass(*mass)
-    asked, notes = Asked(method, drift, known_mass), (*notes, *aged)
+    known = load_profile(profile) if isinstance(profile, str | Path) else profile
+    asked, notes = Asked(method, drift, known_mass, known), (*notes, *aged)
+    if tare is not None and known is not None:
+        _check_same_mounted(tare, arm, known, asked)
     mounted = read_payload(tool) if isinstance(tool, str | Path) else tool
     say("identifying")
     times = changes_of_payload(recording, arm)
@@ -98,33 +104,38 @@ def _of_one_payload(
     notes: tuple[str, ...],
 ) -> Identification:
     """The answer for a log, or the part of one, throughout which the payload is the same."""
+    tared = tare is not None or asked.profile is not None
+    without = "profile" if asked.profile is not None else "arm"
     if mounted is None:
-        relative_to = "arm" if tare is None else "tare"
-        return answered(found_in(recording, arm, tare, asked), arm, recording, tare, relative_to, notes)
+        relative_to = without if tare is None else "tare"
+        return answered(found_in(recording, arm, tare, asked), arm, recording, tared, relative_to, notes)
     known = plausible_tool(arm.in_frame(mounted.parameters if isinstance(mounted, Payload) else mounted), arm)
     unsure = None
     if isinstance(mounted, Payload) and not mounted.inertia_known:
         notes = (*notes, f"tool {mounted.name}: {INERTIA_ASSUMED}; the intervals allow for any other")
         unsure = known
-    if tare is None:
+    if tare is None and asked.profile is None:
         arm = arm.with_payload(known)
-        return answered(found_in(recording, arm, None, asked), arm, recording, None, "tool", notes, unsure=unsure)
-    carried, sure = _carries(tare, arm, known)
+        return answered(found_in(recording, arm, None, asked), arm, recording, False, "tool", notes, unsure=unsure)
+    carried, sure = _carries(arm, known, tare, asked.profile)
+    before = "at the tare" if tare is not None else "in the profile's logs"
+    since = "since the tare" if tare is not None else "since the profile"
     if carried:
         arm = arm.with_payload(known)
-        found, relative_to = found_in(recording, arm, tare, asked), "tare"
-        note, otherwise = "the tool was mounted at the tare already", -known.phi
+        found, relative_to = found_in(recording, arm, tare, asked), "profile" if tare is None else "tare"
+        note, otherwise = f"the tool was mounted {before} already", -known.phi
     else:
         both = asked.mass and KnownMass(asked.mass.mass + known.mass, asked.mass.std)  # what was added since the tare
         found, relative_to = found_in(recording, arm, tare, replace(asked, mass=both)).less(known.phi), "tool"
         note, otherwise = (
-            "the tool was mounted after the tare: the answer is what was added since, less the tool",
+            f"the tool was mounted {since}: the answer is what was added since, less the tool",
             known.phi,
         )
     if sure:
-        return answered(found, arm, recording, tare, relative_to, (*notes, note), unsure=unsure)
-    note = f"it seems that {note}; the tare does not tell for sure, the intervals hold the other case, too"
-    return answered(found, arm, recording, tare, relative_to, (*notes, note), otherwise, unsure)
+        return answered(found, arm, recording, tared, relative_to, (*notes, note), unsure=unsure)
+    who = "tare" if tare is not None else "profile"
+    note = f"it seems that {note}; the {who} does not tell for sure, the intervals hold the other case, too"
+    return answered(found, arm, recording, tared, relative_to, (*notes, note), otherwise, unsure)
 
 
 def plausible_tool(tool: InertialParameters, arm: Arm) -> InertialParameters:
@@ -142,19 +153,44 @@ def plausible_tool(tool: InertialParameters, arm: Arm) -> InertialParameters:
     return tool
 
 
-def _carries(log: Recording, arm: Arm, tool: InertialParameters) -> tuple[bool, bool]:
-    """Whether a log fits the arm with the tool better than the bare arm, and whether it does so beyond doubt.
+def _carries(arm: Arm, tool: InertialParameters, tare: Recording | None, profile: Profile | None) -> tuple[bool, bool]:
+    """Whether a tare, or a profile's logs, fit the arm with the tool better than without, and whether beyond doubt.
 
-    The metric is what the log tells by the method that knows best how far it can be trusted.
+    The metric is what a tare tells by the method that knows best how far it can be trusted.
     """
-    seen = choose(arm).identifier.run(log)
-    information = np.linalg.inv(seen.covariance)
-    with_tool = seen.phi - tool.phi
-    ahead = float(seen.phi @ information @ seen.phi - with_tool @ information @ with_tool)
+    if tare is not None:
+        seen = choose(arm).identifier.run(tare)
+        phi, covariance = seen.phi, seen.covariance
+    else:
+        assert profile is not None
+        phi, covariance = profile.mounted(arm)
+    information = np.linalg.inv(covariance)
+    with_tool = phi - tool.phi
+    ahead = float(phi @ information @ phi - with_tool @ information @ with_tool)
     return ahead > 0.0, abs(ahead) > DECISIVE
 
 
-def _check(log: Recording, arm: Arm) -> None:
+def _check_same_mounted(tare: Recording, arm: Arm, profile: Profile, asked: Asked) -> None:
+    """See that a tare carries what the profile's logs do.
+
+    Raises:
+        IdentificationError: it carries something else.
+    """
+    seen = found_in(tare, arm, None, replace(asked, mass=None, drift=0.0, profile=profile)).estimate
+    mass, std = float(seen.phi[0]), float(seen.std[0])
+    if abs(mass) > HELD * std:
+        raise IdentificationError(
+            f"the tare carries {mass:+.3g} ± {Z95 * std:.2g} kg beside what was mounted in the profile's logs: "
+            "expected the same; leave out the tare or the profile, or record a tare with the same mounted"
+        )
+
+
+def check_usable(log: Recording, arm: Arm) -> None:
+    """See that a log is plausible for an arm, and of a torque and a rate that something can be found from.
+
+    Raises:
+        ArmloadError: it is not; the message says what was found and what to do.
+    """
     check_plausible(log, arm)
     if log.channel != "measured":
         raise IdentificationError(

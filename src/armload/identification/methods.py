@@ -30,7 +30,7 @@ from armload.estimators import (
     Tared,
     WeightedLeastSquares,
 )
-from armload.posterior import PosteriorLeastSquares, SmoothPosteriorLeastSquares
+from armload.posterior import PosteriorLeastSquares, Profile, SmoothPosteriorLeastSquares
 from armload.recording import Recording
 
 TARES = ("own equation", "virtual calibration", "same motion", "none")
@@ -48,7 +48,7 @@ class Method:
     prior: whether it starts from a prior on the payload; "determined" then asks how far the log has narrowed it.
     needs: what it cannot work without, beside a log: "", "tare", "training" (a trained model's file) or "motion" (the
         commanded motion).
-    build: makes the identifier; call `make`.
+    build: makes the identifier; call `make`. profile: whether it can use a profile of the arm.
     """
 
     name: str
@@ -57,19 +57,25 @@ class Method:
     source: str
     tare: str
     prior: bool
-    build: Callable[[Arm, Recording | None], Identifier] = field(repr=False)
+    build: Callable[..., Identifier] = field(repr=False)
     needs: str = ""
+    profile: bool = False
 
     def __post_init__(self) -> None:
         if self.tare not in TARES or self.needs not in NEEDS:
             raise ValueError(f"{self.name}: tare {self.tare!r} and needs {self.needs!r}: expected {TARES} and {NEEDS}")
 
-    def make(self, arm: Arm, tare: Recording | None = None) -> Identifier:
-        """The method for an arm, relative to a tare where one is given.
+    def make(self, arm: Arm, tare: Recording | None = None, profile: Profile | None = None) -> Identifier:
+        """The method for an arm, relative to a tare or a profile where one is given.
 
         Raises:
-            IdentificationError: it needs what was not given, or cannot use the tare that was.
+            IdentificationError: it needs what was not given, or cannot use the tare or profile that was.
         """
+        if profile is not None and not self.profile:
+            able = ", ".join(method.name for method in _CATALOGUE if method.profile)
+            raise IdentificationError(
+                f"the method {self.name} cannot use a profile: leave --profile out, or use one of {able}"
+            )
         if self.needs == "tare" and tare is None:
             raise IdentificationError(
                 f"the method {self.name} needs a tare and none was given: record an earlier log of the same arm"
@@ -80,7 +86,7 @@ class Method:
             raise IdentificationError(
                 f"the method {self.name} cannot use a tare: leave the tare out, or use the method map"
             )
-        return self.build(arm, tare)
+        return self.build(arm, tare) if profile is None else self.build(arm, tare, profile=profile)
 
 
 def calibrated(kind: Callable[[Arm], Identifier]) -> Callable[[Arm, Recording | None], Identifier]:
@@ -105,10 +111,10 @@ def _trained(name: str) -> Callable[[Arm, Recording | None], Identifier]:
     return refuse
 
 
-def _hybrid(arm: Arm, tare: Recording | None) -> Identifier:
+def _hybrid(arm: Arm, tare: Recording | None, profile: Profile | None = None) -> Identifier:
     from armload.posterior import HybridIdentifier
 
-    return HybridIdentifier(arm, tare)
+    return HybridIdentifier(arm, tare, profile=profile)
 
 
 def _commanded(*_: object) -> Identifier:
@@ -128,6 +134,7 @@ _CATALOGUE = (
         tare="own equation",
         prior=True,
         build=_hybrid,
+        profile=True,
     ),
     Method(
         "map-gp",
@@ -137,6 +144,7 @@ _CATALOGUE = (
         tare="own equation",
         prior=True,
         build=SmoothPosteriorLeastSquares,
+        profile=True,
     ),
     Method(
         "map",

@@ -65,11 +65,12 @@ def leaning_on_prior(leaning: NDArray[np.bool_]) -> list[str]:
     ]
 
 
-def changed_since_tare(drift: Drift) -> str:
-    """That the arm is not as it was at its tare, where that shows most, and what to do."""
+def changed_since_tare(drift: Drift, what: str = "tare") -> str:
+    """That the arm is not as it was at its tare, or as its profile says, where that shows most, and what to do."""
     j = drift.joint
+    then = "its profile says" if what == "profile" else "it was at its tare"
     return (
-        f"the arm is not as it was at its tare: at joint {j + 1} the torque's offset differs by {drift.offset[j]:+.2g} "
+        f"the arm is not as {then}: at joint {j + 1} the torque's offset differs by {drift.offset[j]:+.2g} "
         f"N·m, the friction by {drift.coulomb[j]:+.2g} N·m; the intervals allow for it; record a tare of this arm as "
         "it is now, with the same base and tool"
     )

@@ -28,7 +28,7 @@ def answered(
     found: Found,
     arm: Arm,
     recording: Recording,
-    tare: Recording | None,
+    tared: bool,
     relative_to: str,
     notes: tuple[str, ...] = (),
     otherwise: NDArray[np.float64] | None = None,
@@ -36,7 +36,8 @@ def answered(
 ) -> Identification:
     """What is said of an estimate.
 
-    otherwise: how far off the truth may be beyond the error bars (10,). unsure: a tool whose own inertia is not known.
+    tared: whether there was a tare or a profile. otherwise: how far off the truth may be beyond the error bars
+    (10,). unsure: a tool whose own inertia is not known.
     """
     estimate, before, weak = found.estimate, found.before, payload_prior_std(arm)
     determined = determined_by(estimate.std, before.std if before.used else None, found.weak_std, weak)
@@ -54,7 +55,7 @@ def answered(
     if found.friction_found:
         said.append("the torque holds the gears' friction, as that of motor currents does: the intervals allow for it")
     if is_held or not determined[0]:  # an empty hand has no inertia to be determined
-        said += lacking(arm, tare is not None, determined, found.known_arm_std, weak)
+        said += lacking(arm, tared, determined, found.known_arm_std, weak)
         said += leaning_on_prior(leaning)
     consistent = is_consistent(phi)
     trusted = found.calibrated and doubt is None and consistent and otherwise is None and unsure is None
@@ -86,8 +87,11 @@ def answered(
 def _doubt(found: Found, mass_determined: bool, relative_to: str) -> str | None:
     """What keeps an answer from being believed, in a sentence."""
     if is_removal(found.estimate, mass_determined):
-        if relative_to == "tare":
-            return "something was taken off since the tare: the added mass is negative, so no body has these parameters"
+        if relative_to in ("tare", "profile"):
+            return (
+                f"something was taken off since the {relative_to}: the added mass is negative, so no body has these "
+                "parameters"
+            )
         return (
             "the mass is negative: less is mounted than the model of the arm and its tool assume, or the torque's "
             "sign is turned"
@@ -95,7 +99,7 @@ def _doubt(found: Found, mass_determined: bool, relative_to: str) -> str | None:
     if not found.explained:
         return NO_BODY
     if found.drift is not None and found.drift.changed:
-        return changed_since_tare(found.drift)
+        return changed_since_tare(found.drift, relative_to)
     if found.mass is not None and found.mass_alone is not None:
         mean, std = found.mass_alone
         if abs(found.mass.mass - mean) > HELD * np.hypot(found.mass.std, std):

@@ -16,6 +16,7 @@ from typing import Any, Self
 import numpy as np
 
 from armload.arms import Arm
+from armload.errors import IdentificationError
 from armload.estimators import Estimate, Identifier
 from armload.identification.answer import body_of
 from armload.identification.choice import choose
@@ -27,13 +28,14 @@ from armload.inertia import determined, distance_to_body, held
 from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
 from armload.online.gate import Gate, Health, all_finite
+from armload.online.learning import drift_of_run, learned_from
 from armload.online.listening import Listening
 from armload.online.restoring import known_parts, origin, same_origin
 from armload.online.state import load_state, save_state
 from armload.online.step import MassStep
 from armload.online.thresholds import MOVING, RECENT, STANDS
 from armload.online.watch import PayloadWatch
-from armload.posterior import PosteriorLeastSquares
+from armload.posterior import PosteriorLeastSquares, Profile
 from armload.posterior.map import PUBLISH
 from armload.recording import Recording, Sample
 from armload.regression import payload_prior_std
@@ -56,14 +58,21 @@ class OnlineIdentifier:
         tare: an earlier log of the same arm, on any motion, with whatever was mounted then: estimates are of what was
             added since.
         method: a name of the catalogue, or a trained model's file; None: the most trustworthy for the arm.
+        profile: what many logs said of this arm; estimates are of what was added since.
 
     Raises:
         ArmloadError: an unknown method, a model of another arm, or a tare that is none of this arm.
     """
 
-    def __init__(self, arm: Arm, tare: Recording | None = None, method: str | Path | None = None) -> None:
-        self.arm, self.tare, self._tared = arm, tare, tare is not None
-        choice = choose(arm, tare, method, live=True)
+    def __init__(
+        self,
+        arm: Arm,
+        tare: Recording | None = None,
+        method: str | Path | None = None,
+        profile: Profile | None = None,
+    ) -> None:
+        self.arm, self.tare, self.profile, self._tared = arm, tare, profile, tare is not None
+        choice = choose(arm, tare, method, live=True, profile=profile)
         first = choice.identifier
         self._watch = PayloadWatch(first) if isinstance(first, PosteriorLeastSquares) else None
         self._engine = first
@@ -84,7 +93,7 @@ class OnlineIdentifier:
 
     @property
     def relative_to(self) -> str:
-        """What the answer is relative to: the bare "arm", the "tool" it was given with, the "tare", or "before".
+        """What the answer is relative to: the bare "arm", its "tool", the "tare", the "profile", or "before".
 
         That is the empty arm before the last change, taken for a tare.
         """
@@ -92,6 +101,8 @@ class OnlineIdentifier:
             return "tare"
         if getattr(self._source or self.engine, "reference", None) is not None:
             return "before"
+        if self.profile is not None:
+            return "profile"
         return "arm" if self.arm.attached is None else "tool"
 
     @property
@@ -171,10 +182,19 @@ class OnlineIdentifier:
                 self._doubted = distance_to_body(said, covariance) > MISFIT
                 if self._doubted:
                     self._notes = (*self._notes, NO_BODY)
-                drift = run.stream.drift if isinstance(run, PosteriorLeastSquares) else None
-                if drift is not None and drift.changed:
-                    self._doubted, self._notes = True, (*self._notes, changed_since_tare(drift))
+                self._doubted = self._doubted or drift_of_run(run) is not None
         return self._said()
+
+    def learned(self, name: str = "stream") -> Profile | None:
+        """The profile with this stream as one more session (`learning.learned_from`); None: there is nothing to learn.
+
+        Raises:
+            IdentificationError: there is no profile to learn for.
+        """
+        if self.profile is None or self._watch is None:
+            raise IdentificationError("nothing is learned without a profile: make one with `armload profile`")
+        self._watch.hold()
+        return learned_from(self.profile, self._watch.runs, name)
 
     def close(self) -> None:
         """Stop what runs beside; the identifier may go on."""
@@ -189,21 +209,27 @@ class OnlineIdentifier:
         """
         if self._watch is not None:
             self._watch.hold()
-        state = {k: v for k, v in vars(self).items() if k not in ("arm", "tare")}
+        state = {k: v for k, v in vars(self).items() if k not in ("arm", "tare", "profile")}
         own = origin(self.arm, self.method, self._engine)
         return save_state({"state": state, "tared": self._tared}, known_parts(self.arm, self._engine), path, own)
 
     @classmethod
-    def restore(cls, path: str | PathLike[str], arm: Arm, method: str | Path | None = None) -> Self:
+    def restore(
+        cls,
+        path: str | PathLike[str],
+        arm: Arm,
+        method: str | Path | None = None,
+        profile: Profile | None = None,
+    ) -> Self:
         """An identifier in the state that was saved.
 
         Args:
-            path: what `save` wrote. arm, method: what the identifier was made with; a tare is in the state.
+            path: what `save` wrote. arm, method, profile: what the identifier was made with; a tare is in the state.
 
         Raises:
             IdentificationError: the file is none, or of another arm or trained model.
         """
-        new = cls(arm, method=method)
+        new = cls(arm, method=method, profile=profile)
         try:
             own = origin(arm, new.method, new._engine)
             saved = load_state(path, known_parts(arm, new._engine), same_origin(path, arm, own))
@@ -236,7 +262,8 @@ class OnlineIdentifier:
         if fresh:
             self._published = sample.t
             self._judge(estimate, run, stands)
-        self._estimate, self._source, self._around, self._doubted = estimate, run, estimate.phi, False
+        self._estimate, self._source, self._around = estimate, run, estimate.phi
+        self._doubted = drift_of_run(run) is not None
 
     def _counted(self, sample: Sample, run: Identifier) -> bool:
         """Remember how old the answer is; whether what was seen lately told it nothing, as the arm stands."""
@@ -284,6 +311,8 @@ class OnlineIdentifier:
             notes.append("not moving: inertia undetermined" if not self._determined[4:].all() else "not moving")
         if stands and self._stream.trouble is None:
             notes.append(_STANDING)
+        if (changed := drift_of_run(run)) is not None:
+            notes.append(changed_since_tare(changed, self.relative_to))
         self._notes = tuple(notes)
 
     @property

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def known_parts(arm: Arm, engine: Identifier) -> dict[str, Any]:
     """What a new identifier for the same arm has already: the arm and the trained parts."""
-    parts = {name: value for name in ("model", "_payloads") if (value := getattr(engine, name, None))}
+    parts = {name: value for name in ("model", "_payloads", "profile") if (value := getattr(engine, name, None))}
     return {"arm": arm, **parts}
 
 
@@ -28,6 +28,7 @@ def origin(arm: Arm, method: str, engine: Identifier) -> dict[str, Any]:
         "name": arm.name,
         "method": method,
         "model": None if model is None else model_fingerprint(model),
+        "profile": None if (profile := getattr(engine, "profile", None)) is None else profile.digest,
     }
 
 
@@ -50,6 +51,14 @@ def same_origin(path: str | PathLike[str], arm: Arm, own: Mapping[str, Any]) -> 
                 f"{path} was saved with the method {saved['method']} and its trained model "
                 f"{saved['model'][:12]} (SHA-256): found the method {own['method']}, {there}; give the method or "
                 "the model's file that it was saved with, or begin anew"
+            )
+        if saved["profile"] != own["profile"]:
+            with_, given = (
+                "without a profile" if x is None else f"with the profile {x}"
+                for x in (saved["profile"], own["profile"])
+            )
+            raise IdentificationError(
+                f"{path} was saved {with_}, found is a stream {given}: give the one it was saved with, or begin anew"
             )
 
     return check

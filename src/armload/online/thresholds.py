@@ -114,3 +114,8 @@ SILENT = 0.1
 BAD_IN_A_ROW = 50
 # [pauses] in a row, no two samples between them that belong together: one or two are a robot's, five are a wrong unit
 PAUSES_IN_A_ROW = 5
+
+# ---------------------------------------------------------------------- what a profile learns, `learning.py`
+
+# [s] of a run of the empty arm, at least, that a profile learns from: as long as a tare is asked for
+LEARN_FROM = 20.0

@@ -109,6 +109,11 @@ class PayloadWatch:
         return self._runs.current
 
     @property
+    def runs(self) -> Runs:
+        """The runs that are kept."""
+        return self._runs
+
+    @property
     def settling(self) -> bool:
         """Whether samples are left out because the payload has just changed."""
         return self.phase == SETTLING

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from armload.posterior.map import PosteriorLeastSquares, SmoothPosteriorLeastSquares
     from armload.posterior.model_file import HybridModel, Training
     from armload.posterior.payload_prior import MixturePosterior, MixturePrior
+    from armload.posterior.profile import Profile, SessionRecord
+    from armload.posterior.profile_file import load_profile, save_profile
+    from armload.posterior.profile_learning import learn_profile
     from armload.posterior.scales import Posterior
 
 __all__ = [
@@ -33,11 +36,16 @@ __all__ = [
     "MixturePrior",
     "Posterior",
     "PosteriorLeastSquares",
+    "Profile",
+    "SessionRecord",
     "SmoothPosteriorLeastSquares",
     "Training",
     "advise",
     "bound",
     "efficiency",
+    "learn_profile",
+    "load_profile",
+    "save_profile",
     "scales_of",
     "shipped_model",
 ]

@@ -6,6 +6,7 @@ The run's rows have unknowns of their own, delta ~ N(0, D), by which offsets and
     T = deltaᵀ·(P + E)⁻¹·delta
 
 is small where nothing else has changed. It is large for a tare of another day, of another arm, or of another base.
+With a profile, E is the drift of the arm's own sessions, and T is large where this one is not of their kind.
 
 Motor currents cannot be asked: their friction grows with the load, so that an empty tare and a loaded run differ on a
 sound arm, too (T = 1970 of the real UR10e pair).
@@ -14,7 +15,7 @@ sound arm, too (T = 1970 of the real UR10e pair).
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,15 +63,17 @@ def drift_since_tare(
     Args:
         runs, prior_std, prior, noise: as of `solve`. found: their solution, for its scales.
     """
-    run, explained = copy(runs[-1]), runs[-1].session.drift
-    run.session = Session(1, max(TESTED, explained))
-    there = solve([*runs[:-1], run], prior_std, prior, noise, _STEPS, found.scales)
-    return _drift(there, run.correction, explained)
+    run, explained = copy(runs[-1]), runs[-1].session
+    if explained.drift < TESTED:  # else the solution itself has allowed for as much
+        run.session = replace(explained, number=1, drift=TESTED)
+        found = solve([*runs[:-1], run], prior_std, prior, noise, _STEPS, found.scales)
+    return drift_of(found, run.correction, explained)
 
 
-def _drift(found: Posterior, correction: Correction, explained: float) -> Drift:
+def drift_of(found: Posterior, correction: Correction, explained: Session) -> Drift:
+    """The test of a solution that has allowed for a drift; `explained`: the session, with what its age explains."""
     n, change = correction.arm.n, found.drift
-    C = found.drift_covariance + np.diag((explained * correction.daily_std) ** 2)
+    C = found.drift_covariance + np.diag(explained.variance(correction))
     own = [change[j::n] @ np.linalg.solve(C[j::n, j::n], change[j::n]) for j in range(n)]
     statistic = float(change @ np.linalg.solve(C, change))
     return Drift(

@@ -19,6 +19,7 @@ from armload.posterior.known_mass import KnownMass
 from armload.posterior.map import PosteriorLeastSquares
 from armload.posterior.model_file import HybridModel
 from armload.posterior.payload_prior import MixturePrior
+from armload.posterior.profile import Profile
 from armload.posterior.same_motion import SameMotion
 from armload.recording import Recording
 from armload.regression import JointFeatures, solution_prior_std
@@ -42,6 +43,7 @@ class HybridIdentifier(PosteriorLeastSquares):
         tare: an earlier log of the same arm, on any motion, with whatever was mounted then.
         model: the learned parts; None: those shipped for the arm.
         features: of the smooth mismatch; a model's error bars were calibrated with the default.
+        profile: as for `PosteriorLeastSquares`; its features are those of the smooth mismatch.
 
     Raises:
         ModelError: no model is shipped for this arm, or it was trained for another one.
@@ -57,14 +59,15 @@ class HybridIdentifier(PosteriorLeastSquares):
         tare: Recording | None = None,
         model: HybridModel | None = None,
         features: JointFeatures | None = None,
+        profile: Profile | None = None,
     ) -> None:
         self.model = shipped_model(arm) if model is None else model
         self._payloads = self.model.prior_for(arm)
         self._traits_frame = self.model.into_frame(arm)
         self.calibrated = self.model.calibrated
         self.payload_prior = (self._payloads.mean, self._payloads.std)
-        self.features = features or JointFeatures(arm.n)
-        super().__init__(arm, tare)
+        self.features = features or (JointFeatures(arm.n) if profile is None else profile.features)
+        super().__init__(arm, tare, profile=profile)
         if tare is not None:
             self._same_motion = SameMotion(arm, tare, self.gain)
 

@@ -17,6 +17,7 @@ from armload.arms import Arm, rated_effort
 from armload.estimators import ArmMismatch, Estimate, Identifier
 from armload.posterior.evidence import Evidence
 from armload.posterior.known_mass import KnownMass
+from armload.posterior.profile import Profile
 from armload.posterior.same_motion import SameMotion
 from armload.posterior.scales import Posterior, Scales
 from armload.posterior.solve import solve
@@ -47,6 +48,8 @@ class PosteriorLeastSquares(Identifier):
             relative to it.
         gain: λ of the lag [1/s].
         prior: what is known about the payload before; None: the weak prior of `solution_prior_std`.
+        profile: what many logs said of this arm; a tare is then of the run's own session. Estimates are relative to
+            what was mounted in the profile's logs.
 
     Attributes:
         reference: an earlier run of the stream with the same mounted as at the tare; it is a tare, too.
@@ -68,20 +71,29 @@ class PosteriorLeastSquares(Identifier):
         tare: Recording | None = None,
         gain: float = GAIN,
         prior: GaussianPrior | None = None,
+        profile: Profile | None = None,
     ) -> None:
-        self.arm, self.gain, self.prior, self.session = arm, gain, prior, SAME
+        self.arm, self.gain, self.prior, self.profile, self.session = arm, gain, prior, profile, SAME
         self._weak = payload_prior_std(arm)
         self._correction = Correction(arm, rated_effort(arm))
         self.reference: PosteriorLeastSquares | None = None
         self._stream: StreamingPosterior | None = None
-        self._tare: RegressionData | None = None
+        self._tares: list[RegressionData] = []
         self._start: Scales | None = None
         self._tare_time = 0.0 if tare is None else tare.duration
+        if profile is not None:
+            profile.check(arm)
+            self._tares.append(profile.data(self._correction, gain, self._noise.block))
+            self._start = profile.scales
+            self._tare_time += profile.duration
+            self.session = profile.session(self._correction)
         if tare is not None:
             self._check(tare)
-            self._tare = self.empty_data()
-            self._tare.add(tare.t, tare.q, tare.dq, tare.tau)
-            self._start = self._from_tare(self._tare)
+            data = self.empty_data()
+            data.add(tare.t, tare.q, tare.dq, tare.tau)
+            self._tares.append(data)
+            if profile is None:
+                self._start = self._from_tare(data)
         self.reset()
 
     @property
@@ -91,7 +103,7 @@ class PosteriorLeastSquares(Identifier):
 
     def empty_data(self) -> RegressionData:
         """An empty regression of the kind this method accumulates."""
-        return RegressionData(self._correction, self.gain, self._features, self._noise.block)
+        return RegressionData(self._correction, self.gain, self._features, self._noise.block, self.session)
 
     def _from_tare(self, tare: RegressionData) -> Scales | None:
         """Scales found from the tare once, for all later solutions to begin with; without features those stated."""
@@ -179,7 +191,7 @@ class PosteriorLeastSquares(Identifier):
     def stream(self) -> StreamingPosterior:
         """The posterior of the run."""
         if self._stream is None:
-            tares, start = () if self._tare is None else (self._tare,), self._start
+            tares, start = tuple(self._tares), self._start
             if self.reference is not None:
                 earlier = self.reference.stream
                 tares, start = (*earlier.tares, earlier.finish()), earlier.posterior.scales
@@ -241,8 +253,10 @@ class PosteriorLeastSquares(Identifier):
 
     def allow_for(self, drift: float) -> None:
         """Before the first sample: by how many daily deviations the arm may differ from what it was at its tare."""
-        self.session = Session(1, drift) if self._tare is not None and drift > 0.0 else SAME
-        self._stream = None
+        if drift > 0.0 and self._tares:
+            # the profile has the size of the arm's own drift: then it is enough that it is another session's
+            self.session = Session(1, drift) if self.profile is None else self.profile.session(self._correction, 2)
+            self._stream = None
 
     def another(self, reference: PosteriorLeastSquares | None = None) -> Self:
         """Another run of the same arm, that has seen nothing yet.
@@ -279,7 +293,7 @@ class SmoothPosteriorLeastSquares(PosteriorLeastSquares):
     'map-gp'
 
     Args:
-        arm, tare, gain, prior: as for `PosteriorLeastSquares`.
+        arm, tare, gain, prior, profile: as for `PosteriorLeastSquares`.
         features: of the smooth part; None: 128 of the pose, 12 of the velocity.
         same_motion: whether a tare along the run's own motion takes the posterior's place in the `evidence`.
     """
@@ -296,11 +310,12 @@ class SmoothPosteriorLeastSquares(PosteriorLeastSquares):
         prior: GaussianPrior | None = None,
         features: JointFeatures | None = None,
         same_motion: bool = False,
+        profile: Profile | None = None,
     ) -> None:
-        self.features = features or JointFeatures(arm.n)
+        self.features = features or (JointFeatures(arm.n) if profile is None else profile.features)
         if same_motion and tare is not None:
             self._same_motion = SameMotion(arm, tare, gain)
-        super().__init__(arm, tare, gain, prior)
+        super().__init__(arm, tare, gain, prior, profile)
 
     @property
     def _features(self) -> JointFeatures:

@@ -63,6 +63,11 @@ class _Gaussian:
         """Mean of g (n, R)."""
         return self.own - self.slope @ self.mean
 
+    def covariance_of(self, E: NDArray, j: int, X: NDArray) -> NDArray[np.float64]:
+        """Covariance (B, B) of the rows of X·[E·z, g_j], X (B, ·)."""
+        shared, own = X[:, : len(E)] @ E - X[:, len(E) :] @ self.slope[j], X[:, len(E) :]
+        return shared @ self.covariance @ shared.T + own @ self.rest[j] @ own.T
+
     def spread(self, E: NDArray, j: int, X: NDArray) -> NDArray[np.float64]:
         """Variance (B,) of X·[E·z, g_j], X (B, ·)."""
         shared, own = X[:, : len(E)] @ E - X[:, len(E) :] @ self.slope[j], X[:, len(E) :]
@@ -80,21 +85,29 @@ class _Eliminated(NamedTuple):
 
 
 class Problem:
-    """One solution's fixed part: which unknowns a run sees, the stated priors."""
+    """One solution's fixed part: which unknowns a run sees, the stated priors.
+
+    Arguments as of `solve.solve`; same: the last run has the same mounted as the others.
+    """
 
     def __init__(
-        self, runs: list[RegressionData], prior_std: NDArray, prior: GaussianPrior | None, noise: NoiseModel
+        self,
+        runs: list[RegressionData],
+        prior_std: NDArray,
+        prior: GaussianPrior | None,
+        noise: NoiseModel,
+        same: bool = False,
     ) -> None:
         self.runs, self.noise_model, self.correction = runs, noise, runs[0].correction
         self.features = runs[0].features
-        count, p = min(len(runs), 2), self.correction.size
+        count, p = 1 if same else min(len(runs), 2), self.correction.size
         d = self.correction.drifting
         # the run's own session first: its rows go on
         own, others = runs[-1].session, {run.session for run in runs[:-1]} - {runs[-1].session}
         self.sessions = [s for s in (own, *sorted(others, key=lambda s: s.number)) if s.drift > 0.0]
         self.payloads, self.size = 10 * count, 10 * count + p + d * len(self.sessions)
         self.eta = slice(self.payloads, self.payloads + p)
-        self.drift_variance = np.array([(s.drift * self.correction.daily_std) ** 2 for s in self.sessions])
+        self.drift_variance = np.array([s.variance(self.correction) for s in self.sessions])
         self.last = slice(10 * (count - 1), 10 * count)
         self.payload_variance = np.tile(np.asarray(prior_std) ** 2, count)
         self.mean, self.root = np.zeros(self.size), None
@@ -102,6 +115,9 @@ class Problem:
             self.mean[self.last], self.root = prior.mean, prior.root
         share = [share_of_noise(run.blocks.duration) for run in runs]
         self.expected = np.outer(share, whole_noise(self.correction, noise))  # (K, n)
+        for k, run in enumerate(runs):
+            if run.noise is not None:
+                self.expected[k] = run.noise
         self.selections = []
         for run in runs:
             E = np.zeros((10 + p, self.size))
@@ -212,6 +228,9 @@ class Problem:
         """S of each run."""
         model, out = self.noise_model, []
         for run, E, expected in zip(self.runs, self.selections, self.expected, strict=True):
+            if run.noise is not None:
+                out.append(run.noise)
+                continue
             spread = partial(found.spread, E) if self.features.size else None
             S = run.residual_variance(E @ found.mean, expected, np.inf, found.weights, spread)
             S = np.maximum(S, expected) if model.floor else S

@@ -14,13 +14,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import deepcopy
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armload.inertia.cholesky import factor, invert
 from armload.kernels import kernel
-from armload.posterior.drift import ALLOWED, Drift, drift_since_tare
+from armload.posterior.drift import ALLOWED, TESTED, Drift, drift_of, drift_since_tare
 from armload.posterior.handover import Handover, Result
 from armload.posterior.same_motion import Difference, SameMotion
 from armload.posterior.scales import Posterior, Scales
@@ -211,12 +212,12 @@ class StreamingPosterior:
         self._handover.abandon()
         self._accumulate_waiting()
         runs = [*self.tares, self._run]
-        self._adopt(self._solved(runs, self.start, self.iterations - 1))
         self.drift = None
+        self._adopt(self._solved(runs, self.start, self.iterations - 1))
         if self.tares and self._test_tare and self.posterior.torque == "link":
             self.drift = drift_since_tare(runs, self.prior_std, self.prior, self.noise, self.posterior)
             if self.drift.changed:
-                self._run.session = Session(1, max(ALLOWED, self.session.drift))
+                self._run.session = replace(self.session, number=1, drift=max(ALLOWED, self.session.drift))
                 self._adopt(self._solved(runs, self.start, self.iterations - 1))
                 self._run.session = self.session
         changed = self.drift is not None and self.drift.changed  # then the difference is of two arms, too
@@ -280,6 +281,8 @@ class StreamingPosterior:
         if np.isfinite(solution.state.information.sum() + solution.state.vector.sum()):  # else the last one goes on
             self._posterior, self._state = solution.posterior, solution.state
             self.solutions += 1
+            if self._test_tare and self.session.drift >= TESTED and self.posterior.torque == "link":
+                self.drift = drift_of(solution.posterior, self.correction, self.session)
         elif self._state is None:
             self.prepare()
             assert self._base is not None
@@ -304,6 +307,13 @@ class StreamingPosterior:
             self.seconds -= sum(row.h for row in rows[kept:])
             self._adopt(self._step(self._run))
         return self._run
+
+    def accumulated(self) -> RegressionData:
+        """All rows so far, accumulated in a copy; `hold` first."""
+        run = deepcopy(self._run, {id(self.correction): self.correction})
+        if self._waiting:
+            run.take(Rows.of(self._waiting))
+        return run
 
     def close(self) -> None:
         """Stop the second thread."""

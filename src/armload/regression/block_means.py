@@ -8,7 +8,8 @@ Source: Conway 1963; Flegal & Jones, Annals of Statistics 2010 (batch means).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from copy import copy
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,11 +25,14 @@ class BlockMeans:
     Args:
         shape: shape of one value of the signal (an int or a tuple).
         block: length of a block to begin with [s]; it should exceed the correlation time.
+
+    Attributes:
+        sums: (B, *shape) integral of the signal over each block, as far as it is filled.
     """
 
     def __init__(self, shape: int | tuple[int, ...], block: float = BLOCK) -> None:
         self.block = block
-        self._sums = np.zeros((_MOST_BLOCKS, *np.atleast_1d(shape)))
+        self.sums = np.zeros((_MOST_BLOCKS, *np.atleast_1d(shape)))
         self._times = np.zeros(_MOST_BLOCKS)
         self._filled = 0  # index of the block being filled
         self._count = 0
@@ -52,7 +56,7 @@ class BlockMeans:
 
     def _put(self, durations: NDArray[np.float64], values: NDArray[np.float64]) -> None:
         """Into the block being filled."""
-        self._sums[self._filled] += np.tensordot(durations, values, 1)
+        self.sums[self._filled] += np.tensordot(durations, values, 1)
         self._times[self._filled] += durations.sum()
         self._count += int(np.count_nonzero(durations > 0))
 
@@ -70,7 +74,7 @@ class BlockMeans:
     def means(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Means (B, *shape) and durations (B,) [s] of the blocks that are at least half full."""
         keep = self._times >= 0.5 * self.block
-        return self._sums[keep] / self._times[keep].reshape(-1, *[1] * (self._sums.ndim - 1)), self._times[keep]
+        return self.sums[keep] / self._times[keep].reshape(-1, *[1] * (self.sums.ndim - 1)), self._times[keep]
 
     @property
     def duration(self) -> float:
@@ -81,29 +85,35 @@ class BlockMeans:
         """S (shape) [unit²·s] about zero; infinite while fewer than two blocks are full."""
         means, times = self.means()
         if not self.ready:
-            return np.full(self._sums.shape[1:], np.inf)
+            return np.full(self.sums.shape[1:], np.inf)
         return np.mean(means**2 * times.reshape(-1, *[1] * (means.ndim - 1)), axis=0)
+
+    def mapped(self, change: Callable[[NDArray], NDArray]) -> BlockMeans:
+        """The blocks of a linear function of the signal; change: (B, *shape) → (B, *new)."""
+        out = copy(self)
+        out.sums, out._times = change(self.sums), self._times.copy()
+        return out
 
     @classmethod
     def joined(cls, parts: Sequence[BlockMeans]) -> BlockMeans:
         """The blocks of several stretches of one signal, one after another, to be read and not to be added to."""
-        out = cls(parts[0]._sums.shape[1:], max(part.block for part in parts))
-        sums = np.concatenate([part._sums[: part._filled + 1] for part in parts])
+        out = cls(parts[0].sums.shape[1:], max(part.block for part in parts))
+        sums = np.concatenate([part.sums[: part._filled + 1] for part in parts])
         times = np.concatenate([part._times[: part._filled + 1] for part in parts])
         while len(times) > _MOST_BLOCKS:
             last = len(times) - len(times) % 2
             sums = np.concatenate([sums[0:last:2] + sums[1:last:2], sums[last:]])
             times = np.concatenate([times[0:last:2] + times[1:last:2], times[last:]])
             out.block *= 2.0
-        out._sums[: len(times)], out._times[: len(times)] = sums, times
+        out.sums[: len(times)], out._times[: len(times)] = sums, times
         out._filled = len(times) - 1
         out._count = sum(part._count for part in parts)
         return out
 
     def _join_pairs(self) -> None:
         half = _MOST_BLOCKS // 2
-        self._sums[:half] = self._sums[0::2] + self._sums[1::2]
+        self.sums[:half] = self.sums[0::2] + self.sums[1::2]
         self._times[:half] = self._times[0::2] + self._times[1::2]
-        self._sums[half:], self._times[half:] = 0.0, 0.0
+        self.sums[half:], self._times[half:] = 0.0, 0.0
         self.block *= 2.0
         self._filled = half

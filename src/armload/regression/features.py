@@ -70,6 +70,17 @@ class JointFeatures:
         shares = (np.arange(count) + 0.5) / max(count, 1)
         return ndtri((1.0 + shares) / 2.0) / _VELOCITY_SCALE
 
+    def first(self, fewer: JointFeatures) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Which of these are the features (R',) with fewer waves of the pose, and the factor (R',) that makes them so.
+
+        The waves of fewer features are the first of more.
+        """
+        half, few = self.pose // 2, fewer.pose // 2
+        pose = np.concatenate([np.arange(few), half + np.arange(few)])
+        velocity = self.pose + np.arange(self.velocity)
+        scale = np.concatenate([np.full(2 * few, np.sqrt(half / max(few, 1))), np.ones(self.velocity)])
+        return np.concatenate([pose, velocity]), scale
+
     def of_pose(self, q: ArrayLike) -> NDArray[np.float64]:
         """f (N, pose) at poses (N, n), the same for all joints; the mean square of a weighted sum is the weights'."""
         angle = np.atleast_2d(q) @ self.waves.T

@@ -30,11 +30,17 @@ class Session:
     """Between two switchings-on of an arm: its offsets and friction are the same throughout.
 
     number: sessions of the same number are one. drift: by how many daily deviations (`Correction.daily_std`) it differs
-    from session 0, 1 sigma; 0: not at all.
+    from session 0, 1 sigma; 0: not at all. relative: factors on those deviations, one for each unknown that drifts,
+    where an arm's own are known; empty: they are 1.
     """
 
     number: int = 0
     drift: float = 0.0
+    relative: tuple[float, ...] = ()
+
+    def variance(self, correction: Correction) -> NDArray[np.float64]:
+        """Variance (d,) of what offsets and friction differ by from session 0."""
+        return (self.drift * correction.daily_std * (self.relative or 1.0)) ** 2
 
 
 SAME = Session()
@@ -49,7 +55,12 @@ class RegressionData:
         features: of each joint's nonparametric part; None: there is none.
         block: length of the blocks of the residual's batch means [s].
         session: that the recording is of.
+
+    Attributes:
+        noise: long-run variance (n,) of the residual, where it is known; None: the data tell.
     """
+
+    noise: NDArray[np.float64] | None = None
 
     def __init__(
         self,
@@ -92,6 +103,23 @@ class RegressionData:
         out = cls(first.correction, first.gain, first.features, first.blocks.block, first.session)
         out.A, out.b = sum(part.A for part in parts), sum(part.b for part in parts)  # type: ignore[assignment]
         out.blocks = BlockMeans.joined([part.blocks for part in parts])
+        return out
+
+    def less(self, phi: NDArray[np.float64]) -> None:
+        """Take the torque of a known body (10,) off all rows so far."""
+        self.b -= self.A[:, :, :10] @ phi
+        self.blocks.sums[:, :, -1] -= self.blocks.sums[:, :, :10] @ phi
+
+    def of_features(self, features: JointFeatures) -> RegressionData:
+        """The same with the first waves of the pose only, to be read and not to be added to."""
+        out = RegressionData(self.correction, self.gain, features, self.blocks.block, self.session)
+        keep, scale = self.features.first(features)
+        shared = np.arange(10 + self.correction.size)
+        rows = np.concatenate([shared, len(shared) + keep])
+        by = np.concatenate([np.ones(len(shared)), scale])
+        out.A = self.A[:, rows[:, None], rows] * np.outer(by, by)
+        out.b = self.b[:, rows] * by
+        out.blocks = self.blocks.mapped(lambda sums: sums[..., np.append(rows, -1)] * np.append(by, 1.0))
         return out
 
     def selected(self, E: NDArray) -> tuple[NDArray, NDArray]:

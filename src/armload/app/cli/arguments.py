@@ -168,6 +168,12 @@ def add_identifier_arguments(parser: argparse.ArgumentParser) -> None:
         help="an earlier log of the same arm, on any motion; the answer is what was added since",
     )
     parser.add_argument(
+        "--profile",
+        type=file_name,
+        metavar="P",
+        help="what many logs said of this arm (armload profile); the answer is what was added since",
+    )
+    parser.add_argument(
         "--method",
         type=file_name,
         metavar="M",

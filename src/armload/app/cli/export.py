@@ -216,10 +216,8 @@ def _on_use(load: Load, to: str) -> list[str]:
         notes.append("this contains any hand that is mounted: take off what Desk counts already with --minus")
     if to in ("ur", "ur-payload") and load.relative_to == "tool":
         notes.append("a UR's payload is everything on the flange: add the tool with --plus")
-    if to in ("ur", "ur-payload") and load.relative_to in ("tare", "before"):
-        notes.append(
-            "a UR's payload is everything on the flange: add what was mounted at the tare, if any, with --plus"
-        )
+    if to in ("ur", "ur-payload") and load.relative_to in ("tare", "profile", "before"):
+        notes.append("a UR's payload is everything on the flange: add what was mounted before, if any, with --plus")
     if to in CONTROLLERS and load.frame is None:
         notes.append("the payload names no frame: it is taken to be about the flange")
     return notes

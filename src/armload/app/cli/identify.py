@@ -24,6 +24,7 @@ examples:
   armload identify loaded.csv --robot my_arm.urdf --frame tool0 --tare unloaded.csv
   armload identify run.csv --robot ur10e --gravity=-9.81,0,0        (on a wall)
   armload identify run.csv --robot panda --tare yesterday.csv --tare-age 1d
+  armload identify run.csv --robot panda --profile arm.profile       (an arm that knows itself: armload profile)
   armload identify run.csv --robot panda --mass 1.200±0.002         (weighed: what is left is found better)
   armload identify run.csv --robot panda --out payload.json         (the answer as JSON, usable as --tool later)
   armload identify run.csv --robot panda --tool franka-hand --to franka    (what the controller reads)
@@ -90,6 +91,7 @@ def run(options: argparse.Namespace) -> None:
             tare_age=options.tare_age,
             tool=tool,
             mass=options.mass,
+            profile=options.profile,
             method=options.method,
             progress=say,
         )

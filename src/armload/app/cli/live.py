@@ -28,6 +28,7 @@ examples:
   armload live run.csv --robot panda --speed 2 --loop
   armload live fr3://172.16.0.2 --record today.csv
   armload live panda://172.16.0.2 --tare empty.csv --headless | tee estimates.jsonl
+  armload live panda://172.16.0.2 --profile arm.profile --learn
   armload live panda://172.16.0.2 --tool franka-hand
   armload live 'ur://192.168.0.10?torque_constants=12,12,10,11,11,11' --robot ur10e
   armload live ros2:///joint_states --robot my_arm.urdf --frame tool0
@@ -70,6 +71,11 @@ def parser() -> Parser:
         metavar="S",
         help="with --headless: seconds between lines (0.1)",
     )
+    add(
+        "--learn",
+        action="store_true",
+        help="add what the stream shows of the empty arm to the file of --profile, when it ends",
+    )
     add("--record", type=file_name, metavar="FILE.csv", help="keep every sample in a log that does not exist yet")
     add(
         "--speed",
@@ -96,10 +102,14 @@ def run(options: argparse.Namespace) -> int | None:
     from armload.app.cli.headless import lines
     from armload.app.page.session import Session
     from armload.devices import open_source
+    from armload.posterior import load_profile
     from armload.recording import ColumnSpec, check_own_measurements, has_topics
 
     options.robot = options.robot or _robot_of(options.source)
     arm = _arm_of(options)
+    if options.learn and options.profile is None:
+        raise UsageError("--learn adds to a profile, but there is no --profile; make one with `armload profile`")
+    profile = None if options.profile is None else load_profile(options.profile)
     of_log, columns = options.source != "sim" and "://" not in options.source, columns_of(options)
     if columns != ColumnSpec() and not of_log and options.tare is None:
         raise UsageError("--columns and its companions are for logs, but neither SOURCE nor --tare is one")
@@ -119,7 +129,7 @@ def run(options: argparse.Namespace) -> int | None:
         columns=columns if of_log and not (has_topics(options.source) and options.tare is not None) else None,
     )
     with source:
-        session = Session(source, arm, tare, options.method, _warn)
+        session = Session(source, arm, tare, options.method, _warn, profile)
         try:
             if not options.headless:
                 return _serve(session, options)
@@ -128,6 +138,8 @@ def run(options: argparse.Namespace) -> int | None:
             return None
         finally:
             session.close()
+            if options.learn and options.profile is not None and session.error is None:
+                _learn(session, options.profile)
 
 
 def _arm_of(options: argparse.Namespace) -> Arm:
@@ -143,6 +155,18 @@ def _arm_of(options: argparse.Namespace) -> Arm:
     from armload.identification import plausible_tool
 
     return arm.with_payload(plausible_tool(arm.in_frame(payload_of(options.tool, arm)), arm))
+
+
+def _learn(session, path: str) -> None:
+    """Add what the stream has shown of the empty arm to a profile's file."""
+    from armload.posterior import save_profile
+
+    profile = session.learned()
+    if profile is None:
+        print_note(f"{path} is as it was: the stream showed no 20 s of the empty arm as the profile knows it")
+        return
+    save_profile(profile, path)
+    print_note(f"{path}: learned {profile.sessions[-1].duration:.0f} s of the empty arm")
 
 
 def _warn(text: str) -> None:

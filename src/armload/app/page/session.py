@@ -24,6 +24,7 @@ from armload.devices import Source
 from armload.errors import IdentificationError, SourceError
 from armload.inertia import Z95, InertialParameters
 from armload.online import Event, OnlineEstimate, OnlineIdentifier
+from armload.posterior import Profile
 from armload.recording import Recording, Sample
 
 _AGAIN = 10.0  # [s] between two warnings of samples that cannot be used
@@ -56,7 +57,8 @@ class Session:
 
     Args:
         source: closed with the session.
-        arm: the bare arm, or with a tool that is known. tare: an earlier log of it. method: see `OnlineIdentifier`.
+        arm: the bare arm, or with a tool that is known. tare: an earlier log of it. method, profile: see
+            `OnlineIdentifier`.
         warn: called with each warning on the stream, also with the error it ended with in a thread (`start`).
 
     Attributes:
@@ -76,8 +78,9 @@ class Session:
         tare: Recording | None = None,
         method: str | Path | None = None,
         warn: Callable[[str], None] | None = None,
+        profile: Profile | None = None,
     ) -> None:
-        self.source, self.arm, self.tare = source, arm, tare
+        self.source, self.arm, self.tare, self.profile = source, arm, tare, profile
         self._warn_too = warn or (lambda _: None)
         # what was held while the tare was recorded; None: nobody knows
         self._tared = InertialParameters.zero(arm.frame) if tare is None else None
@@ -105,6 +108,10 @@ class Session:
     def lost(self) -> int:
         """Samples the source had to drop because the identifier was too slow."""
         return int(getattr(self.source, "lost", 0))
+
+    def learned(self) -> Profile | None:
+        """The profile with what the stream has shown of the empty arm; None: it showed nothing that can be learned."""
+        return self._identifier.learned(self.source.name)
 
     # ------------------------------------------------------------------ the loop
 
@@ -266,7 +273,7 @@ class Session:
 
     def _made(self, tare: Recording | None, method: str | Path | None) -> OnlineIdentifier:
         # an arm's model computes in a memory of its own, which two threads must not share
-        return OnlineIdentifier(replace(self.arm), tare, method)
+        return OnlineIdentifier(replace(self.arm), tare, method, self.profile)
 
     def _say(self, text: str, warning: bool = False) -> None:
         self.log.append(Entry(0.0 if self.estimate is None else self.estimate.t, text, warning=warning))

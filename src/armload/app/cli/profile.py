@@ -1,0 +1,184 @@
+"""`armload profile`: learn an arm from its logs, go on with further ones, or show what is known of it."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from armload.app.cli.arguments import Parser, add_arm_arguments, add_column_arguments, file_name
+from armload.app.cli.named import arm_of, payload_of, read_logs
+from armload.app.cli.printing import console, print_json, print_note, table, working
+from armload.errors import UsageError
+
+if TYPE_CHECKING:
+    from armload.posterior import Profile
+
+_USAGE = """armload profile LOG… --robot R --out P [--update] …
+       armload profile show P [--figure F.png] [--json]"""
+_EXAMPLES = """\
+examples:
+  armload profile monday.csv tuesday.csv friday.csv --robot panda --out arm.profile
+  armload profile today.csv --robot panda --out arm.profile --update
+  armload profile empty*.csv --robot panda --tool franka-hand --out arm.profile
+  armload profile show arm.profile --figure arm.png
+
+Every log is of the arm without a payload, on any motion, and a session of its own: offsets and friction may differ from
+log to log (logs within an hour, by clocks that show the time of day, are one session). Whatever is mounted must be the
+same in all of them. Use it with: armload identify LOG --profile arm.profile
+"""
+
+
+def parser() -> Parser:
+    """The arguments of `armload profile`."""
+    parser = Parser(
+        prog="armload profile",
+        usage=_USAGE,
+        description="Learn an arm from its logs: what it does unlike its model, and how that drifts from day to day.",
+        epilog=_EXAMPLES,
+    )
+    parser.add_argument("logs", nargs="+", type=file_name, metavar="LOG", help="logs of the arm, or: show PROFILE")
+    add_arm_arguments(parser, required=False)
+    parser.add_argument("--out", type=file_name, metavar="P", help="the profile's file")
+    parser.add_argument("--update", action="store_true", help="add the logs to the profile that --out names")
+    parser.add_argument(
+        "--one-session", action="store_true", help="all logs are of one session, without a switching-off between them"
+    )
+    parser.add_argument(
+        "--tool", type=file_name, metavar="FILE", help="a known tool that was mounted (JSON, or franka-hand)"
+    )
+    parser.add_argument("--topic", metavar="T", help="JointState topic of a bag, where it has several")
+    add_column_arguments(parser)
+    parser.add_argument("--figure", type=file_name, metavar="F.png", help="with show: draw where the arm is known")
+    parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+    return parser
+
+
+def run(options: argparse.Namespace) -> None:
+    """Learn and save, or show."""
+    if options.logs[0] == "show":
+        _show(options)
+        return
+    if options.robot is None or options.out is None:
+        raise UsageError("a profile needs --robot, whose arm it is, and --out, its file; or: armload profile show P")
+    from armload.identification import check_usable
+    from armload.posterior import learn_profile, load_profile, save_profile
+    from armload.posterior.profile_learning import check_fits
+
+    with working("reading") as say:
+        arm = arm_of(options)
+        known = load_profile(options.out) if options.update else None
+        tool = None if options.tool is None else arm.in_frame(payload_of(options.tool, arm)).phi
+        logs = [log for log in read_logs(options, arm, *options.logs) if log is not None]
+        for log in logs:
+            check_usable(log, arm)
+        say("learning")
+        mounted = None if tool is None else [tool] * len(logs)
+        if known is not None:
+            for log in logs:
+                check_fits(known, arm, log, tool)
+        profile = learn_profile(
+            arm,
+            logs,
+            mounted,
+            sessions=[0] * len(logs) if options.one_session else None,
+            known=known,
+            progress=lambda done, total: say(f"learning: {done} of {total} logs"),
+        )
+    save_profile(profile, options.out)
+    if options.json:
+        print_json(_fields(profile) | {"out": options.out})
+        return
+    _print(profile)
+    size = Path(options.out).stat().st_size / 1e6
+    use = f"armload identify LOG --robot {options.robot} --profile {options.out}"
+    print(f"wrote {options.out} ({size:.1f} MB); use it with: {use}")
+
+
+def _show(options: argparse.Namespace) -> None:
+    from armload.posterior import load_profile
+
+    if len(options.logs) != 2:
+        raise UsageError("armload profile show takes one profile: armload profile show arm.profile")
+    profile = load_profile(options.logs[1])
+    if options.figure is not None:
+        from armload.lab.report.profile_figure import write_profile_figure
+
+        arm = arm_of(options) if options.robot is not None else _arm_of(profile)
+        write_profile_figure(profile, arm, options.figure)
+    if options.json:
+        print_json(_fields(profile))
+        return
+    _print(profile)
+
+
+def _arm_of(profile: Profile) -> Any:
+    from armload.arms import ARMS, arm
+
+    if profile.arm_name not in ARMS:
+        raise UsageError(f"the profile is of {profile.arm_name}: name its URDF with --robot")
+    x, y, z = (float(part) for part in profile.gravity)
+    return arm(profile.arm_name, profile.frame, (x, y, z))
+
+
+def _fields(profile: Profile) -> dict[str, Any]:
+    from dataclasses import asdict
+
+    n = profile.n
+    drift = profile.drift.reshape(-1, n) ** 0.5
+    return {
+        "robot": profile.arm_name,
+        "frame": profile.frame,
+        "duration": profile.duration,
+        "pose_features": profile.features.pose,
+        "repeated": profile.repeated,
+        "drift_offset": drift[0].tolist(),
+        "drift_coulomb": drift[1].tolist(),
+        "sessions": [asdict(session) for session in profile.sessions],
+        "next": list(_next(profile)),
+    }
+
+
+def _print(profile: Profile) -> None:
+    from armload.posterior.drift import CHANGED
+
+    n, drift = profile.n, profile.drift.reshape(-1, profile.n) ** 0.5
+    print(
+        f"{profile.arm_name} about {profile.frame}: {len(profile.sessions)} sessions, {profile.duration:.0f} s, "
+        f"{profile.features.pose} features of the pose, noise counted {profile.repeated:g} times"
+    )
+    rows = table("from session to session, 1 sigma [N·m]", "", *(f"joint {j + 1}" for j in range(n)))
+    for name, values in (("offset", drift[0]), ("Coulomb friction", drift[1])):
+        rows.add_row(name, *(f"{x:.3f}" for x in values))
+    console().print(rows)
+    rows = table("sessions", "log", "time [s]", "offsets [N·m]", "misfit", "noise")
+    for session in profile.sessions:
+        offsets = " ".join(f"{x:+.2f}" for x in session.offset)
+        name, time = Path(session.name).name, f"{session.duration:.0f}"
+        rows.add_row(name, time, offsets, f"{session.statistic:.0f}", f"{max(session.noise):.1f}")
+    console().print(rows)
+    print_note(
+        f"misfit is T of how the session's offsets and friction differ from the others': about {3 * n} or less, above "
+        f"{CHANGED:.0f} it is another arm's; noise is over what is expected, the largest joint's"
+    )
+    for line in _next(profile):
+        print_note(line)
+
+
+def _next(profile: Profile) -> tuple[str, ...]:
+    """What to record next, and what does not fit."""
+    from armload.posterior.drift import CHANGED
+
+    said = [
+        f"{Path(session.name).name} does not fit the other sessions (misfit {session.statistic:.0f}): another arm, "
+        "another base, or something was mounted; learn the profile without it"
+        for session in profile.sessions
+        if session.statistic > CHANGED
+    ]
+    if len(profile.sessions) < 4:
+        said.append(f"{len(profile.sessions)} sessions do not tell how the arm drifts: record it on four days or more")
+    moved = profile.poses.max(axis=0) - profile.poses.min(axis=0)
+    still = [str(j + 1) for j in range(profile.n) if moved[j] < 0.5]
+    if still:
+        said.append(f"joint {', '.join(still)} moved by less than half a radian in all logs: move it further")
+    return tuple(said)

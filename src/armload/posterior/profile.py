@@ -1,0 +1,148 @@
+"""What many logs of an arm say of the arm: its profile, a tare that outlives the day.
+
+A profile is information on x_j = [phi_0 eta g_j] of every joint j, what its sessions share: whatever is mounted in all
+of its logs, the rigid mismatch, the weights of the smooth one. `profile_learning` makes it. In `problem.Problem` it
+takes the place of a tare, as a run whose noise is known. Offsets and friction of a session differ from those of the
+mean session by delta ~ N(0, D); D is the arm's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm, link_fingerprint, prefixed_frame, rated_effort
+from armload.errors import ModelError
+from armload.inertia import InertialParameters
+from armload.posterior.scales import Scales
+from armload.posterior.solve import solve
+from armload.regression import Correction, JointFeatures, payload_prior_std
+from armload.regression.information import RegressionData, Session
+from armload.regression.lag import GAIN
+from armload.regression.noise import SMOOTH
+
+
+@dataclass(frozen=True)
+class SessionRecord:
+    """What a profile keeps of one session, for people: what it is called, how it drifted, how well it fits.
+
+    duration [s]; date: [s since 1970], None where the log does not say. offset, coulomb: (n,) by which they differ from
+    the mean session [N·m]. statistic: T of `posterior.drift`, chi-squared of 3·n where the session is like the others.
+    noise: (n,) the residual's long-run deviation √S over the one expected.
+    """
+
+    name: str
+    duration: float
+    date: float | None
+    offset: tuple[float, ...]
+    coulomb: tuple[float, ...]
+    statistic: float
+    noise: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """An arm as its logs show it.
+
+    Args:
+        arm_name, fingerprint, frame, n: of the arm (`link_fingerprint`); phi_0 is about that frame.
+        gravity: (3,) that the logs were recorded with [m/s²].
+        features: of each joint's smooth part.
+        A, b: (n, S, S), (n, S) information on x_j, in units of the noise.
+        scales: that the arm's other logs start from.
+        drift: (d,) variance of a session's offsets and friction about the mean session.
+        repeated: by how much the noise of a log counts for more, as what the features cannot say repeats.
+        sessions: what it was learned from. poses: (P, n) where the arm was seen [rad].
+    """
+
+    arm_name: str
+    fingerprint: str
+    frame: str
+    n: int
+    gravity: NDArray[np.float64]
+    features: JointFeatures
+    A: NDArray[np.float64] = field(repr=False)
+    b: NDArray[np.float64] = field(repr=False)
+    scales: Scales = field(repr=False)
+    drift: NDArray[np.float64] = field(repr=False)
+    repeated: float
+    sessions: tuple[SessionRecord, ...] = field(repr=False)
+    poses: NDArray[np.float64] = field(repr=False)
+
+    @property
+    def duration(self) -> float:
+        """Seconds that it was learned from."""
+        return sum(session.duration for session in self.sessions)
+
+    @property
+    def digest(self) -> str:
+        """The first twelve digits of the SHA-256 of what it knows."""
+        from hashlib import sha256
+
+        return sha256(np.ascontiguousarray(self.A).tobytes() + self.b.tobytes()).hexdigest()[:12]
+
+    def check(self, arm: Arm) -> None:
+        """See that it is of this arm, on this base.
+
+        Raises:
+            ModelError: it is of another one.
+        """
+        flange = prefixed_frame(arm, self.frame)
+        if arm.n != self.n or flange is None or _fingerprint(arm, flange) != self.fingerprint:
+            raise ModelError(
+                f"the profile is of {self.arm_name}: {arm.name} is another arm, or has other links; learn one for it "
+                "with `armload profile`"
+            )
+        if not np.allclose(arm.gravity, self.gravity, atol=0.05):
+            raise ModelError(
+                f"the profile is of an arm with gravity {_text(self.gravity)} m/s² in its base's axes, asked for is "
+                f"{_text(arm.gravity)}: expected the same base; learn a profile of the arm as it stands now"
+            )
+
+    def data(self, correction: Correction, gain: float, block: float) -> RegressionData:
+        """The profile as a run of session 0 whose noise is known, phi_0 about the arm's frame."""
+        out = RegressionData(correction, gain, self.features, block)
+        T = np.eye(self.A.shape[1])
+        arm, flange = correction.arm, prefixed_frame(correction.arm, self.frame)
+        if flange != arm.frame:
+            T[:10, :10] = np.array([arm.in_frame(InertialParameters(unit, flange)).phi for unit in np.eye(10)])
+            T[:10, :10] = np.linalg.inv(T[:10, :10].T)
+        out.A, out.b, out.noise = T.T @ self.A @ T, self.b @ T, np.ones(self.n)
+        return out
+
+    def mounted(self, arm: Arm) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """phi_0 (10,) about the arm's frame, what is mounted in the profile's logs, and its covariance (10, 10)."""
+        data = self.data(Correction(arm, rated_effort(arm)), GAIN, SMOOTH.block)
+        found = solve([data], payload_prior_std(arm), None, SMOOTH, 1, self.scales)
+        return found.phi, found.covariance
+
+    def uncertainty(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Standard deviation (N, n) [N·m] of each joint's smooth torque at poses q (N, n), all else known."""
+        f, root = self.features.of_pose(q), np.sqrt(self.scales.features)
+        own, pose = self.A.shape[1] - self.features.size, slice(0, self.features.pose)
+        out = np.empty((len(f), self.n))
+        for j in range(self.n):
+            K = root[j][:, None] * self.A[j, own:, own:] * root[j] + np.eye(self.features.size)
+            scaled = f * root[j, pose]
+            out[:, j] = np.sqrt(np.maximum(((scaled @ np.linalg.inv(K)[pose, pose]) * scaled).sum(axis=1), 0.0))
+        return out
+
+    def session(self, correction: Correction, number: int = 1) -> Session:
+        """Another session of the arm."""
+        return Session(number, 1.0, tuple(np.sqrt(self.drift) / correction.daily_std))
+
+
+def fingerprint(arm: Arm) -> str:
+    """Of an arm's links about its frame, whatever is attached (`link_fingerprint`)."""
+    return link_fingerprint(replace(arm, attached=None))
+
+
+def _fingerprint(arm: Arm, frame: str) -> str:
+    return fingerprint(replace(arm, frame=frame))
+
+
+def _text(vector: Iterable[float]) -> str:
+    return ", ".join(f"{x:.3g}" for x in vector)

@@ -1,0 +1,159 @@
+"""A profile in one file of a few megabytes: safetensors with JSON in its header, nothing in it is executed.
+
+The information is kept as a factor, in units of the prior: with A of the joints' own weights, Ã = √P·A·√P,
+
+    L_j·L_jᵀ = Ã_gg,j + 1,    V_j = L_j⁻¹·Ã_gz,j,    Z = A_zz − Σ_j V_jᵀ·V_j
+
+L and V in single precision, Z in double. A rounded factor is still a factor, so that the information that is read is
+one that can be; its rounding is 1e-7 of a square root, where that of A would be 1e-7 of numbers a million times the
+prior.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.atomic import replacing
+from armload.errors import ModelError
+from armload.posterior.profile import Profile, SessionRecord
+from armload.posterior.scales import Scales
+from armload.regression import JointFeatures
+
+FORMAT = 1
+_HEADER = "armload-profile"
+
+
+def save_profile(profile: Profile, path: str | PathLike[str]) -> Path:
+    """Write one file; it appears whole or not at all.
+
+    Raises:
+        ModelError: the file cannot be written.
+    """
+    from safetensors.numpy import save
+
+    scales = profile.scales
+    tensors = {
+        **_factors(profile.A, profile.b, profile.features.size, scales.features),
+        "eta": scales.eta,
+        "features": scales.features,
+        "payloads": scales.payloads,
+        "drift": profile.drift,
+        "gravity": profile.gravity,
+        "poses": profile.poses.astype(np.float32),
+    }
+    header = {
+        "format": FORMAT,
+        "arm": {
+            "name": profile.arm_name,
+            "fingerprint": profile.fingerprint,
+            "frame": profile.frame,
+            "joints": profile.n,
+        },
+        "pose_features": profile.features.pose,
+        "velocity_features": profile.features.velocity,
+        "repeated": profile.repeated,
+        "sessions": [asdict(session) for session in profile.sessions],
+    }
+    path = Path(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(path) as part:
+            arrays = {name: np.ascontiguousarray(array) for name, array in tensors.items()}
+            part.write_bytes(save(arrays, {_HEADER: json.dumps(header)}))
+    except OSError as error:
+        raise ModelError(f"the profile cannot be written to {path}: {error.strerror}; name a file elsewhere") from None
+    return path
+
+
+def load_profile(path: str | PathLike[str]) -> Profile:
+    """Read what `save_profile` wrote.
+
+    Raises:
+        ModelError: missing, damaged or foreign file, or one of another armload.
+    """
+    from safetensors import SafetensorError, safe_open
+
+    try:
+        with safe_open(Path(path), framework="np") as file:
+            text = (file.metadata() or {}).get(_HEADER)
+            tensors = {name: np.array(file.get_tensor(name)) for name in file.keys()}  # noqa: SIM118
+    except FileNotFoundError:
+        raise ModelError(f"no profile at {path}: learn one with `armload profile`") from None
+    except (SafetensorError, OSError, ValueError, TypeError):
+        raise ModelError(f"{path} is not a readable profile: expected a file that `armload profile` wrote") from None
+    if text is None:
+        raise ModelError(f"{path} is no profile of an arm: expected a file that `armload profile` wrote")
+    try:
+        header = json.loads(text)
+        if header["format"] != FORMAT:
+            raise ModelError(f"{path} belongs to another version of armload: learn the profile again")
+        arm, n = header["arm"], int(header["arm"]["joints"])
+        features = JointFeatures(n, int(header["pose_features"]), int(header["velocity_features"]))
+        scales = Scales(np.ones((1, n)), tensors["eta"], tensors["features"], tensors["payloads"])
+        A, b = _information(tensors, features.size)
+        if not all(np.all(np.isfinite(x)) for x in (A, b, *tensors.values())):
+            raise ValueError("numbers that are not finite")
+        return Profile(
+            arm["name"],
+            arm["fingerprint"],
+            arm["frame"],
+            n,
+            tensors["gravity"],
+            features,
+            A,
+            b,
+            scales,
+            tensors["drift"],
+            float(header["repeated"]),
+            tuple(_session(one) for one in header["sessions"]),
+            tensors["poses"].astype(float),
+        )
+    except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
+        raise ModelError(f"{path} holds a profile armload cannot use ({error}): learn it again") from None
+
+
+def _session(found: dict[str, Any]) -> SessionRecord:
+    made: dict[str, Any] = {name: tuple(x) if isinstance(x, list) else x for name, x in found.items()}
+    return SessionRecord(**made)
+
+
+def _factors(A: NDArray, b: NDArray, R: int, variance: NDArray) -> dict[str, NDArray]:
+    n, c = len(A), A.shape[1] - R
+    lower = np.tril_indices(R)
+    L32, V32 = np.empty((n, len(lower[0])), np.float32), np.empty((n, R, c), np.float32)
+    own = np.empty((n, R))
+    Z, z = A[:, :c, :c].sum(axis=0), b[:, :c].sum(axis=0)
+    for j in range(n):
+        root = np.sqrt(variance[j])
+        L = np.linalg.cholesky(root[:, None] * A[j, c:, c:] * root + np.eye(R))
+        V = np.linalg.solve(L, root[:, None] * A[j, c:, :c])
+        own[j] = np.linalg.solve(L, root * b[j, c:])
+        L32[j], V32[j] = L[lower], V
+        Z, z = Z - V.T @ V, z - V.T @ own[j]
+    return {"factor": L32, "crossed": V32, "own": own, "shared": 0.5 * (Z + Z.T), "vector": z}
+
+
+def _information(tensors: dict[str, NDArray], R: int) -> tuple[NDArray, NDArray]:
+    """A (n, S, S), b (n, S); what the joints share is put into the first joint's."""
+    variance, own = tensors["features"], tensors["own"]
+    n, c = len(own), len(tensors["vector"])
+    A, b = np.zeros((n, c + R, c + R)), np.zeros((n, c + R))
+    A[0, :c, :c], b[0, :c] = tensors["shared"], tensors["vector"]
+    for j in range(n):
+        L = np.zeros((R, R))
+        L[np.tril_indices(R)] = tensors["factor"][j]
+        V, root = tensors["crossed"][j].astype(float), np.sqrt(variance[j])
+        crossed = L @ V / root[:, None]
+        A[j, c:, c:] = (L @ L.T - np.eye(R)) / np.outer(root, root)
+        A[j, c:, :c], A[j, :c, c:] = crossed, crossed.T
+        b[j, c:] = L @ own[j] / root
+        A[0, :c, :c] += V.T @ V
+        b[0, :c] += V.T @ own[j]
+    return A, b

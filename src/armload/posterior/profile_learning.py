@@ -1,0 +1,348 @@
+"""How a profile is learned: from many logs, each of a session with offsets and friction of its own.
+
+    r = W·phi_0 + Z·(eta + delta_s) + G·g + e,      delta_s ~ N(0, D)
+
+phi_0 is whatever is mounted in all logs, known tools taken off. Given the noise S of each log and D, delta_s is
+integrated out joint by joint, as it is each joint's own (`without_drift`), and the sessions' information is added up.
+D and S are found by expectation–maximisation with stated priors.
+
+How many features the pose has, and by which factor the noise counts for more because what the features cannot say
+repeats, is chosen by logs left out: the density of their block means as the others predict them, all blocks of a log
+together. So the long-run variance is estimated, and capacity follows the data.
+
+Sources: Bishop 2006, ch. 3 and 9 (information form, EM); Geisser & Eddy, JASA 1979 (predictive density of what is left
+out).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm, rated_effort
+from armload.errors import IdentificationError
+from armload.inertia import HELD, Z95
+from armload.posterior.drift import drift_of
+from armload.posterior.problem import Problem
+from armload.posterior.profile import Profile, SessionRecord, fingerprint
+from armload.posterior.scales import Scales
+from armload.posterior.solve import solve, threads
+from armload.recording import Recording
+from armload.regression import Correction, FilteredRegression, JointFeatures, payload_prior_std
+from armload.regression.information import RegressionData, Session
+from armload.regression.lag import GAIN
+from armload.regression.noise import SMOOTH, whole_noise
+
+# features of the pose that a profile may have; the first is that of a single tare. A stream's row takes a third of a
+# millisecond at the last
+CAPACITIES = (128, 256, 384)
+# by which factor the noise of a log may count for more, by steps that a density can tell apart
+REPEATED = tuple(2.0**k for k in range(7))
+_RATE = 50.0  # [Hz] of a profile's rows: what passes the lag is below 4 Hz, and a profile's logs are long
+_FEWEST = 4  # logs below which none is left out: then capacity and noise are those of a tare
+_FOLDS = 5  # into which the logs are parted
+_STEPS = 5  # of expectation–maximisation, as for a tare
+_STATED = 3.0  # [sessions] that the stated size of the drift counts for: of so few a variance is known to 60 %
+_PREDICTED = 1.0  # [s] of a block that is predicted: residuals stay correlated for about as long
+_MOST_BLOCKS = 64  # of a log: their covariance is a matrix
+_POSES = 20  # of each log that are kept, to show where the arm was seen
+_CLOCK = 1e9  # [s since 1970] from which a log's clock shows the time of day: September 2001
+_SESSION = 3600.0  # [s] between logs of one session at most, as of a tare (`identification.tare_age`)
+
+
+def learn_profile(
+    arm: Arm,
+    logs: Sequence[Recording],
+    mounted: Sequence[NDArray[np.float64] | None] | None = None,
+    *,
+    sessions: Sequence[int] | None = None,
+    known: Profile | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Profile:
+    """Learn an arm from its logs.
+
+    Args:
+        arm: the bare arm, with its frame and gravity.
+        logs: of any motions, all with the same mounted but for the tools that are known.
+        mounted: (10,) the known tool of each log, about the arm's frame; None: there was none.
+        sessions: a number for each log, logs of the same number are of one session; None: the logs' clocks tell, those
+            without the time of day are sessions of their own.
+        known: a profile to go on from: its information grows, what was chosen for it stays.
+        progress: called as progress(done, total) after every log.
+
+    Raises:
+        IdentificationError: no log. ModelError: `known` is of another arm.
+    """
+    if not logs:
+        raise IdentificationError("a profile needs at least one log of the arm: found none")
+    correction = Correction(arm, rated_effort(arm))
+    if known is not None:
+        known.check(arm)
+        features = known.features
+    else:
+        features = JointFeatures(arm.n, CAPACITIES[-1] if len(logs) >= _FEWEST else CAPACITIES[0])
+    numbers = list(sessions) if sessions is not None else by_clock(logs)
+    tools = list(mounted) if mounted is not None else [None] * len(logs)
+    parts = []
+    for k, (log, tool) in enumerate(zip(logs, tools, strict=True)):
+        parts.append(log_data(correction, log, features, Session(numbers[k] + 1, 1.0), tool))
+        if progress is not None:
+            progress(k + 1, len(logs))
+    with threads().limit(limits=1):
+        if known is None:
+            return _learned(correction, parts, logs)
+        for number in dict.fromkeys(numbers):
+            of = [k for k in range(len(logs)) if numbers[k] == number]
+            data = RegressionData.joined([parts[k] for k in of])
+            known = with_session(known, correction, data, [logs[k] for k in of])
+        return known
+
+
+def by_clock(logs: Sequence[Recording]) -> list[int]:
+    """A session's number for each log: one for those that follow each other within `_SESSION` by the time of day."""
+    numbers, last = list(range(len(logs))), -1
+    order = sorted((k for k in range(len(logs)) if logs[k].t[0] > _CLOCK), key=lambda k: float(logs[k].t[0]))
+    for k in order:
+        if last >= 0 and logs[k].t[0] - logs[last].t[-1] < _SESSION:
+            numbers[k] = numbers[last]
+        last = k
+    return numbers
+
+
+def log_data(
+    correction: Correction, log: Recording, features: JointFeatures, session: Session, tool: NDArray | None = None
+) -> RegressionData:
+    """The rows of a log, less a known tool (10,)."""
+    data = RegressionData(correction, GAIN, features, SMOOTH.block, session)
+    rows = FilteredRegression(correction.arm, GAIN, correction, features, _RATE, SMOOTH.block)
+    data.take(rows.rows(log.t, log.q, log.dq, log.tau))
+    if tool is not None:
+        data.less(tool)
+    return data
+
+
+def without_drift(
+    A: NDArray[np.float64], b: NDArray[np.float64], drift: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """A (n, S, S) and b (n, S) of a session in units of its noise, its own offsets and friction integrated out.
+
+    With u the rows of a joint's drift, A − A_u·(A_uu + D⁻¹)⁻¹·A_uᵀ: they occur in the joint's own rows only.
+    """
+    A, b, n = A.copy(), b.copy(), len(A)
+    for j in range(n):
+        own = 10 + j + n * np.arange(len(drift) // n)
+        gain = A[j][:, own] @ np.linalg.inv(A[j][np.ix_(own, own)] + np.diag(1.0 / drift[j::n]))
+        b[j] -= gain @ b[j, own]
+        A[j] -= gain @ A[j][own]
+        A[j] = 0.5 * (A[j] + A[j].T)
+    return A, b
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """Logs solved together with as many features: scales, size of the drift, the sessions' own and its variance."""
+
+    features: JointFeatures
+    scales: Scales
+    drift: NDArray[np.float64]
+    means: dict[int, NDArray[np.float64]]
+    variances: dict[int, NDArray[np.float64]]
+
+
+def _learned(correction: Correction, parts: list[RegressionData], logs: Sequence[Recording]) -> Profile:
+    arm, found = correction.arm, []
+    for size in CAPACITIES if len(parts) >= _FEWEST else CAPACITIES[:1]:
+        features = JointFeatures(arm.n, size)
+        data = [part if part.features == features else part.of_features(features) for part in parts]
+        fit = _fitted(correction, data)
+        found.append((*_left_out(correction, data, fit), fit, data))
+    _, repeated, fit, data = max(found, key=lambda one: one[0])
+    A, b = 0.0, 0.0
+    for number in fit.means:
+        of = [(part, S) for part, S in zip(data, fit.scales.noise, strict=True) if part.session.number == number]
+        one = sum(part.A / S[:, None, None] for part, S in of), sum(part.b / S[:, None] for part, S in of)
+        one = without_drift(*one, fit.drift)  # type: ignore[arg-type]
+        A, b = A + one[0] / repeated, b + one[1] / repeated
+    return Profile(
+        arm.name,
+        fingerprint(arm),
+        str(arm.frame),
+        arm.n,
+        np.asarray(arm.gravity, dtype=float),
+        fit.features,
+        A,  # type: ignore[arg-type]
+        b,  # type: ignore[arg-type]
+        replace(fit.scales, noise=np.ones((1, arm.n)), drifts=np.zeros((0, 0))),
+        fit.drift,
+        repeated,
+        tuple(_records(correction, fit, data, logs)),
+        np.concatenate([_poses(log) for log in logs]),
+    )
+
+
+def _fitted(correction: Correction, data: list[RegressionData]) -> _Fit:
+    """Scales and drift of the sessions by expectation–maximisation."""
+    noise = replace(SMOOTH, novelty=np.inf)  # what repeats is found from logs left out
+    problem = Problem(data, payload_prior_std(correction.arm), None, noise, same=True)
+    scales, stated, count = problem.scales(None), correction.daily_std**2, len(problem.sessions)
+    drift = stated
+    for step in range(_STEPS + 1):
+        found = problem.posterior(scales)
+        means = found.mean[problem.eta.stop :].reshape(count, -1)
+        variances = np.diag(found.covariance)[problem.eta.stop :].reshape(count, -1)
+        if step < _STEPS:
+            drift = (_STATED * stated + (means**2 + variances).sum(axis=0)) / (_STATED + count)
+            scales = replace(problem.improved(scales, found), drifts=np.tile(drift, (count, 1)))
+    numbers = [session.number for session in problem.sessions]
+    in_order = sorted(range(count), key=lambda i: numbers[i])
+    return _Fit(
+        data[0].features,
+        scales,
+        drift,
+        {numbers[i]: means[i] for i in in_order},
+        {numbers[i]: variances[i] for i in in_order},
+    )
+
+
+def _left_out(correction: Correction, data: list[RegressionData], fit: _Fit) -> tuple[float, float]:
+    """Log density of the blocks of logs left out, and the factor on the noise at which it is highest."""
+    count, n = len(data), correction.arm.n
+    if count < _FEWEST:
+        return 0.0, max(1.0, sum(part.blocks.duration for part in data) / SMOOTH.novelty)
+    own = [
+        without_drift(part.A / S[:, None, None], part.b / S[:, None], fit.drift)
+        for part, S in zip(data, fit.scales.noise, strict=True)
+    ]
+    total, folds = np.zeros(len(REPEATED)), min(_FOLDS, count)
+    for fold in range(folds):
+        out = range(fold, count, folds)
+        kept = RegressionData(correction, GAIN, fit.features, SMOOTH.block)
+        kept.A = sum(A for k, (A, _) in enumerate(own) if k not in out)  # type: ignore[assignment]
+        kept.b = sum(b for k, (_, b) in enumerate(own) if k not in out)  # type: ignore[assignment]
+        for i, repeated in enumerate(REPEATED):
+            kept.noise = np.full(n, repeated)
+            problem = Problem([kept], payload_prior_std(correction.arm), None, SMOOTH, same=True)
+            scales = replace(fit.scales, noise=kept.noise[None], drifts=np.zeros((0, 0)))
+            found, E = problem.posterior(scales), problem.selections[0]
+            for k in out:
+                means, times = _blocks(data[k])
+                for j in range(n):
+                    X, u = means[:, j, :-1], 10 + j + n * np.arange(len(fit.drift) // n)
+                    e = means[:, j, -1] - X[:, : len(E)] @ (E @ found.mean) - X[:, len(E) :] @ found.weights[j]
+                    V = found.covariance_of(E, j, X) + (X[:, u] * fit.drift[j::n]) @ X[:, u].T
+                    total[i] += _log_density(e, V + np.diag(fit.scales.noise[k, j] / times))
+    best = int(np.argmax(total))
+    return float(total[best]), REPEATED[best]
+
+
+def _log_density(e: NDArray[np.float64], V: NDArray[np.float64]) -> float:
+    """Of e under N(0, V), but for a constant."""
+    L = np.linalg.cholesky(V)
+    white = np.linalg.solve(L, e)
+    return -0.5 * float(white @ white) - float(np.log(np.diag(L)).sum())
+
+
+def _blocks(data: RegressionData) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Means (B, n, size + 1) and durations (B,) of blocks of `_PREDICTED` or longer, `_MOST_BLOCKS` at most."""
+    means, times = data.blocks.means()
+    each = max(round(_PREDICTED / data.blocks.block), -(-len(times) // _MOST_BLOCKS), 1)
+    each = min(each, len(times))
+    whole = len(times) // each * each
+    sums = (means[:whole] * times[:whole, None, None]).reshape(-1, each, *means.shape[1:]).sum(axis=1)
+    total = times[:whole].reshape(-1, each).sum(axis=1)
+    return sums / total[:, None, None], total
+
+
+def with_session(
+    known: Profile, correction: Correction, data: RegressionData, logs: Sequence[Recording] = (), name: str = ""
+) -> Profile:
+    """A profile and one more session, whose rows have the profile's features; the scales stay, the drift's size learns.
+
+    Args:
+        data: of the session. logs: it came from, for their names and poses. name: of a session that is no log.
+    """
+    data.session = known.session(correction, len(known.sessions) + 1)
+    runs = [known.data(correction, GAIN, SMOOTH.block), data]
+    problem = Problem(runs, payload_prior_std(correction.arm), None, replace(SMOOTH, novelty=np.inf), same=True)
+    scales = problem.scales(known.scales)
+    for _ in range(2):
+        scales = replace(scales, noise=problem.improved(scales, problem.posterior(scales)).noise)
+    found = problem.posterior(scales)
+    means, P = found.mean[problem.eta.stop :], found.covariance[problem.eta.stop :, problem.eta.stop :]
+    S, seen = scales.noise[-1], len(known.sessions) + _STATED
+    A, b = without_drift(data.A / S[:, None, None], data.b / S[:, None], known.drift)
+    about = (data.blocks.duration, logs, name)
+    return replace(
+        known,
+        A=known.A + A / known.repeated,
+        b=known.b + b / known.repeated,
+        drift=(seen * known.drift + means**2 + np.diag(P)) / (seen + 1.0),
+        sessions=(*known.sessions, _record(correction, means, P + np.diag(known.drift), S, *about)),
+        poses=np.concatenate([known.poses, *(_poses(log) for log in logs)]),
+    )
+
+
+def _records(
+    correction: Correction, fit: _Fit, data: list[RegressionData], logs: Sequence[Recording]
+) -> list[SessionRecord]:
+    out = []
+    for number, mean in fit.means.items():
+        of = [k for k, part in enumerate(data) if part.session.number == number]
+        C = np.diag(fit.variances[number] + fit.drift)
+        S = np.mean([fit.scales.noise[k] for k in of], axis=0)
+        lasts = sum(data[k].blocks.duration for k in of)
+        out.append(_record(correction, mean, C, S, lasts, [logs[k] for k in of], ""))
+    return out
+
+
+def _record(
+    correction: Correction,
+    drift: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+    S: NDArray[np.float64],
+    duration: float,
+    logs: Sequence[Recording],
+    name: str,
+) -> SessionRecord:
+    dates = [float(log.t[0]) for log in logs if log.t[0] > _CLOCK]
+    return SessionRecord(
+        name or ", ".join(log.source for log in logs),
+        float(duration),
+        min(dates) if dates else None,
+        tuple(correction.offset(drift).tolist()),
+        tuple(correction.coulomb(drift).tolist()),
+        float(drift @ np.linalg.solve(covariance, drift)),
+        tuple(np.sqrt(S / whole_noise(correction, SMOOTH)).tolist()),
+    )
+
+
+def _poses(log: Recording) -> NDArray[np.float64]:
+    return log.q[np.linspace(0, len(log) - 1, _POSES).astype(int)]
+
+
+def check_fits(known: Profile, arm: Arm, log: Recording, tool: NDArray[np.float64] | None = None) -> None:
+    """See that a log is of the profile's arm, with the same mounted.
+
+    Raises:
+        IdentificationError: it carries something, or its offsets or friction are beyond what the other sessions show.
+    """
+    known.check(arm)
+    correction = Correction(arm, rated_effort(arm))
+    data = log_data(correction, log, known.features, known.session(correction), tool)
+    runs = [known.data(correction, GAIN, SMOOTH.block), data]
+    found = solve(runs, payload_prior_std(arm), None, SMOOTH, 3, known.scales)
+    drift = drift_of(found, correction, data.session)
+    mass, std = float(found.phi[0]), float(np.sqrt(found.covariance[0, 0]))
+    if abs(mass) > HELD * std:
+        raise IdentificationError(
+            f"{log.source} carries {mass:+.3g} ± {Z95 * std:.2g} kg beside what was mounted in the profile's logs: a "
+            "profile learns from the arm without a payload; leave the log out, or name what was mounted with --tool"
+        )
+    if drift.changed:
+        raise IdentificationError(
+            f"{log.source} does not fit the profile (T = {drift.statistic:.0f}, at joint {drift.joint + 1} most): it "
+            "is of another arm, or of one that was repaired or moved; learn a new profile, and leave this one as it is"
+        )
