@@ -6,15 +6,16 @@ VENV_ROS := .venv-ros
 BIN := $(VENV)/bin
 WORKERS ?= 2
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+# One worker for each file: what its tests share (a study, a demo) is made once. The order is that of tests/conftest.py.
+PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 # One thread for each test worker: nested BLAS threads fight over the cores and make a test slower, never faster.
-# One worker for each file: what its tests share (a study, a demo) is made once.
-test test-all test-robots: export OMP_NUM_THREADS = 1
-test test-all test-robots: export OPENBLAS_NUM_THREADS = 1
-test test-all test-robots: export MPLBACKEND = agg
+test test-all test-full: export OMP_NUM_THREADS = 1
+test test-all test-full: export OPENBLAS_NUM_THREADS = 1
+test test-all test-full: export MPLBACKEND = agg
 
 .DEFAULT_GOAL := help
-.PHONY: help demo docs test test-all test-robots parts lint format lock clean
+.PHONY: help demo docs test test-all test-full parts lint format lock clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -26,13 +27,13 @@ docs: $(VENV)/.stamp ## the pages as a site, strictly: build/site/index.html
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet
 
 test: lint ## lint, types and every test that needs nothing but Python (this is what CI runs)
-	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile -m "not full"
+	$(PYTEST) -m "not full"
 
 test-all: lint parts ## as test, and the tests marked full too (skipped with a reason where their program is missing)
-	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile -m ""
+	$(PYTEST) -m ""
 
-test-robots: $(VENV)/.stamp parts ## the makers' clients, ROS 2 and the page in a browser, each where it can be installed
-	$(BIN)/python -m pytest -m full tests/devices tests/app/test_live_browser.py
+test-full: $(VENV)/.stamp parts ## only the tests marked full: the wheel, and clients, ROS 2 and a browser where they can be installed
+	$(BIN)/python -m pytest -m full
 
 parts: $(VENV)/.stamp
 	@$(MAKE) --no-print-directory $(VENV)/.vendors || echo "no makers' clients: their tests will be skipped" >&2

@@ -242,10 +242,9 @@ def test_where_the_tare_does_not_tell_of_the_tool_the_intervals_hold_both_cases(
     assert answer.phi_low[0] < 2.5 * BOX.mass < answer.phi_high[0]
 
 
-@pytest.mark.parametrize("gravity", [(5.0, 0.0, -8.44), (0.0, -4.0, -8.96)])
-def test_a_base_that_stands_otherwise_than_was_said_is_noticed(real_like, gravity):
+def test_a_base_that_stands_otherwise_than_was_said_is_noticed(real_like):
     panda, how = real_like
-    true = arm("panda", gravity=gravity)
+    true = arm("panda", gravity=(0.0, -4.0, -8.96))
     log = simulate(true, taie2024(), BOX, seed=3, **how)
     right, wrong = identify(log, true), identify(log, panda)
     assert not any("--gravity" in note for note in right.notes)

@@ -111,7 +111,7 @@ def test_a_cycle_in_step_with_the_motion_stays_as_good_in_its_second_minute_as_i
     payload, motion = box(0.3), taie2024()  # always taken up in one pose and put down in another
     changes = np.arange(4.0, 118.0, 0.5 * motion.duration)
     schedule = [(t, None if k % 2 else payload) for k, t in enumerate(changes)]
-    log = stream(22, schedule, 120.0, 100.0, motion)
+    log = stream(22, schedule, 120.0, 50.0, motion)
     estimates, events = said(log, "map-gp")
     assert len(events) == len(changes)
     for event, t in zip(events, changes, strict=True):
@@ -138,12 +138,12 @@ def test_another_payload_of_another_mass_is_no_return():
 
 @pytest.mark.parametrize("payload", [None, HALF_KILO], ids=["empty", "loaded"])
 def test_nothing_is_noticed_where_nothing_changes(payload):
-    _, events = said(stream(4, [(-1.0, payload)], 20.0, motion=taie2024()), "map-gp")
+    _, events = said(stream(4, [(-1.0, payload)], 20.0, 100.0, taie2024()), "map-gp")
     assert events == []
 
 
 def test_a_slow_drift_of_the_torque_is_no_change():
-    log = stream(5, [], 20.0)
+    log = stream(5, [], 20.0, 100.0)
     drift = np.outer(log.t / log.t[-1], 5e-3 * arm("panda").limits.effort)  # 0.4 N·m on the large joints
     _, events = said(Recording(log.t, log.q, log.dq, log.tau + drift), "map-gp")
     assert events == []
