@@ -13,9 +13,9 @@ from armload.recording import Recording
 FAMILIES = ("fr3", "gen3", "iiwa14", "panda", "ur10e", "ur5e", "xarm7")
 
 
-# Files that workers take first (`make test`: a worker takes a file, and the next in this order when it has done with it).
-# In a fresh clone the first compiles nearly all there is, while the other worker has files that compile next to nothing;
-# then come the longest, so that none is left for the end.
+# Files that workers take first: `make test` gives a worker a file, and the next in this order when that is done. In a
+# fresh clone the first compiles nearly all there is, while the other worker has files that compile next to nothing.
+# Then come the longest, so that none is left for the end.
 FIRST = (
     "estimators/test_identifier.py",
     "ensembles/test_learners.py",
