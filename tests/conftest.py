@@ -30,7 +30,6 @@ FIRST = (
     "posterior/test_hybrid.py",
     "app/test_live.py",
     "app/test_light_install.py",
-    "test_site.py",
     "app/test_cli_workflow.py",
     "app/test_cli_examples.py",
     "lab/test_episodes.py",

@@ -170,7 +170,7 @@ def test_a_push_that_ends_gives_the_estimate_back(force):
 
 
 def test_a_replay_says_the_same_bit_for_bit_however_the_second_thread_fares():
-    log = stream(7, [(4.0, HALF_KILO), (7.0, None)], 10.0)
+    log = stream(7, [(3.0, HALF_KILO), (5.5, None)], 7.5)
     (ours, events), (theirs, other) = said(log), said(log, pause=0.004)
     assert len(events) == 2
     assert events == other
@@ -187,7 +187,7 @@ def test_threads_do_not_pile_up_with_the_changes():
     schedule = [(3.0 + 2.0 * k, None if k % 2 else HALF_KILO) for k in range(8)]
     identifier, before, most = OnlineIdentifier(arm("panda"), method="map-gp"), running(), 0
     seen = set()
-    for sample in stream(8, schedule, 19.0):
+    for sample in stream(8, schedule, 19.0, 100.0):
         estimate = identifier.update(*sample)
         seen.add(estimate.event and estimate.event.t)
         most = max(most, running() - before)
