@@ -130,7 +130,7 @@ def test_times_that_do_not_rise_from_zero_are_refused(panda, log, times):
 
 def test_reset_forgets_the_run(make, log, whole):
     identifier = make()
-    identifier.run(log.between(0.5, 1.5))
+    identifier.run(log.between(0.0, 2.0))
     again = identifier.run(log)
     np.testing.assert_array_equal(whole.phi, again.phi)
     np.testing.assert_array_equal(whole.covariance, again.covariance)
