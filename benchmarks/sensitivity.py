@@ -519,7 +519,7 @@ def with_what_was_measured_before(result: dict[str, Any], before: dict[str, Any]
         row = merged[constant.name] = {"home": constant.home, "value": plain(constant.value)}
         for word in (*NEAR, *FAR):
             both = then.get(word, {}) | now.get(word, {})
-            if word in NEAR or (both and idle(row)):
+            if word in NEAR or (idle(row) and both.keys() >= set(constant.on)):
                 row[word] = {on: both[on] for on in constant.on}
     kept = {key: before[key] | result[key] for key in ("cpu_s", "as they are")}
     return result | kept | {"constants": merged}

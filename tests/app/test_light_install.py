@@ -99,7 +99,9 @@ def light(request, wheel, hook, tmp_path_factory):
         (place,) = (folder / "venv" / "lib").glob("python*/site-packages")
         (place / "only_required.py").write_text(hook)
         packages = sysconfig.get_path("purelib")
-        (place / "only_required.pth").write_text(f"import only_required, site; site.addsitedir({packages!r})\n")
+        # the hook last: the packages' own may import anything
+        start = f"import site; site.addsitedir({packages!r}); import only_required\n"
+        (place / "only_required.pth").write_text(start)
 
     def run(*arguments):
         command = [python, *map(str, arguments)]
