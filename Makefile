@@ -6,15 +6,16 @@ VENV_ROS := .venv-ros
 BIN := $(VENV)/bin
 WORKERS ?= 2
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+# One worker for each file: what its tests share (a study, a demo) is made once. The order is that of tests/conftest.py.
+PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 # One thread for each test worker: nested BLAS threads fight over the cores and make a test slower, never faster.
-# One worker for each file: what its tests share (a study, a demo) is made once.
-test test-all test-robots: export OMP_NUM_THREADS = 1
-test test-all test-robots: export OPENBLAS_NUM_THREADS = 1
-test test-all test-robots: export MPLBACKEND = agg
+.tests test-all test-full: export OMP_NUM_THREADS = 1
+.tests test-all test-full: export OPENBLAS_NUM_THREADS = 1
+.tests test-all test-full: export MPLBACKEND = agg
 
 .DEFAULT_GOAL := help
-.PHONY: help demo docs test test-all test-robots parts lint format lock clean
+.PHONY: help demo docs test .tests test-all test-full parts lint format lock clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -25,14 +26,17 @@ demo: $(VENV)/.stamp ## simulate, train small ensembles, identify an unseen payl
 docs: $(VENV)/.stamp ## the pages as a site, strictly: build/site/index.html
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet
 
-test: lint ## lint, types and every test that needs nothing but Python (this is what CI runs)
-	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile -m "not full"
+test: $(VENV)/.stamp ## lint, types and every test that needs nothing but Python, side by side (this is what CI runs)
+	@$(MAKE) --no-print-directory --jobs 2 lint .tests
+
+.tests: $(VENV)/.stamp
+	$(PYTEST) -m "not full"
 
 test-all: lint parts ## as test, and the tests marked full too (skipped with a reason where their program is missing)
-	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile -m ""
+	$(PYTEST) -m ""
 
-test-robots: $(VENV)/.stamp parts ## the makers' clients, ROS 2 and the page in a browser, each where it can be installed
-	$(BIN)/python -m pytest -m full tests/devices tests/app/test_live_browser.py
+test-full: $(VENV)/.stamp parts ## only the tests marked full: the site, the wheel, and clients, ROS 2 and a browser if to be had
+	$(BIN)/python -m pytest -m full
 
 parts: $(VENV)/.stamp
 	@$(MAKE) --no-print-directory $(VENV)/.vendors || echo "no makers' clients: their tests will be skipped" >&2
@@ -59,14 +63,15 @@ clean: ## remove everything that can be made again, the virtual environment incl
 	rm -rf $(VENV) $(VENV_ROS) build dist out .ruff_cache .pytest_cache .hypothesis
 	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
-# The stamp is touched last: a set-up that was interrupted is taken up again by the next make.
+# The stamp is touched last: a set-up that was interrupted is taken up again by the next make. Most of what is installed
+# is never imported: Python compiles what is, when it is.
 $(VENV)/.stamp: requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
 		echo "armload needs Python 3.11 or newer, and '$(PYTHON)' is" \
 		"$$($(PYTHON) --version 2>&1 || echo missing): name another one with 'make PYTHON=python3.12'" >&2; exit 1; }
 	@echo "setting up $(VENV) (once; a few minutes)"
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	@$(PIP) install --no-deps --requirement requirements.lock
+	@$(PIP) install --no-deps --no-compile --requirement requirements.lock
 	@$(PIP) install --no-deps --no-build-isolation --editable .
 	@touch $@
 

@@ -1,18 +1,23 @@
 """What half and twice each tuned constant would do to streams with changes of payload, and to sound and wrong logs.
 
-    python benchmarks/sensitivity.py [--only ALARM,TRANSIENT] [--parts streams,logs] [--page]
+    python benchmarks/sensitivity.py [--only ALARM,TRANSIENT] [--parts streams,logs,tares] [--far] [--page]
 
-The constants are those of `online/thresholds.py` that decide about changes, of `identification/thresholds.py`, and
-three of the posterior. Each is set to half and to double, all others as they are; CALM, which is 0, to −3 and 3.
+The constants are those of `online/thresholds.py` that decide about changes, of `identification/thresholds.py`, three of
+the posterior, and those of a tare's age. Each is set to half and to double, all others as they are; CALM, which is 0,
+to −3 and 3. What changes nothing either way is set to a thousandth and to a thousand times, too (CALM to −3000 and
+3000): a constant that changes nothing even then decides nothing in these scenes.
 
 streams    10 scenes of 7–12 s at 250 and 500 Hz with the hybrid: payloads grasped, released, swapped, taken up again,
            two of 0.2 kg, pushes at the flange, an arm that nothing happens to, a UR10e with motor torque. Real-like
            arms (`World.real_like`). What is called a change, late or false is as in events.py.
 logs       16 sound logs of 4 s, and 8 that something is wrong with: a base tilted by 30°, the torque sign of a joint
            turned, a tool taken off since the tare, motor torque of an arm that nobody knows. All go through `identify`.
+tares      12 logs of 4 s with a tare of the same arm 0 to 30 days before, the age said or not, or of another arm.
+           Offsets and friction walk by `Correction.daily_std` a day.
 
 "nothing" means that all answers are the same bit for bit, notes included. Written to docs/constants.md and
-benchmarks/results/sensitivity.json, where a part that was not asked for keeps what was measured of it before; --page
+benchmarks/results/sensitivity.json, where a part that was not asked for keeps what was measured of it before; --far
+measures the thousandth and the thousand times alone, of what the committed result has as changing nothing; --page
 writes the page alone, from the committed result. `cpu_s` says what a run of which parts took.
 """
 
@@ -37,6 +42,7 @@ from threadpoolctl import threadpool_limits
 
 import armload
 from armload import Recording, __version__, arm
+from armload.arms import rated_effort
 from armload.devices import Simulator
 from armload.errors import ArmloadError
 from armload.identification import identify
@@ -44,6 +50,7 @@ from armload.inertia import InertialParameters
 from armload.motion import random_motion
 from armload.online import OnlineIdentifier
 from armload.payloads import Payload, draw_payload
+from armload.regression import Correction
 from armload.simulation import Sensors, World, simulate
 
 HERE = Path(__file__).resolve().parent
@@ -55,7 +62,13 @@ GROUPS = {  # home → constants, None: all; what they are tried on
     "identification.thresholds": (r"(?s).*", ("logs",)),
     "posterior.problem": (r"(?m)(^#.*\n)*^(_MOTOR_SIDE|_GAIN_STD) = .*\n", ("streams", "logs")),
     "posterior.hybrid": (r"(?m)(^#.*\n)*^_REMOVED = .*\n", ("streams", "logs")),
+    "regression.mismatch": (r"(?m)(^#.*\n)*^DAILY = .*\n", ("tares",)),
+    "posterior.drift": (r"(?m)(^#.*\n)*^(TESTED|ALLOWED|CHANGED) = .*\n", ("tares",)),
+    "identification.tare_age": (r"(?m)(^#.*\n)*^SESSION = .*\n", ("tares",)),
 }
+PARTS = ("streams", "logs", "tares")
+NEAR = {"half": 0.5, "double": 2.0}
+FAR = {"thousandth": 1e-3, "thousand times": 1e3}
 # the largest of WINDOWS; a word about a change that was noticed; words of advice and of a refusal; a bound on what does
 # not exist where it holds
 NOT_VARIED = ("LONGEST", "STEP_STD", "NOMINAL", "KNOWN", "CURRENT_LOW", "CURRENT_HIGH", "FARTHEST")
@@ -79,7 +92,7 @@ class Constant:
         return getattr(importlib.import_module(f"armload.{self.home}"), self.name)
 
     def times(self, factor: float) -> Any:
-        """Its value times 0.5 or 2; of 0, −3 or 3."""
+        """Its value times a factor; of 0, −3 or 3, times a thousand where the factor is far."""
         return _times(self.value, factor)
 
 
@@ -91,7 +104,7 @@ def _times(value: Any, factor: float) -> Any:
     if isinstance(value, int):
         return max(int(value * factor), 1)
     if isinstance(value, float) and value == 0.0:
-        return 3.0 if factor > 1.0 else -3.0
+        return (1.0 if factor > 1.0 else -1.0) * (3.0 if factor in NEAR.values() else 3e3)
     return value * factor
 
 
@@ -336,23 +349,79 @@ def on_logs(all_logs: list[Log]) -> tuple[dict[str, Any], list[bytes]]:
     }, answers
 
 
+# ---------------------------------------------------------------------- tares
+
+
+@dataclass(frozen=True)
+class Aged:
+    """A log for `identify` with its tare, the true mass, and whether the arm is another one than at the tare."""
+
+    log: Log
+    changed: bool
+
+
+def tares() -> list[Aged]:
+    """All of them; each is another arm. Days between tare and log, and the age that is said [s]."""
+    day, minute = 86400.0, 60.0
+    cases = [(0.0, None), (0.0, None), (0.0, 45.0 * minute), (0.0, 90.0 * minute), (1.0, None), (1.0, day)]
+    cases += [(5.0, None), (5.0, 5.0 * day), (30.0, None), (30.0, 30.0 * day), (30.0, 90.0 * minute)]
+    out = [aged(k, days, said) for k, (days, said) in enumerate(cases)]
+    return [*out, aged(len(cases), 0.0, None, other=True)]
+
+
+def aged(k: int, days: float, said: float | None, other: bool = False) -> Aged:
+    """Simulate one: offsets and friction at the tare were what they are less a random walk of so many days."""
+    known, seed = arm(("panda", "iiwa14")[k % 2]), SEED + 900 + k
+    world, rng, n = World.real_like(known, seed), np.random.default_rng(seed), known.n
+    walk = np.sqrt(days) * rng.normal(size=2 * n) * Correction(known, rated_effort(known)).daily_std[: 2 * n]
+    level = np.maximum(world.friction.level + walk[n:], 0.3 * world.friction.level)
+    then = replace(world, offset=world.offset + walk[:n], friction=replace(world.friction, level=level))
+    if other:
+        then = World.real_like(known, seed + 50)
+    how, held = {"sensors": _sensors(known), "rate": 250.0}, body(1.0, k)
+    path = random_motion(known, seed + 100, duration=6.0, harmonics=6)
+    tare = simulate(known, path, None, seed=seed + 100, world=then, **how)
+    log = simulate(known, random_motion(known, seed, duration=4.0), held, seed=seed, world=world, **how)
+    told = {"tare": tare} | ({} if said is None else {"tare_age": said})
+    return Aged(Log(known, log, told, held.phi, False), other or days > 0.0)
+
+
+def on_tares(all_tares: list[Aged]) -> tuple[dict[str, Any], list[bytes]]:
+    """What is measured over all tares, and each log's answer."""
+    found = [(one, identify(one.log.log, one.log.robot, **one.log.told)) for one in all_tares]
+    doubted = {id(a): any("not as it was at its tare" in note for note in a.notes) for _, a in found}
+    inside = [(a.phi_low <= one.log.truth) & (one.log.truth <= a.phi_high) for one, a in found]
+    return {
+        "changed ones doubted": sum(doubted[id(a)] for one, a in found if one.changed),
+        "same ones doubted": sum(doubted[id(a)] for one, a in found if not one.changed),
+        "error": round(1e3 * float(np.mean([abs(a.mass - one.log.truth[0]) for one, a in found])), 1),
+        "half-width": round(1e3 * float(np.mean([(a.phi_high[0] - a.phi_low[0]) / 2.0 for _, a in found])), 1),
+        "inside": round(100.0 * float(np.mean(inside)), 1),
+    }, [json.dumps(a.to_dict() | {"date": ""}).encode() for _, a in found]
+
+
 # ---------------------------------------------------------------------- the page
 
 
 def table(result: dict[str, Any]) -> str:
     """The table, and what it is a difference to."""
     base = result["as they are"]
+    took = ", ".join(f"{what} {seconds:.0f} s" for what, seconds in result["cpu_s"].items())
     lines = [
         "As they are: "
-        + "; ".join(f"{on}: " + ", ".join(f"{k} {v:g}" for k, v in base[on].items()) for on in ("streams", "logs"))
-        + f". A run of all took {result['cpu_s']['streams and logs']:.0f} s of processor time.",
+        + "; ".join(f"{on}: " + ", ".join(f"{k} {v:g}" for k, v in base[on].items()) for on in PARTS)
+        + f". Processor time of the runs: {took}.",
         "",
         "| constant | value | unit | reason | half | double |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
     for constant in constants():
         tried = result["constants"][constant.name]
-        cells = [_cell(tried[factor], base) for factor in ("half", "double")]
+        cells = [_cell(tried[factor], base) for factor in NEAR]
+        if "thousandth" in tried:
+            cells = [
+                f"nothing; {word}: {_cell(tried[far], base)}" for word, far in zip(("1/1000", "1000"), FAR, strict=True)
+            ]
         value = json.dumps(tried["value"], ensure_ascii=False).strip("{}[]").replace('"', "")
         name = f"`{constant.home}` `{constant.name}`"
         lines.append(f"| {' | '.join([name, value, constant.unit, constant.reason, *cells])} |")
@@ -388,8 +457,8 @@ def plain(value: Any) -> Any:
     return value if isinstance(value, int) else round(float(value), 6)
 
 
-def measured(only: list[str], parts: list[str]) -> dict[str, Any]:
-    """All settings of all constants."""
+def measured(only: list[str], parts: list[str], factors: dict[str, float]) -> dict[str, Any]:
+    """These settings of the constants, and the far ones of what neither half nor double changes."""
     started = time.process_time()
     material: dict[str, Any] = {}
     if "streams" in parts:
@@ -397,44 +466,61 @@ def measured(only: list[str], parts: list[str]) -> dict[str, Any]:
     if "logs" in parts:
         with tempfile.TemporaryDirectory() as folder:
             material["logs"] = on_logs, logs(Path(folder))
+    if "tares" in parts:
+        material["tares"] = on_tares, tares()
     base = {on: of(what) for on, (of, what) in material.items()}
-    print({on: found[0] for on, found in base.items()}, round(time.process_time() - started, 1), flush=True)
+    as_they_are = {on: found[0] for on, found in base.items()}
+    print(as_they_are, round(time.process_time() - started, 1), flush=True)
+
+    def tried(constant: Constant, factor: float) -> dict[str, Any]:
+        out = {}
+        with set_to(constant, constant.times(factor)):
+            for on in (on for on in constant.on if on in parts):
+                of, what = material[on]
+                measures, answers = of(what)
+                changed = sum(a != b for a, b in zip(answers, base[on][1], strict=True))
+                out[on] = {"changed": changed, "measures": measures}
+        return out
+
     out: dict[str, Any] = {}
     for constant in constants():
         if (only and constant.name not in only) or not set(constant.on) & set(parts):
             continue
-        out[constant.name] = {"home": constant.home, "value": plain(constant.value)}
-        for word, factor in (("half", 0.5), ("double", 2.0)):
-            tried = {}
-            with set_to(constant, constant.times(factor)):
-                for on in (on for on in constant.on if on in parts):
-                    of, what = material[on]
-                    measures, answers = of(what)
-                    changed = sum(a != b for a, b in zip(answers, base[on][1], strict=True))
-                    tried[on] = {"changed": changed, "measures": measures}
-            out[constant.name][word] = tried
-            shown = _cell(tried, {on: found[0] for on, found in base.items()})
+        row = out[constant.name] = {"home": constant.home, "value": plain(constant.value)}
+        left = list(factors.items())
+        while left:
+            word, factor = left.pop(0)
+            row[word] = tried(constant, factor)
+            shown = _cell(row[word], as_they_are)
             print(constant.name, word, shown, round(time.process_time() - started, 1), flush=True)
+            if word == "double" and idle(row):
+                left += FAR.items()
+    what = " and ".join(parts) + (", far" if factors is FAR else "")
     return {
         "command": "python benchmarks/sensitivity.py",
         "version": __version__,
         "seeds_from": SEED,
-        "cpu_s": {" and ".join(parts): round(time.process_time() - started, 1)},
-        "as they are": {on: found[0] for on, found in base.items()},
+        "cpu_s": {what: round(time.process_time() - started, 1)},
+        "as they are": as_they_are,
         "constants": out,
     }
 
 
+def idle(row: dict[str, Any]) -> bool:
+    """Whether neither half nor double of a constant changes an answer."""
+    return not any(found["changed"] for word in NEAR for found in row[word].values())
+
+
 def with_what_was_measured_before(result: dict[str, Any], before: dict[str, Any]) -> dict[str, Any]:
     """Parts and constants that were not asked for, as they were."""
-    known = {constant.name: constant for constant in constants()}
     merged = {}
-    for name, constant in known.items():
-        now, then = result["constants"].get(name, {}), before["constants"].get(name, {})
-        merged[name] = {"home": constant.home, "value": plain(constant.value)}
-        for word in ("half", "double"):
+    for constant in constants():
+        now, then = (one["constants"].get(constant.name, {}) for one in (result, before))
+        row = merged[constant.name] = {"home": constant.home, "value": plain(constant.value)}
+        for word in (*NEAR, *FAR):
             both = then.get(word, {}) | now.get(word, {})
-            merged[name][word] = {on: both[on] for on in constant.on}
+            if word in NEAR or (idle(row) and both.keys() >= set(constant.on)):
+                row[word] = {on: both[on] for on in constant.on}
     kept = {key: before[key] | result[key] for key in ("cpu_s", "as they are")}
     return result | kept | {"constants": merged}
 
@@ -442,16 +528,21 @@ def with_what_was_measured_before(result: dict[str, Any], before: dict[str, Any]
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", default="", help="some constants, printed and not written")
-    parser.add_argument("--parts", default="streams,logs")
+    parser.add_argument("--parts", default=",".join(PARTS))
+    parser.add_argument("--far", action="store_true", help="a thousandth and a thousand times alone")
     parser.add_argument("--page", action="store_true", help="write the page from the committed result")
     asked = parser.parse_args()
+    before = json.loads(RESULT.read_text()) if RESULT.exists() else None
     if not asked.page:
+        only = [name for name in asked.only.split(",") if name]
+        if asked.far and not only:
+            only = [name for name, row in before["constants"].items() if idle(row)]
         with threadpool_limits(1):
-            result = measured([name for name in asked.only.split(",") if name], asked.parts.split(","))
+            result = measured(only, asked.parts.split(","), FAR if asked.far else NEAR)
         if asked.only:
             return
-        if asked.parts != parser.get_default("parts"):
-            result = with_what_was_measured_before(result, json.loads(RESULT.read_text()))
+        if asked.far or asked.parts != parser.get_default("parts"):
+            result = with_what_was_measured_before(result, before)
         RESULT.write_text(json.dumps(result, indent=1) + "\n")
     write_page(json.loads(RESULT.read_text()))
 

@@ -13,6 +13,8 @@ import pytest
 
 import armload
 
+pytestmark = pytest.mark.full
+
 ROOT = Path(__file__).resolve().parents[1]
 TUTORIAL = ROOT / "docs" / "tutorial.ipynb"
 ROOMS = [m.name for m in pkgutil.iter_modules(armload.__path__) if m.ispkg and m.name != "app"]

@@ -1,8 +1,9 @@
 """A wheel without extras identifies, follows a stream and exports; what is missing is one sentence.
 
-The environment of these tests holds the wheel as pip installs it. What it depends on is that of the running tests,
-less every module of a distribution that the wheel does not require: importing one of those fails as if it were not
-installed. So this shows that armload gets along without them. That pip finds what is required shows
+What the package depends on is that of the running tests, less every module of a distribution that the wheel does not
+require: importing one of those fails as if it were not installed. So this shows that armload gets along without them.
+The package is the one under test, which has the files of the wheel and has been compiled; what is marked full is the
+wheel itself, as pip installs it into an environment of its own. That pip finds what is required shows
 `benchmarks/install.py`, which needs the network.
 """
 
@@ -13,13 +14,14 @@ import sys
 import sysconfig
 import tomllib
 import zipfile
-from importlib.metadata import Distribution, PackageNotFoundError, distribution, packages_distributions
+from importlib.metadata import PackageNotFoundError, PathDistribution, distribution, packages_distributions
 from pathlib import Path
 
 import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+import armload
 from armload import extras
 from armload.payloads import test_payload as payload_of_the_tests
 from armload.recording import write_recording
@@ -28,14 +30,13 @@ ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 HOOK = '''\
 """Refuses to import what is not required."""
-import site, sys
+import sys
 
 class Refuse:
     def find_spec(self, name, path=None, target=None):
         if name.partition(".")[0] in {refused!r}:
             raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
 
-site.addsitedir({packages!r})
 sys.meta_path.insert(0, Refuse())
 '''
 
@@ -67,16 +68,10 @@ def wheel(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def light(wheel, tmp_path_factory):
-    """Runs Python in an environment with the wheel and what it requires, and nothing else."""
-    folder = tmp_path_factory.mktemp("light")
-    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(folder / "venv")], check=True)
-    python = folder / "venv" / "bin" / "python"
-    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet", "--python", str(python)]
-    subprocess.run([*pip, "install", "--no-deps", "--no-index", str(wheel)], check=True, cwd=folder)
-    (place,) = (folder / "venv" / "lib").glob("python*/site-packages")
-    (info,) = place.glob("armload-*.dist-info")
-    core = [Requirement(line) for line in Distribution.at(info).requires or []]
+def hook(wheel):
+    """The source of a module that refuses to import what the wheel does not require."""
+    (info,) = (path for path in zipfile.Path(wheel).iterdir() if path.name.endswith(".dist-info"))
+    core = [Requirement(line) for line in PathDistribution(info).requires or []]  # type: ignore[arg-type]
     allowed = required(r.name for r in core if r.marker is None or r.marker.evaluate({"extra": ""}))
     refused = {
         module
@@ -84,14 +79,37 @@ def light(wheel, tmp_path_factory):
         if module != "armload" and not {canonicalize_name(owner) for owner in owners} & allowed
     }
     assert {"mujoco", "sklearn", "jax", "matplotlib", "jinja2", "joblib", "trimesh", "viser", "rosbags"} <= refused
-    (place / "only_required.py").write_text(HOOK.format(refused=refused, packages=sysconfig.get_path("purelib")))
-    (place / "only_required.pth").write_text("import only_required\n")
-    kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "NUMBA"))}
+    return HOOK.format(refused=refused)
+
+
+@pytest.fixture(scope="module", params=["package", pytest.param("wheel", marks=pytest.mark.full)])
+def light(request, wheel, hook, tmp_path_factory):
+    """Runs Python with armload and what it requires, and nothing else."""
+    folder = tmp_path_factory.mktemp("light")
+    if request.param == "package":
+        home, python = Path(armload.__file__).parents[1], sys.executable
+        kept = os.environ | {"PYTHONPATH": os.pathsep.join([str(folder), str(home)])}
+        (folder / "sitecustomize.py").write_text(hook)
+    else:
+        home, python = folder, str(folder / "venv" / "bin" / "python")
+        kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "NUMBA"))}
+        subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(folder / "venv")], check=True)
+        pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet", "--python", python]
+        subprocess.run([*pip, "install", "--no-deps", "--no-index", str(wheel)], check=True, cwd=folder)
+        (place,) = (folder / "venv" / "lib").glob("python*/site-packages")
+        (place / "only_required.py").write_text(hook)
+        packages = sysconfig.get_path("purelib")
+        # the hook last: the packages' own may import anything
+        start = f"import site; site.addsitedir({packages!r}); import only_required\n"
+        (place / "only_required.pth").write_text(start)
 
     def run(*arguments):
-        command = [str(python), *map(str, arguments)]
+        command = [python, *map(str, arguments)]
         return subprocess.run(command, cwd=folder, env=kept, capture_output=True, text=True, timeout=300)
 
+    found = run("-c", "import armload; print(armload.__file__); import mujoco")
+    assert Path(found.stdout.strip()).is_relative_to(home)
+    assert "'mujoco'" in found.stderr
     return run
 
 
@@ -99,8 +117,6 @@ def test_a_wheel_without_extras_identifies_exports_and_follows_a_replay(light, p
     body = payload_of_the_tests()
     log, held = tmp_path / "log.csv", tmp_path / "held.json"
     write_recording(log, analytic_log(panda, body.parameters, duration=2.0))
-    assert "venv" in light("-c", "import armload; print(armload.__file__)").stdout
-    assert "'mujoco'" in light("-c", "import mujoco").stderr
 
     done = light("-m", "armload", "identify", log, "--robot", "panda", "--json")
     assert done.returncode == 0, done.stderr
@@ -150,11 +166,13 @@ def test_each_extra_and_each_package_of_it_is_known_and_named_as_in_pyproject():
     assert all(package in of[extra] for package, extra in stated)
 
 
-def test_the_wheel_holds_the_mark_of_typed_packages_and_the_shipped_models(wheel):
-    names = zipfile.ZipFile(wheel).namelist()
+def test_the_wheel_holds_the_files_of_the_package_and_nothing_else(wheel):
+    names = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
+    package = ROOT / "src" / "armload"
+    files = {path.relative_to(package.parent) for path in package.rglob("*") if path.is_file()}
+    assert names == {path.as_posix() for path in files if "__pycache__" not in path.parts}
     assert "armload/py.typed" in names
     assert any(name.startswith("armload/posterior/models/") for name in names)
-    assert not [name for name in names if not name.startswith("armload")]
 
 
 @pytest.mark.parametrize(

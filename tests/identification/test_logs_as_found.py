@@ -36,8 +36,8 @@ def holds(answer, truth):
 
 @pytest.fixture(scope="module")
 def drawn(panda):
-    """Three arms with a payload each, and a tare on another motion."""
-    return [replace(e, duration=RUN, tare_duration=TARE) for e in draw_episodes(panda, "reference", 3, seed=0)]
+    """Two arms with a payload each, and a tare on another motion."""
+    return [replace(e, duration=RUN, tare_duration=TARE) for e in draw_episodes(panda, "reference", 2, seed=0)]
 
 
 @pytest.fixture(scope="module")
@@ -96,13 +96,17 @@ FOUND = {
 }
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("name", FOUND)
-@TARED
+# the default method with and without a tare; its physics alone mostly with one
+TRIED = [(name, tared, None) for name in FOUND for tared in (True, False)]
+TRIED += [(name, True, method) for name in FOUND for method in METHODS[1:]]
+TRIED += [(name, False, method) for name in ("irregular", "torque 20 ms late") for method in METHODS[1:]]
+
+
+@pytest.mark.parametrize(("name", "tared", "method"), TRIED)
 def test_the_mass_is_right_whatever_the_clock_and_its_interval_holds(panda, logs, name, tared, method):
     change, *worst = FOUND[name]
     bound = worst[0 if tared else 1] * (1.5 if method == "map" else 1.0)
-    for run, tare, truth in logs[: 3 if method is None and tared else 1]:
+    for run, tare, truth in logs[: 2 if method is None and tared else 1]:
         answer = identify(change(run), panda, tare=change(tare) if tared else None, method=method)
         assert answer.held
         assert abs(answer.mass - truth.mass) < bound
@@ -124,7 +128,7 @@ def test_30_hz_100_hz_and_1_khz_of_one_run_agree_within_their_intervals(panda, l
 
 # ---------------------------------------------------------------- standstill
 
-STILL = 20.0  # [s]
+STILL = 10.0  # [s]
 
 
 class Waits(Motion):
@@ -147,12 +151,12 @@ class Waits(Motion):
 
 @pytest.fixture(scope="module")
 def waiting(drawn):
-    """Two of the arms with 20 s of standstill before and after the run, at 100 Hz, with stiction, and their tares.
+    """The arms with 10 s of standstill before and after the run, at 100 Hz, with stiction, and their tares.
 
     Friction at rest may be anything up to its level: each joint has one value of it before, and one after.
     """
     rng, out = np.random.default_rng(4), []
-    waits = [replace(e, motion=Waits(e.motion), duration=e.motion.duration + 2 * STILL) for e in drawn[:2]]
+    waits = [replace(e, motion=Waits(e.motion), duration=e.motion.duration + 2 * STILL) for e in drawn]
     for episode, (run, tare, truth) in zip(waits, simulate_episodes(waits, rate=100.0), strict=True):
         tau = run.tau.copy()
         for still in (run.t < STILL, run.t > run.t[-1] - STILL):
@@ -177,7 +181,7 @@ def test_standstill_at_the_ends_neither_moves_the_answer_nor_makes_it_surer(pand
 @pytest.mark.parametrize("method", METHODS)
 @TARED
 def test_an_arm_that_stood_still_tells_no_inertia_and_no_more_mass_by_standing_longer(panda, waiting, tared, method):
-    for run, tare, truth in waiting[: 2 if method is None and tared else 1]:
+    for run, tare, truth in waiting[:1]:
         tare = tare if tared else None
         once = run.between(0.0, 0.5 * STILL)
         q, dq, tau = (np.concatenate([x, x]) for x in (once.q, once.dq, once.tau))
@@ -219,7 +223,7 @@ def test_map_alone_finds_the_mass_from_motor_currents_without_a_tare(panda, moto
     strict=True, reason="the gain of a link-side torque is taken to be known to 0.5 %, whatever the log says"
 )
 def test_a_torque_channel_with_2_percent_gain_is_within_the_interval(panda, drawn):
-    heavy = [replace(e, payload=HEAVY, rate=200.0) for e in drawn[:2]]
+    heavy = [replace(e, payload=HEAVY, rate=200.0) for e in drawn]
     inside = []
     for run, tare, truth in simulate_episodes(heavy):
         assert tare is not None

@@ -339,10 +339,10 @@ def test_any_method_of_the_catalogue_runs_beside_a_robot(panda, log, method):
     assert estimate.n_samples > 0
 
 
-@pytest.mark.parametrize("cut", [7, 30, 500])
+@pytest.mark.parametrize("cut", [7, 30, 300])
 @pytest.mark.parametrize("method", [None, "map", "rls-filter"])
 def test_a_saved_state_goes_on_exactly(panda, log, tmp_path, method, cut):
-    samples = list(log)[:700]
+    samples = list(log)[:400]
     identifier = OnlineIdentifier(panda, method=method)
     fed(identifier, samples[:cut])
     path = identifier.save(tmp_path / "state.npz")

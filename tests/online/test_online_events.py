@@ -107,11 +107,11 @@ def test_what_is_put_down_is_gone_and_what_is_taken_up_again_is_recognised():
     assert np.all(again.std[:4] < first.std[:4])
 
 
-def test_a_cycle_in_step_with_the_motion_stays_as_good_in_its_second_minute_as_in_its_first():
+def test_a_cycle_in_step_with_the_motion_stays_as_good_in_its_second_half_as_in_its_first():
     payload, motion = box(0.3), taie2024()  # always taken up in one pose and put down in another
-    changes = np.arange(4.0, 118.0, 0.5 * motion.duration)
+    changes = np.arange(4.0, 82.0, 0.5 * motion.duration)
     schedule = [(t, None if k % 2 else payload) for k, t in enumerate(changes)]
-    log = stream(22, schedule, 120.0, 100.0, motion)
+    log = stream(22, schedule, 84.0, 100.0, motion)
     estimates, events = said(log, "map-gp")
     assert len(events) == len(changes)
     for event, t in zip(events, changes, strict=True):
@@ -122,7 +122,7 @@ def test_a_cycle_in_step_with_the_motion_stays_as_good_in_its_second_minute_as_i
     error = np.array([estimate.phi[0] for estimate in after]) - truth
     half_width = 1.96 * np.array([estimate.std[0] for estimate in after])
     assert np.all(np.abs(error) <= half_width)
-    late = changes > 60.0
+    late = changes > 42.0
     for loaded in (truth == 0.0, truth > 0.0):
         first, second = (np.sqrt(np.mean(error[loaded & part] ** 2)) for part in (~late, late))
         assert second < 1.5 * first + 0.005
@@ -138,12 +138,12 @@ def test_another_payload_of_another_mass_is_no_return():
 
 @pytest.mark.parametrize("payload", [None, HALF_KILO], ids=["empty", "loaded"])
 def test_nothing_is_noticed_where_nothing_changes(payload):
-    _, events = said(stream(4, [(-1.0, payload)], 20.0, motion=taie2024()), "map-gp")
+    _, events = said(stream(4, [(-1.0, payload)], 20.0, 100.0, taie2024()), "map-gp")
     assert events == []
 
 
 def test_a_slow_drift_of_the_torque_is_no_change():
-    log = stream(5, [], 20.0)
+    log = stream(5, [], 20.0, 100.0)
     drift = np.outer(log.t / log.t[-1], 5e-3 * arm("panda").limits.effort)  # 0.4 N·m on the large joints
     _, events = said(Recording(log.t, log.q, log.dq, log.tau + drift), "map-gp")
     assert events == []
@@ -170,7 +170,7 @@ def test_a_push_that_ends_gives_the_estimate_back(force):
 
 
 def test_a_replay_says_the_same_bit_for_bit_however_the_second_thread_fares():
-    log = stream(7, [(4.0, HALF_KILO), (7.0, None)], 10.0)
+    log = stream(7, [(3.0, HALF_KILO), (5.5, None)], 7.5)
     (ours, events), (theirs, other) = said(log), said(log, pause=0.004)
     assert len(events) == 2
     assert events == other
@@ -187,7 +187,7 @@ def test_threads_do_not_pile_up_with_the_changes():
     schedule = [(3.0 + 2.0 * k, None if k % 2 else HALF_KILO) for k in range(8)]
     identifier, before, most = OnlineIdentifier(arm("panda"), method="map-gp"), running(), 0
     seen = set()
-    for sample in stream(8, schedule, 19.0):
+    for sample in stream(8, schedule, 19.0, 100.0):
         estimate = identifier.update(*sample)
         seen.add(estimate.event and estimate.event.t)
         most = max(most, running() - before)

@@ -59,7 +59,7 @@ def test_a_filling_is_the_empty_container_and_weights_by_the_paper_s_rules():
 
 def test_odd_payloads_lie_outside_every_other_family():
     def aside_and_moment(family):
-        phi = np.array([draw_payload(family, seed).parameters.phi for seed in range(300)])
+        phi = np.array([draw_payload(family, seed).parameters.phi for seed in range(150)])
         moment = np.hypot(phi[:, 1], phi[:, 2])
         return moment / phi[:, 0], moment, phi[:, 0]
 

@@ -26,7 +26,7 @@ def panda():
     return arm("panda")
 
 
-def logs_of(panda, changed, population="reference", count=3):
+def logs_of(panda, changed, population="reference", count=2):
     """Episodes whose tare is of the arm as `changed` makes it."""
     drawn = draw_episodes(panda, population, count, seed=81, motions=3)
     return list(simulate_episodes([replace(e, tare_world=changed(e.world)) for e in drawn]))
@@ -79,12 +79,8 @@ def test_a_tare_of_known_age_is_worth_less_and_its_change_is_expected(panda, old
     for log in (*old, *sound):
         same_day, aged = HybridIdentifier(panda, log.tare), HybridIdentifier(panda, log.tare)
         aged.allow_for(3.0)
-        same_day.test_tare = aged.test_tare = False
+        same_day.test_tare = False
         assert aged.run(log.run).std[0] >= 0.99 * same_day.run(log.run).std[0]
-    for log in old:
-        aged = HybridIdentifier(panda, log.tare)
-        aged.allow_for(3.0)
-        aged.run(log.run)
         assert not aged.stream.drift.changed
 
 

@@ -30,7 +30,7 @@ def test_a_gaussian_given_one_of_its_coordinates_is_what_many_draws_near_it_show
 def test_a_known_mass_makes_the_moments_better_and_their_intervals_narrower_and_they_hold():
     panda = arm("panda")
     better, inside = [], []
-    for log in simulate_episodes(draw_episodes(panda, "untared", 12, seed=17, motions=6)):
+    for log in simulate_episodes(draw_episodes(panda, "untared", 8, seed=17, motions=6)):
         plain, weighed = HybridIdentifier(panda), HybridIdentifier(panda)
         weighed.known_mass = KnownMass(log.truth.mass, 1e-3)
         before, after = plain.run(log.run), weighed.run(log.run)
