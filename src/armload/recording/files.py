@@ -50,7 +50,7 @@ def read_recording(
 
     Args:
         path: the file, or the folder of a ROS 2 bag or of a LeRobot data set. Columns of a table are known by the names
-            that tools give them (docs/recordings.md); SI units, unless the header, the tool or `columns` says otherwise.
+            that tools give them (docs/recordings.md); SI units, unless header, tool or `columns` say otherwise.
         arm: the arm that made the log, if known: the number of joints is checked, and joints that have names are taken
             by them, in the arm's order.
         topic: the JointState topic of a bag, where several have the arm's joints.
