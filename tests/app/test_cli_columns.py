@@ -119,3 +119,51 @@ def test_columns_for_a_robot_without_a_log_are_refused(capsys):
     code, _, err = run(capsys, "live", "sim", "--headless", "--columns", SPEC)
     assert code == 2
     assert "--columns and its companions are for logs" in err
+
+
+IDENTIFY = ("identify", "run_odd.csv", *ROBOT, "--columns", SPEC, "--json")
+
+
+def test_a_tare_from_another_tool_has_columns_of_its_own(logs, capsys, monkeypatch):
+    monkeypatch.chdir(logs)
+    expected = json.loads(run(capsys, "identify", "run.csv", "--tare", "tare.csv", *ROBOT, "--json")[1])["phi"]
+    named = "rate=200,q=positions,dq=velocities,tau=drive"
+    for tare, spec in (("tare.csv", "none"), ("tare.csv", "t=t"), ("tare_odd.csv", SPEC), ("tare.npz", named)):
+        code, out, err = run(capsys, *IDENTIFY, "--tare", tare, "--tare-columns", spec)
+        assert code == 0, err
+        np.testing.assert_allclose(json.loads(out)["phi"], expected, rtol=0, atol=1e-9, err_msg=f"{tare} {spec}")
+
+
+def test_a_tare_that_lacks_the_columns_of_the_log_is_told_how_to_be_read(logs, capsys, monkeypatch):
+    monkeypatch.chdir(logs)
+    code, out, err = run(capsys, *IDENTIFY, "--tare", "tare.csv")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "tare.csv has no column 'enc_{i}'" in err
+    assert err.endswith("if the tare's own header says all, add --tare-columns none\n")
+    code, _, err = run(capsys, *IDENTIFY, "--tare", "tare.npz")  # whose header does not say all
+    assert code == 2
+    assert "--tare-columns" not in err
+    for option in (("--tare-columns", "none"), ("--tare-episode", "0")):
+        code, _, err = run(capsys, *IDENTIFY, *option)
+        assert (code, "but there is no --tare" in err) == (2, True)
+
+
+def test_log_and_tare_may_be_episodes_of_one_file(logs, capsys, monkeypatch):
+    monkeypatch.chdir(logs)
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    from armload.recording import read_recording
+    from armload.recording.columns import column_names
+
+    both = [read_recording(f"{name}.csv") for name in ("tare", "run")]
+    table = np.vstack([np.column_stack([log.t, log.q, log.dq, log.tau]) for log in both])
+    columns = dict(zip(column_names(7), table.T, strict=True)) | {"episode_index": np.repeat([0, 1], 800)}
+    parquet.write_table(pa.table(columns), "both.parquet")
+    expected = json.loads(run(capsys, "identify", "run.csv", "--tare", "tare.csv", *ROBOT, "--json")[1])["phi"]
+    episodes = ("--episode", "1", "--tare-episode", "0")
+    code, out, err = run(capsys, "identify", "both.parquet", "--tare", "both.parquet", *episodes, *ROBOT, "--json")
+    assert code == 0, err
+    np.testing.assert_allclose(json.loads(out)["phi"], expected, rtol=0, atol=1e-9)
+    code, _, err = run(capsys, "motion", "check", "both.parquet", "--tare", "both.parquet", *episodes, *ROBOT[:2])
+    assert code in (0, 3), err

@@ -286,7 +286,7 @@ def test_a_bad_npz_is_refused_by_array(tmp_path, stack, says):
 def test_what_is_no_log_file_is_refused(tmp_path):
     with pytest.raises(RecordingError, match=r"none\.csv does not exist"):
         read_recording(tmp_path / "none.csv")
-    with pytest.raises(RecordingError, match=r"is a folder without metadata\.yaml, \.db3 or \.mcap"):
+    with pytest.raises(RecordingError, match=r"is a folder without metadata\.yaml, \.db3, \.mcap or meta/info\.json"):
         read_recording(tmp_path)
     (tmp_path / "log.dat").write_text(text(log()))
     with pytest.raises(RecordingError, match=r"unsupported suffix '\.dat': expected \.csv, .*\.npz, .*\.bag"):

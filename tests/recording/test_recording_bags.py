@@ -85,6 +85,7 @@ def test_a_bag_gives_what_was_published(tmp_path, panda, kind, form):
     for got, k in ((log.q, 3), (log.dq, 4), (log.tau, 5)):
         np.testing.assert_array_equal(got, [m[k] for m in sent])
     assert (log.joint_names, log.channel, log.notes) == (PANDA, "measured", ())
+    assert log.epoch == pytest.approx(EPOCH * 1e-9)
 
 
 @pytest.mark.parametrize("mode", [CompressionMode.FILE, CompressionMode.MESSAGE])

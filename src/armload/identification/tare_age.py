@@ -42,8 +42,8 @@ def drift_since(tare: Recording, recording: Recording, age: float | None) -> tup
         if not (np.isfinite(age) and age >= 0.0):
             raise IdentificationError(f"the tare's age is {age:g} s: expected a time of 0 or more")
         return drift_after(age), ()
-    if tare.t[0] > _CLOCK and recording.t[0] > _CLOCK:
-        seconds = max(abs(float(recording.t[0] - tare.t[-1])), 0.0)
+    if tare.epoch + tare.t[0] > _CLOCK and recording.epoch + recording.t[0] > _CLOCK:
+        seconds = abs(float(recording.epoch - tare.epoch + recording.t[0] - tare.t[-1]))
         drift = drift_after(seconds)
         said = f"by the logs' clocks the tare is {in_words(seconds)} old: offsets and friction may have changed since"
         return drift, (said,) if drift else ()

@@ -10,19 +10,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.errors import RecordingError
+from armload.recording.dates import nanoseconds_of
 
 WIDEST = 64  # elements a row; a longer one is no list of joints but an image, or lies across
 
 
 class Column(NamedTuple):
-    """One array that is read when it is needed: numbers (N,) or, where width says so, (N, width)."""
+    """One array that is read when it is needed: numbers (N,) or, where width says so, (N, width); or dates (N,).
+
+    elements: names of the width elements of a row; None: they are counted.
+    """
 
     width: int | None
     load: Callable[[], NDArray]
+    dates: bool = False
+    elements: Sequence[str] | None = None
 
 
 class ArrayTable:
-    """Arrays by name (`table.Table`); elements of a list-valued one are columns `name[0]`, `name[1]`, …
+    """Arrays by name (`table.Table`); elements of a list-valued one are columns `name[0]`, … or `name/joint`.
 
     Args:
         columns: the arrays that could be columns.
@@ -36,11 +42,12 @@ class ArrayTable:
         self._elements: list[tuple[str, int | None]] = []
         for name, column in columns.items():
             self._elements += [(name, k) for k in (range(column.width) if column.width is not None else (None,))]
-        self.names: Sequence[str] = [name if k is None else f"{name}[{k}]" for name, k in self._elements]
+        self.names: Sequence[str] = [_called(name, k, columns[name].elements) for name, k in self._elements]
+        self.dates = [k for k, (name, _) in enumerate(self._elements) if columns[name].dates]
         self._load = cache(lambda name: columns[name].load())
 
     def numbers(self, places: Sequence[int]) -> NDArray[np.float64]:
-        """The columns at these places (N, k)."""
+        """The columns at these places (N, k); dates as nanoseconds since 1970."""
         found = [self._column(place) for place in places]
         lengths = {len(column): self.names[place] for place, column in zip(places, found, strict=True)}
         if len(lengths) > 1:
@@ -69,7 +76,15 @@ class ArrayTable:
     def _column(self, place: int) -> NDArray:
         name, element = self._elements[place]
         array = self._load(name)
+        if array.dtype.kind == "M":
+            array = nanoseconds_of(array)
         if array.dtype.kind not in "iuf":
             held = "text" if array.dtype.kind in "USO" else array.dtype
             raise RecordingError(f"{self.where}: column {name} holds {held}: expected numbers")
         return array if element is None else array[:, element]
+
+
+def _called(name: str, element: int | None, elements: Sequence[str] | None) -> str:
+    if element is None:
+        return name
+    return f"{name}[{element}]" if elements is None else f"{name}/{elements[element]}"

@@ -19,11 +19,14 @@ _WHY_NOT = {
 }
 
 
+DATE = "date"  # the unit of a column whose cells are dates
+
+
 @dataclass(frozen=True)
 class TimeColumns:
     """The columns of time: seconds and, where they are apart, nanoseconds.
 
-    unit: as stated in the header, by the tool or by the user; None: nobody says.
+    unit: as stated in the header, by the tool or by the user, or `DATE`; None: nobody says.
     tool: whose rule gave the unit. other: another clock, for files in which this one stands still.
     """
 
@@ -46,6 +49,7 @@ class Header:
         n: number of joints.
         arm: whose log it is, where known.
         where: the file.
+        dates: places of the columns that hold dates.
     """
 
     names: Sequence[str]
@@ -55,6 +59,7 @@ class Header:
     n: int
     arm: Arm | None
     where: str
+    dates: Sequence[int] = ()
 
     @property
     def joints(self) -> tuple[str, ...] | None:
@@ -96,8 +101,16 @@ class Header:
         """The columns of time; None: the samples are evenly spaced, at the rate the user gives.
 
         Raises:
-            RecordingError: there is none and no rate, more than one, or both.
+            RecordingError: there is none and no rate, more than one, or both; or a unit is stated for dates.
         """
+        time = self._time(spec)
+        if time is not None and time.unit == DATE and spec.t_unit is not None:
+            raise RecordingError(
+                f"{self.where}: column {self.names[time.place]!r} holds dates: expected no t_unit then; leave it out"
+            )
+        return time
+
+    def _time(self, spec: ColumnSpec) -> TimeColumns | None:
         places = [place for place, _ in self.times]
         if spec.rate is not None:
             if spec.t is not None or places:
@@ -114,7 +127,7 @@ class Header:
             lower = [name.lower() for name in self.names]
             known = [lower.index(name) for name in self.form.times if name in lower]
             strange = [at for at in places if at not in known and not re.fullmatch(self.form.clocks, lower[at])]
-            if known and not strange:
+            if known and not strange and known[0] not in self.dates:
                 unit = spec.t_unit or self.form.unit
                 return TimeColumns(known[0], unit, None, None if spec.t_unit else self.form.tool, (*known[1:], None)[0])
         if len(self.times) == 2:
@@ -138,6 +151,8 @@ class Header:
         )
 
     def _timed(self, place: int, unit: str | None) -> TimeColumns:
+        if place in self.dates:
+            return TimeColumns(place, DATE)
         if unit is not None and unit.strip().lower() not in TIME_UNITS:
             raise RecordingError(
                 f"{self.where}: column {self.names[place]!r} states the unit {unit!r}: expected s, ms, us or ns; say "

@@ -41,6 +41,7 @@ def checked_recording(
     channel: str = "measured",
     joint_names: tuple[str, ...] | None = None,
     notes: tuple[str, ...] = (),
+    epoch: float = 0.0,
 ) -> Recording:
     """A Recording from a table (N, 1 + 3n) in the order of `column_names`, if every row of it is valid.
 
@@ -83,4 +84,4 @@ def checked_recording(
             rows += f", {given} times"
         raise RecordingError(f"{where} holds {rows}: expected at least 2, one per sample")
     q, dq, tau = np.split(table[:, 1:], 3, axis=1)
-    return Recording(table[:, 0], q, dq, tau, channel, joint_names, where, notes)
+    return Recording(table[:, 0], q, dq, tau, channel, joint_names, where, notes, epoch)

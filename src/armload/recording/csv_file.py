@@ -9,6 +9,7 @@ writer was killed or whose machine lost its power.
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import re
 from collections.abc import Sequence
@@ -23,6 +24,7 @@ from armload.errors import RecordingError
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.columns import column_names
 from armload.recording.csv_layout import NUMBER, layout_of
+from armload.recording.dates import nanoseconds
 from armload.recording.recording import Recording
 from armload.recording.table import read_table
 
@@ -58,11 +60,13 @@ class _Csv:
         self._drop_torn_end(data)
         while self._body and not self._body[-1].strip():
             self._body.pop()
+        first = next((line for line in self._body if line.strip()), "")
+        self.dates = [k for k, cell in enumerate(self._first_cells(first)) if nanoseconds(cell) is not None]
         self._rows: list[tuple[int, list[str]]] | None = None  # line and cells, once it was read line by line
         self._comma, self._point = 0, 0  # the first line with a decimal comma, and with a decimal point
 
     def numbers(self, places: Sequence[int]) -> NDArray[np.float64]:
-        """The columns at these places (N, k)."""
+        """The columns at these places (N, k); dates as nanoseconds since 1970."""
         table = self._fast(places)
         if table is not None and len(table) > 1 and np.isfinite(table).all():
             return table
@@ -78,6 +82,9 @@ class _Csv:
     def whole_numbers(self, place: int) -> NDArray[np.int64] | None:
         """A column of whole numbers (N,), exactly; None: they are not whole, or longer than 18 digits hold."""
         cells = self._column(place)
+        if place in self.dates:
+            stamps = [nanoseconds(cell) for cell in cells]
+            return None if None in stamps else np.array(stamps, dtype=np.int64)
         if not all(map(_WHOLE.fullmatch, cells)):
             return None
         return np.array([int(cell) for cell in cells], dtype=np.int64)
@@ -113,8 +120,11 @@ class _Csv:
         if not self._body or not self._plain:
             return None
         separator = None if self.layout.separator == " " else self.layout.separator
+        of_dates = {place: _nanoseconds for place in self.dates if place in places}
         try:
-            return np.loadtxt(self._body, delimiter=separator, comments=None, usecols=places, ndmin=2)
+            return np.loadtxt(
+                self._body, delimiter=separator, comments=None, usecols=places, ndmin=2, converters=of_dates or None
+            )
         except ValueError:
             pass
         if separator == "," or any("." in line for line in self._body):
@@ -161,7 +171,14 @@ class _Csv:
             return kept
         return rows
 
+    def _first_cells(self, line: str) -> list[str]:
+        with contextlib.suppress(csv.Error):
+            return self.layout.cells(line)
+        return []
+
     def _number(self, cell: str, place: int, line: int) -> float:
+        if place in self.dates and (stamp := nanoseconds(cell)) is not None:
+            return float(stamp)
         if NUMBER.fullmatch(cell) or _NOT_FINITE.fullmatch(cell):
             self._point = self._point or ("." in cell) * line
             return float(cell)
@@ -171,9 +188,8 @@ class _Csv:
         if not cell:
             raise RecordingError(f"{self.where}, line {line}: {self.names[place]} is empty: expected a number")
         shown = cell if len(cell) <= 24 else cell[:24] + "…"
-        raise RecordingError(
-            f"{self.where}, line {line}: {self.names[place]} is {shown!r}: expected a number with a decimal point"
-        )
+        expected = "a date, as in the first row" if place in self.dates else "a number with a decimal point"
+        raise RecordingError(f"{self.where}, line {line}: {self.names[place]} is {shown!r}: expected {expected}")
 
     def _drop_torn_end(self, data: bytes) -> None:
         """Leave out a last line that was cut off: no line end, and the beginning of a row like the one before it."""
@@ -198,6 +214,13 @@ class _Csv:
             self.notes.append(f"{self.where}: dropped the last line, which was cut off: {cut} bytes")
         elif zeros:
             _refuse_zeros(self.where, self.layout.first + len(self._body) - 1)
+
+
+def _nanoseconds(cell: str) -> float:
+    stamp = nanoseconds(cell)
+    if stamp is None:
+        raise ValueError(cell)
+    return float(stamp)
 
 
 def _is_number(cell: str, comma: bool) -> bool:

@@ -12,6 +12,7 @@ from armload.errors import RecordingError
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.csv_file import read_csv, write_csv
 from armload.recording.hdf5_file import read_hdf5
+from armload.recording.lerobot import is_data_set, read_data_set
 from armload.recording.npz_file import read_npz, write_npz
 from armload.recording.parquet_file import read_parquet, write_parquet
 from armload.recording.recording import Recording
@@ -24,7 +25,7 @@ _READERS = {
     **dict.fromkeys((".hdf5", ".h5"), read_hdf5),
 }
 LOG_SUFFIXES = (*_READERS, *BAG_SUFFIXES)
-_FORMS = "CSV, Parquet, NPZ, HDF5 or ROS bag"
+_FORMS = "CSV, Parquet, NPZ, HDF5, ROS bag or LeRobot folder"
 _WRITERS = {".csv": write_csv, ".parquet": write_parquet, ".npz": write_npz}
 _SIGNATURES = {
     b"PAR1": (".parquet",),
@@ -45,11 +46,11 @@ def read_recording(
     rate: float | None = None,
     episode: int | None = None,
 ) -> Recording:
-    """Read the log of an arm: a table (CSV, Parquet, NPZ, HDF5), a ROS 1 bag or a ROS 2 bag (folder, .db3 or .mcap).
+    """Read the log of an arm: a table (CSV, Parquet, NPZ, HDF5), a ROS bag, or an episode of a LeRobot data set.
 
     Args:
-        path: the file, or the folder of a ROS 2 bag. Columns of a table are known by the names that tools give them
-            (docs/recordings.md); SI units, unless the header, the tool or `columns` says otherwise.
+        path: the file, or the folder of a ROS 2 bag or of a LeRobot data set. Columns of a table are known by the names
+            that tools give them (docs/recordings.md); SI units, unless header, tool or `columns` say otherwise.
         arm: the arm that made the log, if known: the number of joints is checked, and joints that have names are taken
             by them, in the arm's order.
         topic: the JointState topic of a bag, where several have the arm's joints.
@@ -77,6 +78,10 @@ def read_recording(
                 )
             if path.is_dir():
                 return read_bag(path, where, arm, topic)
+        elif path.is_dir():
+            if topic is not None:
+                raise RecordingError(_without_topics(where, topic))
+            return read_data_set(path, where, arm, spec)
         elif suffix not in _READERS:
             raise RecordingError(
                 f"{where}: unsupported suffix {path.suffix!r}: expected {', '.join(LOG_SUFFIXES)}"
@@ -85,7 +90,7 @@ def read_recording(
         if path.stat().st_size == 0:
             raise RecordingError(f"{where} is empty: expected a log of at least 2 samples")
         if topic is not None and suffix in _READERS:
-            raise RecordingError(f"{where}: a topic ({topic!r}) was named, but only ROS bags have topics; leave it out")
+            raise RecordingError(_without_topics(where, topic))
         if hint := _looks_like(path, suffix):
             raise RecordingError(f"{where} is not a {suffix} file{hint}")
         return read_bag(path, where, arm, topic) if has_topics(path) else _READERS[suffix](path, where, arm, spec)
@@ -94,9 +99,13 @@ def read_recording(
 
 
 def has_topics(path: str | Path) -> bool:
-    """Whether a file is a ROS bag, by its name."""
+    """Whether a file or folder is a ROS bag, by its name."""
     path = Path(path)
-    return path.is_dir() or path.suffix.lower() in BAG_SUFFIXES
+    return not is_data_set(path) if path.is_dir() else path.suffix.lower() in BAG_SUFFIXES
+
+
+def _without_topics(where: str, topic: str) -> str:
+    return f"{where}: a topic ({topic!r}) was named, but only ROS bags have topics; leave it out"
 
 
 def write_recording(path: str | Path, recording: Recording) -> None:

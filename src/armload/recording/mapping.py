@@ -17,7 +17,7 @@ from armload.recording.aliases import AMPERE, CALLED, EPISODE, FORMS, QUANTITIES
 from armload.recording.choice import Header, TimeColumns, some
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.columns import check_joint_count, column_names
-from armload.recording.header import Family, families_of, read_name, words_of
+from armload.recording.header import Family, Reading, families_of, read_name, words_of
 from armload.recording.templates import named_columns
 
 
@@ -48,6 +48,7 @@ def map_columns(
     arm: Arm | None = None,
     spec: ColumnSpec | None = None,
     text: Callable[[int], str | None] = lambda _: None,
+    dates: Sequence[int] = (),
 ) -> ColumnMap:
     """The columns of a log in a header.
 
@@ -60,12 +61,14 @@ def map_columns(
         arm: whose log it is, where known.
         spec: what the user says of the columns.
         text: the one text that a column holds in all rows, for columns of joint names.
+        dates: places of the columns that hold dates: times, whatever they are called, where no other column is.
 
     Raises:
         RecordingError: a quantity is missing, incomplete or could be read in two ways, or n is not the arm's.
     """
     spec = spec or ColumnSpec()
     families, times = families_of(names, () if arm is None else arm.joint_names)
+    times = times or [(place, Reading("t", "measured", names[place], None, None)) for place in dates]
     form = _form_of(names, families)
     families = _with_joint_names(families, names, where, text)
     given = {}
@@ -77,7 +80,7 @@ def map_columns(
         raise RecordingError(
             f"{where} has no columns named q1, dq1, tau1, …: found {found}; name the columns with --columns"
         )
-    header = Header(names, families, times, form, _joint_count(families, given, where, arm), arm, where)
+    header = Header(names, families, times, form, _joint_count(families, given, where, arm), arm, where, dates)
     places, scales, notes = {}, {}, []
     for key in QUANTITIES:
         places[key] = given[key] if key in given else header.family(key).order(header.n, header.joints)

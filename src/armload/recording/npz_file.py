@@ -40,7 +40,7 @@ def read_npz(path: Path, where: str, arm: Arm | None = None, spec: ColumnSpec | 
         raise RecordingError(f"{where}: channel is {channel[:24]!r}: expected one of {', '.join(CHANNELS)}")
     joints = tuple(str(name) for name in np.ravel(arrays["joint_names"])) if "joint_names" in arrays else None
     columns = {
-        name: Column(array.shape[1] if array.ndim == 2 else None, lambda array=array: array)
+        name: Column(array.shape[1] if array.ndim == 2 else None, lambda array=array: array, array.dtype.kind == "M")
         for name, array in arrays.items()
         if name not in _LABELS and (array.ndim == 1 or (array.ndim == 2 and 0 < array.shape[1] <= WIDEST))
     }

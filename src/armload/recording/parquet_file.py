@@ -6,6 +6,7 @@ A file written here holds channel and joint names in its metadata. pyarrow is im
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -25,9 +26,18 @@ from armload.recording.table import read_table
 _METADATA = b"armload.recording"
 
 
-def read_parquet(path: Path, where: str, arm: Arm | None = None, spec: ColumnSpec | None = None) -> Recording:
-    """Read a Parquet log; see `read_recording` for what it raises."""
-    pa, parquet = _pyarrow(where)
+def read_parquet(
+    path: Path,
+    where: str,
+    arm: Arm | None = None,
+    spec: ColumnSpec | None = None,
+    elements: Mapping[str, Sequence[str]] | None = None,
+) -> Recording:
+    """Read a Parquet log; see `read_recording` for what it raises.
+
+    elements: names of the elements of columns that hold lists, where there are any.
+    """
+    pa, parquet = pyarrow_for(where)
     try:
         with parquet.ParquetFile(path, page_checksum_verification=True) as file:
             columns = {}
@@ -36,9 +46,11 @@ def read_parquet(path: Path, where: str, arm: Arm | None = None, spec: ColumnSpe
                 if _is_list(pa, entry.type):
                     lists = read()
                     if lists.shape[1] <= WIDEST:
-                        columns[entry.name] = Column(lists.shape[1], lambda lists=lists: lists)
+                        called = (elements or {}).get(entry.name, ())
+                        called = called if len(called) == lists.shape[1] else None
+                        columns[entry.name] = Column(lists.shape[1], lambda lists=lists: lists, elements=called)
                 else:
-                    columns[entry.name] = Column(None, read)
+                    columns[entry.name] = Column(None, read, pa.types.is_timestamp(entry.type))
             channel, joints = _about((file.schema_arrow.metadata or {}).get(_METADATA))
             log = read_table(ArrayTable(columns, where), where, arm, spec or ColumnSpec(), channel=channel)
     except RecordingError:
@@ -48,7 +60,7 @@ def read_parquet(path: Path, where: str, arm: Arm | None = None, spec: ColumnSpe
     return log if joints is None or len(joints) != log.n else replace(log, joint_names=joints)
 
 
-def _pyarrow(where: str | Path) -> tuple[Any, Any]:
+def pyarrow_for(where: str | Path) -> tuple[Any, Any]:
     """pyarrow and its Parquet module.
 
     Raises:
@@ -56,6 +68,7 @@ def _pyarrow(where: str | Path) -> tuple[Any, Any]:
     """
     try:
         import pyarrow
+        import pyarrow.compute
         from pyarrow import parquet
     except ImportError:
         raise RecordingError(
@@ -70,32 +83,33 @@ def _is_list(pa: Any, kind: Any) -> bool:
 
 
 def _column(file: Any, name: str, where: str) -> NDArray:
-    """One column: numbers (N,), or lists of numbers (N, width).
+    """One column: numbers or dates (N,), or lists of numbers (N, width).
 
     Raises:
         RecordingError: text, a cell that is empty, or lists of different lengths.
     """
-    pa, _ = _pyarrow(where)
+    pa, _ = pyarrow_for(where)
     column = file.read([name], use_threads=False).column(name)
     if column.null_count:
         row = int(np.flatnonzero(np.asarray(column.is_null()))[0])
         raise RecordingError(f"{where}, row {row}: {name} is empty: expected a number")
     if _is_list(pa, column.type):
-        lengths = {len(cell) for cell in column.to_pylist()} if len(column) else {0}
+        lengths = set(pa.compute.list_value_length(column).unique().to_pylist()) or {0}
         values = column.combine_chunks().flatten()
         if len(lengths) > 1 or values.null_count:
             raise RecordingError(f"{where}: column {name} holds lists of {sorted(lengths)[:4]} numbers, or with gaps")
         return values.to_numpy(zero_copy_only=False).reshape(len(column), lengths.pop())
     if pa.types.is_string(column.type) or pa.types.is_large_string(column.type):
         return np.array(column.to_pylist(), dtype=object)
-    if not (pa.types.is_floating(column.type) or pa.types.is_integer(column.type)):
+    known = pa.types.is_floating(column.type) or pa.types.is_integer(column.type) or pa.types.is_timestamp(column.type)
+    if not known:
         raise RecordingError(f"{where}: column {name} holds {column.type}: expected numbers")
     return column.to_numpy()
 
 
 def write_parquet(path: Path, recording: Recording) -> None:
     """Write a Parquet log with a checksum on every page."""
-    pa, parquet = _pyarrow(path)
+    pa, parquet = pyarrow_for(path)
     matrix = np.hstack([recording.t[:, None], recording.q, recording.dq, recording.tau])
     about = {"channel": recording.channel, "joint_names": recording.joint_names}
     schema = pa.schema(

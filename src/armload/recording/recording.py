@@ -42,6 +42,7 @@ class Recording:
         joint_names: names of the columns, where the source has them.
         source: where it comes from (a path), for messages and provenance.
         notes: what a reader did to the log that its user should know (rows dropped, say), one sentence each.
+        epoch: time since 1970 at t = 0 [s], where the source has stamps that t is counted from; else 0.
 
     Raises:
         RecordingError: wrong shapes, a number that is not finite, times out of order; the message names row and column
@@ -56,6 +57,7 @@ class Recording:
     joint_names: tuple[str, ...] | None = None
     source: str = "recording"
     notes: tuple[str, ...] = ()
+    epoch: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("t", "q", "dq", "tau"):

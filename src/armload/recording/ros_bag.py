@@ -90,7 +90,8 @@ def _readers(path: Path, where: str, stack: ExitStack) -> list[Any]:
         return [Reader2(_plain_name(path, stack))]
     if not parts:
         raise RecordingError(
-            f"{where} is a folder without metadata.yaml, .db3 or .mcap: expected a log file or a ROS 2 bag folder"
+            f"{where} is a folder without metadata.yaml, .db3, .mcap or meta/info.json: expected a log file, or the "
+            "folder of a ROS 2 bag or of a LeRobot data set"
         )
     return [Reader2(_plain_name(part, stack)) for part in parts]
 
@@ -182,6 +183,7 @@ def _recording(bag: _Bag, topic: str, where: str, arm: Arm | None) -> Recording:
         channel="desired" if "desired" in topic.rsplit("/", 1)[-1] else "measured",
         joint_names=wanted,
         notes=tuple(notes),
+        epoch=stamps[0] * 1e-9,
     )
 
 

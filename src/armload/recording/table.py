@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from armload.arms import Arm
 from armload.errors import RecordingError
 from armload.recording.aliases import EPISODE, QUANTITIES, TIME_UNITS
-from armload.recording.choice import TimeColumns
+from armload.recording.choice import DATE, TimeColumns
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.columns import checked_recording
 from armload.recording.mapping import ColumnMap, map_columns
@@ -22,6 +22,7 @@ class Table(Protocol):
     """A file of rows and named columns."""
 
     names: Sequence[str]
+    dates: Sequence[int]  # places of the columns that hold dates
 
     @property
     def notes(self) -> Sequence[str]:
@@ -29,11 +30,11 @@ class Table(Protocol):
         ...
 
     def numbers(self, places: Sequence[int]) -> NDArray[np.float64]:
-        """The columns at these places (N, k)."""
+        """The columns at these places (N, k); dates as nanoseconds since 1970."""
         ...
 
     def whole_numbers(self, place: int) -> NDArray[np.int64] | None:
-        """A column of whole numbers (N,), exactly; None: they are not whole."""
+        """A column of whole numbers (N,), exactly, or of dates [ns since 1970]; None: they are not whole."""
         ...
 
     def text(self, place: int) -> str | None:
@@ -56,7 +57,7 @@ def read_table(table: Table, where: str, arm: Arm | None, spec: ColumnSpec, chan
     Raises:
         RecordingError: the columns are not clear, or a row is not valid.
     """
-    columns: ColumnMap = map_columns(table.names, where, arm, spec, table.text)
+    columns: ColumnMap = map_columns(table.names, where, arm, spec, table.text, table.dates)
     places = [place for key in QUANTITIES for place in columns.places[key]]
     time = columns.time
     extra = [] if time is None else [time.place]
@@ -72,9 +73,9 @@ def read_table(table: Table, where: str, arm: Arm | None, spec: ColumnSpec, chan
     motion = values[:, len(extra) : len(extra) + len(places)] * scales
     if time is None:
         assert spec.rate is not None
-        t, label = np.maximum(np.cumsum(keep) - 1, 0) / spec.rate, "t"
+        (t, epoch), label = (np.maximum(np.cumsum(keep) - 1, 0) / spec.rate, 0.0), "t"
     else:
-        t, label = _seconds(table, time, values[:, 0], where), table.names[time.place]
+        (t, epoch), label = _seconds(table, time, values[:, 0], where), table.names[time.place]
     rows = np.flatnonzero(keep)
     return checked_recording(
         np.column_stack([t, motion])[rows],
@@ -84,11 +85,12 @@ def read_table(table: Table, where: str, arm: Arm | None, spec: ColumnSpec, chan
         channel=channel,
         joint_names=columns.joints,
         notes=(*table.notes, *columns.notes),
+        epoch=epoch,
     )
 
 
-def _seconds(table: Table, time: TimeColumns, raw: NDArray[np.float64], where: str) -> NDArray:
-    """The times (N,) [s].
+def _seconds(table: Table, time: TimeColumns, raw: NDArray[np.float64], where: str) -> tuple[NDArray, float]:
+    """The times (N,) [s], and what they are counted from [s since the clock's own beginning].
 
     Stamps in nanoseconds are subtracted as whole numbers first: since 1970 a double resolves 0.2 µs. They begin at 0.
     """
@@ -97,8 +99,7 @@ def _seconds(table: Table, time: TimeColumns, raw: NDArray[np.float64], where: s
         seconds, nanoseconds = table.whole_numbers(time.place), table.whole_numbers(time.nanoseconds)
         if seconds is None or nanoseconds is None:
             raise RecordingError(f"{where}: columns {name!r} and {table.names[time.nanoseconds]!r} hold broken numbers")
-        stamps = seconds * 1_000_000_000 + nanoseconds
-        return (stamps - stamps[:1]) * 1e-9
+        return _counted(seconds * 1_000_000_000 + nanoseconds, 1e-9)
     if time.unit is None:
         with np.errstate(invalid="ignore"):  # numbers that are not finite are refused later, by their row
             step = float(np.median(np.diff(raw))) if len(raw) > 1 else 0.0
@@ -107,22 +108,29 @@ def _seconds(table: Table, time: TimeColumns, raw: NDArray[np.float64], where: s
                 f"{where}: times in column {name!r} are {step:g} apart, too far for seconds: expected the unit; say it "
                 "with --columns t_unit=ms (or us, ns, s)"
             )
-        return raw
-    scale = TIME_UNITS[time.unit.strip().lower()]
+        return raw, 0.0
+    scale = 1e-9 if time.unit == DATE else TIME_UNITS[time.unit.strip().lower()]
     if scale == 1.0:
-        return raw
+        return raw, 0.0
     whole = table.whole_numbers(time.place)
     if whole is None:
+        if time.unit == DATE:
+            raise RecordingError(f"{where}: column {name!r} holds dates in some rows only: expected one in every row")
         if time.tool is not None:
             raise RecordingError(
                 f"{where}: {time.tool} writes whole {time.unit} in column {name!r}, here they are broken: expected the "
                 "unit; say it with --columns t_unit=s (or ms, us, ns)"
             )
-        return raw * scale
+        return raw * scale, 0.0
     if time.other is not None and len(whole) > 1 and (whole == whole[0]).all():
         other = table.whole_numbers(time.other)  # messages that were not stamped: the time of logging, as in bags
         whole = whole if other is None else other
-    return (whole - whole[:1]) * scale
+    return _counted(whole, scale)
+
+
+def _counted(whole: NDArray[np.int64], scale: float) -> tuple[NDArray, float]:
+    """Times (N,) [s] from the first of some stamps, and that stamp [s]."""
+    return (whole - whole[:1]) * scale, float(whole[0] * scale) if len(whole) else 0.0
 
 
 def _episode(episodes: NDArray[np.float64], spec: ColumnSpec, where: str) -> NDArray[np.bool_]:

@@ -25,6 +25,8 @@ def named_columns(
     holder = _PLACEHOLDER.search(template)
     if holder is None:
         elements = [name for name in (f"{template}[{k}]" for k in range(len(names))) if name in names]
+        if not elements and template not in names and arm is not None:  # elements that have names
+            elements = [name for name in (f"{template}/{joint}" for joint in arm.joint_names) if name in names]
         return [place_of(name, key, names, where) for name in elements or [template]]
     before, after = template[: holder.start()], template[holder.end() :]
     if holder[1] == "joint":

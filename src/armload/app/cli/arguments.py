@@ -12,6 +12,7 @@ from armload.errors import UsageError
 # options whose value may begin with a minus sign: argparse would take "-1,0,-9.7" for an option
 _SIGNED = ("--gravity",)
 COLUMNS = 'names and units of columns, such as "t=time,q=joint_pos_{i},t_unit=ms", or a TOML file'
+AS_NAMED = "none"  # as SPEC: nothing is said of the columns
 
 
 class Parser(argparse.ArgumentParser):
@@ -193,9 +194,16 @@ def add_tool_and_topic_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_column_arguments(parser: argparse.ArgumentParser) -> None:
-    """`--columns`, `--effort-key`, `--rate` and `--episode`: what the header of a log leaves open."""
-    add = parser.add_argument_group("logs that are tables (CSV, Parquet, NPZ, HDF5)").add_argument
+    """`--columns`, `--effort-key`, `--rate`, `--episode`, and for the tare: what the header of a log leaves open."""
+    add = parser.add_argument_group("logs that are tables (CSV, Parquet, NPZ, HDF5, LeRobot)").add_argument
     add("--columns", type=file_name, metavar="SPEC", help=COLUMNS)
     add("--effort-key", type=file_name, metavar="K", help="list-valued column of the joint torques (--columns tau=K)")
     add("--rate", dest="log_rate", type=at_least(1e-3, float), metavar="HZ", help="of a log without times")
-    add("--episode", type=at_least(0), metavar="K", help="which one of a file that holds several")
+    add("--episode", type=at_least(0), metavar="K", help="which one of a file or data set that holds several")
+    add("--tare-episode", type=at_least(0), metavar="K", help="that of the tare (default: as --episode)")
+    add(
+        "--tare-columns",
+        type=file_name,
+        metavar="SPEC",
+        help=f"of a tare from another tool, in place of the four above; {AS_NAMED}: its header says all",
+    )

@@ -125,7 +125,7 @@ def _check(options: argparse.Namespace) -> int:
 
     arm = arm_of(options)
     run = motion_check.run_of(options, options.motion, arm)
-    tare = run if options.tare is None else motion_check.run_of(options, options.tare, arm)
+    tare = run if options.tare is None else motion_check.run_of(options, options.tare, arm, is_tare=True)
     result, carried = None, ""
     with working("checking"):
         if isinstance(run, Recording):

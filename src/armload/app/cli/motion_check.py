@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from armload.recording import Recording
 
 
-def run_of(options: argparse.Namespace, name: str, arm: Arm) -> Recording | Motion:
-    """A log by the suffix of its file (or the folder of a bag), else a motion."""
+def run_of(options: argparse.Namespace, name: str, arm: Arm, is_tare: bool = False) -> Recording | Motion:
+    """A log by the suffix of its file (or the folder of one), else a motion."""
     from armload.app.cli.named import motion_of, read_logs
     from armload.identification import check_plausible
     from armload.recording import LOG_SUFFIXES
@@ -25,7 +25,7 @@ def run_of(options: argparse.Namespace, name: str, arm: Arm) -> Recording | Moti
     path = Path(name)
     if path.suffix.lower() not in LOG_SUFFIXES and not path.is_dir():
         return motion_of(name, arm)
-    (log,) = read_logs(options, arm, name)
+    log = read_logs(options, arm, None, name)[1] if is_tare else read_logs(options, arm, name)[0]
     assert log is not None
     check_plausible(log, arm)
     return log

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from armload.app.cli.arguments import AS_NAMED
 from armload.app.cli.printing import print_note
-from armload.errors import UsageError
+from armload.errors import RecordingError, UsageError
 
 if TYPE_CHECKING:
     from armload.arms import Arm
@@ -18,45 +20,73 @@ if TYPE_CHECKING:
     from armload.simulation import World
 
 
-def columns_of(options: argparse.Namespace) -> ColumnSpec:
-    """What `--columns` and its companions say of the logs."""
+def columns_of(options: argparse.Namespace, of_tare: bool = False) -> ColumnSpec:
+    """What `--columns` and its companions say of the log, or of the tare: the same unless `--tare-columns` differs."""
     from armload.recording import ColumnSpec
 
-    companions = {"tau": "effort_key", "rate": "log_rate", "episode": "episode"}
-    more = {key: getattr(options, name, None) for key, name in companions.items()}
-    return ColumnSpec.of(options.columns).over(**more)
+    if of_tare and (given := getattr(options, "tare_columns", None)) is not None:
+        said = ColumnSpec() if given == AS_NAMED else ColumnSpec.of(given)
+    else:
+        companions = {"tau": "effort_key", "rate": "log_rate", "episode": "episode"}
+        more = {key: getattr(options, name, None) for key, name in companions.items()}
+        said = ColumnSpec.of(options.columns).over(**more)
+    episode = getattr(options, "tare_episode", None) if of_tare else None
+    return said if episode is None else replace(said, episode=episode)
 
 
 def read_logs(
-    options: argparse.Namespace, arm: Arm, *logs: str | None, topics: tuple[str | None, ...] = ()
-) -> list[Recording | None]:
-    """The logs at some paths; None stays None.
+    options: argparse.Namespace,
+    arm: Arm,
+    log: str | None,
+    tare: str | None = None,
+    topics: tuple[str | None, str | None] | None = None,
+) -> tuple[Recording | None, Recording | None]:
+    """A log and its tare, by their paths; None stays None.
 
     Topics are for bags, columns for tables. Where there is none of the kind, reading says that they were named in vain.
 
     Args:
         options: of the command.
         arm: whose logs they are.
-        logs: paths.
-        topics: of each log (default: `--topic`).
+        log, tare: paths.
+        topics: of each (default: `--topic`).
     """
     from armload.recording import has_topics, read_recording
 
-    columns = columns_of(options)
-    bags = [log is not None and has_topics(log) for log in logs]
-    tables = [log is not None and not bag for log, bag in zip(logs, bags, strict=True)]
-    given = topics or (getattr(options, "topic", None),) * len(logs)
-    return [
-        None
-        if log is None
-        else read_recording(
-            log,
-            arm,
-            topic=topic if bag or not any(bags) else None,
-            columns=columns if not bag or not any(tables) else None,
-        )
-        for log, bag, topic in zip(logs, bags, given, strict=True)
-    ]
+    of_tare = [getattr(options, name, None) for name in ("tare_columns", "tare_episode")]
+    if of_tare != [None, None] and options.tare is None:
+        raise UsageError("--tare-columns and --tare-episode are for a tare, but there is no --tare")
+    bags = [path is not None and has_topics(path) for path in (log, tare)]
+    tables = [path is not None and not bag for path, bag in zip((log, tare), bags, strict=True)]
+    read: list[Recording | None] = [None, None]
+    for k, path in enumerate((log, tare)):
+        if path is None:
+            continue
+        columns, own = columns_of(options, of_tare=k == 1), k == 1 and of_tare != [None, None]
+        if bags[k] and any(tables) and not own:
+            columns = None
+        topic = (topics or (getattr(options, "topic", None),) * 2)[k]
+        topic = topic if bags[k] or not any(bags) else None
+        try:
+            read[k] = read_recording(path, arm, topic=topic, columns=columns)
+        except RecordingError as error:
+            if k == 1 and not own and columns is not None and _reads(path, arm):
+                raise RecordingError(
+                    f"{error}; if the tare's own header says all, add --tare-columns {AS_NAMED}"
+                ) from None
+            raise
+    return read[0], read[1]
+
+
+def _reads(path: str, arm: Arm) -> bool:
+    """Whether a log can be read by what its header says alone."""
+    from armload.recording import read_recording
+
+    try:
+        read_recording(path, arm)
+    except RecordingError:
+        return False
+    return True
 
 
 def arm_of(options: argparse.Namespace) -> Arm:

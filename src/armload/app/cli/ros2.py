@@ -104,7 +104,7 @@ def _node(options: argparse.Namespace) -> None:
     from armload.online import OnlineIdentifier
 
     arm = arm_of(options)
-    (tare,) = read_logs(options, arm, options.tare, topics=(None,))
+    _, tare = read_logs(options, arm, None, options.tare, topics=(None, None))
     identifier = OnlineIdentifier(arm, tare, options.method)
     begun = False
 
