@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from datetime import UTC, datetime
 from importlib import resources
 
@@ -13,7 +14,7 @@ from armload.arms import arm
 from armload.inertia import NAMES, InertialParameters, com_to_phi
 from armload.motion import taie2024
 from armload.payloads import Payload, franka_hand, write_payload
-from armload.recording import Recording, write_recording
+from armload.recording import Recording, read_recording, write_recording
 from armload.simulation import simulate
 from armload.version import __version__
 
@@ -303,6 +304,16 @@ def test_an_inertia_that_rests_on_the_prior_is_exported_with_a_note_and_a_commen
         out, err = capsys.readouterr()
         for text in (out, err):
             assert f"rests on what payloads are usually like more than on the log: {', '.join(leaning)}" in text
+
+
+def test_gravity_that_a_controller_took_out_is_put_back(answer, logs, panda, tmp_path):
+    """The controller knows of the hand, and reports what is beyond it and the arm; the answer is the same."""
+    log = read_recording(logs / "both.csv", panda)
+    known = panda.with_payload(InertialParameters(franka_hand().parameters.phi, panda.frame))
+    write_recording(tmp_path / "taken.csv", replace(log, tau=log.tau - known.torque(log.q)))
+    found = answer(tmp_path / "taken.csv", "--robot", "panda", "--compensated", "franka-hand")
+    np.testing.assert_allclose(found["phi"], answer(logs / "both.csv", "--robot", "panda")["phi"], atol=1e-4)
+    assert found["mass"] == pytest.approx(BODY.mass + franka_hand().parameters.mass, abs=0.05)
 
 
 def test_a_tool_s_file_of_mass_and_centre_alone_is_taken_with_wider_intervals(answer, logs, tmp_path):

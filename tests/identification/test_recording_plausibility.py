@@ -12,7 +12,7 @@ from armload.identification import check_plausible
 from armload.identification.torque_scale import torque_scale
 from armload.inertia import InertialParameters
 from armload.motion import random_motion, taie2024
-from armload.recording import Recording, read_recording
+from armload.recording import Recording, read_recording, with_gravity
 from armload.recording.windows import integrals, windows
 from armload.simulation import Run, Sensors, World, simulate, simulate_many
 
@@ -186,7 +186,10 @@ WRONG_TORQUE = {
     "backwards": (lambda r, _: -r.tau, r"tau has the opposite sign of the torque"),
     "amperes": (lambda r, _: r.tau / 11.0, r"tau holds only \d+% of the torque"),
     "third": (lambda r, _: r.tau / 3.0, r"tau is 0\.[23]\d times the torque"),
-    "without gravity": (lambda r, a: r.tau - a.torque(r.q), r"tau holds only \d+% of the torque"),
+    "without gravity": (
+        lambda r, a: r.tau - a.torque(r.q),
+        r"tau (holds only \d+% of|seems to have gravity taken out)",
+    ),
     "reversed": (lambda r, _: r.tau[:, ::-1], r"tau"),
 }
 
@@ -324,6 +327,17 @@ def test_motor_currents_are_called_so_with_what_to_do(real_data, name):
     stranger = replace(robot, known_as=None)
     with pytest.raises(RecordingError, match=r"look like currents, in A.*torque constant .*from the maker"):
         check_plausible(replace(log, tau=log.tau / constants), stranger)
+
+
+@pytest.mark.parametrize("name", ["ur10e_unloaded.csv", "ur10e_loaded_2805g.csv"])
+def test_torque_without_gravity_is_called_so_with_what_to_do(real_data, name):
+    """As UR's ROS 2 driver reports it: the real torque less the gravity of the arm."""
+    robot = arm("ur10e")
+    log = read_recording(real_data / name, robot)
+    taken = replace(log, tau=log.tau - robot.torque(log.q))
+    with pytest.raises(RecordingError, match=r"gravity taken out.*--compensated nothing"):
+        check_plausible(taken, robot)
+    check_plausible(with_gravity(taken, robot), robot)
 
 
 def test_a_torque_that_is_no_current_is_not_called_one(panda):

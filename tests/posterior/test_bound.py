@@ -274,7 +274,7 @@ def test_the_scales_of_worlds_are_the_spread_of_what_worlds_add_to_the_torque(pa
     added = np.array([world.disturbance(q, dq) + world.offset for world in worlds])
     spread = np.mean((added - added.mean(axis=0)) ** 2, axis=(0, 1))
     correction = Correction(panda, panda.limits.effort)
-    drift = correction.regressor(q, dq).drift[:, :, :21]  # offset, Coulomb, viscous
+    drift = correction.regressor(q, dq, np.zeros_like(q)).drift[:, :, :21]  # offset, Coulomb, viscous
     expected = np.mean(drift**2 @ scales.eta[:21], axis=0) + scales.features[:, 0] + scales.features[:, -1]
     assert spread == pytest.approx(expected, rel=0.15)
     links = np.array([world.links for world in worlds]) - World.nominal(panda).links

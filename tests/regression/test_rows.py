@@ -36,7 +36,7 @@ def by_arrays(robot, t, q, dq, tau, correction, features):
     t, q, dq = t[rows], q[rows], dq[rows]
     p, drift = robot.momentum(q, dq)
     r = torque - lagged(t, p, drift)
-    payload, own = momentum_regressor(robot.frame_motion(q), dq), correction.regressor(q, dq)
+    payload, own = momentum_regressor(robot.frame_motion(q), dq), correction.regressor(q, dq, torque)
     parts = [lagged(t, *payload), lagged(t, *own)]
     pose = first_order_lag(t, features.of_pose(q), GAIN)
     parts += [np.broadcast_to(pose[:, None], (len(t), robot.n, features.pose))]

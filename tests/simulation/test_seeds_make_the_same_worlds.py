@@ -14,8 +14,8 @@ from armload.simulation import Gains, Sensors, World, moderate_stiffness, simula
 WORLDS = {
     "panda": "84f5411928aad9b8",
     "fr3": "ab4ee60ce05c03a3",
-    "ur5e": "4f916d1cb2fde17e",
-    "ur10e": "a259c5e17b20e114",
+    "ur5e": "da7bda9ec0a17665",
+    "ur10e": "34c419b108cd1721",
     "unknown": "9dbab9f36bef3dfe",
 }
 CONTROL = {
@@ -25,7 +25,7 @@ CONTROL = {
     "ur10e": "6f32fcfca760ce0b",
     "unknown": "2d5ca2d4bf9416d2",
 }
-LOGS = {"panda": "be2927ec922b3c02", "ur10e": "e9388d6dc8ff6e3c"}
+LOGS = {"panda": "be2927ec922b3c02", "ur10e": "916a0f46c4a73d11"}
 
 
 def digest(*arrays, digits):

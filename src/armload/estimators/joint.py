@@ -130,7 +130,7 @@ def base_parameters(correction: Correction, seed: int = 0) -> NDArray[np.float64
     low, high = np.maximum(limits.position_low, -np.pi), np.minimum(limits.position_high, np.pi)
     q = rng.uniform(low, high, size=(_STATES, correction.arm.n))
     dq = rng.normal(size=q.shape)
-    Z = correction.regressor(q, dq)
+    Z = correction.regressor(q, dq, correction.effort * rng.normal(size=q.shape))
     scale = correction.prior_std
     rows = np.concatenate(
         [part.reshape(-1, correction.size) / np.tile(correction.effort, len(q))[:, None] * scale for part in Z]

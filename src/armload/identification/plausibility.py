@@ -28,11 +28,13 @@ from armload.identification.thresholds import (
     NO_TORQUE,
     NOT_DERIVATIVE,
     POSITION_TOLERANCE,
+    SCALE_NONE,
+    SCALE_SURE,
     SPEED,
     WINDOW_MOVES,
 )
-from armload.identification.torque_scale import torque_scale
-from armload.recording import Recording
+from armload.identification.torque_scale import TorqueScale, torque_scale
+from armload.recording import Recording, with_gravity
 from armload.recording.columns import check_joint_count
 from armload.recording.windows import integrals, windows
 
@@ -230,9 +232,10 @@ def _check_torque_is_the_arms(recording: Recording, arm: Arm) -> None:
         return
     if fit.is_wrong:
         _check_for_currents(recording, arm, fit.scale)
+        _check_for_compensation(recording, arm, fit)
         if fit.is_negative:
             what = "has the opposite sign of"
-        elif fit.scale < 0.25:
+        elif fit.scale < SCALE_NONE:
             what = f"holds only {max(fit.scale, 0.0):.0%} of"
         else:
             what = f"is {fit.scale:.2f} times"
@@ -269,6 +272,23 @@ def _check_for_currents(recording: Recording, arm: Arm, scale: float) -> None:
     raise RecordingError(
         f"{recording.source}: tau holds only {scale:.0%} of the torque {arm.name} needs to carry itself: these look "
         f"like currents, in A; expected joint torque in N·m: {how}"
+    )
+
+
+def _check_for_compensation(recording: Recording, arm: Arm, seen: TorqueScale) -> None:
+    """Refuse torque without gravity by name: it holds nothing of the arm's own, and with gravity put back it is sound.
+
+    Only of arms that measure motor current: their controllers report such torque. The payload that the controller was
+    set to is not known here; the arm's own gravity is most of it.
+    """
+    if not arm.motor_torque or abs(seen.scale) > min(SCALE_SURE * seen.std, SCALE_NONE):
+        return
+    fit = torque_scale(with_gravity(recording, arm), arm)
+    if fit is None or fit.is_wrong or fit.misfit > MODEL_MISFIT:
+        return
+    raise RecordingError(
+        f"{recording.source}: tau seems to have gravity taken out: expected the measured joint torque in N·m, gravity "
+        "included; say what the controller was set to carry (--compensated nothing, or a payload's file)"
     )
 
 

@@ -2,6 +2,7 @@
 
 from armload.recording.alignment import Alignment, same_motion
 from armload.recording.column_spec import ColumnSpec
+from armload.recording.compensated import with_gravity
 from armload.recording.copies import check_own_measurements, shared_samples
 from armload.recording.files import LOG_SUFFIXES, has_topics, read_recording, write_recording
 from armload.recording.recording import CHANNELS, GAP, JITTERED, Recording, Sample
@@ -20,5 +21,6 @@ __all__ = [
     "read_recording",
     "same_motion",
     "shared_samples",
+    "with_gravity",
     "write_recording",
 ]

@@ -11,11 +11,17 @@ needs no acceleration either:
 | coulomb  | smooth Coulomb friction                       | 0          | tanh(dq_j / width)    |
 | viscous  | viscous friction                              | 0          | dq_j                  |
 | rotor    | motor inertia, where torque is motor-side     | dq_j       | 0                     |
+| load     | what gears lose of the torque they transmit   | 0          | |tau_j|·tanh(dq_j/w)  |
 | links    | errors of the links' inertial parameters      | Y_p(links) | Y_g(links) − Y_c(links) |
+
+`load` is there only of arms that are known to measure motor current (Bittencourt & Gunnarsson, ASME J. Dyn. Sys. Meas.
+Control 134, 2012). Its tau is the measured torque, lagged as the rows are; what it holds of Coulomb friction is that
+block's. Without it, gear losses of the payload's own torque look like another payload: of a real UR10e with a tare, two
+in five intervals of a second's log missed the mass (`benchmarks/motor_side.py`).
 
 Prior standard deviations are fractions of the joint's effort limit, the same for every arm (two Pandas and a UR10e lie
 within a factor of 3 of each other so, but for friction, which is five times as large where torque is motor current);
-`problem.py` rescales all blocks but `links` from the data.
+`problem.py` rescales all blocks but `load` and `links` from the data.
 """
 
 from __future__ import annotations
@@ -34,6 +40,9 @@ from armload.inertia import InertialParameters
 PER_JOINT = {"offset": 4e-3, "coulomb": 1e-2, "viscous": 5e-3, "rotor": 3e-4}
 # times these where torque is motor current: the gear's friction is in it (the UR10e's logs)
 _MOTOR_FRICTION = {"coulomb": 5.0, "viscous": 5.0}
+# [1] prior standard deviation of the share of the torque that a joint's gear loses: 0.06 to 0.1 of a UR10e's in five of
+# its joints (`benchmarks/real_residuals.py`)
+_LOSS = 0.08
 # times that the variance of a joint's residual is larger at rest than in motion, link and motor side: friction is
 # anything below stiction there. √10 and √250 of a residual of 1e-3 effort limits are a third of the friction expected
 _PRESLIDING, _MOTOR_PRESLIDING = 10.0, 250.0
@@ -59,14 +68,20 @@ class Correction:
     @property
     def size(self) -> int:
         """Number of unknowns p."""
-        return len(PER_JOINT) * self.arm.n + 10 * self.arm.n
+        return self.own + 10 * self.arm.n
+
+    @property
+    def own(self) -> int:
+        """How many unknowns, the first ones, are the joints' own: all but the links'."""
+        return (len(PER_JOINT) + self.arm.motor_torque) * self.arm.n
 
     @cached_property
     def prior_std(self) -> NDArray[np.float64]:
         """Prior standard deviation of eta (p,), its mean being zero."""
         larger = _MOTOR_FRICTION if self.arm.motor_torque else {}
         per_joint = [fraction * larger.get(name, 1.0) * self.effort for name, fraction in PER_JOINT.items()]
-        return np.concatenate([*per_joint, _link_std(self.arm)])
+        loss = np.full(self.own - len(PER_JOINT) * self.arm.n, _LOSS)
+        return np.concatenate([*per_joint, loss, _link_std(self.arm)])
 
     @property
     def drifting(self) -> int:
@@ -86,7 +101,10 @@ class Correction:
 
     @property
     def adaptive(self) -> NDArray[np.bool_]:
-        """Which unknowns have a prior whose scale the data may set (p,): all but the links'."""
+        """Which unknowns have a prior whose scale the data may set (p,): all but the links' and what gears lose.
+
+        Where friction is most of a joint's torque, a loss of all of it would fit as well.
+        """
         return np.arange(self.size) < len(PER_JOINT) * self.arm.n
 
     def coulomb(self, eta: ArrayLike) -> NDArray[np.float64]:
@@ -101,13 +119,16 @@ class Correction:
         n, block = self.arm.n, list(PER_JOINT).index(what)
         return np.asarray(eta)[block * n : (block + 1) * n]
 
-    def regressor(self, q: ArrayLike, dq: ArrayLike) -> MomentumRegressor:
-        """Momentum form of Z for samples (N, n): two arrays (N, n, p)."""
-        dq = np.atleast_2d(dq)
+    def regressor(self, q: ArrayLike, dq: ArrayLike, torque: ArrayLike) -> MomentumRegressor:
+        """Momentum form of Z for samples (N, n), torque being measured: two arrays (N, n, p)."""
+        dq, torque = np.atleast_2d(dq), np.atleast_2d(torque)
         n, eye = self.arm.n, np.eye(self.arm.n)
-        nothing = np.zeros((len(dq), n, n))
+        nothing, direction = np.zeros((len(dq), n, n)), np.tanh(dq / FRICTION_WIDTH)
         momentum = [nothing, nothing, nothing, dq[:, :, None] * eye]
-        drift = [nothing + eye, np.tanh(dq / FRICTION_WIDTH)[:, :, None] * eye, dq[:, :, None] * eye, nothing]
+        drift = [nothing + eye, direction[:, :, None] * eye, dq[:, :, None] * eye, nothing]
+        if self.arm.motor_torque:
+            momentum.append(nothing)
+            drift.append((np.abs(torque) * direction)[:, :, None] * eye)
         links = full_arm_regressor(self.arm, q, dq)
         return MomentumRegressor(
             np.concatenate([*momentum, links.momentum], axis=2), np.concatenate([*drift, links.drift], axis=2)

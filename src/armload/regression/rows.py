@@ -239,6 +239,7 @@ def _lagged(inputs, gain, h, fresh, joints, regressor, pose_lag, velocity_lag, X
     """One row from what goes into its lags, h seconds after the last; `fresh`: the lags start here."""
     momentum, drift, links, dq, torque, pose, velocity = inputs
     n, few, many, wide = dq.shape[0], velocity.shape[1], pose.shape[0], regressor.shape[2]
+    own = wide - 10 - links.shape[0]  # unknowns of the joints, where there are any
     S, U, P, UP, V, UV = regressor[0], regressor[1], pose_lag[0], pose_lag[1], velocity_lag[0], velocity_lag[1]
     B, UB = joints[2], joints[3]
     x = gain * h
@@ -263,7 +264,7 @@ def _lagged(inputs, gain, h, fresh, joints, regressor, pose_lag, velocity_lag, X
             i = k - 10
             if k < 10:
                 Y, D = momentum[j, k], drift[j, k]
-            elif i < 4 * n:  # offset, Coulomb and viscous friction, rotor: `Correction.regressor`
+            elif i < own:  # offset, Coulomb and viscous friction, rotor, load: `Correction.regressor`
                 Y = D = 0.0
                 if i % n == j:
                     if i < n:
@@ -272,10 +273,12 @@ def _lagged(inputs, gain, h, fresh, joints, regressor, pose_lag, velocity_lag, X
                         D = np.tanh(dq[j] / FRICTION_WIDTH)
                     elif i < 3 * n:
                         D = dq[j]
-                    else:
+                    elif i < 4 * n:
                         Y = dq[j]
+                    else:
+                        D = abs(torque[j]) * np.tanh(dq[j] / FRICTION_WIDTH)
             else:
-                Y, D = momentum[j, 10 + i - 4 * n], drift[j, 10 + i - 4 * n]
+                Y, D = momentum[j, 10 + i - own], drift[j, 10 + i - own]
             u = D - gain * Y
             if fresh:
                 S[j, k], U[j, k] = -gain * Y, u

@@ -24,10 +24,15 @@ _FRICTION_SPREAD = 0.3
 # beyond the measured ones
 _WIDTHS = (0.02, 0.2)  # [rad/s]
 LENGTHS = (0.3, 3.0)  # [rad] of the residual
-_STRIBECK, _VISCOUS, LOAD = 0.6, 0.5, 0.015  # at most: of the level, of the level per rad/s, of the torque
+_STRIBECK, _VISCOUS, _LOAD = 0.6, 0.5, 0.015  # at most: of the level, of the level per rad/s, of the torque
 GAIN, MOTOR_GAIN = 0.01, 0.03  # torque scale, at most
 _MOTOR_FRICTION = (0.05, 0.15)  # of the rated torque
-MOTOR_LOAD = 0.08  # at most of the torque: gears lose a share of what they transmit
+# of the torque, from and to, that the gears of an arm lose whose motor currents are measured: 0.06 to 0.10 of a UR10e's
+# joints 2 to 6, 0.03 to 0.05 of a UR10's joints 2 to 4 (`benchmarks/real_residuals.py`)
+_MOTOR_LOAD = (0.02, 0.12)
+# of the friction's level per rad/s, from and to, of the same arms: 1.1 of a UR10e, 0.9 of a UR10, whose levels are half
+# as high as those drawn here (`benchmarks/real_residuals.py`)
+_MOTOR_VISCOUS = (0.2, 1.2)
 _ROTOR = (0.002, 0.02)  # [s²] rotor inertia over rated torque
 
 
@@ -59,20 +64,25 @@ def plain_friction(level: NDArray[np.float64], rng: np.random.Generator) -> Fric
     return Friction(_spread(level, rng), np.full(len(level), FRICTION_WIDTH))
 
 
-def any_friction(level: NDArray[np.float64], rng: np.random.Generator, load: float) -> Friction:
-    """Friction of any width, with each other shape in half of the worlds; load: the most that grows with the torque."""
+def any_friction(level: NDArray[np.float64], rng: np.random.Generator, motor: bool) -> Friction:
+    """Friction of any width, with each other shape in half of the worlds.
+
+    motor: of an arm that is known to measure motor current; its friction is viscous, and its gears lose a share of the
+        torque, in every world.
+    """
     n = len(level)
     level = _spread(level, rng)
     width = np.exp(rng.uniform(*np.log(_WIDTHS), size=n))
     has = rng.random(4) < 0.5
+    viscous, load = (_MOTOR_VISCOUS, _MOTOR_LOAD) if motor else ((0.0, _VISCOUS), (0.0, _LOAD))
     return Friction(
         level,
         width,
         has[0] * np.clip(0.2 * rng.normal(size=n), -0.5, 0.5),
         has[1] * level * rng.uniform(0.0, _STRIBECK, size=n),
         width + rng.uniform(0.03, 0.2, size=n),
-        has[2] * level * rng.uniform(0.0, _VISCOUS, size=n),
-        has[3] * rng.uniform(0.0, load, size=n),
+        (motor or has[2]) * level * rng.uniform(*viscous, size=n),
+        (motor or has[3]) * rng.uniform(*load, size=n),
     )
 
 

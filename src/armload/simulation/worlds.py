@@ -28,9 +28,7 @@ from armload.simulation.friction import Friction
 from armload.simulation.model_error import (
     GAIN,
     LENGTHS,
-    LOAD,
     MOTOR_GAIN,
-    MOTOR_LOAD,
     any_friction,
     on_motor,
     perturbed,
@@ -121,15 +119,15 @@ class World:
     def real_like(cls, arm: Arm, seed: int) -> World:
         """An arm that differs from its model about as much as real ones were measured to.
 
-        Where torque is known to be the motor's, friction, gain and rotor inertia are as in `beyond` on that side, gears
-        lose up to 8 % of what they transmit, and stiction shows at rest.
+        Where torque is known to be the motor's, friction, gain and rotor inertia are as in `beyond` on that side: it
+        is viscous, gears lose 2–12 % of what they transmit, and stiction shows at rest.
         """
         rng = np.random.default_rng([seed, 1])
         offset, friction, residual = sizes(arm)
         links = np.array([perturbed(phi, rng, np.full(3, arm.link_spread)) for phi in _bare_links(arm)])
         offset = offset * rng.normal(size=arm.n)
         level, rotor = on_motor(arm, rng) if arm.motor_torque else (friction, None)
-        friction = any_friction(level, rng, MOTOR_LOAD) if arm.motor_torque else plain_friction(level, rng)
+        friction = any_friction(level, rng, True) if arm.motor_torque else plain_friction(level, rng)
         return cls(
             "real-like",
             seed,
@@ -172,7 +170,7 @@ class World:
         warming = float(np.exp(rng.uniform(*np.log(_WARMING))))
         links = np.array([perturbed(phi, rng, arm.link_spread * heavier[:3]) for phi in _bare_links(arm)])
         offset = heavier[3] * usual * rng.normal(size=arm.n)
-        friction = any_friction(level, rng, MOTOR_LOAD if arm.motor_torque else LOAD)
+        friction = any_friction(level, rng, arm.motor_torque)
         return cls(
             "beyond, motor side" if motor_side else "beyond",
             seed,

@@ -14,7 +14,7 @@ from armload.app.cli.arguments import (
     file_name,
 )
 from armload.app.cli.export import FORMS, write
-from armload.app.cli.named import arm_of, payload_named, read_logs
+from armload.app.cli.named import arm_of, payload_named, read_logs, uncompensated
 from armload.app.cli.printing import print_json, print_note, working, write_json
 
 _EXAMPLES = """\
@@ -26,6 +26,7 @@ examples:
   armload identify run.csv --robot panda --tare yesterday.csv --tare-age 1d
   armload identify run.csv --robot panda --profile arm.profile       (an arm that knows itself: armload profile)
   armload identify run.csv --robot panda --mass 1.200±0.002         (weighed: what is left is found better)
+  armload identify bag/ --robot ur10e --tare empty/ --compensated set.json   (torque without gravity)
   armload identify run.csv --robot panda --out payload.json         (the answer as JSON, usable as --tool later)
   armload identify run.csv --robot panda --tool franka-hand --to franka    (what the controller reads)
 
@@ -50,6 +51,13 @@ def parser() -> Parser:
     add_tare_and_mass_arguments(parser)
     add_tool_and_topic_arguments(parser)
     parser.add_argument("--tare-topic", metavar="T", help="that of the tare's bag, where it is another one")
+    parser.add_argument(
+        "--compensated",
+        type=file_name,
+        metavar="PAYLOAD",
+        help="the torque has gravity taken out (UR's ROS 2 driver): that of the arm is put back, and that of what the "
+        "controller was set to carry (JSON, franka-hand, or nothing)",
+    )
     add_column_arguments(parser)
     parser.add_argument("--all", action="store_true", help="print the ten parameters about the frame's origin, too")
     parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
@@ -84,6 +92,9 @@ def run(options: argparse.Namespace) -> None:
         topics = (options.topic, options.tare_topic or options.topic)
         log, tare = read_logs(options, arm, options.log, options.tare, topics=topics)
         assert log is not None
+        if options.compensated is not None:
+            log, tare = (None if x is None else uncompensated(x, arm, options.compensated) for x in (log, tare))
+            assert log is not None
         result = identify(
             log,
             arm,

@@ -89,6 +89,13 @@ def _reads(path: str, arm: Arm) -> bool:
     return True
 
 
+def uncompensated(log: Recording, arm: Arm, payload: str) -> Recording:
+    """A log with the gravity that its controller took out of the torque: the arm's, and a payload's or `nothing`'s."""
+    from armload.recording import with_gravity
+
+    return with_gravity(log, arm, None if payload == "nothing" else payload_of(payload, arm))
+
+
 def arm_of(options: argparse.Namespace) -> Arm:
     """The arm that `--robot`, `--frame` and `--gravity` name."""
     from armload.arms import arm

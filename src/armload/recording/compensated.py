@@ -1,0 +1,33 @@
+"""Torque from which a controller has taken gravity: what it took is put back.
+
+A controller that reports tau_c = tau_J − g(q), with g of the arm and of the payload it was set to, says that a joint at
+rest carries nothing. tau_J = tau_c + g(q) is again what the rest of armload takes for measured torque. What the
+controller's own model of the arm has of gravity is not known: where the description here differs from it, the
+difference is an error of the links, which a tare shows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from armload.arms import Arm
+from armload.inertia import InertialParameters
+from armload.recording.recording import Recording
+
+
+def with_gravity(recording: Recording, arm: Arm, payload: InertialParameters | None = None) -> Recording:
+    """The recording with g(q) of the arm, and of the payload its controller was set to, added to its torque.
+
+    >>> import numpy as np
+    >>> from armload.arms import arm
+    >>> panda, still = arm("panda"), np.zeros((2, 7))
+    >>> log = Recording(np.array([0.0, 0.1]), still, still, still)
+    >>> bool(np.allclose(with_gravity(log, panda).tau, panda.torque(still)))
+    True
+
+    Args:
+        recording: of torque without gravity [N·m]. arm: with its base's orientation.
+        payload: about the arm's payload frame; None: the controller was set to none.
+    """
+    loaded = arm if payload is None else arm.with_payload(InertialParameters(payload.phi, arm.frame))
+    return replace(recording, tau=recording.tau + loaded.torque(recording.q), channel="measured")

@@ -1,0 +1,59 @@
+"""Gears lose a share of the torque they transmit, the payload's too: found, and not taken for payload."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from armload.arms import arm, rated_effort
+from armload.inertia import InertialParameters
+from armload.motion import random_motion
+from armload.posterior import SmoothPosteriorLeastSquares
+from armload.regression import Correction
+from armload.simulation import Friction, World, simulate
+
+LOSSES = np.array([0.04, 0.06, 0.08, 0.10, 0.07, 0.05])
+BOX = InertialParameters.from_com(6.0, [0.02, -0.03, 0.12], np.diag([0.04, 0.05, 0.03]))
+
+
+@pytest.fixture(scope="module")
+def logs():
+    """A UR10e as described but for friction, with 6 kg and, on another motion, without."""
+    robot = arm("ur10e")
+    friction = Friction(0.03 * rated_effort(robot), np.full(6, 0.06), load=LOSSES)
+    world = replace(World.nominal(robot), friction=friction)
+    run, before = (
+        simulate(robot, random_motion(robot, k), b, world=world, rate=200.0) for k, b in ((1, BOX), (2, None))
+    )
+    return robot, run, before
+
+
+def losses(found):
+    n = found.arm.n
+    return found.posterior.eta[4 * n : 5 * n]
+
+
+def test_what_gears_lose_is_found(logs):
+    """The shoulder and the elbow transmit gravity; the wrist's torque is mostly friction, which hides its losses."""
+    robot, run, before = logs
+    found = SmoothPosteriorLeastSquares(robot, before)
+    found.run(run)
+    np.testing.assert_allclose(losses(found)[1:3], LOSSES[1:3], atol=0.015)
+
+
+def test_the_payloads_share_of_it_is_not_taken_for_payload(logs):
+    """A tare without the payload shows what gears lose of the arm's torque; of the payload's it follows."""
+    robot, run, before = logs
+    method = SmoothPosteriorLeastSquares(robot, before)
+    answers = [method.run(run.between(start, start + 1.0)) for start in (0.5, 1.5, 2.5, 3.5, 4.5)]
+    errors = np.array([a.phi[0] - BOX.mass for a in answers])
+    assert np.mean(np.abs(errors)) < 0.05 * BOX.mass  # 9 % without the unknown
+    assert all(abs(e) < 1.96 * a.std[0] for e, a in zip(errors, answers, strict=True))
+
+
+def test_sensors_behind_the_gears_see_nothing_of_it():
+    robot = arm("panda")
+    n = robot.n
+    assert Correction(robot, rated_effort(robot)).size == 14 * n
+    motor = replace(robot, motor_torque=True)
+    assert Correction(motor, rated_effort(motor)).size == 15 * n
