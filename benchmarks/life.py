@@ -2,10 +2,10 @@
 
     python benchmarks/life.py [--arms 12] [--seed 11] [--parts days,same-day]
 
-Pandas that differ from their model as real ones do. On each of 15 days an empty log of 20 s is recorded, about poses of the
-place where the arm works; offsets and friction of a day differ from the arm's own by (1 sigma) 0.08 0.12 0.06 0.10 0.03
-0.04 0.01 N·m and 15 %, our assumption, and by half and twice that. Today's run of 6 s with a payload is answered by the
-hybrid, after 1 and 6 s:
+Pandas that differ from their model as real ones do. On each of 15 days an empty log of 20 s is recorded, about poses of
+the place where the arm works; offsets and friction of a day differ from the arm's own by (1 sigma) 0.08 0.12 0.06 0.10
+0.03 0.04 0.01 N·m and 15 %, our assumption, and by half and twice that. Today's run of 6 s with a payload is answered
+by the hybrid, after 1 and 6 s:
 
 nothing             without any empty log
 yesterday           a tare of 20 s of the last of the 15 days, said to be a day old
@@ -15,8 +15,8 @@ profile, refresh    both
 profile, no drift   of the same logs, taken for one session (ablation, at drift 1)
 profile, 128        with as many features of the pose as a tare (ablation, at drift 1)
 
-same-day: 15 logs of 20 s of one session, about the poses of the place where the arm works or about any, against a tare of
-20 s elsewhere. Printed, and written to benchmarks/results/life.json and tables of docs/profiles.md.
+same-day: 15 logs of 20 s of one session, about the poses of the place where the arm works or about any, against a tare
+of 20 s elsewhere. Printed, and written to benchmarks/results/life.json and tables of docs/profiles.md.
 """
 
 from __future__ import annotations

@@ -121,7 +121,8 @@ def _of_one_payload(
     before = "at the tare" if tare is not None else "in the profile's logs"
     since = "since the tare" if tare is not None else "since the profile"
     if carried:
-        arm = arm.with_payload(known)
+        if asked.profile is None:
+            arm = arm.with_payload(known)  # a profile holds what was mounted already
         found, relative_to = found_in(recording, arm, tare, asked), "profile" if tare is None else "tare"
         note, otherwise = f"the tool was mounted {before} already", -known.phi
     else:

@@ -24,6 +24,8 @@ from armload.regression.information import RegressionData, Session
 from armload.regression.lag import GAIN
 from armload.regression.noise import SMOOTH
 
+_SAME_MASS = 1e-3  # [kg] tools whose masses differ by less are one
+
 
 @dataclass(frozen=True)
 class SessionRecord:
@@ -50,6 +52,7 @@ class Profile:
     Args:
         arm_name, fingerprint, frame, n: of the arm (`link_fingerprint`); phi_0 is about that frame.
         gravity: (3,) that the logs were recorded with [m/s²].
+        attached: mass of what counts as a part of the arm (`Arm.attached`) [kg].
         features: of each joint's smooth part.
         A, b: (n, S, S), (n, S) information on x_j, in units of the noise.
         scales: that the arm's other logs start from.
@@ -63,6 +66,7 @@ class Profile:
     frame: str
     n: int
     gravity: NDArray[np.float64]
+    attached: float
     features: JointFeatures
     A: NDArray[np.float64] = field(repr=False)
     b: NDArray[np.float64] = field(repr=False)
@@ -88,8 +92,13 @@ class Profile:
         """See that it is of this arm, on this base.
 
         Raises:
-            ModelError: it is of another one.
+            ModelError: it is of another one, or something is counted with the arm that a profile does not know of.
         """
+        if abs(attached_mass(arm) - self.attached) > _SAME_MASS:
+            raise ModelError(
+                f"the profile is of {self.arm_name} with a tool of {self.attached:.3g} kg that counts as the arm's, "
+                f"asked is for one of {attached_mass(arm):.3g} kg: expected the same; take the tool off the answer"
+            )
         flange = prefixed_frame(arm, self.frame)
         if arm.n != self.n or flange is None or _fingerprint(arm, flange) != self.fingerprint:
             raise ModelError(
@@ -133,6 +142,11 @@ class Profile:
     def session(self, correction: Correction, number: int = 1) -> Session:
         """Another session of the arm."""
         return Session(number, 1.0, tuple(np.sqrt(self.drift) / correction.daily_std))
+
+
+def attached_mass(arm: Arm) -> float:
+    """Mass of what counts as a part of the arm [kg]."""
+    return 0.0 if arm.attached is None else arm.attached.mass
 
 
 def fingerprint(arm: Arm) -> str:

@@ -59,6 +59,7 @@ def save_profile(profile: Profile, path: str | PathLike[str]) -> Path:
         "pose_features": profile.features.pose,
         "velocity_features": profile.features.velocity,
         "repeated": profile.repeated,
+        "attached": profile.attached,
         "sessions": [asdict(session) for session in profile.sessions],
     }
     path = Path(path)
@@ -106,6 +107,7 @@ def load_profile(path: str | PathLike[str]) -> Profile:
             arm["frame"],
             n,
             tensors["gravity"],
+            float(header["attached"]),
             features,
             A,
             b,

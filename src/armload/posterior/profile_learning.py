@@ -27,7 +27,7 @@ from armload.errors import IdentificationError
 from armload.inertia import HELD, Z95
 from armload.posterior.drift import drift_of
 from armload.posterior.problem import Problem
-from armload.posterior.profile import Profile, SessionRecord, fingerprint
+from armload.posterior.profile import Profile, SessionRecord, attached_mass, fingerprint
 from armload.posterior.scales import Scales
 from armload.posterior.solve import solve, threads
 from armload.recording import Recording
@@ -172,6 +172,7 @@ def _learned(correction: Correction, parts: list[RegressionData], logs: Sequence
         str(arm.frame),
         arm.n,
         np.asarray(arm.gravity, dtype=float),
+        attached_mass(arm),
         fit.features,
         A,  # type: ignore[arg-type]
         b,  # type: ignore[arg-type]

@@ -22,7 +22,11 @@ class Table(Protocol):
     """A file of rows and named columns."""
 
     names: Sequence[str]
-    dates: Sequence[int]  # places of the columns that hold dates
+
+    @property
+    def dates(self) -> Sequence[int]:
+        """Places of the columns that hold dates."""
+        ...
 
     @property
     def notes(self) -> Sequence[str]:

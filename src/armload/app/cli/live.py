@@ -147,6 +147,11 @@ def _arm_of(options: argparse.Namespace) -> Arm:
     arm = arm_of(options)
     if options.tool is None:
         return arm
+    if options.profile is not None:
+        raise UsageError(
+            "--tool and --profile together are for a log (armload identify), which finds out whether the tool was "
+            "mounted in the profile's logs: on a live robot give one of them"
+        )
     if options.tare is not None:
         raise UsageError(
             "--tool and --tare together are for a log (armload identify), which finds out whether the tool was mounted "

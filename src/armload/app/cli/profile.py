@@ -69,7 +69,8 @@ def run(options: argparse.Namespace) -> None:
         arm = arm_of(options)
         known = load_profile(options.out) if options.update else None
         tool = None if options.tool is None else arm.in_frame(payload_of(options.tool, arm)).phi
-        logs = [log for log in read_logs(options, arm, *options.logs) if log is not None]
+        read = [read_logs(options, arm, path)[0] for path in options.logs]
+        logs = [log for log in read if log is not None]
         for log in logs:
             check_usable(log, arm)
         say("learning")

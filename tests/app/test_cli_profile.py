@@ -1,0 +1,116 @@
+"""`armload profile`, and `--profile` of the other commands."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from armload.app.cli import main
+from armload.arms import arm
+from armload.motion import random_motion
+from armload.payloads import test_payload as make_payload
+from armload.posterior import load_profile
+from armload.recording import write_recording
+from armload.simulation import Run, World, simulate_many
+from armload.simulation.resolution import COARSE
+
+PANDA = ("--robot", "panda", "--profile")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Five empty logs, and one of a payload."""
+    made, panda = tmp_path_factory.mktemp("profile"), arm("panda")
+    world, motions = World.real_like(panda, 3), [random_motion(panda, seed, duration=6.0) for seed in range(6)]
+    runs = [Run(motion, None, world, seed=k) for k, motion in enumerate(motions[:5])]
+    runs.append(Run(motions[5], make_payload().parameters, world, seed=9))
+    logs = simulate_many(panda, runs, rate=100.0, duration=6.0, workers=1, resolution=COARSE)
+    for name, log in zip([*(f"day{k}.csv" for k in range(5)), "run.csv"], logs, strict=True):
+        write_recording(made / name, log)
+    return made
+
+
+@pytest.fixture(scope="module")
+def profile(folder):
+    path = folder / "arm.profile"
+    logs = [str(folder / f"day{k}.csv") for k in range(4)]
+    assert main(["profile", *logs, "--robot", "panda", "--out", str(path)]) == 0
+    return path
+
+
+def test_logs_make_a_profile_that_identify_uses(folder, profile, capsys):
+    assert main(["identify", str(folder / "run.csv"), "--robot", "panda", "--profile", str(profile), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["relative_to"] == "profile"
+    truth = make_payload().parameters.mass
+    assert found["phi_low"][0] <= truth <= found["phi_high"][0]
+    assert found["phi_high"][0] - found["phi_low"][0] < 0.2
+
+
+def test_show_says_what_is_known_and_how_the_arm_drifted(profile, capsys, tmp_path):
+    figure = tmp_path / "arm.png"
+    assert main(["profile", "show", str(profile), "--figure", str(figure)]) == 0
+    said = capsys.readouterr()
+    assert "4 sessions, 24 s" in said.out
+    assert "day3.csv" in said.out
+    assert figure.read_bytes()[:4] == b"\x89PNG"
+    assert main(["profile", "show", str(profile), "--json"]) == 0
+    fields = json.loads(capsys.readouterr().out)
+    assert len(fields["sessions"]) == 4
+    assert np.isfinite(fields["drift_offset"]).all()
+
+
+def test_update_adds_a_session_and_refuses_a_payload(folder, profile, capsys, tmp_path):
+    path = tmp_path / "more.profile"
+    path.write_bytes(profile.read_bytes())
+    log, out = str(folder / "day4.csv"), ["--robot", "panda", "--out", str(path), "--update"]
+    assert main(["profile", log, *out]) == 0
+    assert len(load_profile(path).sessions) == 5
+    before = path.read_bytes()
+    capsys.readouterr()
+    assert main(["profile", str(folder / "run.csv"), *out]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert "carries" in said.err
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("argv", "expected"),
+    [
+        (["profile", "show"], "takes one profile"),
+        (["profile", "day0.csv"], "needs --robot"),
+        (["profile", "day0.csv", "--robot", "panda", "--out", "none.profile", "--update"], "no profile at"),
+        (["identify", "run.csv", "--robot", "panda", "--profile", "none.profile"], "no profile at"),
+        (
+            ["identify", "run.csv", "--robot", "panda", "--profile", "arm.profile", "--method", "wls"],
+            "cannot use a profile",
+        ),
+        (["live", "run.csv", "--robot", "panda", "--learn", "--headless"], "there is no --profile"),
+        (
+            ["live", "run.csv", "--robot", "panda", "--profile", "arm.profile", "--tool", "franka-hand"],
+            "give one of them",
+        ),
+    ],
+)
+def test_what_cannot_be_is_refused_in_a_sentence(folder, profile, capsys, monkeypatch, argv, expected):
+    assert profile.exists()
+    monkeypatch.chdir(folder)
+    assert main(argv) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert expected in said.err
+    assert len(said.err.strip().splitlines()) == 1
+
+
+def test_a_stream_uses_a_profile_and_leaves_it_as_it_was_where_nothing_was_learned(folder, profile, capsys):
+    before = profile.read_bytes()
+    argv = ["live", str(folder / "run.csv"), "--robot", "panda", "--profile", str(profile)]
+    assert main([*argv, "--learn", "--headless", "--speed", "max", "--every", "1"]) == 0
+    said = capsys.readouterr()
+    last = json.loads(said.out.strip().splitlines()[-1])
+    assert last["relative_to"] == "profile"
+    assert "is as it was" in said.err
+    assert profile.read_bytes() == before

@@ -1,0 +1,104 @@
+"""A stream teaches a profile the empty arm, and nothing that it may have held."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from armload import arm
+from armload.devices import Simulator
+from armload.errors import IdentificationError
+from armload.motion import random_motion
+from armload.online import OnlineIdentifier
+from armload.payloads import draw_payload
+from armload.posterior import learn_profile
+from armload.simulation import Run, Sensors, World, simulate_many
+from armload.simulation.resolution import COARSE
+
+SECONDS = 24.0
+
+
+@pytest.fixture(scope="module")
+def panda():
+    return arm("panda")
+
+
+@pytest.fixture(scope="module")
+def world(panda):
+    return World.real_like(panda, 31)
+
+
+@pytest.fixture(scope="module")
+def profile(panda, world):
+    motions = [random_motion(panda, seed, duration=8.0) for seed in range(4)]
+    runs = [Run(motion, None, world, Sensors.panda(panda), k) for k, motion in enumerate(motions)]
+    return learn_profile(panda, simulate_many(panda, runs, rate=100.0, duration=8.0, workers=1, resolution=COARSE))
+
+
+def streamed(panda, world, profile, held):
+    """A stream of an arm that repeats one motion, `held` being [(from, payload)]."""
+    source = Simulator(
+        panda,
+        random_motion(panda, 3, duration=8.0),
+        held,
+        speed=None,
+        duration=SECONDS,
+        seed=5,
+        world=world,
+        sensors=Sensors.panda(panda),
+        rate=100.0,
+    )
+    stream = OnlineIdentifier(panda, profile=profile)
+    for sample in source:
+        last = stream.update(*sample)
+    learned = stream.learned("today")
+    stream.close()
+    return last, learned
+
+
+def test_a_stream_of_the_empty_arm_is_one_more_session(panda, world, profile):
+    last, learned = streamed(panda, world, profile, [(0.0, None)])
+    assert not last.held
+    assert learned is not None
+    assert [session.name for session in learned.sessions[len(profile.sessions) :]] == ["today"]
+    assert learned.sessions[-1].duration == pytest.approx(SECONDS, abs=1.0)
+    poses = random_motion(panda, 3, duration=8.0).position(np.linspace(1.0, 7.0, 20))
+    assert learned.uncertainty(poses).mean() < profile.uncertainty(poses).mean()
+
+
+def test_nothing_is_learned_from_a_payload(panda, world, profile):
+    last, learned = streamed(panda, world, profile, [(0.0, draw_payload("boxes", 1, 0.8))])
+    assert last.held
+    assert learned is None
+
+
+def test_a_light_thing_that_nobody_noticed_does_not_become_the_arm_s(panda, world, profile):
+    light = draw_payload("boxes", 2, 0.04)
+    _, learned = streamed(panda, world, profile, [(0.0, light)])
+    if learned is not None:
+        before, after = (p.mounted(panda)[0][0] for p in (profile, learned))
+        assert abs(after - before) < 0.25 * light.parameters.mass
+
+
+def test_nothing_is_learned_from_another_arm_and_it_is_said_within_a_minute(panda, profile):
+    last, learned = streamed(panda, World.real_like(panda, 77), profile, [(0.0, None)])
+    assert learned is None
+    assert not last.calibrated
+    assert any("not as its profile says" in note for note in last.notes)
+
+
+def test_what_was_taken_up_on_the_way_is_left_out(panda, world, profile):
+    _, learned = streamed(panda, world, profile, [(0.0, None), (21.5, draw_payload("boxes", 3, 1.5))])
+    if learned is not None:
+        assert learned.sessions[-1].duration < 22.0
+        before, after = (p.mounted(panda)[0][0] for p in (profile, learned))
+        assert abs(after - before) < 0.03
+
+
+def test_without_a_profile_nothing_is_learned(panda):
+    stream = OnlineIdentifier(replace(panda))
+    with pytest.raises(IdentificationError, match="without a profile"):
+        stream.learned()
+    stream.close()

@@ -1,0 +1,194 @@
+"""A profile: many logs of an arm, each with offsets and friction of its own, learned into one tare."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from armload import arm, identify
+from armload.arms import rated_effort
+from armload.errors import ArmloadError, IdentificationError, ModelError
+from armload.inertia import InertialParameters
+from armload.lab.episodes import draw_episodes
+from armload.lab.episodes.motion_kinds import MotionSource
+from armload.online import OnlineIdentifier
+from armload.posterior import HybridIdentifier, learn_profile, load_profile, save_profile
+from armload.posterior.problem import Problem
+from armload.posterior.profile_learning import by_clock, log_data, without_drift
+from armload.recording import Recording
+from armload.regression import Correction, JointFeatures, payload_prior_std
+from armload.regression.information import RegressionData, Session
+from armload.regression.lag import GAIN
+from armload.regression.noise import SMOOTH
+from armload.simulation import Run, World, simulate_many
+from armload.simulation.resolution import COARSE
+
+DAYS, SECONDS = 6, 8.0
+OFFSET = np.array([0.08, 0.12, 0.06, 0.10, 0.03, 0.04, 0.01])  # [N·m] of a day, 1 sigma
+SMALL = JointFeatures(7, 16, 4)
+
+
+@pytest.fixture(scope="module")
+def panda():
+    return arm("panda")
+
+
+def simulated(panda, worlds, motions, payload=None, seconds=SECONDS, seed=0):
+    runs = [Run(motion, payload, world, seed=seed + k) for k, (world, motion) in enumerate(zip(worlds, motions))]  # noqa: B905
+    return simulate_many(panda, runs, rate=200.0, duration=seconds, workers=1, resolution=COARSE)
+
+
+@pytest.fixture(scope="module")
+def life(panda):
+    """An arm's episode, its empty logs of six days, and the world of today."""
+    (episode,) = draw_episodes(panda, "reference", 1, seed=6, motions=1)
+    rng, source = np.random.default_rng(1), MotionSource(panda, 0.0)
+    around = source.centre(episode.motion)
+    days = [replace(episode.world, offset=episode.world.offset + OFFSET * rng.normal(size=7)) for _ in range(DAYS + 1)]
+    motions = [source.draw("long", rng, SECONDS, f"day {k}", around, 0.5) for k in range(DAYS)]
+    return episode, simulated(panda, days[:-1], motions), days[-1]
+
+
+@pytest.fixture(scope="module")
+def run(panda, life):
+    episode, _, today = life
+    load = InertialParameters(episode.payload.parameters.phi)
+    return simulated(panda, [today], [episode.motion], load, 2.0)[0]
+
+
+@pytest.fixture(scope="module")
+def profile(panda, life):
+    return learn_profile(panda, life[1])
+
+
+def test_what_integrates_out_the_days_is_the_solution_with_all_days_as_unknowns(panda, life):
+    correction = Correction(panda, rated_effort(panda))
+    data = [log_data(correction, log, SMALL, Session(k + 1, 1.0)) for k, log in enumerate(life[1][:3])]
+    together = Problem(data, payload_prior_std(panda), None, SMOOTH, same=True)
+    scales = together.scales(None)
+    with_days = together.posterior(scales)
+    parts = [
+        without_drift(one.A / S[:, None, None], one.b / S[:, None], correction.daily_std**2)
+        for one, S in zip(data, scales.noise, strict=True)
+    ]
+    summed = RegressionData(correction, GAIN, SMALL, SMOOTH.block)
+    summed.A, summed.b, summed.noise = sum(A for A, _ in parts), sum(b for _, b in parts), np.ones(7)
+    alone = Problem([summed], payload_prior_std(panda), None, SMOOTH, same=True)
+    without_days = alone.posterior(replace(scales, noise=summed.noise[None], drifts=np.zeros((0, 0))))
+    shared = 10 + correction.size
+    np.testing.assert_allclose(with_days.mean[:shared], without_days.mean, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(with_days.covariance[:shared, :shared], without_days.covariance, rtol=1e-5, atol=1e-12)
+    np.testing.assert_allclose(with_days.weights, without_days.weights, rtol=1e-5, atol=1e-9)
+
+
+def test_the_first_waves_of_many_are_those_of_few(panda, life):
+    correction, many = Correction(panda, rated_effort(panda)), JointFeatures(7, 48, 4)
+    narrowed = log_data(correction, life[1][0], many, Session()).of_features(SMALL)
+    made = log_data(correction, life[1][0], SMALL, Session())
+    np.testing.assert_allclose(narrowed.A, made.A, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(narrowed.b, made.b, rtol=1e-9, atol=1e-9)
+    for ours, theirs in zip(narrowed.blocks.means(), made.blocks.means(), strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9)
+
+
+def test_a_profile_knows_the_payload_better_than_a_tare_of_another_day(panda, life, run, profile):
+    truth = life[0].truth.phi
+    unit = np.array([1.0] + 3 * [0.1] + 6 * [0.01])
+    with_profile = identify(run, panda, profile=profile)
+    with_tare = identify(run, panda, tare=life[1][-1], tare_age=86400.0)
+    assert with_profile.relative_to == "profile"
+    assert with_profile.interval == "calibrated"
+    width = [np.mean((x.phi_high - x.phi_low)[:4] / unit[:4]) for x in (with_profile, with_tare)]
+    assert width[0] < 0.8 * width[1]
+    assert np.sum((with_profile.phi_low <= truth) & (truth <= with_profile.phi_high)) >= 8
+    error = [np.linalg.norm((x.phi - truth) / unit) for x in (with_profile, with_tare)]
+    assert error[0] < error[1]
+
+
+def test_a_file_holds_all_of_a_profile_in_a_few_megabytes(panda, run, profile, tmp_path):
+    path = save_profile(profile, tmp_path / "arm.profile")
+    assert path.stat().st_size < 5e6
+    read = load_profile(path)
+    assert read.sessions == profile.sessions
+    assert read.features == profile.features
+    one, other = (HybridIdentifier(panda, profile=p).run(run) for p in (profile, read))
+    np.testing.assert_allclose((one.phi - other.phi) / one.std, 0.0, atol=1e-4)
+    np.testing.assert_allclose(one.std, other.std, rtol=1e-4)
+
+
+@pytest.mark.parametrize("damage", [b"", b"nonsense", None])
+def test_a_file_that_is_no_profile_is_refused_by_name(tmp_path, damage):
+    path = tmp_path / "x.profile"
+    if damage is not None:
+        path.write_bytes(damage)
+    with pytest.raises(ModelError, match=r"x\.profile"):
+        load_profile(path)
+
+
+def test_a_profile_of_another_arm_or_base_is_refused(panda, run, profile):
+    with pytest.raises(ModelError, match="another arm"):
+        identify(replace(run, joint_names=None), arm("fr3"), profile=profile)
+    with pytest.raises(ModelError, match="gravity"):
+        HybridIdentifier(arm("panda", gravity=(-9.81, 0.0, 0.0)), profile=profile)
+    with pytest.raises(IdentificationError, match="cannot use a profile"):
+        identify(run, panda, profile=profile, method="ols")
+
+
+def test_a_body_is_the_same_about_another_frame(panda, run, profile):
+    here = identify(run, panda, profile=profile, method="map-gp")
+    joint = arm("panda", "panda_link7")
+    there = identify(run, joint, profile=profile, method="map-gp")
+    moved = joint.in_frame(InertialParameters(here.phi, "panda_link8"))
+    assert there.mass == pytest.approx(here.mass, abs=0.02 * here.mass)
+    np.testing.assert_allclose(there.com, moved.com, atol=3e-3)
+
+
+def test_a_log_says_what_the_concluded_stream_says_with_a_profile(panda, run, profile):
+    answer = identify(run, panda, profile=profile)
+    stream = OnlineIdentifier(panda, profile=profile)
+    for sample in run:
+        stream.update(*sample)
+    end = stream.conclude()
+    stream.close()
+    assert end.relative_to == answer.relative_to == "profile"
+    np.testing.assert_allclose((end.phi - answer.phi) / end.std, 0.0, atol=1e-5)
+
+
+def test_another_arm_is_said_not_to_be_the_profile_s(panda, life, profile):
+    other = World.real_like(panda, seed=4711)
+    load = InertialParameters(life[0].payload.parameters.phi)
+    log = simulated(panda, [other], [life[0].motion], load, 4.0)[0]
+    answer = identify(log, panda, profile=profile)
+    assert answer.interval == "approximate"
+    assert "not as its profile says" in answer.notes[0]
+
+
+def test_a_tare_that_carries_something_beside_is_refused(panda, run, profile, life):
+    with pytest.raises(IdentificationError, match="carries"):
+        identify(life[1][0], panda, profile=profile, tare=run)
+
+
+def test_a_tool_in_all_logs_of_the_profile_is_found_to_be_in_them(panda, life, run):
+    tool = InertialParameters.from_com(0.7, (0.0, 0.02, 0.06), np.diag([2e-3, 2e-3, 1e-3]))
+    gripping = [
+        Recording(log.t, log.q, log.dq, log.tau + panda.with_payload(tool).torque(log.q) - panda.torque(log.q))
+        for log in (*life[1][:4], run)
+    ]  # at rest, as far as the tool goes: it tells a mass and its moments
+    known = learn_profile(panda, gripping[:4])
+    answer = identify(gripping[-1], panda, profile=known, tool=tool)
+    assert any("mounted in the profile's logs already" in note for note in answer.notes)
+    assert answer.mass == pytest.approx(life[0].truth.mass, abs=0.15)
+
+
+def test_logs_within_an_hour_are_of_one_session(life):
+    day = 86400.0
+    clocks = [1.7e9, 1.7e9 + 600.0, 1.7e9 + day, None, 1.7e9 + 5400.0]
+    logs = [log if t is None else replace(log, t=log.t - log.t[0] + t) for t, log in zip(clocks, life[1], strict=False)]
+    assert by_clock(logs) == [0, 0, 2, 3, 4]
+
+
+def test_a_profile_needs_a_log(panda):
+    with pytest.raises(ArmloadError, match="at least one log"):
+        learn_profile(panda, [])
