@@ -406,12 +406,14 @@ def on_tares(all_tares: list[Aged]) -> tuple[dict[str, Any], list[bytes]]:
 def table(result: dict[str, Any]) -> str:
     """The table, and what it is a difference to."""
     base = result["as they are"]
+    far = any("thousandth" in tried for tried in result["constants"].values())
     took = ", ".join(f"{what} {seconds:.0f} s" for what, seconds in result["cpu_s"].items())
     lines = [
         "As they are: "
         + "; ".join(f"{on}: " + ", ".join(f"{k} {v:g}" for k, v in base[on].items()) for on in PARTS)
         + f". Processor time of the runs: {took}.",
         "",
+        *(["Where a row goes on after nothing, the constant was set to 1/1000 and to 1000 times as well.", ""] * far),
         "| constant | value | unit | reason | half | double |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
