@@ -406,12 +406,14 @@ def on_tares(all_tares: list[Aged]) -> tuple[dict[str, Any], list[bytes]]:
 def table(result: dict[str, Any]) -> str:
     """The table, and what it is a difference to."""
     base = result["as they are"]
+    far = any("thousandth" in tried for tried in result["constants"].values())
     took = ", ".join(f"{what} {seconds:.0f} s" for what, seconds in result["cpu_s"].items())
     lines = [
         "As they are: "
         + "; ".join(f"{on}: " + ", ".join(f"{k} {v:g}" for k, v in base[on].items()) for on in PARTS)
         + f". Processor time of the runs: {took}.",
         "",
+        *(["Where a row goes on after nothing, the constant was set to 1/1000 and to 1000 times as well.", ""] * far),
         "| constant | value | unit | reason | half | double |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
@@ -457,8 +459,13 @@ def plain(value: Any) -> Any:
     return value if isinstance(value, int) else round(float(value), 6)
 
 
-def measured(only: list[str], parts: list[str], factors: dict[str, float]) -> dict[str, Any]:
-    """These settings of the constants, and the far ones of what neither half nor double changes."""
+def measured(
+    only: list[str], parts: list[str], factors: dict[str, float], known: dict[str, Any] | None = None
+) -> dict[str, Any]:
+    """These settings of the constants, and the far ones of what neither half nor double changes.
+
+    known: the measures as they are that the result is to stand beside; it ends where they are others now.
+    """
     started = time.process_time()
     material: dict[str, Any] = {}
     if "streams" in parts:
@@ -471,6 +478,8 @@ def measured(only: list[str], parts: list[str], factors: dict[str, float]) -> di
     base = {on: of(what) for on, (of, what) in material.items()}
     as_they_are = {on: found[0] for on, found in base.items()}
     print(as_they_are, round(time.process_time() - started, 1), flush=True)
+    if known is not None and any(known[on] != found for on, found in as_they_are.items()):
+        raise SystemExit("the committed result is of other code: measure these parts without --far")
 
     def tried(constant: Constant, factor: float) -> dict[str, Any]:
         out = {}
@@ -538,7 +547,8 @@ def main() -> None:
         if asked.far and not only:
             only = [name for name, row in before["constants"].items() if idle(row)]
         with threadpool_limits(1):
-            result = measured(only, asked.parts.split(","), FAR if asked.far else NEAR)
+            known = before["as they are"] if asked.far else None
+            result = measured(only, asked.parts.split(","), FAR if asked.far else NEAR, known)
         if asked.only:
             return
         if asked.far or asked.parts != parser.get_default("parts"):
