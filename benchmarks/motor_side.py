@@ -18,6 +18,7 @@ from real_logs import data
 from script import options, say, write
 
 from armload import Arm, Recording, arm, read_recording
+from armload.arms import rated_mass
 from armload.identification import identify
 from armload.lab.episodes.motion_kinds import MotionSource
 from armload.payloads import Payload, draw_payload
@@ -85,7 +86,7 @@ def real() -> dict[str, Any]:
 
 def heavy(robot: Arm, seed: int) -> Payload:
     """Boxes of half of what the arm is rated for, or more."""
-    rated = robot.rated_payload
+    rated = rated_mass(robot)
     drawn = (draw_payload("boxes", 1000 * seed + k, rated) for k in range(1000))
     return next(box for box in drawn if 0.5 * rated <= box.parameters.mass <= rated)
 

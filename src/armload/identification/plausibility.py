@@ -28,7 +28,6 @@ from armload.identification.thresholds import (
     NO_TORQUE,
     NOT_DERIVATIVE,
     POSITION_TOLERANCE,
-    SCALE_NONE,
     SCALE_SURE,
     SPEED,
     WINDOW_MOVES,
@@ -40,6 +39,8 @@ from armload.recording.windows import integrals, windows
 
 _DEGREE = 180.0 / np.pi
 _FULL_TURN = 2.0 * np.pi
+# of the arm's own torque: of what holds less the percentage is said; where that may be none, gravity was taken out
+_NEARLY_NONE = 0.25
 
 
 def check_plausible(recording: Recording, arm: Arm) -> None:
@@ -235,7 +236,7 @@ def _check_torque_is_the_arms(recording: Recording, arm: Arm) -> None:
         _check_for_compensation(recording, arm, fit)
         if fit.is_negative:
             what = "has the opposite sign of"
-        elif fit.scale < SCALE_NONE:
+        elif fit.scale < _NEARLY_NONE:
             what = f"holds only {max(fit.scale, 0.0):.0%} of"
         else:
             what = f"is {fit.scale:.2f} times"
@@ -281,7 +282,7 @@ def _check_for_compensation(recording: Recording, arm: Arm, seen: TorqueScale) -
     Only of arms that measure motor current: their controllers report such torque. The payload that the controller was
     set to is not known here; the arm's own gravity is most of it.
     """
-    if not arm.motor_torque or abs(seen.scale) > min(SCALE_SURE * seen.std, SCALE_NONE):
+    if not arm.motor_torque or abs(seen.scale) > min(SCALE_SURE * seen.std, _NEARLY_NONE):
         return
     fit = torque_scale(with_gravity(recording, arm), arm)
     if fit is None or fit.is_wrong or fit.misfit > MODEL_MISFIT:

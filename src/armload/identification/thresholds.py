@@ -110,8 +110,6 @@ SCALE_LOW = 0.6
 SCALE_HIGH = 1.7
 # [standard deviations] that the scale must be beyond either: one side of a normal 95 % interval
 SCALE_SURE = 2.0
-# of the arm's own torque, below which a log is said to hold a percentage of it, or none: gravity was taken out
-SCALE_NONE = 0.25
 # [model errors] rms of what the arm's own torque leaves: a sound log's is about 1 by the meaning of `MODEL_ERROR`
 MODEL_MISFIT = 2.5
 # [N·m/A] torque constant of a joint, gear included, at least: the wrist of a small arm. A UR10e's are 10 to 12

@@ -52,7 +52,7 @@ def scales_of(
         np.mean([world.offset**2 for world in worlds], axis=0),
         *friction[:, :2].var(axis=0),
         np.mean([np.zeros(arm.n) if w.rotor_inertia is None else w.rotor_inertia**2 for w in worlds], axis=0),
-        *([np.var([world.friction.load for world in worlds], axis=0)] if arm.motor_torque else []),
+        *([np.var(np.array([world.friction.load for world in worlds]), axis=0)] if arm.motor_torque else []),
         np.mean([(world.links - nominal) ** 2 for world in worlds], axis=0).ravel(),
     ]
     eta = np.concatenate(square)  # in the order of `Correction`

@@ -8,8 +8,8 @@ The run's rows have unknowns of their own, delta ~ N(0, D), by which offsets and
 is small where nothing else has changed. It is large for a tare of another day, of another arm, or of another base.
 With a profile, E is the drift of the arm's own sessions, and T is large where this one is not of their kind.
 
-Motor currents cannot be asked: their friction grows with the load, so that an empty tare and a loaded run differ on a
-sound arm, too (T = 1970 of the real UR10e pair).
+Motor currents cannot be asked: friction differs from run to run on a sound arm, too, by more than T allows (T = 1000 of
+the real UR10e pair, though what its gears lose is an unknown).
 """
 
 from __future__ import annotations

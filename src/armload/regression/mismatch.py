@@ -11,13 +11,14 @@ needs no acceleration either:
 | coulomb  | smooth Coulomb friction                       | 0          | tanh(dq_j / width)    |
 | viscous  | viscous friction                              | 0          | dq_j                  |
 | rotor    | motor inertia, where torque is motor-side     | dq_j       | 0                     |
-| load     | what gears lose of the torque they transmit   | 0          | |tau_j|·tanh(dq_j/w)  |
+| load     | what gears lose of the torque they transmit   | 0          | |tau_t|·tanh(dq_j/w)  |
 | links    | errors of the links' inertial parameters      | Y_p(links) | Y_g(links) − Y_c(links) |
 
 `load` is there only of arms that are known to measure motor current (Bittencourt & Gunnarsson, ASME J. Dyn. Sys. Meas.
-Control 134, 2012). Its tau is the measured torque, lagged as the rows are; what it holds of Coulomb friction is that
-block's. Without it, gear losses of the payload's own torque look like another payload: of a real UR10e with a tare, two
-in five intervals of a second's log missed the mass (`benchmarks/motor_side.py`).
+Control 134, 2012). The torque transmitted is tau_t = tau − c·tanh(dq_j/w), the measured torque, lagged as the rows are,
+less a friction c that is surely in it; what else it holds of Coulomb friction is that block's. Without `load`, what the
+gears lose of the payload's torque looks like another payload: two in five windows of a second of a real UR10e with a
+tare missed the mass (`benchmarks/motor_side.py`).
 
 Prior standard deviations are fractions of the joint's effort limit, the same for every arm (two Pandas and a UR10e lie
 within a factor of 3 of each other so, but for friction, which is five times as large where torque is motor current);
@@ -43,6 +44,9 @@ _MOTOR_FRICTION = {"coulomb": 5.0, "viscous": 5.0}
 # [1] prior standard deviation of the share of the torque that a joint's gear loses: 0.06 to 0.1 of a UR10e's in five of
 # its joints (`benchmarks/real_residuals.py`)
 _LOSS = 0.08
+# [effort limits] friction surely in a motor current's torque: 0.03 to 0.06 of a UR10e's joints. With it, |torque| of a
+# joint that mostly rubs would be its friction, and a loss all that it transmits
+_LEAST_FRICTION = 0.02
 # times that the variance of a joint's residual is larger at rest than in motion, link and motor side: friction is
 # anything below stiction there. √10 and √250 of a residual of 1e-3 effort limits are a third of the friction expected
 _PRESLIDING, _MOTOR_PRESLIDING = 10.0, 250.0
@@ -119,6 +123,11 @@ class Correction:
         n, block = self.arm.n, list(PER_JOINT).index(what)
         return np.asarray(eta)[block * n : (block + 1) * n]
 
+    @property
+    def least_friction(self) -> NDArray[np.float64]:
+        """c (n,) [N·m], friction that is surely in the measured torque; 0 where gears are not."""
+        return self.arm.motor_torque * _LEAST_FRICTION * self.effort
+
     def regressor(self, q: ArrayLike, dq: ArrayLike, torque: ArrayLike) -> MomentumRegressor:
         """Momentum form of Z for samples (N, n), torque being measured: two arrays (N, n, p)."""
         dq, torque = np.atleast_2d(dq), np.atleast_2d(torque)
@@ -128,7 +137,7 @@ class Correction:
         drift = [nothing + eye, direction[:, :, None] * eye, dq[:, :, None] * eye, nothing]
         if self.arm.motor_torque:
             momentum.append(nothing)
-            drift.append((np.abs(torque) * direction)[:, :, None] * eye)
+            drift.append((np.abs(torque - self.least_friction * direction) * direction)[:, :, None] * eye)
         links = full_arm_regressor(self.arm, q, dq)
         return MomentumRegressor(
             np.concatenate([*momentum, links.momentum], axis=2), np.concatenate([*drift, links.drift], axis=2)

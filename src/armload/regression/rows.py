@@ -100,7 +100,8 @@ class FilteredRegression:
             self._waves, self._velocity_waves = features.waves, features.velocity_waves
         self._wide = 10 + (0 if mismatch is None else mismatch.size)
         apart = -1.0 if rate is None else SPACING * REGRESSOR_RATE / rate
-        self._settings = np.array([gain, apart, settling, 0.0 if mismatch is None else mismatch.presliding])
+        known = [0.0] if mismatch is None else [mismatch.presliding, *mismatch.least_friction]
+        self._settings = np.array([gain, apart, settling, *known])
         self.reset()
 
     def reset(self) -> None:
@@ -219,7 +220,7 @@ def _make(
     for m in range(count):
         momentum, drift = momentum_rows(rotations, translations, axes, turning, gravity, q[m], dq[m])
         pose, velocity = features_of_sample(q[m], dq[m], waves, velocity_waves)
-        inputs = (momentum, drift, links, dq[m], torque[m], pose, velocity)
+        inputs = (momentum, drift, links, dq[m], torque[m], pose, velocity, settings[4:])
         _lagged(inputs, gain, steps[m], fresh[m], joints, regressor, pose_lag, velocity_lag, X[m], r[m])
         for j in range(n):
             weights[m, j] = 1.0 / (1.0 + excess * (1.0 - np.tanh(abs(dq[m, j]) / FRICTION_WIDTH) ** 2))
@@ -237,7 +238,7 @@ def _make(
 @kernel
 def _lagged(inputs, gain, h, fresh, joints, regressor, pose_lag, velocity_lag, X, r):  # pragma: no cover - compiled
     """One row from what goes into its lags, h seconds after the last; `fresh`: the lags start here."""
-    momentum, drift, links, dq, torque, pose, velocity = inputs
+    momentum, drift, links, dq, torque, pose, velocity, least_friction = inputs
     n, few, many, wide = dq.shape[0], velocity.shape[1], pose.shape[0], regressor.shape[2]
     own = wide - 10 - links.shape[0]  # unknowns of the joints, where there are any
     S, U, P, UP, V, UV = regressor[0], regressor[1], pose_lag[0], pose_lag[1], velocity_lag[0], velocity_lag[1]
@@ -276,7 +277,8 @@ def _lagged(inputs, gain, h, fresh, joints, regressor, pose_lag, velocity_lag, X
                     elif i < 4 * n:
                         Y = dq[j]
                     else:
-                        D = abs(torque[j]) * np.tanh(dq[j] / FRICTION_WIDTH)
+                        D = np.tanh(dq[j] / FRICTION_WIDTH)
+                        D *= abs(torque[j] - least_friction[j] * D)
             else:
                 Y, D = momentum[j, 10 + i - own], drift[j, 10 + i - own]
             u = D - gain * Y
