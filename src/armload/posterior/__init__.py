@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from armload.posterior.profile_file import load_profile, save_profile
     from armload.posterior.profile_learning import learn_profile
     from armload.posterior.scales import Posterior
+    from armload.posterior.torque_gain import with_known_weight
 
 __all__ = [
     "TIMES",
@@ -48,6 +49,7 @@ __all__ = [
     "save_profile",
     "scales_of",
     "shipped_model",
+    "with_known_weight",
 ]
 
 __getattr__, __dir__ = on_first_use(__name__)

@@ -75,7 +75,7 @@ class PosteriorLeastSquares(Identifier):
     ) -> None:
         self.arm, self.gain, self.prior, self.profile, self.session = arm, gain, prior, profile, SAME
         self._weak = payload_prior_std(arm)
-        self._correction = Correction(arm, rated_effort(arm))
+        self._correction = Correction(arm, rated_effort(arm)) if profile is None else profile.correction(arm)
         self.reference: PosteriorLeastSquares | None = None
         self._stream: StreamingPosterior | None = None
         self._tares: list[RegressionData] = []

@@ -31,7 +31,7 @@ _LIGHTEST = 0.02  # [kg] of it: an arm that is said to hold nothing has cables a
 _MOTOR_SIDE = 0.01
 # of the torque, standard deviation of its calibration by its side: sensors are calibrated to half a per cent, motor
 # constants known to a few per cent. Stated priors (test_the_torques_gain_widens_an_interval_by_its_own_share)
-_GAIN_STD = {"link": 0.005, "motor": 0.02}
+GAIN_STD = {"link": 0.005, "motor": 0.02}
 # [effort limits] prior rms of a joint's smooth functions of pose and of velocity: 0.2–0.6 % of two Pandas is left after
 # links, offsets and friction (`regression.features`); and the weight of these figures, in observations
 _POSE, _VELOCITY, _FEATURE_COUNT = 3e-3, 2e-3, 20.0
@@ -258,7 +258,7 @@ class Problem:
         else:
             before = np.linalg.inv(self.root @ self.root.T)
             pull = before @ self.mean[self.last]
-        gain = _GAIN_STD[torque]
+        gain = self.correction.gain_std or GAIN_STD[torque]
         return Posterior(
             phi=phi,
             covariance=self.noise_model.overrated * covariance + gain**2 * np.outer(phi, phi),

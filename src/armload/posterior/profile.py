@@ -58,6 +58,8 @@ class Profile:
         scales: that the arm's other logs start from.
         drift: (d,) variance of a session's offsets and friction about the mean session.
         repeated: by how much the noise of a log counts for more, as what the features cannot say repeats.
+        gain, gain_std: (n,) gamma, by how much the torque sensors are off as a known weight showed it (`torque_gain`),
+            and how well that is known; None: nobody hung one on.
         sessions: what it was learned from. poses: (P, n) where the arm was seen [rad].
     """
 
@@ -75,6 +77,8 @@ class Profile:
     repeated: float
     sessions: tuple[SessionRecord, ...] = field(repr=False)
     poses: NDArray[np.float64] = field(repr=False)
+    gain: NDArray[np.float64] | None = None
+    gain_std: float | None = None
 
     @property
     def duration(self) -> float:
@@ -110,6 +114,10 @@ class Profile:
                 f"the profile is of an arm with gravity {_text(self.gravity)} m/s² in its base's axes, asked for is "
                 f"{_text(arm.gravity)}: expected the same base; learn a profile of the arm as it stands now"
             )
+
+    def correction(self, arm: Arm) -> Correction:
+        """The unknowns of the arm, with the gains of its torque sensors."""
+        return Correction(arm, rated_effort(arm), None if self.gain is None else 1.0 + self.gain, self.gain_std)
 
     def data(self, correction: Correction, gain: float, block: float) -> RegressionData:
         """The profile as a run of session 0 whose noise is known, phi_0 about the arm's frame."""

@@ -48,6 +48,8 @@ def save_profile(profile: Profile, path: str | PathLike[str]) -> Path:
         "gravity": profile.gravity,
         "poses": profile.poses.astype(np.float32),
     }
+    if profile.gain is not None:
+        tensors["gain"] = profile.gain
     header = {
         "format": FORMAT,
         "arm": {
@@ -59,6 +61,7 @@ def save_profile(profile: Profile, path: str | PathLike[str]) -> Path:
         "pose_features": profile.features.pose,
         "velocity_features": profile.features.velocity,
         "repeated": profile.repeated,
+        "gain_std": profile.gain_std,
         "attached": profile.attached,
         "sessions": [asdict(session) for session in profile.sessions],
     }
@@ -116,6 +119,8 @@ def load_profile(path: str | PathLike[str]) -> Profile:
             float(header["repeated"]),
             tuple(_session(one) for one in header["sessions"]),
             tensors["poses"].astype(float),
+            tensors.get("gain"),
+            header["gain_std"],
         )
     except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
         raise ModelError(f"{path} holds a profile armload cannot use ({error}): learn it again") from None

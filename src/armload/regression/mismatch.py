@@ -64,10 +64,14 @@ class Correction:
     Args:
         arm: the arm.
         effort: torque scale of each joint (n,) [N·m], usually `rated_effort(arm)`.
+        gain: (n,) of each joint's torque sensor, as a payload's torque shows it; None: 1.
+        gain_std: relative standard deviation of those gains; None: what is expected of the sensor's kind.
     """
 
     arm: Arm
     effort: NDArray[np.float64]
+    gain: NDArray[np.float64] | None = None
+    gain_std: float | None = None
 
     @property
     def size(self) -> int:

@@ -94,6 +94,7 @@ class FilteredRegression:
     ) -> None:
         self.arm, self.gain = arm, gain
         self._momentum = MomentumRow(arm)
+        self._torque_gain = None if mismatch is None else mismatch.gain
         self._links = np.ascontiguousarray(arm.link_parameters.ravel())
         self._waves, self._velocity_waves = np.zeros((0, arm.n)), np.zeros(0)
         if features is not None and features.size:
@@ -141,7 +142,10 @@ class FilteredRegression:
     def _made(self, t: NDArray, q: NDArray, dq: NDArray, torque: NDArray, steps: NDArray, fresh: NDArray) -> tuple:
         states = (self._clock, self._joints, self._regressor, self._pose, self._velocity)
         arm = (*self._momentum.chain, self._links, self._waves, self._velocity_waves)
-        return _make(t, q, dq, torque, steps, fresh, self._settings, *arm, *states)
+        made = _make(t, q, dq, torque, steps, fresh, self._settings, *arm, *states)
+        if self._torque_gain is not None:
+            made[1][:, :, :10] *= self._torque_gain[:, None]
+        return made
 
 
 def _writable(x: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from armload.app.cli.arguments import Parser, add_arm_arguments, add_column_arguments, file_name
+from armload.app.cli.arguments import Parser, add_arm_arguments, add_column_arguments, file_name, weighed
 from armload.app.cli.named import arm_of, payload_of, read_logs
 from armload.app.cli.printing import console, print_json, print_note, table, working
 from armload.errors import UsageError
@@ -21,11 +21,13 @@ examples:
   armload profile monday.csv tuesday.csv friday.csv --robot panda --out arm.profile
   armload profile today.csv --robot panda --out arm.profile --update
   armload profile empty*.csv --robot panda --tool franka-hand --out arm.profile
+  armload profile weight.csv --robot panda --out arm.profile --update --mass 2.000±0.002
   armload profile show arm.profile --figure arm.png
 
 Every log is of the arm without a payload, on any motion, and a session of its own: offsets and friction may differ from
 log to log (logs within an hour, by clocks that show the time of day, are one session). Whatever is mounted must be the
-same in all of them. Use it with: armload identify LOG --profile arm.profile
+same in all of them. With --mass, the log is of a known weight, which tells how far the torque sensors are off.
+Use it with: armload identify LOG --profile arm.profile
 """
 
 
@@ -47,6 +49,9 @@ def parser() -> Parser:
     parser.add_argument(
         "--tool", type=file_name, metavar="FILE", help="a known tool that was mounted (JSON, or franka-hand)"
     )
+    parser.add_argument(
+        "--mass", type=weighed, metavar="M±S", help="the log is of a known weight [kg], with its 1 sigma; with --update"
+    )
     parser.add_argument("--topic", metavar="T", help="JointState topic of a bag, where it has several")
     add_column_arguments(parser)
     parser.add_argument("--figure", type=file_name, metavar="F.png", help="with show: draw where the arm is known")
@@ -59,10 +64,12 @@ def run(options: argparse.Namespace) -> None:
     if options.logs[0] == "show":
         _show(options)
         return
+    if options.mass is not None and (not options.update or len(options.logs) != 1):
+        raise UsageError("--mass is of the one log of a known weight that --update adds to the profile --out")
     if options.robot is None or options.out is None:
         raise UsageError("a profile needs --robot, whose arm it is, and --out, its file; or: armload profile show P")
     from armload.identification import check_usable
-    from armload.posterior import learn_profile, load_profile, save_profile
+    from armload.posterior import learn_profile, load_profile, save_profile, with_known_weight
     from armload.posterior.profile_learning import check_fits
 
     with working("reading") as say:
@@ -74,18 +81,20 @@ def run(options: argparse.Namespace) -> None:
         for log in logs:
             check_usable(log, arm)
         say("learning")
-        mounted = None if tool is None else [tool] * len(logs)
-        if known is not None:
-            for log in logs:
-                check_fits(known, arm, log, tool)
-        profile = learn_profile(
-            arm,
-            logs,
-            mounted,
-            sessions=[0] * len(logs) if options.one_session else None,
-            known=known,
-            progress=lambda done, total: say(f"learning: {done} of {total} logs"),
-        )
+        if known is not None and options.mass is not None:
+            profile = with_known_weight(known, arm, logs[0], *options.mass)
+        else:
+            if known is not None:
+                for log in logs:
+                    check_fits(known, arm, log, tool)
+            profile = learn_profile(
+                arm,
+                logs,
+                None if tool is None else [tool] * len(logs),
+                sessions=[0] * len(logs) if options.one_session else None,
+                known=known,
+                progress=lambda done, total: say(f"learning: {done} of {total} logs"),
+            )
     save_profile(profile, options.out)
     if options.json:
         print_json(_fields(profile) | {"out": options.out})
@@ -133,6 +142,8 @@ def _fields(profile: Profile) -> dict[str, Any]:
         "duration": profile.duration,
         "pose_features": profile.features.pose,
         "repeated": profile.repeated,
+        "torque_gain": None if profile.gain is None else (1.0 + profile.gain).tolist(),
+        "torque_gain_std": profile.gain_std,
         "drift_offset": drift[0].tolist(),
         "drift_coulomb": drift[1].tolist(),
         "sessions": [asdict(session) for session in profile.sessions],
@@ -151,6 +162,9 @@ def _print(profile: Profile) -> None:
     rows = table("from session to session, 1 sigma [N·m]", "", *(f"joint {j + 1}" for j in range(n)))
     for name, values in (("offset", drift[0]), ("Coulomb friction", drift[1])):
         rows.add_row(name, *(f"{x:.3f}" for x in values))
+    if profile.gain is not None and profile.gain_std is not None:
+        rows.add_row("torque sensor's gain", *(f"{1.0 + x:.3f}" for x in profile.gain))
+        print(f"a known weight was hung on: the torque is known to {100 * profile.gain_std:.1f} %")
     console().print(rows)
     rows = table("sessions", "log", "time [s]", "offsets [N·m]", "misfit", "noise")
     for session in profile.sessions:

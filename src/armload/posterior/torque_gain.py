@@ -1,0 +1,113 @@
+"""The torque's calibration, joint by joint, from a weight that is known.
+
+A profile knows the empty arm as its sensors show it, whatever their gains. What is added shows them: with a weight of
+mass M ± S on the arm, and gains 1 + gamma_j of the joints,
+
+    r_j = (1 + gamma_j)·W_j·phi + Z_j·eta + G_j·g_j + e_j,      phi_1 ~ N(M, S²),  gamma_j ~ N(0, s²)
+
+is linear about the last phi: gamma_j has the column W_j·phi, which the accumulated information holds already. Three
+steps settle it. From then on the payload's rows of the arm are (1 + gamma_j)·W_j.
+
+Source: Gautier & Briot, ASME J. Dyn. Sys. Meas. Control 136, 2014 (drive gains from a known payload).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm, rated_effort
+from armload.errors import IdentificationError
+from armload.inertia import HELD, Z95
+from armload.posterior.problem import GAIN_STD, Problem
+from armload.posterior.profile import Profile
+from armload.posterior.profile_learning import log_data
+from armload.posterior.scales import Scales
+from armload.posterior.solve import solve, threads
+from armload.recording import Recording
+from armload.regression import Correction, payload_prior_std
+from armload.regression.lag import GAIN
+from armload.regression.noise import SMOOTH
+
+# times what is expected of a sensor of its side (`GAIN_STD`) that a joint's gain may be off, 1 sigma: a joint whose
+# sensor is far off is what a known weight is hung on for. A stated prior
+_WIDE = 6.0
+_STEPS = 3
+# of the torque, below which no gain is believed to be known: the weight itself moves a little on its hook. Stated
+_LEAST = 1e-3
+
+
+def with_known_weight(profile: Profile, arm: Arm, log: Recording, mass: float, std: float) -> Profile:
+    """The profile with the torque's gains, from a log of a known weight; its own gains, if it has some, are replaced.
+
+    Args:
+        profile: of the arm. arm: the bare arm. log: of the weight on any motion.
+        mass, std: of the weight, and its standard deviation [kg].
+
+    Raises:
+        IdentificationError: a mass that is none, or one that the log does not bear.
+        ModelError: the profile is of another arm.
+    """
+    if not (np.isfinite(mass) and mass > 0.0 and np.isfinite(std) and std >= 0.0):
+        raise IdentificationError(
+            f"a known weight of {mass:g} ± {std:g} kg: expected a mass above 0, and its deviation"
+        )
+    profile.check(arm)
+    correction = Correction(arm, rated_effort(arm))
+    data = log_data(correction, log, profile.features, profile.session(correction))
+    runs, weak = [profile.data(correction, GAIN, SMOOTH.block), data], payload_prior_std(arm)
+    with threads().limit(limits=1):
+        found = solve(runs, 4.0 * weak, None, SMOOTH, 3, profile.scales)
+        phi, alone = found.phi, float(np.sqrt(found.covariance[0, 0]))
+        side = GAIN_STD[found.torque]
+        if abs(phi[0] - mass) > HELD * np.hypot(alone, _WIDE * side * mass):
+            raise IdentificationError(
+                f"{log.source} carries {phi[0]:.4g} ± {Z95 * alone:.2g} kg by the profile: expected the weight of "
+                f"{mass:.4g} kg that is known; check what was hung on, and what was mounted in the profile's logs"
+            )
+        problem = Problem(runs, 4.0 * weak, None, SMOOTH)
+        gamma, C = np.zeros(arm.n), np.zeros((arm.n, arm.n))
+        for _ in range(_STEPS):
+            phi, gamma, C = _solved(problem, found.scales, phi, mass, max(std, 1e-6), _WIDE * side)
+    seen = data.A[:, :10, :10] / found.scales.noise[-1][:, None, None]
+    # what each joint's gain does to the mass: d ln m / d gamma_j, 1 in all
+    total = np.linalg.inv(seen.sum(axis=0) + np.diag(weak**-2.0))
+    weight = (total @ (seen @ phi).T)[0] / mass
+    share = float(np.sqrt(SMOOTH.overrated * weight @ C @ weight + (std / mass) ** 2))
+    return replace(profile, gain=gamma, gain_std=max(share, _LEAST))
+
+
+def _solved(
+    problem: Problem, scales: Scales, phi: NDArray, mass: float, std: float, wide: float
+) -> tuple[NDArray, NDArray, NDArray]:
+    """phi (10,), gamma (n,) and its covariance (n, n), linear about phi."""
+    n, size = problem.correction.arm.n, problem.size
+    c = 10 + problem.correction.size
+    whole = size + n
+    A, b = np.zeros((whole, whole)), np.zeros(whole)
+    for j in range(n):
+        Agg, bg = np.zeros((problem.features.size,) * 2), np.zeros(problem.features.size)
+        Agz = np.zeros((problem.features.size, whole))
+        for run, E, S in zip(problem.runs, problem.selections, scales.noise, strict=True):
+            T = np.zeros((c, whole))
+            T[:, :size] = E
+            if run is problem.runs[-1]:
+                T[:10, size + j] = phi
+            one, vector = run.A[j] / S[j], run.b[j] / S[j]
+            A += T.T @ one[:c, :c] @ T
+            b += T.T @ vector[:c]
+            Agg, Agz, bg = Agg + one[c:, c:], Agz + one[c:, :c] @ T, bg + vector[c:]
+        root = np.sqrt(scales.features[j])
+        rest = root[:, None] * np.linalg.inv(root[:, None] * Agg * root + np.eye(len(root))) * root
+        A, b = A - Agz.T @ rest @ Agz, b - Agz.T @ rest @ bg
+    prior = np.concatenate([scales.payloads, scales.eta, scales.drifts.ravel(), np.full(n, wide**2)])
+    mean = np.zeros(whole)
+    weighed = problem.last.start
+    prior[weighed], mean[weighed] = std**2, mass
+    root = np.sqrt(prior)
+    P = root[:, None] * np.linalg.inv(root[:, None] * A * root + np.eye(whole)) * root
+    z = mean + P @ (b - A @ mean)
+    # the column of gamma is W·phi: a payload of (1 + gamma)·phi, so that what is found is relative to phi itself
+    return z[problem.last], z[size:], P[size:, size:]
