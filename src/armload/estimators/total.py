@@ -139,4 +139,4 @@ def _relative(B: NDArray[np.float64], A: NDArray[np.float64]) -> tuple[NDArray[n
     L = np.linalg.cholesky(A)
     half = np.linalg.solve(L, B)
     values, vectors = np.linalg.eigh(np.linalg.solve(L, half.T))
-    return values, np.linalg.solve(L.T, vectors)
+    return values, np.asarray(np.linalg.solve(L.T, vectors), dtype=float)

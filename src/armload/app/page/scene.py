@@ -113,7 +113,7 @@ def _wxyz(R: NDArray[np.float64]) -> NDArray[np.float64]:
     """Quaternions (N, 4), scalar first, of rotations (N, 3, 3)."""
     from viser.transforms import SO3
 
-    return SO3.from_matrix(R).wxyz
+    return np.asarray(SO3.from_matrix(R).wxyz, dtype=np.float64)
 
 
 def _finite(estimate: OnlineEstimate) -> bool:
