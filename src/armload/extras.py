@@ -13,6 +13,7 @@ from importlib.metadata import PackageNotFoundError, requires
 # module: (package, extra of pyproject.toml that installs it)
 MODULES = {
     "mujoco": ("mujoco", "lab"),
+    "scipy": ("scipy", "lab"),
     "sklearn": ("scikit-learn", "lab"),
     "jax": ("jax", "lab"),
     "joblib": ("joblib", "lab"),

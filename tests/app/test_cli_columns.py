@@ -167,3 +167,15 @@ def test_log_and_tare_may_be_episodes_of_one_file(logs, capsys, monkeypatch):
     np.testing.assert_allclose(json.loads(out)["phi"], expected, rtol=0, atol=1e-9)
     code, _, err = run(capsys, "motion", "check", "both.parquet", "--tare", "both.parquet", *episodes, *ROBOT[:2])
     assert code in (0, 3), err
+
+
+def test_what_was_read_of_log_and_tare_alike_is_said_once(logs, capsys, monkeypatch):
+    monkeypatch.chdir(logs)
+    _, _, err = run(capsys, *IDENTIFY, "--tare", "tare_odd.csv")
+    assert err.count("read t from 'clock'") == 1
+    assert "run_odd.csv and tare_odd.csv: read t from 'clock'" in err
+    _, out, _ = run(
+        capsys, *IDENTIFY, "--tare", "tare.npz", "--tare-columns", "rate=200,q=positions,dq=velocities,tau=drive"
+    )
+    notes = [note for note in json.loads(out)["notes"] if ": read " in note]
+    assert [note.partition(":")[0] for note in notes] == ["run_odd.csv", "tare.npz"]

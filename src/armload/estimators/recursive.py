@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm, payload_regressor
 from armload.estimators.contract import Estimate, Identifier
+from armload.inertia.cholesky import factor, solve
 from armload.kernels import kernel
 from armload.recording import GAP
 from armload.regression import BlockMeans
@@ -97,22 +98,51 @@ class _Recursive(Identifier):
 @kernel
 def _recursion(phi: NDArray, P: NDArray, A: NDArray, y: NDArray, Y: NDArray, mu: float) -> NDArray:
     """The recursion over N samples, in place; returns the residuals (N, n) after each update."""
+    N, n = y.shape
     residual = np.full(y.shape, np.nan)
-    for k in range(len(y)):
+    PYt, K, S, L, e = np.empty((10, n)), np.empty((10, n)), np.empty((n, n)), np.empty((n, n)), np.empty(n)
+    for k in range(N):
         if not np.isfinite(y[k, 0]):
             continue
         Yk = Y[k]
-        PYt = P @ Yk.T
-        K = np.linalg.solve(mu * np.eye(len(Yk)) + Yk @ PYt, PYt.T).T
-        phi += K @ (y[k] - Yk @ phi)
-        P -= K @ PYt.T
-        P[:] = (P + P.T) / (2.0 * mu)
-        residual[k] = y[k] - Yk @ phi
-        for j in range(len(Yk)):
+        for a in range(10):
+            for j in range(n):
+                PYt[a, j] = 0.0
+                for b in range(10):
+                    PYt[a, j] += P[a, b] * Yk[j, b]
+        for i in range(n):
+            for j in range(n):
+                S[i, j] = mu if i == j else 0.0
+                for a in range(10):
+                    S[i, j] += Yk[i, a] * PYt[a, j]
+        factor(S, L, 0.0)
+        for a in range(10):
+            solve(L, PYt[a], K[a])  # row by row: S is symmetric
+        _misfit(phi, y[k], Yk, e)
+        for a in range(10):
+            for j in range(n):
+                phi[a] += K[a, j] * e[j]
+        for a in range(10):
+            for b in range(a + 1):
+                both = P[a, b] + P[b, a]
+                for j in range(n):
+                    both -= K[a, j] * PYt[b, j] + K[b, j] * PYt[a, j]
+                P[a, b] = P[b, a] = both / (2.0 * mu)
+        _misfit(phi, y[k], Yk, residual[k])
+        for j in range(n):
             for a in range(10):
                 for b in range(10):
                     A[j, a, b] = mu * A[j, a, b] + Yk[j, a] * Yk[j, b]
     return residual
+
+
+@kernel
+def _misfit(phi: NDArray, y: NDArray, Y: NDArray, e: NDArray) -> None:
+    """e (n,) = y − Y·phi."""
+    for j in range(len(y)):
+        e[j] = y[j]
+        for a in range(10):
+            e[j] -= Y[j, a] * phi[a]
 
 
 class RecursiveLeastSquares(_Recursive):

@@ -102,8 +102,6 @@ class RecursiveTotalLeastSquares(NormalLeastSquares):
             self._differences += count
 
     def _estimate(self, t: float) -> Estimate:
-        from scipy.linalg import eigh
-
         if not self._rows_seen:
             return super()._estimate(t)
         phi, _ = self._solve(np.ones(self.arm.n))
@@ -122,8 +120,8 @@ class RecursiveTotalLeastSquares(NormalLeastSquares):
             explained = np.einsum("a,jab,b->j", v, error, v) / self._rows_seen
             B = np.einsum("j,jab->ab", w, error)
             B[10, 10] += self._rows_seen * (w @ np.maximum(total - explained, _LEAST_TORQUE * total))
-            B /= eigh(B, A, eigvals_only=True)[-1]
-            share, V = eigh(B[:10, :10], A[:10, :10])  # Vᵀ·A_YY·V = 1, Vᵀ·B_YY·V = diag(share)
+            B /= _relative(B, A)[0][-1]
+            share, V = _relative(B[:10, :10], A[:10, :10])  # Vᵀ·A_YY·V = 1, Vᵀ·B_YY·V = diag(share)
             G = (V / (1.0 - np.minimum(share, _MOST_ERROR))) @ V.T
             x = G @ (A[:10, 10] - B[:10, 10])
         phi, G = x * UNKNOWN, G * np.outer(UNKNOWN, UNKNOWN)
@@ -134,3 +132,11 @@ class RecursiveTotalLeastSquares(NormalLeastSquares):
         top = np.concatenate([self._A, self._b[:, :, None]], axis=2)
         bottom = np.concatenate([self._b, self._c[:, None]], axis=1)
         return np.concatenate([top, bottom[:, None]], axis=1)
+
+
+def _relative(B: NDArray[np.float64], A: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """λ (k,), rising, and V (k, k) with Vᵀ·A·V = 1 and Vᵀ·B·V = diag(λ): B·v = λ·A·v, A positive definite."""
+    L = np.linalg.cholesky(A)
+    half = np.linalg.solve(L, B)
+    values, vectors = np.linalg.eigh(np.linalg.solve(L, half.T))
+    return values, np.asarray(np.linalg.solve(L.T, vectors), dtype=float)

@@ -15,7 +15,7 @@ from armload.errors import IdentificationError
 from armload.identification.answer import Identification, Segment
 from armload.identification.choice import choose
 from armload.identification.found import Asked, found_in
-from armload.identification.notes import changed_within
+from armload.identification.notes import changed_within, of_both
 from armload.identification.plausibility import check_plausible
 from armload.identification.said import answered
 from armload.identification.segments import changes_of_payload
@@ -65,7 +65,7 @@ def identify(
     arm = arm if isinstance(arm, Arm) else arm_named(arm)
     recording = recording if isinstance(recording, Recording) else read_recording(recording, arm)
     tare = tare if tare is None or isinstance(tare, Recording) else read_recording(tare, arm)
-    notes = (*recording.notes, *(() if tare is None else tare.notes))
+    notes = recording.notes if tare is None else of_both(recording, tare)
     for log in (recording, tare):
         if log is not None:
             check_usable(log, arm)

@@ -10,8 +10,21 @@ from armload.identification.thresholds import KNOWN, NOMINAL
 from armload.inertia import NAMES, SHRINK, Z95
 from armload.posterior import KnownMass
 from armload.posterior.drift import Drift
+from armload.recording import Recording
 
 RECORD = "record the arm as it is, without the payload, on any motion of 20 s, and name the log with --tare"
+
+
+def of_both(recording: Recording, tare: Recording) -> tuple[str, ...]:
+    """What the readers of log and tare did; what they did to both alike is said once."""
+    notes = list(recording.notes)
+    for note in tare.notes:
+        alike = recording.source + note.removeprefix(tare.source)
+        if note.startswith(tare.source) and alike in notes:
+            notes[notes.index(alike)] = f"{recording.source} and {alike.replace(recording.source, tare.source, 1)}"
+        else:
+            notes.append(note)
+    return tuple(notes)
 
 
 def lacking(

@@ -85,7 +85,7 @@ def _check_radians(recording: Recording, arm: Arm) -> None:
         k, j = np.unravel_index(int(np.argmax(np.abs(q))), q.shape)
         raise RecordingError(
             f"{recording.source}: positions look like degrees (q{j + 1} = {q[k, j]:.4g} at {_row(recording, k)}): "
-            "expected radians; multiply q, and dq if it is in degrees too, by pi/180"
+            "expected radians; of a table say so with --columns q_unit=deg,dq_unit=deg/s, else multiply by pi/180"
         )
 
 
@@ -148,8 +148,8 @@ def _why_not_derivative(change: NDArray, integral: NDArray, wrong: NDArray) -> s
         factor = float(np.median([change[:, j] @ integral[:, j] / (integral[:, j] @ integral[:, j]) for j in wrong]))
         for value, cause in (
             (-1.0, "it has the opposite sign; turn it around"),
-            (1.0 / _DEGREE, "it looks like degrees per second; multiply dq by pi/180"),
-            (_DEGREE, "q looks like degrees; multiply q by pi/180"),
+            (1.0 / _DEGREE, "it looks like degrees per second: --columns dq_unit=deg/s"),
+            (_DEGREE, "q looks like degrees: --columns q_unit=deg"),
             (1e-3, "t looks like milliseconds; divide it by 1000"),
             (1e-6, "t looks like microseconds; divide it by 1e6"),
             (1e-9, "t looks like nanoseconds; divide it by 1e9"),

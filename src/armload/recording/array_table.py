@@ -43,7 +43,7 @@ class ArrayTable:
         for name, column in columns.items():
             self._elements += [(name, k) for k in (range(column.width) if column.width is not None else (None,))]
         self.names: Sequence[str] = [_called(name, k, columns[name].elements) for name, k in self._elements]
-        self.dates = [k for k, (name, _) in enumerate(self._elements) if columns[name].dates]
+        self.dates: Sequence[int] = [k for k, (name, _) in enumerate(self._elements) if columns[name].dates]
         self._load = cache(lambda name: columns[name].load())
 
     def numbers(self, places: Sequence[int]) -> NDArray[np.float64]:

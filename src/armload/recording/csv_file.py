@@ -15,6 +15,7 @@ import re
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +62,9 @@ class _Csv:
         while self._body and not self._body[-1].strip():
             self._body.pop()
         first = next((line for line in self._body if line.strip()), "")
-        self.dates = [k for k, cell in enumerate(self._first_cells(first)) if nanoseconds(cell) is not None]
+        self.dates: Sequence[int] = [
+            k for k, cell in enumerate(self._first_cells(first)) if nanoseconds(cell) is not None
+        ]
         self._rows: list[tuple[int, list[str]]] | None = None  # line and cells, once it was read line by line
         self._comma, self._point = 0, 0  # the first line with a decimal comma, and with a decimal point
 
@@ -120,7 +123,7 @@ class _Csv:
         if not self._body or not self._plain:
             return None
         separator = None if self.layout.separator == " " else self.layout.separator
-        of_dates = {place: _nanoseconds for place in self.dates if place in places}
+        of_dates: Any = {place: _nanoseconds for place in self.dates if place in places}
         try:
             return np.loadtxt(
                 self._body, delimiter=separator, comments=None, usecols=places, ndmin=2, converters=of_dates or None

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -63,12 +64,10 @@ class JointFeatures:
     @cached_property
     def velocity_waves(self) -> NDArray[np.float64]:
         """Waves (velocity/2,) over the stretched velocity."""
-        from scipy.special import ndtri
-
         # quantiles of the half-normal, so that few waves already span the functions evenly
         count = self.velocity // 2
         shares = (np.arange(count) + 0.5) / max(count, 1)
-        return ndtri((1.0 + shares) / 2.0) / _VELOCITY_SCALE
+        return np.array([NormalDist().inv_cdf((1.0 + share) / 2.0) for share in shares]) / _VELOCITY_SCALE
 
     def first(self, fewer: JointFeatures) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Which of these are the features (R',) with fewer waves of the pose, and the factor (R',) that makes them so.

@@ -75,7 +75,6 @@ def parser() -> Parser:
 
 def run(options: argparse.Namespace) -> None:
     """Identify and print."""
-    from armload.devices import Load
     from armload.errors import UsageError
     from armload.identification import identify
     from armload.identification.text import summary
@@ -107,6 +106,8 @@ def run(options: argparse.Namespace) -> None:
             progress=say,
         )
     if options.to is not None:
+        from armload.devices import Load
+
         write(Load.of(result), options.to, options.out, arm, options.frame, told=result.notes)
         return
     if options.out is not None:

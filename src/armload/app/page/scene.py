@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from armload.app.page.drawing import Box, arm_parts, com_region, edges, ellipsoid, equivalent_box, frame_poses
 from armload.arms import Arm
@@ -112,7 +111,9 @@ def _place(handle: Any, box: Box) -> None:
 
 def _wxyz(R: NDArray[np.float64]) -> NDArray[np.float64]:
     """Quaternions (N, 4), scalar first, of rotations (N, 3, 3)."""
-    return Rotation.from_matrix(R).as_quat()[:, [3, 0, 1, 2]]
+    from viser.transforms import SO3
+
+    return np.asarray(SO3.from_matrix(R).wxyz, dtype=np.float64)
 
 
 def _finite(estimate: OnlineEstimate) -> bool:
