@@ -5,7 +5,7 @@
 Real: every window of 1, 2 and 4 s of the loaded UR10e (2.805 kg) in which a joint moves, with the unloaded run as a
 tare and without one. Simulated: boxes of 0.5 to 1 times what the arm is rated for, on another arm, motion (half of them
 with stops) and seed in each case, without a tare and with one of 20 s on another motion; the first 1, 2 and 6 s. Each
-is one `identify`. Writes benchmarks/results/motor_side.json.
+is one `identify`. Writes benchmarks/results/motor_side.json and a table of docs/real_arms.md.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from real_logs import data
-from script import options, say, write
+from script import ROOT, markdown_table, options, say, write, write_table
 
 from armload import Arm, Recording, arm, read_recording
 from armload.arms import rated_mass
@@ -118,6 +118,40 @@ def simulated(name: str, worlds: str, count: int) -> dict[str, Any]:
     return out
 
 
+def table(result: dict[str, Any]) -> str:
+    """A row for each kind of log."""
+    rows = []
+    for group, kinds in result.items():
+        for kind, found in kinds.items() if isinstance(kinds, dict) else ():
+            if "answers" not in found:
+                continue
+            time, tare = kind.split(", ")
+            low, middle, high = found["error_percent_5_50_95"]
+            rows.append(
+                [
+                    "real UR10e, 2.805 kg" if group == "real_ur10e" else f"simulated {group.split(', ')[0]}",
+                    {"tare": "yes", "no tare": "no"}[tare],
+                    time,
+                    str(found["answers"]),
+                    f"{middle:g} ({low:g} … {high:g})",
+                    f"{found['mean_half_width_kg']:.2f}",
+                    f"{100 * found['mass_inside']:.0f} %",
+                    "{} of {}".format(*found["of_calibrated"]),
+                ]
+            )
+    columns = (
+        "log",
+        "tare",
+        "length",
+        "answers",
+        "error of the mass [%]",
+        "half-width [kg]",
+        "inside",
+        "of calibrated",
+    )
+    return markdown_table(columns, "lllrrrrr", rows)
+
+
 def main() -> None:
     asked = options(__doc__, cases=40, arms="ur10e,ur5e", worlds="real_like")
     result = {"simulated_cases": asked.cases, "real_ur10e": real()}
@@ -125,6 +159,7 @@ def main() -> None:
         for name in asked.arms.split(","):
             result[f"{name}, {worlds}"] = simulated(name, worlds, asked.cases)
     write("motor_side", result)
+    write_table(ROOT / "docs" / "real_arms.md", "motor side", table(result))
 
 
 if __name__ == "__main__":

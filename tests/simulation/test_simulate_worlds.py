@@ -190,7 +190,7 @@ def test_an_arm_known_to_measure_motor_current_is_simulated_so(panda):
 
 @pytest.mark.parametrize("draw", [World.real_like, World.beyond])
 def test_gears_before_a_motor_s_torque_lose_as_much_as_a_ur10e_s(draw):
-    """Fitted to its logs (`benchmarks/real_residuals.py`): 6 to 10 % in joints 2 to 6; a UR10's 3 to 5 %."""
+    """Fitted to its logs (`benchmarks/real_residuals.py`): 4 to 7 % in joints 2 to 6; a UR10's 3 to 5 %."""
     frictions = [draw(arm("ur10e"), seed).friction for seed in range(40)]
     losses = np.array([friction.load for friction in frictions])
     assert losses.min() >= 0.02

@@ -41,8 +41,8 @@ from armload.inertia import InertialParameters
 PER_JOINT = {"offset": 4e-3, "coulomb": 1e-2, "viscous": 5e-3, "rotor": 3e-4}
 # times these where torque is motor current: the gear's friction is in it (the UR10e's logs)
 _MOTOR_FRICTION = {"coulomb": 5.0, "viscous": 5.0}
-# [1] prior standard deviation of the share of the torque that a joint's gear loses: 0.06 to 0.1 of a UR10e's in five of
-# its joints (`benchmarks/real_residuals.py`)
+# [1] prior standard deviation of the share of the torque that a joint's gear loses: 0.04 to 0.07 of a UR10e's in five
+# of its joints (`benchmarks/real_residuals.py`)
 _LOSS = 0.08
 # [effort limits] friction surely in a motor current's torque: 0.03 to 0.06 of a UR10e's joints. With it, |torque| of a
 # joint that mostly rubs would be its friction, and a loss all that it transmits

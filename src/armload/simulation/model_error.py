@@ -27,7 +27,7 @@ LENGTHS = (0.3, 3.0)  # [rad] of the residual
 _STRIBECK, _VISCOUS, _LOAD = 0.6, 0.5, 0.015  # at most: of the level, of the level per rad/s, of the torque
 GAIN, MOTOR_GAIN = 0.01, 0.03  # torque scale, at most
 _MOTOR_FRICTION = (0.05, 0.15)  # of the rated torque
-# of the torque, from and to, that the gears of an arm lose whose motor currents are measured: 0.06 to 0.10 of a UR10e's
+# of the torque, from and to, that the gears of an arm lose whose motor currents are measured: 0.04 to 0.07 of a UR10e's
 # joints 2 to 6, 0.03 to 0.05 of a UR10's joints 2 to 4 (`benchmarks/real_residuals.py`)
 _MOTOR_LOAD = (0.02, 0.12)
 # of the friction's level per rad/s, from and to, of the same arms: 1.1 of a UR10e, 0.9 of a UR10, whose levels are half
