@@ -11,11 +11,13 @@ needs no acceleration either:
 | coulomb  | smooth Coulomb friction                       | 0          | tanh(dq_j / width)    |
 | viscous  | viscous friction                              | 0          | dq_j                  |
 | rotor    | motor inertia, where torque is motor-side     | dq_j       | 0                     |
+| tilt     | (all) gravity is turned about the horizontal  | 0          | dg_j/dtheta           |
 | links    | errors of the links' inertial parameters      | Y_p(links) | Y_g(links) − Y_c(links) |
 
 Prior standard deviations are fractions of the joint's effort limit, the same for every arm (two Pandas and a UR10e lie
 within a factor of 3 of each other so, but for friction, which is five times as large where torque is motor current);
-`problem.py` rescales all blocks but `links` from the data.
+`problem.py` rescales all blocks but `tilt` and `links` from the data. Gravity is believed: the prior of `tilt` is zero,
+unless somebody asks (`armload.posterior.tilt`).
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armload.arms import FRICTION_WIDTH, LINK_SPREAD, Arm, MomentumRegressor, full_arm_regressor
+from armload.arms import FRICTION_WIDTH, LINK_SPREAD, Arm, MomentumRegressor, full_arm_regressor, leaning_torque
 from armload.inertia import InertialParameters
 
 # [effort limits, per rad/s, per rad/s²] prior standard deviations: two Pandas and a UR10e lie within a factor of 3 of
@@ -41,6 +43,7 @@ _PRESLIDING, _MOTOR_PRESLIDING = 10.0, 250.0
 # warmth, wear, a controller calibrated again. A stated prior, in the order of `PER_JOINT`: 0.13 N·m of a Panda's large
 # joints, 0.02 of its wrist, 15 % of the friction
 DAILY = {"offset": 1.5e-3, "coulomb": 1.5e-3, "viscous": 7.5e-4}
+TILTS = 2  # axes about which gravity may be turned
 _UNMODELLED_INERTIA = 5e-3  # [kg·m²] of every link at least: cables, covers, elastic joints. A stated prior
 
 
@@ -59,14 +62,14 @@ class Correction:
     @property
     def size(self) -> int:
         """Number of unknowns p."""
-        return len(PER_JOINT) * self.arm.n + 10 * self.arm.n
+        return len(PER_JOINT) * self.arm.n + TILTS + 10 * self.arm.n
 
     @cached_property
     def prior_std(self) -> NDArray[np.float64]:
         """Prior standard deviation of eta (p,), its mean being zero."""
         larger = _MOTOR_FRICTION if self.arm.motor_torque else {}
         per_joint = [fraction * larger.get(name, 1.0) * self.effort for name, fraction in PER_JOINT.items()]
-        return np.concatenate([*per_joint, _link_std(self.arm)])
+        return np.concatenate([*per_joint, np.zeros(TILTS), _link_std(self.arm)])
 
     @property
     def drifting(self) -> int:
@@ -86,8 +89,14 @@ class Correction:
 
     @property
     def adaptive(self) -> NDArray[np.bool_]:
-        """Which unknowns have a prior whose scale the data may set (p,): all but the links'."""
+        """Which unknowns have a prior whose scale the data may set (p,): all but the tilt's and the links'."""
         return np.arange(self.size) < len(PER_JOINT) * self.arm.n
+
+    @property
+    def tilt(self) -> slice:
+        """Where eta has the angles [rad] by which gravity is turned about `Arm.horizontal`."""
+        first = len(PER_JOINT) * self.arm.n
+        return slice(first, first + TILTS)
 
     def coulomb(self, eta: ArrayLike) -> NDArray[np.float64]:
         """The Coulomb friction (n,) [N·m] among the unknowns."""
@@ -105,9 +114,10 @@ class Correction:
         """Momentum form of Z for samples (N, n): two arrays (N, n, p)."""
         dq = np.atleast_2d(dq)
         n, eye = self.arm.n, np.eye(self.arm.n)
-        nothing = np.zeros((len(dq), n, n))
-        momentum = [nothing, nothing, nothing, dq[:, :, None] * eye]
+        nothing, level = np.zeros((len(dq), n, n)), np.zeros((len(dq), n, TILTS))
+        momentum = [nothing, nothing, nothing, dq[:, :, None] * eye, level]
         drift = [nothing + eye, np.tanh(dq / FRICTION_WIDTH)[:, :, None] * eye, dq[:, :, None] * eye, nothing]
+        drift.append(leaning_torque(self.arm, q))
         links = full_arm_regressor(self.arm, q, dq)
         return MomentumRegressor(
             np.concatenate([*momentum, links.momentum], axis=2), np.concatenate([*drift, links.drift], axis=2)

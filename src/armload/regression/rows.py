@@ -25,12 +25,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import FRICTION_WIDTH, Arm
-from armload.arms.momentum_row import MomentumRow, momentum_rows
+from armload.arms.momentum_row import MomentumRow, leaning_row, momentum_rows
 from armload.kernels import kernel
 from armload.recording import GAP, JITTERED
 from armload.regression.features import JointFeatures, features_of_sample
 from armload.regression.lag import GAIN
-from armload.regression.mismatch import Correction
+from armload.regression.mismatch import TILTS, Correction
 
 REGRESSOR_RATE = 200.0  # [Hz] rows are made no more often where a rate is set: they hold nothing above a few hertz
 SPACING = JITTERED / REGRESSOR_RATE  # [s] between rows at least
@@ -95,6 +95,7 @@ class FilteredRegression:
         self.arm, self.gain = arm, gain
         self._momentum = MomentumRow(arm)
         self._links = np.ascontiguousarray(arm.link_parameters.ravel())
+        self._turned = np.cross(arm.horizontal, arm.gravity)  # how gravity changes with each angle
         self._waves, self._velocity_waves = np.zeros((0, arm.n)), np.zeros(0)
         if features is not None and features.size:
             self._waves, self._velocity_waves = features.waves, features.velocity_waves
@@ -139,7 +140,7 @@ class FilteredRegression:
 
     def _made(self, t: NDArray, q: NDArray, dq: NDArray, torque: NDArray, steps: NDArray, fresh: NDArray) -> tuple:
         states = (self._clock, self._joints, self._regressor, self._pose, self._velocity)
-        arm = (*self._momentum.chain, self._links, self._waves, self._velocity_waves)
+        arm = (*self._momentum.chain, self._turned, self._links, self._waves, self._velocity_waves)
         return _make(t, q, dq, torque, steps, fresh, self._settings, *arm, *states)
 
 
@@ -202,6 +203,7 @@ def _make(
     axes,
     turning,
     gravity,
+    turned,
     links,
     waves,
     velocity_waves,
@@ -219,7 +221,8 @@ def _make(
     for m in range(count):
         momentum, drift = momentum_rows(rotations, translations, axes, turning, gravity, q[m], dq[m])
         pose, velocity = features_of_sample(q[m], dq[m], waves, velocity_waves)
-        inputs = (momentum, drift, links, dq[m], torque[m], pose, velocity)
+        leaning = leaning_row(rotations, translations, axes, turning, turned, links, q[m])
+        inputs = (momentum, drift, leaning, links, dq[m], torque[m], pose, velocity)
         _lagged(inputs, gain, steps[m], fresh[m], joints, regressor, pose_lag, velocity_lag, X[m], r[m])
         for j in range(n):
             weights[m, j] = 1.0 / (1.0 + excess * (1.0 - np.tanh(abs(dq[m, j]) / FRICTION_WIDTH) ** 2))
@@ -237,7 +240,7 @@ def _make(
 @kernel
 def _lagged(inputs, gain, h, fresh, joints, regressor, pose_lag, velocity_lag, X, r):  # pragma: no cover - compiled
     """One row from what goes into its lags, h seconds after the last; `fresh`: the lags start here."""
-    momentum, drift, links, dq, torque, pose, velocity = inputs
+    momentum, drift, leaning, links, dq, torque, pose, velocity = inputs
     n, few, many, wide = dq.shape[0], velocity.shape[1], pose.shape[0], regressor.shape[2]
     S, U, P, UP, V, UV = regressor[0], regressor[1], pose_lag[0], pose_lag[1], velocity_lag[0], velocity_lag[1]
     B, UB = joints[2], joints[3]
@@ -274,8 +277,11 @@ def _lagged(inputs, gain, h, fresh, joints, regressor, pose_lag, velocity_lag, X
                         D = dq[j]
                     else:
                         Y = dq[j]
+            elif i < 4 * n + TILTS:
+                Y, D = 0.0, leaning[j, i - 4 * n]
             else:
-                Y, D = momentum[j, 10 + i - 4 * n], drift[j, 10 + i - 4 * n]
+                i += 10 - 4 * n - TILTS
+                Y, D = momentum[j, i], drift[j, i]
             u = D - gain * Y
             if fresh:
                 S[j, k], U[j, k] = -gain * Y, u
