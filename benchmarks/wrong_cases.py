@@ -1,4 +1,4 @@
-"""Logs of a Panda of which one thing is not as `armload.identify` assumes, and sound ones: the cases of wrong_logs.py."""
+"""Logs of a Panda of which one thing is not as `armload.identify` assumes, and sound ones: cases of wrong_logs.py."""
 
 from __future__ import annotations
 
@@ -132,8 +132,8 @@ class _Part(NamedTuple):
         """The torque (N, n) beyond that of the same mass at rest at `centre`, and the mean shift (3,) in its frame.
 
         x'' + 2·zeta·omega·x' + omega²·x = −a, x the displacement in the base's axes, a the acceleration of the rest
-        point; a spring's rest point is where it holds the part. A string pulls at `centre`, with no moment about it, and x is
-        horizontal: the arm feels the part at the string's end, wherever it hangs.
+        point; a spring's rest point is where it holds the part. A string pulls at `centre`, with no moment about it,
+        and x is horizontal: the arm feels the part at the string's end, wherever it hangs.
         """
         step = 1e-3
         clock = np.arange(0.0, t[-1] + step, step)

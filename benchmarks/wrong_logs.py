@@ -4,8 +4,8 @@
 
 Every case takes the same Pandas, payloads and motions (the benchmark's reference population, `armload.lab.episodes`),
 with a tare of 20 s and a run of 6 s, makes one thing wrong (`wrong_cases.py`) and asks `armload.identify` as a user
-does. Sound logs are among the cases, twice as many of each: of several populations, and of a second simulator that shares nothing with the one
-the hybrid was trained on but the rigid body.
+does. Sound logs are among the cases, twice as many of each: of several populations, and of a second simulator that
+shares nothing with the one the hybrid was trained on but the rigid body.
 
 mass          mean absolute error ± mean half-width [g]
 inside        share of the true values inside their intervals: mass · first moments · inertia
