@@ -14,11 +14,11 @@ from armload.errors import IdentificationError
 from armload.estimators import ArmMismatch, Estimate
 from armload.identification.choice import Choice, choose
 from armload.identification.intervals import Before
-from armload.identification.thresholds import LARGEST_OFFSETS, MISFIT, MOVES, TURNED, TURNS
+from armload.identification.thresholds import LARGEST_OFFSETS, MISFIT, MOVES
 from armload.inertia import distance_to_body, is_consistent
 from armload.posterior import KnownMass, PosteriorLeastSquares
 from armload.posterior.drift import Drift
-from armload.posterior.tilt import Tilt
+from armload.posterior.tilt import TURNED, TURNS, Tilt
 from armload.recording import Recording
 from armload.regression import payload_prior_std
 
@@ -49,7 +49,7 @@ class Found(NamedTuple):
     drift: by how much the arm differs from what it was at the tare, of a method that asks.
     tilt: by how much gravity is turned from that of the arm, of a method that asks. gravity: (3,) [m/s²] with which all
         this was found, where it is not what was given.
-    restlessness: how restless the torques are, of what they were at the tare (`StreamingPosterior.restlessness`).
+    restlessness: how restless the torques are, of what they were at the tare (`posterior.restless`).
     exchanged: whether the estimate is rather the difference of two bodies, one put on for another.
     mass: that was given. mass_alone: what the log alone says of it, and its standard deviation [kg].
     """

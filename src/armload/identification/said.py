@@ -20,9 +20,10 @@ from armload.identification.notes import (
     not_rigid,
     other_than_weighed,
 )
-from armload.identification.thresholds import LEANS, RESTLESS
+from armload.identification.thresholds import LEANS
 from armload.inertia import HELD, InertialParameters, held, is_consistent, vech
 from armload.inertia import determined as determined_by
+from armload.posterior.restless import RESTLESS
 from armload.recording import Recording
 from armload.regression import payload_prior_std
 from armload.regression.prior import REACH

@@ -22,12 +22,6 @@ MISFIT = 5.439512702905879  # the 99.9 % quantile of a chi distribution of ten d
 # friction holds the joints (motor currents). A base tilted by 30° is seen in 26 of 28 simulated logs, none of 138 sound
 # ones (tests/identification/test_identify.py has one of each)
 LARGEST_OFFSETS = {"link": 5.0, "motor": 8.0}
-# [rad] by which gravity still turns once it has been found turned: the answer no longer changes by its error bars; and
-# how often it is turned at most (test_a_base_that_leans_is_found_and_answered_for)
-TURNED, TURNS = np.radians(0.2), 3
-# times that the torques are as restless with the payload as at the tare, or as is expected: sound simulated logs of
-# Pandas stay below 1.9, a real one below 1.7 (`benchmarks/wrong_logs.py`). What swings or sloshes is often above
-RESTLESS = 2.0
 # [rad] a joint that stays within so much stands: friction below stiction holds it
 MOVES = 0.05
 # times that a log tells a parameter worse under the weak prior: beyond, it leaves it to the learned one. The factor by

@@ -22,7 +22,7 @@ from armload.identification.choice import choose
 from armload.identification.intervals import Before
 from armload.identification.notes import changed_since_tare, gravity_turned, not_rigid
 from armload.identification.said import EXCHANGED, NO_BODY
-from armload.identification.thresholds import MISFIT, RESTLESS
+from armload.identification.thresholds import MISFIT
 from armload.inertia import determined, distance_to_body, held
 from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
@@ -35,6 +35,7 @@ from armload.online.thresholds import MOVING, RECENT, STANDS
 from armload.online.watch import PayloadWatch
 from armload.posterior import PosteriorLeastSquares
 from armload.posterior.map import PUBLISH
+from armload.posterior.restless import RESTLESS
 from armload.recording import Recording, Sample
 from armload.regression import payload_prior_std
 

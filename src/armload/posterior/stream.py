@@ -23,6 +23,7 @@ from armload.kernels import kernel
 from armload.posterior.drift import ALLOWED, Drift, drift_since_tare
 from armload.posterior.handover import Handover, Result
 from armload.posterior.problem import Posterior, Scales
+from armload.posterior.restless import restlessness
 from armload.posterior.same_motion import Difference, SameMotion
 from armload.posterior.sequential import SequentialPosterior
 from armload.posterior.solve import Solution, solve_to_go_on
@@ -169,16 +170,10 @@ class StreamingPosterior:
 
     @property
     def restlessness(self) -> float:
-        """How restless the torques are in the run, of what they were at the tare; 0 without one.
-
-        The root mean square over the joints of what the last solution leaves, over what it leaves of the tare, or over
-        what is expected if that is more: a tare may be of an arm that hardly moves.
-        """
-        power = self.posterior.power
+        """How restless the torques are in the run, of what they were at the tare; 0 where nobody can tell."""
         if not self.tares or self.posterior.torque != "link":
             return 0.0
-        expected = (self.noise.residual * self.correction.effort) ** 2
-        return float(np.sqrt(np.mean(power[-1] / np.maximum(power[:-1].max(axis=0), expected))))
+        return restlessness(self.posterior.power, self.noise.residual * self.correction.effort)
 
     @property
     def state(self) -> SequentialPosterior | None:

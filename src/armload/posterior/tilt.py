@@ -29,6 +29,9 @@ WIDE = np.radians(10.0)  # of one that may not: the log decides
 # T above which a base leans: beyond 1.8° of an arm whose links are known well. Sound logs of Pandas stay below 3, those
 # of arms with nominal links or motor currents below 10 (test_gravity_as_it_is_is_not_doubted)
 LEANS = 12.0
+# [rad] by which gravity still turns once it has been found turned: an answer changes by less than its error bars; and
+# how often it is turned at most (test_a_base_that_leans_is_found_and_answered_for)
+TURNED, TURNS = np.radians(0.2), 3
 _STEPS = 2  # of expectation–maximisation from the scales of the solution that is tested
 
 
