@@ -54,6 +54,6 @@ def test_the_payloads_share_of_it_is_not_taken_for_payload(logs):
 def test_sensors_behind_the_gears_see_nothing_of_it():
     robot = arm("panda")
     n = robot.n
-    assert Correction(robot, rated_effort(robot)).size == 14 * n
+    assert Correction(robot, rated_effort(robot)).own == 4 * n
     motor = replace(robot, motor_torque=True)
     assert Correction(motor, rated_effort(motor)).size == 15 * n

@@ -13,7 +13,13 @@ if TYPE_CHECKING:
     from armload.arms.forward import ForwardDerivatives, ForwardDynamics
     from armload.arms.matching import link_fingerprint, names_among, prefixed_frame
     from armload.arms.model import LINK_SPREAD, Arm, BodyMotion, Limits
-    from armload.arms.regressors import MomentumRegressor, full_arm_regressor, momentum_regressor, payload_regressor
+    from armload.arms.regressors import (
+        MomentumRegressor,
+        full_arm_regressor,
+        leaning_torque,
+        momentum_regressor,
+        payload_regressor,
+    )
     from armload.arms.strength import FRICTION_WIDTH, PAYLOAD_REACH, poses, rated_effort, rated_mass
 
 __all__ = [
@@ -33,6 +39,7 @@ __all__ = [
     "arm",
     "facts_of",
     "full_arm_regressor",
+    "leaning_torque",
     "link_fingerprint",
     "momentum_regressor",
     "names_among",

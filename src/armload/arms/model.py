@@ -165,7 +165,21 @@ class Arm:
             [from_order(self._model.inertias[k].toDynamicParameters(), "pinocchio").phi for k in range(1, self.n + 1)]
         )
 
+    @property
+    def horizontal(self) -> NDArray[np.float64]:
+        """Two axes (2, 3) of the base, normal to gravity and to each other: x and y where gravity is along −z."""
+        up = -np.asarray(self.gravity) / np.linalg.norm(self.gravity)
+        first = np.eye(3)[np.argmin(np.abs(up))]
+        first = first - (first @ up) * up
+        first /= np.linalg.norm(first)
+        return np.array([first, np.cross(up, first)])
+
     # ------------------------------------------------------------------ other arms made from it
+
+    def leaning(self, angles: ArrayLike) -> Arm:
+        """The arm with gravity turned about the axes of `horizontal` by angles (2,) [rad]."""
+        turned = pin.exp3(np.asarray(angles, dtype=float) @ self.horizontal) @ np.asarray(self.gravity)
+        return replace(self, gravity=tuple(turned.tolist()))
 
     def with_payload(self, payload: InertialParameters) -> Arm:
         """The arm with a payload (about `frame`) counted as part of it; payloads add up."""

@@ -151,6 +151,28 @@ def momentum_rows(rotations, translations, axes, turning, gravity, q, dq):  # pr
 
 
 @kernel
+def leaning_row(rotations, translations, axes, turning, turned, links, q):  # pragma: no cover - compiled
+    """Torque (n, K) that holds the links (10·n,) against each of K accelerations of gravity `turned` (K, 3) alone."""
+    n, K = q.shape[0], len(turned)
+    R, p, lines = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3)), np.empty((n, 3))
+    _poses(rotations, translations, axes, turning, q, R, p, lines)
+    out, mass, moment = np.empty((n, K)), 0.0, np.zeros(3)  # of all links from a joint on, about the base's origin
+    arm, force, x = np.empty(3), np.empty(3), np.empty(3)
+    for c in range(n - 1, -1, -1):
+        m, h = links[10 * c], links[10 * c + 1 : 10 * c + 4]
+        mass += m
+        for i in range(3):
+            moment[i] += m * p[c + 1, i] + R[c + 1, i, 0] * h[0] + R[c + 1, i, 1] * h[1] + R[c + 1, i, 2] * h[2]
+            arm[i] = moment[i] - mass * p[c + 1, i]
+        for k in range(K):
+            _cross(arm, turned[k], x)
+            for i in range(3):
+                force[i] = x[i] if turning[c] else mass * turned[k, i]
+            out[c, k] = -(lines[c, 0] * force[0] + lines[c, 1] * force[1] + lines[c, 2] * force[2])
+    return out
+
+
+@kernel
 def _project(a, l, omega, v, out, sign, x, y):  # noqa: E741  # pragma: no cover - compiled
     out[0] = sign * (l[0] * v[0] + l[1] * v[1] + l[2] * v[2])
     _cross(v, a, x)

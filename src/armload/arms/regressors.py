@@ -11,6 +11,7 @@ where L(omega)·vech(I) = I·omega. Sources: Niemeyer & Slotine, IJRR 1991; Hadd
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -71,6 +72,14 @@ def full_arm_regressor(arm: Arm, q: ArrayLike, dq: ArrayLike) -> MomentumRegress
         np.concatenate([part.momentum for part in parts], axis=2),
         np.concatenate([part.drift for part in parts], axis=2),
     )
+
+
+def leaning_torque(arm: Arm, q: ArrayLike) -> NDArray[np.float64]:
+    """How the arm's own torque (N, n, 2) changes as gravity is turned about the axes of `Arm.horizontal` [N·m/rad]."""
+    change = np.cross(arm.horizontal, arm.gravity)  # (2, 3) [m/s²/rad]
+    weights = [replace(arm, gravity=tuple(np.asarray(arm.gravity) + sign * g)) for g in change for sign in (0.5, -0.5)]
+    up, down, up_too, down_too = (other.torque(np.atleast_2d(q)) for other in weights)
+    return np.stack([up - down, up_too - down_too], axis=2)
 
 
 def _twist_and_jacobian_rate(J: NDArray, dq: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

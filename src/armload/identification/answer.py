@@ -34,9 +34,14 @@ def is_removal(estimate: Estimate, mass_determined: bool) -> bool:
     return bool(mass_determined and estimate.phi[0] < -HELD * estimate.std[0])
 
 
-def body_of(estimate: Estimate, mass_determined: bool) -> NDArray[np.float64]:
-    """phi (10,) of the likeliest body in the estimate's metric; the estimate's own where something was taken off."""
-    return estimate.phi if is_removal(estimate, mass_determined) else nearest_body(estimate.phi, estimate.covariance)
+def body_of(estimate: Estimate, mass_determined: bool, exchanged: bool = False) -> NDArray[np.float64]:
+    """phi (10,) of the likeliest body in the estimate's metric; the estimate's own where something was taken off.
+
+    exchanged: something else was put on, too.
+    """
+    if exchanged or is_removal(estimate, mass_determined):
+        return estimate.phi
+    return nearest_body(estimate.phi, estimate.covariance)
 
 
 _OF_A_SEGMENT = ("mass", "com", "phi", "phi_low", "phi_high", "determined", "held", "interval")

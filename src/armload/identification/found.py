@@ -18,6 +18,7 @@ from armload.identification.thresholds import LARGEST_OFFSETS, MISFIT, MOVES
 from armload.inertia import distance_to_body, is_consistent
 from armload.posterior import KnownMass, PosteriorLeastSquares, Profile
 from armload.posterior.drift import Drift
+from armload.posterior.tilt import TURNED, TURNS, Tilt
 from armload.recording import Recording
 from armload.regression import payload_prior_std
 
@@ -47,6 +48,10 @@ class Found(NamedTuple):
     unknown_friction: whether the torques hold gear friction that nobody knew of; `friction_found`: that they did.
     known_arm_std: standard deviation (10,) of a method that says what it would be, were the arm known exactly.
     drift: by how much the arm differs from what it was at the tare, of a method that asks.
+    tilt: by how much gravity is turned from that of the arm, of a method that asks. gravity: (3,) [m/s²] with which all
+        this was found, where it is not what was given.
+    restlessness: how restless the torques are, of what they were at the tare (`posterior.restless`).
+    exchanged: whether the estimate is rather the difference of two bodies, one put on for another.
     mass: that was given. mass_alone: what the log alone says of it, and its standard deviation [kg].
     """
 
@@ -62,6 +67,10 @@ class Found(NamedTuple):
     friction_found: bool = False
     known_arm_std: NDArray[np.float64] | None = None
     drift: Drift | None = None
+    tilt: Tilt | None = None
+    gravity: tuple[float, float, float] | None = None
+    restlessness: float = 0.0
+    exchanged: bool = False
     mass: KnownMass | None = None
     mass_alone: tuple[float, float] | None = None
 
@@ -86,7 +95,20 @@ class Found(NamedTuple):
 
 
 def found_in(recording: Recording, arm: Arm, tare: Recording | None, asked: Asked) -> Found:
-    """What a method finds in a log of an arm."""
+    """What a method finds in a log of an arm, with gravity as it was given, unless it surely is another."""
+    found = _found_on_side(recording, arm, tare, asked)
+    if found.tilt is None or not found.tilt.found:
+        return found
+    for _ in range(TURNS):  # the payload's torque turns with gravity, which the test leaves out
+        arm = arm.leaning(found.tilt.angles)
+        found = _found_on_side(recording, arm, tare, asked)
+        if found.tilt is None or np.linalg.norm(found.tilt.angles) < TURNED:
+            break
+    return found._replace(gravity=arm.gravity)
+
+
+def _found_on_side(recording: Recording, arm: Arm, tare: Recording | None, asked: Asked) -> Found:
+    """The same, whichever side of the gears the torque is measured on."""
     found = _found(choose(arm, tare, asked.method, profile=asked.profile), arm, recording, asked)
     if found.unknown_friction:
         motor_side = replace(arm, motor_torque=True)
@@ -124,6 +146,9 @@ def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Foun
         unknown_friction=unknown and mismatch is not None and mismatch.torque == "motor",
         known_arm_std=identifier.known_arm_std,
         drift=None if posterior is None else posterior.stream.drift,
+        tilt=None if posterior is None else posterior.stream.tilt,
+        restlessness=0.0 if posterior is None else posterior.stream.restlessness,
+        exchanged=posterior is not None and posterior.exchanged,
         mass=asked.mass,
         mass_alone=None if posterior is None else posterior.mass_alone,
     )

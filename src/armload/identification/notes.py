@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
 from armload.identification.thresholds import KNOWN, NOMINAL
@@ -86,6 +86,31 @@ def changed_since_tare(drift: Drift, what: str = "tare") -> str:
         f"the arm is not as {then}: at joint {j + 1} the torque's offset differs by {drift.offset[j]:+.2g} "
         f"N·m, the friction by {drift.coulomb[j]:+.2g} N·m; the intervals allow for it; record a tare of this arm as "
         "it is now, with the same base and tool"
+    )
+
+
+def gravity_turned(given: ArrayLike, found: ArrayLike, answered: bool) -> str:
+    """That the base leans, by how much, and what to say of it.
+
+    Args:
+        given, found: gravity (3,) [m/s²]. answered: whether the answer is of the one that was found.
+    """
+    given, found = np.asarray(given), np.asarray(found)
+    angle = np.degrees(np.arctan2(np.linalg.norm(np.cross(given, found)), given @ found))
+    option = ",".join(f"{x:.2f}" for x in found)
+    return (
+        f"the base leans by {angle:.1f}° against the gravity that was given: "
+        + ("this is the answer for" if answered else "answer anew with")
+        + f" --gravity={option}, as the torques show it; level the base, or give its gravity"
+    )
+
+
+def not_rigid(restlessness: float) -> str:
+    """That what is held seems to move on its own."""
+    return (
+        f"the torques are {restlessness:.1f} times as restless with the payload as they should be: part of it seems to "
+        "swing, slosh or slip, or the arm touches something; the intervals are those of a rigid body: hold it tighter, "
+        "or move more slowly"
     )
 
 

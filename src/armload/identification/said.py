@@ -12,16 +12,29 @@ from armload.arms import Arm
 from armload.identification.answer import Identification, body_of, is_removal
 from armload.identification.found import Found
 from armload.identification.intervals import about_com, intervals, phi_interval
-from armload.identification.notes import changed_since_tare, lacking, leaning_on_prior, other_than_weighed
+from armload.identification.notes import (
+    changed_since_tare,
+    gravity_turned,
+    lacking,
+    leaning_on_prior,
+    not_rigid,
+    other_than_weighed,
+)
 from armload.identification.thresholds import LEANS
 from armload.inertia import HELD, InertialParameters, held, is_consistent, vech
 from armload.inertia import determined as determined_by
+from armload.posterior.restless import RESTLESS
 from armload.recording import Recording
 from armload.regression import payload_prior_std
 from armload.regression.prior import REACH
 
 _CHECK = "check the robot, the base (--gravity), what is mounted and the torques' signs"
-NO_BODY = f"no body fits within the error bars: {_CHECK}"  # also what a concluded stream says
+NO_BODY = f"no body fits within the error bars: {_CHECK}"  # this and the next are also what a concluded stream says
+EXCHANGED = (
+    "something seems to have been taken off since the tare, and something else put on: the answer is the difference of "
+    "the two, which need be no body; record a tare with what is mounted now, or believe --method map-gp if nothing was "
+    "taken off"
+)
 
 
 def answered(
@@ -45,20 +58,20 @@ def answered(
     leaning = np.zeros(10, dtype=bool)
     if found.weak_std is not None:
         leaning = determined & (found.weak_std > LEANS * estimate.std)
-    phi = body_of(estimate, determined[0])
+    phi = body_of(estimate, determined[0], found.exchanged)
     low, high = phi_interval(phi, estimate.phi, estimate.std, determined, before, otherwise)
     if unsure is not None:
         low, high = _with_any_inertia(low, high, unsure)
     found_of = intervals(phi, low, high, estimate.covariance, otherwise)
-    doubt = _doubt(found, determined[0], relative_to)
-    said = [*notes] if doubt is None else [doubt, *notes]
+    doubts = _doubts(found, arm, determined[0], relative_to)
+    said = [*doubts, *notes]
     if found.friction_found:
         said.append("the torque holds the gears' friction, as that of motor currents does: the intervals allow for it")
     if is_held or not determined[0]:  # an empty hand has no inertia to be determined
         said += lacking(arm, tared, determined, found.known_arm_std, weak)
         said += leaning_on_prior(leaning)
     consistent = is_consistent(phi)
-    trusted = found.calibrated and doubt is None and consistent and otherwise is None and unsure is None
+    trusted = found.calibrated and not doubts and consistent and otherwise is None and unsure is None
     mass, com, inertia_com = about_com(phi)
     return Identification(
         method=found.method,
@@ -84,8 +97,14 @@ def answered(
     )
 
 
+def _doubts(found: Found, arm: Arm, mass_determined: bool, relative_to: str) -> list[str]:
+    """What keeps an answer from being believed, a sentence each."""
+    leans = None if found.gravity is None else gravity_turned(arm.gravity, found.gravity, True)
+    return [doubt for doubt in (leans, _doubt(found, mass_determined, relative_to)) if doubt is not None]
+
+
 def _doubt(found: Found, mass_determined: bool, relative_to: str) -> str | None:
-    """What keeps an answer from being believed, in a sentence."""
+    """What the answer itself shows, most telling first."""
     if is_removal(found.estimate, mass_determined):
         if relative_to in ("tare", "profile"):
             return (
@@ -96,10 +115,14 @@ def _doubt(found: Found, mass_determined: bool, relative_to: str) -> str | None:
             "the mass is negative: less is mounted than the model of the arm and its tool assume, or the torque's "
             "sign is turned"
         )
+    if found.exchanged:
+        return EXCHANGED
     if not found.explained:
         return NO_BODY
     if found.drift is not None and found.drift.changed:
         return changed_since_tare(found.drift, relative_to)
+    if found.restlessness > RESTLESS:
+        return not_rigid(found.restlessness)
     if found.mass is not None and found.mass_alone is not None:
         mean, std = found.mass_alone
         if abs(found.mass.mass - mean) > HELD * np.hypot(found.mass.std, std):

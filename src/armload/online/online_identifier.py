@@ -21,8 +21,8 @@ from armload.estimators import Estimate, Identifier
 from armload.identification.answer import body_of
 from armload.identification.choice import choose
 from armload.identification.intervals import Before
-from armload.identification.notes import changed_since_tare
-from armload.identification.said import NO_BODY
+from armload.identification.notes import changed_since_tare, gravity_turned, not_rigid
+from armload.identification.said import EXCHANGED, NO_BODY
 from armload.identification.thresholds import MISFIT
 from armload.inertia import determined, distance_to_body, held
 from armload.online.estimate import OnlineEstimate
@@ -37,6 +37,7 @@ from armload.online.thresholds import MOVING, RECENT, STANDS
 from armload.online.watch import PayloadWatch
 from armload.posterior import PosteriorLeastSquares, Profile
 from armload.posterior.map import PUBLISH
+from armload.posterior.restless import RESTLESS
 from armload.recording import Recording, Sample
 from armload.regression import payload_prior_std
 
@@ -176,13 +177,22 @@ class OnlineIdentifier:
                 run = self._engine if self._watch is None else self._watch.answered
                 self._told = self._internal
                 self._judge(estimate, run, False)
-                self._estimate = replace(estimate, phi=body_of(estimate, bool(self._determined[0])))
+                exchanged = isinstance(run, PosteriorLeastSquares) and run.exchanged
+                self._estimate = replace(estimate, phi=body_of(estimate, bool(self._determined[0]), exchanged))
                 self._source, self._around = run, estimate.phi
                 said, covariance = run.unprojected or (estimate.phi, estimate.covariance)
                 self._doubted = distance_to_body(said, covariance) > MISFIT
+                self._doubted = self._doubted or exchanged
                 if self._doubted:
-                    self._notes = (*self._notes, NO_BODY)
+                    self._notes = (*self._notes, EXCHANGED if exchanged else NO_BODY)
                 self._doubted = self._doubted or drift_of_run(run) is not None
+                restlessness = run.stream.restlessness if isinstance(run, PosteriorLeastSquares) else 0.0
+                if restlessness > RESTLESS and not self._doubted:
+                    self._doubted, self._notes = True, (*self._notes, not_rigid(restlessness))
+                tilt = run.stream.tilt if isinstance(run, PosteriorLeastSquares) else None
+                if tilt is not None and tilt.found:
+                    note = gravity_turned(self.arm.gravity, self.arm.leaning(tilt.angles).gravity, False)
+                    self._doubted, self._notes = True, (*self._notes, note)
         return self._said()
 
     def learned(self, name: str = "stream") -> Profile | None:

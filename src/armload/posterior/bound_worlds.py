@@ -15,6 +15,7 @@ from armload.arms import FRICTION_WIDTH, Arm
 from armload.errors import IdentificationError
 from armload.posterior.scales import Scales
 from armload.regression import JointFeatures
+from armload.regression.mismatch import TILTS
 from armload.simulation import Sensors, World
 
 _SPEEDS = np.concatenate([-np.geomspace(1.5, 0.01, 60), np.geomspace(0.01, 1.5, 60)])  # [rad/s]
@@ -53,6 +54,7 @@ def scales_of(
         *friction[:, :2].var(axis=0),
         np.mean([np.zeros(arm.n) if w.rotor_inertia is None else w.rotor_inertia**2 for w in worlds], axis=0),
         *([np.var(np.array([world.friction.load for world in worlds]), axis=0)] if arm.motor_torque else []),
+        np.zeros(TILTS),
         np.mean([(world.links - nominal) ** 2 for world in worlds], axis=0).ravel(),
     ]
     eta = np.concatenate(square)  # in the order of `Correction`

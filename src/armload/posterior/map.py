@@ -60,9 +60,12 @@ class PosteriorLeastSquares(Identifier):
     _noise: NoiseModel = RIGID
     _iterations = 12  # of expectation–maximisation in a last solution; with features it settles in five
     _same_motion: SameMotion | None = None
-    test_tare = True  # whether an answer asks if the arm is as it was at the tare; episodes of a training do not
+    test_tare = (
+        True  # whether an answer asks if arm and gravity are as they were said to be; episodes of a training do not
+    )
     known_mass: KnownMass | None = None  # of the payload, where it was weighed
     mass_alone: tuple[float, float] | None = None  # what the log alone says of it then, and its standard deviation [kg]
+    exchanged = False  # whether the last answer is rather the difference of two bodies, one put on for another
     _traits_frame: NDArray[np.float64] | None = None  # see `Evidence.of`: they are about the estimate's own frame
 
     def __init__(

@@ -25,6 +25,8 @@ from armload.errors import ModelError
 from armload.kernels import kernel
 
 _COMPONENTS = 12  # per family: a container's loadings, a box's sizes and places; trained models hold them
+# families that a difference is made of: less nothing, or a screw, a payload is what it was
+_BODIES = ("boxes", "shapes", "tools", "container")
 _FLOOR = np.array([2e-3] + [2e-4] * 3 + [2e-5] * 6)  # [kg, kg·m, kg·m²] no component is narrower than this
 
 
@@ -35,6 +37,19 @@ class MixturePosterior(NamedTuple):
     covariance: NDArray[np.float64]
     weights: NDArray[np.float64]
     log_evidence: float
+
+    def or_else(self, other: MixturePosterior, odds: float) -> tuple[MixturePosterior, float]:
+        """This one, or another of the same evidence under another prior, moments matched; and the other's probability.
+
+        odds: of the other prior over this one, before the evidence.
+        """
+        ahead = np.log(odds) + other.log_evidence - self.log_evidence
+        share = float(1.0 / (1.0 + np.exp(-np.clip(ahead, -500.0, 500.0))))
+        away = other.mean - self.mean
+        covariance = (1.0 - share) * self.covariance + share * other.covariance
+        covariance = covariance + share * (1.0 - share) * np.outer(away, away)
+        log = float(np.logaddexp(self.log_evidence, np.log(odds) + other.log_evidence) - np.log1p(odds))
+        return MixturePosterior(self.mean + share * away, covariance, self.weights, log), share
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +127,21 @@ class MixturePrior:
             np.concatenate([self.means, other.means]),
             np.concatenate([self.covariances, other.covariances]),
             self.families + other.families,
+        )
+
+    @cached_property
+    def differences(self) -> MixturePrior | None:
+        """Of one payload less another: every pair of components that are something; None: there are none."""
+        some = [k for k, family in enumerate(self.families) if family in _BODIES]
+        if not some:
+            return None
+        w, means, covariances = self.weights[some], self.means[some], self.covariances[some]
+        pairs = len(some) ** 2
+        return MixturePrior(
+            np.outer(w, w).ravel() / w.sum() ** 2,
+            (means[:, None] - means).reshape(pairs, 10),
+            (covariances[:, None] + covariances).reshape(pairs, 10, 10),
+            ("difference",) * pairs,
         )
 
     @cached_property

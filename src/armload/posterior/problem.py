@@ -280,7 +280,15 @@ class Problem:
             eta=eta,
             drift=found.mean[drift],
             drift_covariance=found.covariance[drift, drift],
+            tilt=eta[self.correction.tilt],
+            tilt_covariance=found.covariance[self.eta, self.eta][self.correction.tilt, self.correction.tilt],
             residual=np.sqrt(scales.noise[-1]),
+            power=np.array(
+                [
+                    run.residual_power(E @ found.mean, found.weights)
+                    for run, E in zip(self.runs, self.selections, strict=True)
+                ]
+            ),
             torque=torque,
             gain_std=gain,
             scales=scales,

@@ -32,7 +32,9 @@ class Posterior:
     information, vector: Λ (10, 10) and Λ·phi_ML (10,): what the logs alone say, all else integrated out.
     eta: (p,) the arm's mismatch, in session 0.
     drift, drift_covariance: (d,), (d, d) by which the run's session differs from session 0; (0,) where it does not.
+    tilt, tilt_covariance: (2,), (2, 2) angles of gravity about `Arm.horizontal` [rad]; zero where gravity is believed.
     residual: √S (n,) of the run [N·m·√s].
+    power: (K, n) mean square of each run's residual [N²·m²].
     torque: "link" or "motor", the side the torque seems to be measured on.
     gain_std: relative standard deviation of the torque's calibration.
     scales: what expectation–maximisation found; another solution may start there.
@@ -47,7 +49,10 @@ class Posterior:
     eta: NDArray[np.float64]
     drift: NDArray[np.float64]
     drift_covariance: NDArray[np.float64]
+    tilt: NDArray[np.float64]
+    tilt_covariance: NDArray[np.float64]
     residual: NDArray[np.float64]
+    power: NDArray[np.float64]
     torque: str
     gain_std: float
     scales: Scales

@@ -23,10 +23,12 @@ from armload.inertia.cholesky import factor, invert
 from armload.kernels import kernel
 from armload.posterior.drift import ALLOWED, TESTED, Drift, drift_of, drift_since_tare
 from armload.posterior.handover import Handover, Result
+from armload.posterior.restless import restlessness
 from armload.posterior.same_motion import Difference, SameMotion
 from armload.posterior.scales import Posterior, Scales
 from armload.posterior.sequential import SequentialPosterior
 from armload.posterior.solve import Solution, solve_to_go_on
+from armload.posterior.tilt import Tilt, tilt_of_base
 from armload.regression import Correction, GaussianPrior, JointFeatures
 from armload.regression.information import SAME, RegressionData, Session
 from armload.regression.lag import GAIN
@@ -51,12 +53,14 @@ class StreamingPosterior:
         gain: λ of the lag [1/s]. iterations: of expectation–maximisation in the last solution.
         same_motion: asks whether the tare shows the run's motion; None: nobody asks.
         session: of the run; the tares' is session 0 unless they are of this one.
-        test_tare: whether `conclude` asks if the arm is as it was at the tare; the solution allows for it if not.
+        test_tare: whether `conclude` asks if the arm is as it was at the tare, and allows for it if not; and if gravity
+            is as it was given.
 
     Attributes:
         posterior: the last full solution; its scales, ratios and torque side hold until the next.
         difference: what the torque difference with a tare along the same motion says, where it is the better evidence.
         drift: by how much the arm differs from what it was at the tare; None: not asked yet.
+        tilt: by how much gravity is turned from what was given; None: not asked yet.
         solutions: full solutions so far. rows: how many. row: the last one; seconds: what all rows stand for [s].
     """
 
@@ -103,6 +107,7 @@ class StreamingPosterior:
         self.row: Row | None = None
         self.difference: Difference | None = None
         self.drift: Drift | None = None
+        self.tilt: Tilt | None = None
         self._posterior: Posterior | None = None
 
     def prepare(self) -> None:
@@ -165,6 +170,13 @@ class StreamingPosterior:
         return self._regression.row(t, q, dq, tau)
 
     @property
+    def restlessness(self) -> float:
+        """How restless the torques are in the run, of what they were at the tare; 0 where nobody can tell."""
+        if not self.tares or self.posterior.torque != "link":
+            return 0.0
+        return restlessness(self.posterior.power, self.noise.residual * self.correction.effort)
+
+    @property
     def state(self) -> SequentialPosterior | None:
         """The posterior's state after the last row, with what that row said; None in the first moments."""
         return None if self._early is not None else self._state
@@ -219,7 +231,9 @@ class StreamingPosterior:
             if self.drift.changed:
                 self._run.session = replace(self.session, number=1, drift=max(ALLOWED, self.session.drift))
                 self._adopt(self._solved(runs, self.start, self.iterations - 1))
-                self._run.session = self.session
+        if self._test_tare:
+            self.tilt = tilt_of_base(runs, self.prior_std, self.prior, self.noise, self.posterior)
+        self._run.session = self.session
         changed = self.drift is not None and self.drift.changed  # then the difference is of two arms, too
         self.difference = None if changed else self._better(self.posterior.covariance)
 

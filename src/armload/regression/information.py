@@ -76,6 +76,7 @@ class RegressionData:
         size = 10 + correction.size + self.features.size
         self.A = np.zeros((arm.n, size, size))  # ∫ X_jᵀ·X_j dt
         self.b = np.zeros((arm.n, size))  # ∫ X_jᵀ·r_j dt
+        self.c = np.zeros(arm.n)  # ∫ r_j² dt
         self.blocks = BlockMeans((arm.n, size + 1), block)  # of √w·[X, r]
         self._regression: FilteredRegression | None = None
 
@@ -94,6 +95,7 @@ class RegressionData:
             products = Xr.T @ Xr
             self.A[j] += products[:-1, :-1]
             self.b[j] += products[:-1, -1]
+            self.c[j] += products[-1, -1]
         self.blocks.extend(rows.h, rooted)
 
     @classmethod
@@ -102,6 +104,7 @@ class RegressionData:
         first = parts[0]
         out = cls(first.correction, first.gain, first.features, first.blocks.block, first.session)
         out.A, out.b = sum(part.A for part in parts), sum(part.b for part in parts)  # type: ignore[assignment]
+        out.c = sum(part.c for part in parts)  # type: ignore[assignment]
         out.blocks = BlockMeans.joined([part.blocks for part in parts])
         return out
 
@@ -126,6 +129,15 @@ class RegressionData:
         """A and b over the unknowns z, where [phi, eta] = E·z; the features' weights stay out of it."""
         shared = slice(0, 10 + self.correction.size)
         return E.T @ self.A[:, shared, shared] @ E, self.b[:, shared] @ E
+
+    def residual_power(self, x: NDArray, weights: NDArray) -> NDArray[np.float64]:
+        """Mean square (n,) [N²·m²] of what x (10 + p,), payload and eta, and the features' weights (n, R) leave.
+
+        It holds all frequencies that the lag lets pass, where the long-run variance knows the lowest alone.
+        """
+        full = np.concatenate([np.broadcast_to(x, (len(self.c), len(x))), weights], axis=1)
+        left = self.c - 2.0 * np.einsum("jk,jk->j", self.b, full) + np.einsum("jk,jkl,jl->j", full, self.A, full)
+        return np.maximum(left, 0.0) / max(self.blocks.duration, 1e-9)
 
     def residual_variance(
         self,

@@ -12,6 +12,7 @@ needs no acceleration either:
 | viscous  | viscous friction                              | 0          | dq_j                  |
 | rotor    | motor inertia, where torque is motor-side     | dq_j       | 0                     |
 | load     | what gears lose of the torque they transmit   | 0          | |tau_t|·tanh(dq_j/w)  |
+| tilt     | (all) gravity is turned about the horizontal  | 0          | dg_j/dtheta           |
 | links    | errors of the links' inertial parameters      | Y_p(links) | Y_g(links) − Y_c(links) |
 
 `load` is there only of arms that are known to measure motor current (Bittencourt & Gunnarsson, ASME J. Dyn. Sys. Meas.
@@ -22,7 +23,8 @@ tare missed the mass (`benchmarks/motor_side.py`).
 
 Prior standard deviations are fractions of the joint's effort limit, the same for every arm (two Pandas and a UR10e lie
 within a factor of 3 of each other so, but for friction, which is five times as large where torque is motor current);
-`problem.py` rescales all blocks but `load` and `links` from the data.
+`problem.py` rescales all blocks but `load`, `tilt` and `links` from the data. Gravity is believed: the prior of `tilt`
+is zero, unless somebody asks (`armload.posterior.tilt`).
 """
 
 from __future__ import annotations
@@ -33,7 +35,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armload.arms import FRICTION_WIDTH, LINK_SPREAD, Arm, MomentumRegressor, full_arm_regressor
+from armload.arms import FRICTION_WIDTH, LINK_SPREAD, Arm, MomentumRegressor, full_arm_regressor, leaning_torque
 from armload.inertia import InertialParameters
 
 # [effort limits, per rad/s, per rad/s²] prior standard deviations: two Pandas and a UR10e lie within a factor of 3 of
@@ -54,6 +56,7 @@ _PRESLIDING, _MOTOR_PRESLIDING = 10.0, 250.0
 # warmth, wear, a controller calibrated again. A stated prior, in the order of `PER_JOINT`: 0.13 N·m of a Panda's large
 # joints, 0.02 of its wrist, 15 % of the friction
 DAILY = {"offset": 1.5e-3, "coulomb": 1.5e-3, "viscous": 7.5e-4}
+TILTS = 2  # axes about which gravity may be turned
 _UNMODELLED_INERTIA = 5e-3  # [kg·m²] of every link at least: cables, covers, elastic joints. A stated prior
 
 
@@ -76,11 +79,11 @@ class Correction:
     @property
     def size(self) -> int:
         """Number of unknowns p."""
-        return self.own + 10 * self.arm.n
+        return self.own + TILTS + 10 * self.arm.n
 
     @property
     def own(self) -> int:
-        """How many unknowns, the first ones, are the joints' own: all but the links'."""
+        """How many unknowns, the first ones, are the joints' own: all but the tilt and the links'."""
         return (len(PER_JOINT) + self.arm.motor_torque) * self.arm.n
 
     @cached_property
@@ -89,7 +92,7 @@ class Correction:
         larger = _MOTOR_FRICTION if self.arm.motor_torque else {}
         per_joint = [fraction * larger.get(name, 1.0) * self.effort for name, fraction in PER_JOINT.items()]
         loss = np.full(self.own - len(PER_JOINT) * self.arm.n, _LOSS)
-        return np.concatenate([*per_joint, loss, _link_std(self.arm)])
+        return np.concatenate([*per_joint, loss, np.zeros(TILTS), _link_std(self.arm)])
 
     @property
     def drifting(self) -> int:
@@ -109,11 +112,16 @@ class Correction:
 
     @property
     def adaptive(self) -> NDArray[np.bool_]:
-        """Which unknowns have a prior whose scale the data may set (p,): all but the links' and what gears lose.
+        """Which unknowns have a prior whose scale the data may set (p,): not tilt, links and what gears lose.
 
         Where friction is most of a joint's torque, a loss of all of it would fit as well.
         """
         return np.arange(self.size) < len(PER_JOINT) * self.arm.n
+
+    @property
+    def tilt(self) -> slice:
+        """Where eta has the angles [rad] by which gravity is turned about `Arm.horizontal`."""
+        return slice(self.own, self.own + TILTS)
 
     def coulomb(self, eta: ArrayLike) -> NDArray[np.float64]:
         """The Coulomb friction (n,) [N·m] among the unknowns."""
@@ -136,12 +144,15 @@ class Correction:
         """Momentum form of Z for samples (N, n), torque being measured: two arrays (N, n, p)."""
         dq, torque = np.atleast_2d(dq), np.atleast_2d(torque)
         n, eye = self.arm.n, np.eye(self.arm.n)
-        nothing, direction = np.zeros((len(dq), n, n)), np.tanh(dq / FRICTION_WIDTH)
+        nothing, level = np.zeros((len(dq), n, n)), np.zeros((len(dq), n, TILTS))
+        direction = np.tanh(dq / FRICTION_WIDTH)
         momentum = [nothing, nothing, nothing, dq[:, :, None] * eye]
         drift = [nothing + eye, direction[:, :, None] * eye, dq[:, :, None] * eye, nothing]
         if self.arm.motor_torque:
             momentum.append(nothing)
             drift.append((np.abs(torque - self.least_friction * direction) * direction)[:, :, None] * eye)
+        momentum.append(level)
+        drift.append(leaning_torque(self.arm, q))
         links = full_arm_regressor(self.arm, q, dq)
         return MomentumRegressor(
             np.concatenate([*momentum, links.momentum], axis=2), np.concatenate([*drift, links.drift], axis=2)

@@ -25,12 +25,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import FRICTION_WIDTH, Arm
-from armload.arms.momentum_row import MomentumRow, momentum_rows
+from armload.arms.momentum_row import MomentumRow, leaning_row, momentum_rows
 from armload.kernels import kernel
 from armload.recording import GAP, JITTERED
 from armload.regression.features import JointFeatures, features_of_sample
 from armload.regression.lag import GAIN
-from armload.regression.mismatch import Correction
+from armload.regression.mismatch import TILTS, Correction
 
 REGRESSOR_RATE = 200.0  # [Hz] rows are made no more often where a rate is set: they hold nothing above a few hertz
 SPACING = JITTERED / REGRESSOR_RATE  # [s] between rows at least
@@ -96,6 +96,7 @@ class FilteredRegression:
         self._momentum = MomentumRow(arm)
         self._torque_gain = None if mismatch is None else mismatch.gain
         self._links = np.ascontiguousarray(arm.link_parameters.ravel())
+        self._turned = np.cross(arm.horizontal, arm.gravity)  # how gravity changes with each angle
         self._waves, self._velocity_waves = np.zeros((0, arm.n)), np.zeros(0)
         if features is not None and features.size:
             self._waves, self._velocity_waves = features.waves, features.velocity_waves
@@ -141,7 +142,7 @@ class FilteredRegression:
 
     def _made(self, t: NDArray, q: NDArray, dq: NDArray, torque: NDArray, steps: NDArray, fresh: NDArray) -> tuple:
         states = (self._clock, self._joints, self._regressor, self._pose, self._velocity)
-        arm = (*self._momentum.chain, self._links, self._waves, self._velocity_waves)
+        arm = (*self._momentum.chain, self._turned, self._links, self._waves, self._velocity_waves)
         made = _make(t, q, dq, torque, steps, fresh, self._settings, *arm, *states)
         if self._torque_gain is not None:
             made[1][:, :, :10] *= self._torque_gain[:, None]
@@ -207,6 +208,7 @@ def _make(
     axes,
     turning,
     gravity,
+    turned,
     links,
     waves,
     velocity_waves,
@@ -224,7 +226,8 @@ def _make(
     for m in range(count):
         momentum, drift = momentum_rows(rotations, translations, axes, turning, gravity, q[m], dq[m])
         pose, velocity = features_of_sample(q[m], dq[m], waves, velocity_waves)
-        inputs = (momentum, drift, links, dq[m], torque[m], pose, velocity, settings[4:])
+        leaning = leaning_row(rotations, translations, axes, turning, turned, links, q[m])
+        inputs = (momentum, drift, leaning, links, dq[m], torque[m], pose, velocity, settings[4:])
         _lagged(inputs, gain, steps[m], fresh[m], joints, regressor, pose_lag, velocity_lag, X[m], r[m])
         for j in range(n):
             weights[m, j] = 1.0 / (1.0 + excess * (1.0 - np.tanh(abs(dq[m, j]) / FRICTION_WIDTH) ** 2))
@@ -242,9 +245,9 @@ def _make(
 @kernel
 def _lagged(inputs, gain, h, fresh, joints, regressor, pose_lag, velocity_lag, X, r):  # pragma: no cover - compiled
     """One row from what goes into its lags, h seconds after the last; `fresh`: the lags start here."""
-    momentum, drift, links, dq, torque, pose, velocity, least_friction = inputs
+    momentum, drift, leaning, links, dq, torque, pose, velocity, least_friction = inputs
     n, few, many, wide = dq.shape[0], velocity.shape[1], pose.shape[0], regressor.shape[2]
-    own = wide - 10 - links.shape[0]  # unknowns of the joints, where there are any
+    own = wide - 10 - TILTS - links.shape[0]  # unknowns of the joints, where there are any
     S, U, P, UP, V, UV = regressor[0], regressor[1], pose_lag[0], pose_lag[1], velocity_lag[0], velocity_lag[1]
     B, UB = joints[2], joints[3]
     x = gain * h
@@ -283,8 +286,11 @@ def _lagged(inputs, gain, h, fresh, joints, regressor, pose_lag, velocity_lag, X
                     else:
                         D = np.tanh(dq[j] / FRICTION_WIDTH)
                         D *= abs(torque[j] - least_friction[j] * D)
+            elif i < own + TILTS:
+                Y, D = 0.0, leaning[j, i - own]
             else:
-                Y, D = momentum[j, 10 + i - own], drift[j, 10 + i - own]
+                i += 10 - own - TILTS
+                Y, D = momentum[j, i], drift[j, i]
             u = D - gain * Y
             if fresh:
                 S[j, k], U[j, k] = -gain * Y, u

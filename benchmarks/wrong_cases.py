@@ -1,0 +1,214 @@
+"""Logs of a Panda of which one thing is not as `armload.identify` assumes, and sound ones: cases of wrong_logs.py."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import cache, partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from tare_drift import before
+
+from armload import Recording, arm
+from armload.arms import Arm
+from armload.devices import Simulator
+from armload.inertia import InertialParameters
+from armload.lab.episodes import Episode, draw_episodes, simulate_episodes
+from armload.motion import Motion
+from armload.payloads import draw_payload, franka_hand
+from armload.simulation import Sensors
+
+TILT = 5.0  # [°]
+RATE = 200.0  # [Hz]
+
+
+class Wrong(NamedTuple):
+    """A run, its tare, and the truth phi (10,) that `identify` promises: what was added since the tare."""
+
+    run: Recording
+    tare: Recording | None
+    truth: NDArray[np.float64]
+
+
+@cache
+def episodes(count: int, seed: int, population: str = "reference") -> tuple[Episode, ...]:
+    """Those that are made wrong."""
+    return tuple(draw_episodes(arm("panda"), population, count, 300 + seed, motions=max(6, count // 4)))
+
+
+def simulated(changed: list[Episode]) -> Iterator[Wrong]:
+    """As they stand."""
+    for logs in simulate_episodes(changed):
+        yield Wrong(logs.run, logs.tare, logs.truth.phi)
+
+
+def sound(population: str, count: int, seed: int) -> Iterator[Wrong]:
+    """Nothing is wrong."""
+    return simulated(list(episodes(count, seed, population)))
+
+
+# ---------------------------------------------------------------------- the arm and its tare
+
+
+def changed(change: str | float, count: int, seed: int) -> Iterator[Wrong]:
+    """The arm was another at its tare, as in tare_drift.py."""
+    return simulated([before(e, change, k) for k, e in enumerate(episodes(count, seed))])
+
+
+def tool_off(hand: bool, count: int, seed: int) -> Iterator[Wrong]:
+    """A tool was on at the tare and is off in the run: the truth is the payload less the tool, or less the hand."""
+    drawn = episodes(count, seed)
+    tools = [franka_hand() if hand else draw_payload("tools", 900 + seed + k, 0.6 * 3.0) for k in range(count)]
+    with_tool = simulate_episodes([replace(e, tool=tool) for e, tool in zip(drawn, tools, strict=True)])
+    for logs, off, tool in zip(simulate_episodes(drawn), with_tool, tools, strict=True):
+        yield Wrong(logs.run, off.tare, logs.truth.phi - tool.parameters.phi)
+
+
+def gain(size: float, each: bool, count: int, seed: int) -> Iterator[Wrong]:
+    """The torque's scale is off by a share: by the same of all joints, or by up to so much and a third at least."""
+    for k, log in enumerate(sound("reference", count, seed)):
+        rng = np.random.default_rng([seed, k, 7])
+        by = rng.choice([-1.0, 1.0], 7) * rng.uniform(size / 3.0, size, 7) if each else np.full(7, size)
+        run, tare = (replace(x, tau=x.tau * (1.0 + by)) for x in (log.run, log.tare) if x is not None)
+        yield Wrong(run, tare, log.truth)
+
+
+def tilted(degrees: float, tared: bool, count: int, seed: int) -> Iterator[Wrong]:
+    """The base leans, in any direction, and nobody said so: at the tare and in the run."""
+    leaning = []
+    for k, e in enumerate(episodes(count, seed)):
+        way, angle = np.random.default_rng([seed, k, 8]).uniform(0.0, 2.0 * np.pi), np.radians(degrees)
+        gravity = 9.81 * np.array([np.sin(angle) * np.cos(way), np.sin(angle) * np.sin(way), -np.cos(angle)])
+        leans = replace(e.arm, gravity=tuple(gravity.tolist()))
+        leaning.append(replace(e, arm=leans, tare_motion=e.tare_motion if tared else None))
+    return simulated(leaning)
+
+
+# ---------------------------------------------------------------------- the payload
+
+
+def taken_up(mass: float | None, count: int, seed: int) -> Iterator[Wrong]:
+    """Taken up or put down at once in the middle of the log: the truth is what is held at the end."""
+    for k, (e, log) in enumerate(zip(episodes(count, seed), sound("reference", count, seed), strict=True)):
+        rng = np.random.default_rng([seed, k, 3])
+        payload = e.payload if mass is None else draw_payload("boxes", seed + k, mass)
+        when, up = float(rng.uniform(1.5, 4.5)), rng.random() < 0.5
+        held = [(0.0, None), (when, payload)] if up else [(0.0, payload), (when, None)]
+        how = {"world": e.world, "sensors": e.sensors, "rate": RATE}
+        source = Simulator(e.arm, e.motion, held, speed=None, duration=6.0, seed=e.seed, **how)
+        run = Recording(*map(np.array, zip(*source, strict=True)))  # type: ignore[arg-type]
+        yield Wrong(run, log.tare, payload.parameters.phi if up else np.zeros(10))
+
+
+def moving(count: int, seed: int, liquid: bool) -> Iterator[Wrong]:
+    """30 % of the payload's mass hangs on a string of 5–15 cm, or is held by a spring of 1.5–4 Hz, damped by 3–20 %.
+
+    The log is that of the rigid payload, and what the moving part does differently is added: the arm's controller is
+    stiff. The first moments' truth is that of the part's mean place.
+    """
+    for k, (e, log) in enumerate(zip(episodes(count, seed), sound("reference", count, seed), strict=True)):
+        rng = np.random.default_rng([seed, k, 9])
+        frequency = rng.uniform(1.5, 4.0) if liquid else np.sqrt(9.81 / rng.uniform(0.05, 0.15)) / (2.0 * np.pi)
+        part = _Part(0.3 * log.truth[0], 2.0 * np.pi * frequency, rng.uniform(0.03, 0.2), liquid)
+        torque, shift = part.beside(e.arm, e.motion, log.truth[1:4] / log.truth[0], log.run.t)
+        truth = log.truth.copy()
+        truth[1:4] += part.mass * shift
+        yield Wrong(replace(log.run, tau=log.run.tau + torque), log.tare, truth)
+
+
+class _Part(NamedTuple):
+    """A point mass [kg] about a point of the payload: natural frequency [rad/s], damping, spring or string."""
+
+    mass: float
+    omega: float
+    damping: float
+    spring: bool
+
+    def beside(
+        self, robot: Arm, motion: Motion, centre: NDArray, t: NDArray
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The torque (N, n) beyond that of the same mass at rest at `centre`, and the mean shift (3,) in its frame.
+
+        x'' + 2·zeta·omega·x' + omega²·x = −a, x the displacement in the base's axes, a the acceleration of the rest
+        point; a spring's rest point is where it holds the part. A string pulls at `centre`, with no moment about it,
+        and x is horizontal: the arm feels the part at the string's end, wherever it hangs.
+        """
+        step = 1e-3
+        clock = np.arange(0.0, t[-1] + step, step)
+        q = motion.position(np.minimum(clock, motion.duration))
+        R, p = robot.frame_pose(q)
+        point = p + R @ centre
+        acceleration = np.gradient(np.gradient(point, step, axis=0), step, axis=0)
+        across = np.ones(3) if self.spring else np.array([1.0, 1.0, 0.0])
+        x, v, shift = np.zeros(3), np.zeros(3), np.empty_like(point)
+        for i, a in enumerate(acceleration):  # semi-implicit Euler, a thousandth of a period or less
+            v = v + step * across * (-a - 2.0 * self.damping * self.omega * v - self.omega**2 * x)
+            x = x + step * v
+            shift[i] = x
+        relative = np.gradient(np.gradient(shift, step, axis=0), step, axis=0)
+        gravity = np.array([0.0, 0.0, -9.81])
+        force = -self.mass * relative  # on the arm, beyond what a part at rest exerts
+        moment = self.spring * np.cross(shift, self.mass * (gravity - acceleration - relative))
+        motions = robot.frame_motion(q)
+        turned = [np.einsum("nji,nj->ni", R, f) for f in (force, moment)]  # in the frame's axes
+        turned[1] = turned[1] + np.cross(centre, turned[0])
+        extra = -np.einsum("nij,ni->nj", motions.jacobian, np.hstack([turned[1], turned[0]]))
+        at = np.clip(np.searchsorted(clock, t), 0, len(clock) - 1)
+        return extra[at], self.spring * np.einsum("nji,nj->ni", R, shift)[at].mean(axis=0)
+
+
+# ---------------------------------------------------------------------- another simulator
+
+
+def other_simulator(count: int, seed: int) -> Iterator[Wrong]:
+    """Sound logs of an arm that follows its motion exactly, by Pinocchio: other links, friction and pose errors.
+
+    Links differ by 2 % of mass and 2 mm of centre; friction has a Stribeck peak; the pose's torque is that of steps,
+    tanh(2·sin(q_j + a) + cos(2·q_k + b)), of 0.3 % of the effort limit, not the smooth waves of `JointFeatures`.
+    """
+    panda = arm("panda")
+    for k, e in enumerate(episodes(count, seed)):
+        rng = np.random.default_rng([seed, k, 11])
+        links = panda.link_parameters * (1.0 + 0.02 * rng.normal(size=(7, 1)))
+        links[:, 1:4] += links[:, :1] * 0.002 * rng.normal(size=(7, 3))
+        actual, effort = panda.with_links(links), panda.limits.effort
+        a, b, other = rng.uniform(0, 2 * np.pi, 7), rng.uniform(0, 2 * np.pi, 7), rng.permutation(7)
+        level, peak = 0.01 * effort * rng.uniform(0.3, 1.0, 7), rng.uniform(0.0, 0.3, 7)
+        offset, viscous = 0.003 * effort * rng.normal(size=7), 0.004 * effort * rng.uniform(0.2, 1.0, 7)
+        logs = []
+        for part, motion, seconds in ((e.payload, e.motion, 6.0), (None, e.tare_motion, e.tare_duration)):
+            t = np.arange(round(seconds * RATE)) / RATE
+            q, dq, ddq = motion(t)
+            body = actual if part is None else actual.with_payload(InertialParameters(part.parameters.phi))
+            friction = np.tanh(dq / 0.05) * level * (1.0 + peak * np.exp(-((dq / 0.1) ** 2))) + viscous * dq
+            steps = 0.004 * effort * np.tanh(2.0 * np.sin(q + a) + np.cos(2.0 * q[:, other] + b))
+            exact = Recording(t, q, dq, body.torque(q, dq, ddq) + friction + steps + offset)
+            logs.append(Sensors.panda(panda).observe(exact, int(rng.integers(1 << 30))))
+        yield Wrong(logs[0], logs[1], e.payload.parameters.phi)
+
+
+CASES: dict[str, Callable[[int, int], Iterator[Wrong]]] = {
+    "nothing": partial(sound, "reference"),
+    "nothing, everyday motions": partial(sound, "everyday"),
+    "nothing, tare elsewhere": partial(sound, "elsewhere"),
+    "nothing, other shapes": partial(sound, "shapes"),
+    "nothing, same motion": partial(sound, "same-motion"),
+    "nothing, arms beyond": partial(sound, "beyond"),
+    "nothing, no tare": partial(sound, "untared"),
+    "nothing, another simulator": other_simulator,
+    "taken up or put down": partial(taken_up, None),
+    "the same, 0.2 kg": partial(taken_up, 0.2),
+    "tare of another arm": partial(changed, "other"),
+    "tool off since the tare": partial(tool_off, False),
+    "hand off since the tare": partial(tool_off, True),
+    "old tare": partial(changed, 1.0),
+    "torque gain +3 %": partial(gain, 0.03, False),
+    "torque gain ±1–3 % by joint": partial(gain, 0.03, True),
+    "base tilted by 5°": partial(tilted, TILT, True),
+    "base tilted by 5°, no tare": partial(tilted, TILT, False),
+    "base tilted by 2°": partial(tilted, 2.0, True),
+    "30 % of the mass swings": partial(moving, liquid=False),
+    "30 % of the mass sloshes": partial(moving, liquid=True),
+}

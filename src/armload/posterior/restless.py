@@ -1,0 +1,29 @@
+"""Whether what is held moves on its own: how restless the torques are with it.
+
+The rigid model and the arm's smooth mismatch leave noise, of a size that hardly depends on what is held. A part that
+swings, sloshes or slips adds torques of one to five hertz, which no block mean of a quarter of a second shows, and the
+mean square of the residual does:
+
+    restlessness = sqrt(mean_j P_j / max(P0_j, expected_j²)),        P_j = ∫ e_j² dt / T
+
+P of the run, P0 of the tare. Motor currents cannot be asked: friction that grows with the load is restless, too.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+# times that the torques are as restless as they should be: sound simulated logs of Pandas stay below 1.9, a real one
+# below 1.7; what swings or sloshes is above in two of three logs (`benchmarks/wrong_logs.py`)
+RESTLESS = 2.0
+
+
+def restlessness(power: NDArray[np.float64], expected: NDArray[np.float64]) -> float:
+    """Root mean square over the joints of the last run's residual over that of the runs before.
+
+    Args:
+        power: (K, n) mean square of each run's residual [N²·m²], the tares' first.
+        expected: (n,) of it at least [N·m]: a tare may be of an arm that hardly moves.
+    """
+    return float(np.sqrt(np.mean(power[-1] / np.maximum(power[:-1].max(axis=0), expected**2))))

@@ -1,0 +1,68 @@
+"""Whether gravity is as it was given: the angles by which the base leans, and how surely it does.
+
+Two more unknowns of the arm (`Correction.tilt`), the same at the tare and in the run: the derivative of the bare arm's
+torque as gravity is turned about two horizontal axes. Gravity is believed at first; here it has a wide prior,
+theta ~ N(0, WIDE²), and with P the posterior covariance of theta and c by how much that is overrated,
+
+    T = thetaᵀ·(c·P + LEVEL²)⁻¹·theta
+
+is small where gravity is as given. The payload's own torque turns too; that is left out here, as whoever finds gravity
+turned answers the log once more, with gravity as it was found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.posterior.scales import Posterior
+from armload.posterior.solve import solve
+from armload.regression import GaussianPrior
+from armload.regression.information import RegressionData
+from armload.regression.noise import NoiseModel
+
+LEVEL = np.radians(0.5)  # standard deviation of a base that counts as level: bolted without a spirit level
+WIDE = np.radians(10.0)  # of one that may not: the log decides
+# T above which a base leans: beyond 1.8° of an arm whose links are known well. Sound logs of Pandas stay below 3, those
+# of arms with nominal links or motor currents below 10 (test_gravity_as_it_is_is_not_doubted)
+LEANS = 12.0
+# [rad] by which gravity still turns once it has been found turned: an answer changes by less than its error bars; and
+# how often it is turned at most (test_a_base_that_leans_is_found_and_answered_for)
+TURNED, TURNS = np.radians(0.2), 3
+_STEPS = 2  # of expectation–maximisation from the scales of the solution that is tested
+
+
+@dataclass(frozen=True, eq=False)
+class Tilt:
+    """By how much gravity is turned from what was given.
+
+    angles: (2,) about `Arm.horizontal` [rad]. statistic: T. found: whether gravity is turned beyond doubt.
+    """
+
+    angles: NDArray[np.float64]
+    statistic: float
+    found: bool
+
+
+def tilt_of_base(
+    runs: Sequence[RegressionData],
+    prior_std: NDArray[np.float64],
+    prior: GaussianPrior | None,
+    noise: NoiseModel,
+    found: Posterior,
+) -> Tilt:
+    """Test whether gravity is as it was given.
+
+    Args:
+        runs, prior_std, prior, noise: as of `solve`. found: their solution, for its scales.
+    """
+    eta = found.scales.eta.copy()
+    eta[runs[-1].correction.tilt] = WIDE**2
+    there = solve(list(runs), prior_std, prior, noise, _STEPS, replace(found.scales, eta=eta))
+    statistic = float(
+        there.tilt @ np.linalg.solve(noise.overrated * there.tilt_covariance + LEVEL**2 * np.eye(2), there.tilt)
+    )
+    return Tilt(there.tilt, statistic, statistic > LEANS)

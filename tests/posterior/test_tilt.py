@@ -1,0 +1,111 @@
+"""Gravity is not believed where the torques show another one: a base that leans is found, answered for and said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from armload import arm
+from armload.arms.momentum_row import MomentumRow, leaning_row
+from armload.identification import identify
+from armload.lab.episodes import draw_episodes, simulate_episodes
+from armload.online import OnlineIdentifier
+from armload.posterior import HybridIdentifier
+from armload.regression import Correction
+
+ANGLES = np.radians([3.0, -4.0])  # 5° together
+
+
+@pytest.fixture(scope="module")
+def panda():
+    return arm("panda")
+
+
+def logs_of(robot, actual, population="reference", count=2):
+    drawn = draw_episodes(robot, population, count, seed=81, motions=2)
+    return list(simulate_episodes([replace(e, arm=actual) for e in drawn]))
+
+
+@pytest.fixture(scope="module")
+def leaning(panda):
+    return logs_of(panda, panda.leaning(ANGLES))
+
+
+@pytest.mark.parametrize("gravity", [(0.0, 0.0, -9.81), (0.0, 9.81, 0.0), (-3.0, 2.0, -9.0)])
+def test_gravity_is_turned_about_two_axes_normal_to_it(gravity):
+    robot = arm("panda", gravity=gravity)
+    g, axes = np.array(gravity), robot.horizontal
+    np.testing.assert_allclose(axes @ g, 0.0, atol=1e-12)
+    np.testing.assert_allclose(axes @ axes.T, np.eye(2), atol=1e-12)
+    turned = np.array(robot.leaning(ANGLES).gravity)
+    assert np.linalg.norm(turned) == pytest.approx(np.linalg.norm(g))
+    assert np.degrees(np.arccos(turned @ g / (g @ g))) == pytest.approx(5.0)
+    np.testing.assert_allclose(turned - g, ANGLES @ np.cross(axes, g), atol=0.05)
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e"])
+def test_the_tilt_s_columns_are_the_derivative_of_the_arm_s_own_torque(name):
+    robot, rng = arm(name, gravity=(1.0, -3.0, -9.0)), np.random.default_rng(0)
+    q = rng.uniform(-2.0, 2.0, (5, robot.n))
+    step = 1e-5
+    by_difference = [
+        (robot.leaning(step * a).torque(q) - robot.leaning(-step * a).torque(q)) / (2 * step) for a in np.eye(2)
+    ]
+    ours = Correction(robot, robot.limits.effort)
+    drift = ours.regressor(q, np.zeros_like(q)).drift[:, :, ours.tilt]
+    np.testing.assert_allclose(drift, np.stack(by_difference, axis=2), atol=1e-6)
+    turned, links = np.cross(robot.horizontal, robot.gravity), np.ascontiguousarray(robot.link_parameters.ravel())
+    for pose, expected in zip(q, drift, strict=True):
+        row = leaning_row(*MomentumRow(robot).chain[:4], turned, links, pose)
+        np.testing.assert_allclose(row, expected, atol=1e-9)
+
+
+def test_gravity_is_believed_until_somebody_asks(panda):
+    ours = Correction(panda, panda.limits.effort)
+    assert not ours.prior_std[ours.tilt].any()
+    assert not ours.adaptive[ours.tilt].any()
+
+
+def test_a_base_that_leans_is_found_and_answered_for(panda, leaning):
+    """The answer is, but for the last of the angle, what the right gravity gives; and it is said what to pass."""
+    for log in leaning:
+        answer = identify(log.run, panda, tare=log.tare)
+        told = identify(log.run, panda.leaning(ANGLES), tare=log.tare)
+        assert answer.interval == "approximate"
+        assert told.interval == "calibrated"
+        assert answer.notes[0].startswith("the base leans by ")
+        gravity = [float(x) for x in answer.notes[0].split("--gravity=")[1].split(" ")[0].rstrip(",").split(",")]
+        np.testing.assert_allclose(gravity, panda.leaning(ANGLES).gravity, atol=9.81 * np.radians(0.6))
+        half = 0.5 * (told.phi_high - told.phi_low)
+        assert np.all(np.abs(answer.phi - told.phi)[:4] < 0.5 * half[:4])
+
+
+def test_a_base_that_leans_is_found_without_a_tare(panda):
+    (log,) = logs_of(panda, panda.leaning(ANGLES), "untared", 1)
+    answer = identify(log.run, panda)
+    assert answer.notes[0].startswith("the base leans by ")
+    told = identify(log.run, panda.leaning(ANGLES))
+    assert told.phi_low[0] < answer.mass < told.phi_high[0]
+
+
+def test_gravity_as_it_is_is_not_doubted(panda):
+    for population in ("reference", "untared"):
+        for log in logs_of(panda, panda, population):
+            identifier = HybridIdentifier(panda, log.tare)
+            identifier.run(log.run)
+            tilt = identifier.stream.tilt
+            assert not tilt.found
+            assert np.degrees(np.linalg.norm(tilt.angles)) < 1.5
+
+
+def test_a_concluded_stream_says_that_the_base_leans(panda, leaning):
+    log = leaning[0]
+    online = OnlineIdentifier(panda, log.tare)
+    for sample in log.run.between(0.0, 3.0):
+        online.update(*sample)
+    said = online.conclude()
+    online.close()
+    assert said.interval == "approximate"
+    assert any(note.startswith("the base leans by ") for note in said.notes)
