@@ -56,4 +56,4 @@ def test_sensors_behind_the_gears_see_nothing_of_it():
     n = robot.n
     assert Correction(robot, rated_effort(robot)).own == 4 * n
     motor = replace(robot, motor_torque=True)
-    assert Correction(motor, rated_effort(motor)).size == 15 * n
+    assert Correction(motor, rated_effort(motor)).own == 5 * n

@@ -172,7 +172,7 @@ class Arm:
         first = np.eye(3)[np.argmin(np.abs(up))]
         first = first - (first @ up) * up
         first /= np.linalg.norm(first)
-        return np.array([first, np.cross(up, first)])
+        return np.array([first, np.cross(up, first)], dtype=np.float64)
 
     # ------------------------------------------------------------------ other arms made from it
 
