@@ -54,7 +54,7 @@ def test_the_tilt_s_columns_are_the_derivative_of_the_arm_s_own_torque(name):
         (robot.leaning(step * a).torque(q) - robot.leaning(-step * a).torque(q)) / (2 * step) for a in np.eye(2)
     ]
     ours = Correction(robot, robot.limits.effort)
-    drift = ours.regressor(q, np.zeros_like(q)).drift[:, :, ours.tilt]
+    drift = ours.regressor(q, np.zeros_like(q), np.zeros_like(q)).drift[:, :, ours.tilt]
     np.testing.assert_allclose(drift, np.stack(by_difference, axis=2), atol=1e-6)
     turned, links = np.cross(robot.horizontal, robot.gravity), np.ascontiguousarray(robot.link_parameters.ravel())
     for pose, expected in zip(q, drift, strict=True):
