@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 # times that the torques are as restless as they should be: sound simulated logs of Pandas stay below 1.9, a real one
-# below 1.7; what swings or sloshes is above in two of three logs (`benchmarks/wrong_logs.py`)
+# below 1.7; what swings or sloshes is above in half of the logs (`benchmarks/wrong_logs.py`)
 RESTLESS = 2.0
 
 
