@@ -192,3 +192,13 @@ def test_logs_within_an_hour_are_of_one_session(life):
 def test_a_profile_needs_a_log(panda):
     with pytest.raises(ArmloadError, match="at least one log"):
         learn_profile(panda, [])
+
+
+def test_a_base_that_leans_since_the_profile_is_said(panda, life, profile):
+    leaning = panda.leaning(np.radians([6.0, 0.0]))
+    load = InertialParameters(life[0].payload.parameters.phi)
+    runs = [Run(life[0].motion, load, life[2], seed=3)]
+    log = simulate_many(leaning, runs, rate=200.0, duration=4.0, workers=1, resolution=COARSE)[0]
+    answer = identify(log, panda, profile=profile)
+    assert answer.interval == "approximate"
+    assert any("leans by" in note and "answer anew" in note for note in answer.notes)

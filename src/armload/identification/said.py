@@ -99,7 +99,11 @@ def answered(
 
 def _doubts(found: Found, arm: Arm, mass_determined: bool, relative_to: str) -> list[str]:
     """What keeps an answer from being believed, a sentence each."""
-    leans = None if found.gravity is None else gravity_turned(arm.gravity, found.gravity, True)
+    leans = None
+    if found.gravity is not None:
+        leans = gravity_turned(arm.gravity, found.gravity, True)
+    elif found.tilt is not None and found.tilt.found:
+        leans = gravity_turned(arm.gravity, arm.leaning(found.tilt.angles).gravity, False)
     return [doubt for doubt in (leans, _doubt(found, mass_determined, relative_to)) if doubt is not None]
 
 

@@ -110,6 +110,7 @@ class RegressionData:
 
     def less(self, phi: NDArray[np.float64]) -> None:
         """Take the torque of a known body (10,) off all rows so far."""
+        self.c -= (2.0 * self.b[:, :10] - self.A[:, :10, :10] @ phi) @ phi
         self.b -= self.A[:, :, :10] @ phi
         self.blocks.sums[:, :, -1] -= self.blocks.sums[:, :, :10] @ phi
 
@@ -121,7 +122,7 @@ class RegressionData:
         rows = np.concatenate([shared, len(shared) + keep])
         by = np.concatenate([np.ones(len(shared)), scale])
         out.A = self.A[:, rows[:, None], rows] * np.outer(by, by)
-        out.b = self.b[:, rows] * by
+        out.b, out.c = self.b[:, rows] * by, self.c
         out.blocks = self.blocks.mapped(lambda sums: sums[..., np.append(rows, -1)] * np.append(by, 1.0))
         return out
 
