@@ -201,4 +201,4 @@ def test_a_base_that_leans_since_the_profile_is_said(panda, life, profile):
     log = simulate_many(leaning, runs, rate=200.0, duration=4.0, workers=1, resolution=COARSE)[0]
     answer = identify(log, panda, profile=profile)
     assert answer.interval == "approximate"
-    assert any("leans by" in note and "answer anew" in note for note in answer.notes)
+    assert any("not as its profile says" in note or "leans by" in note for note in answer.notes)
