@@ -87,6 +87,7 @@ class Identification:
         changes. All else is of the last.
     log, date: name of the log's file, and when it was answered (ISO 8601, UTC).
     why: what is special about the method, in a few words; not in the JSON.
+    kappa: by how much the physics overrates this log's evidence, of a method that knows; not in the JSON.
     """
 
     method: str
@@ -116,6 +117,7 @@ class Identification:
     log: str = ""
     date: str = ""
     why: str = field(default="", metadata={"json": False})
+    kappa: float | None = field(default=None, metadata={"json": False})
 
     def __post_init__(self) -> None:
         for name, shape in _ARRAYS.items():

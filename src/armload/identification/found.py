@@ -16,7 +16,7 @@ from armload.identification.choice import Choice, choose
 from armload.identification.intervals import Before
 from armload.identification.thresholds import LARGEST_OFFSETS, MISFIT, MOVES
 from armload.inertia import distance_to_body, is_consistent
-from armload.posterior import KnownMass, PosteriorLeastSquares, Profile
+from armload.posterior import HybridIdentifier, KnownMass, PosteriorLeastSquares, Profile
 from armload.posterior.drift import Drift
 from armload.posterior.tilt import TURNED, TURNS, Tilt
 from armload.recording import Recording
@@ -52,6 +52,7 @@ class Found(NamedTuple):
         this was found, where it is not what was given.
     restlessness: how restless the torques are, of what they were at the tare (`posterior.restless`).
     exchanged: whether the estimate is rather the difference of two bodies, one put on for another.
+    kappa: by how much the physics overrates the log's evidence, of a method that knows.
     mass: that was given. mass_alone: what the log alone says of it, and its standard deviation [kg].
     """
 
@@ -73,6 +74,7 @@ class Found(NamedTuple):
     exchanged: bool = False
     mass: KnownMass | None = None
     mass_alone: tuple[float, float] | None = None
+    kappa: float | None = None
 
     @property
     def explained(self) -> bool:
@@ -149,6 +151,7 @@ def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Foun
         tilt=None if posterior is None else posterior.stream.tilt,
         restlessness=0.0 if posterior is None else posterior.stream.restlessness,
         exchanged=posterior is not None and posterior.exchanged,
+        kappa=identifier.kappa if isinstance(identifier, HybridIdentifier) else None,
         mass=asked.mass,
         mass_alone=None if posterior is None else posterior.mass_alone,
     )

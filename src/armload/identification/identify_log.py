@@ -15,12 +15,12 @@ from armload.errors import IdentificationError
 from armload.identification.answer import Identification, Segment
 from armload.identification.choice import choose
 from armload.identification.found import Asked, found_in
-from armload.identification.notes import changed_within, of_both
+from armload.identification.notes import MAY_CHANGE, changed_within, of_both
 from armload.identification.plausibility import check_plausible
 from armload.identification.said import answered
 from armload.identification.segments import changes_of_payload
 from armload.identification.tare_age import drift_since
-from armload.identification.thresholds import DECISIVE, HEAVIEST, LOWEST_RATE, SETTLED
+from armload.identification.thresholds import DECISIVE, HEAVIEST, LOWEST_RATE, PAYLOAD_MAY_CHANGE, SETTLED
 from armload.inertia import HELD, Z95, InertialParameters
 from armload.payloads import INERTIA_ASSUMED, Payload, read_payload
 from armload.posterior import KnownMass, Profile, load_profile
@@ -79,15 +79,17 @@ def identify(
         _check_same_mounted(tare, arm, known, asked)
     mounted = read_payload(tool) if isinstance(tool, str | Path) else tool
     say("identifying")
-    times = changes_of_payload(recording, arm)
-    edges = [recording.t[0], *times, recording.t[-1]]
-    parts = [recording]
+    whole = _of_one_payload(recording, arm, tare, mounted, asked, notes)
+    times, statistic = changes_of_payload(recording, arm, tare, known, whole.kappa)
+    edges, answers = [recording.t[0], *times, recording.t[-1]], [whole]
     if times:
         parts = [recording.between(a + SETTLED * (k > 0), b) for k, (a, b) in enumerate(pairwise(edges))]
         notes = (*notes, changed_within([t - recording.t[0] for t in times], len(parts)))
-    others = replace(asked, mass=None)  # what was weighed is what is held at the end
-    answers = [_of_one_payload(part, arm, tare, mounted, others, notes) for part in parts[:-1]]
-    answers.append(_of_one_payload(parts[-1], arm, tare, mounted, asked, notes))
+        others = replace(asked, mass=None)  # what was weighed is what is held at the end
+        answers = [_of_one_payload(part, arm, tare, mounted, others, notes) for part in parts[:-1]]
+        answers.append(_of_one_payload(parts[-1], arm, tare, mounted, asked, notes))
+    elif statistic > PAYLOAD_MAY_CHANGE:
+        answers = [replace(whole, interval="approximate", notes=(MAY_CHANGE, *whole.notes))]
     segments = tuple(
         Segment(float(a - recording.t[0]), float(b - recording.t[0]), answer)
         for (a, b), answer in zip(pairwise(edges), answers, strict=True)

@@ -27,6 +27,12 @@ def of_both(recording: Recording, tare: Recording) -> tuple[str, ...]:
     return tuple(notes)
 
 
+MAY_CHANGE = (
+    "the payload may change within the log, by a little: its first and its last part do not quite agree; the answer "
+    "takes it for the same throughout: record it once more if nothing was taken up or put down"
+)
+
+
 def lacking(
     arm: Arm,
     tared: bool,

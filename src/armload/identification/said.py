@@ -94,6 +94,7 @@ def answered(
         log=Path(recording.source).name,
         date=datetime.now(UTC).isoformat(timespec="seconds"),
         why=found.why,
+        kappa=found.kappa,
     )
 
 

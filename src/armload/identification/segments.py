@@ -3,26 +3,40 @@
 The log is cut in two at several places. With the part before a cut as the tare of the part after it
 (`posterior.solve`), phi is what was added at the cut, and
 
-    T = phi_MLᵀ·Λ·phi_ML / overrated
+    T = phi_MLᵀ·Λ·phi_ML / kappa
 
-is small where nothing was: Λ, phi_ML what the two parts say of it, all that is unknown about the arm integrated out.
-The cut with the largest T is sought more finely, and both parts are cut again.
+is chi-squared of ten where nothing was: Λ, phi_ML what the two parts say of it, all that is unknown about the arm
+integrated out, kappa by how much the physics overrates such a log (`posterior.Calibration`). The cut with the largest T
+is sought more finely, and both parts are cut again. A tare or a profile says what the arm does by itself, so that a
+lighter change shows; what was mounted then is taken off, and a day's drift allowed for.
 """
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from armload.arms import Arm
-from armload.identification.thresholds import CUT, CUTS_LEAST, CUTS_MOST, PART_LEAST, PAYLOAD_CHANGED, SETTLED
-from armload.posterior import SmoothPosteriorLeastSquares
+from armload.identification.thresholds import (
+    CUT,
+    CUTS_LEAST,
+    CUTS_MOST,
+    KAPPA_UNKNOWN,
+    PART_LEAST,
+    PAYLOAD_CHANGED,
+    SETTLED,
+)
+from armload.posterior import Profile, SmoothPosteriorLeastSquares
+from armload.posterior.drift import TESTED
+from armload.posterior.scales import Scales
 from armload.posterior.solve import solve
 from armload.recording import Recording
-from armload.regression import solution_prior_std
-from armload.regression.information import RegressionData
+from armload.regression import payload_prior_std, solution_prior_std
+from armload.regression.information import RegressionData, Session
 from armload.regression.lag import GAIN
 from armload.regression.noise import SMOOTH
 from armload.regression.rows import Rows
@@ -31,50 +45,75 @@ _ITERATIONS = 3  # of expectation–maximisation: the scales change little after
 _FINER = 4  # cuts on either side of the best one, twice
 
 
-def changes_of_payload(recording: Recording, arm: Arm) -> list[float]:
-    """Times [s, on the log's clock] at which the payload changes; none: it is the same throughout."""
-    found = _Search.of(recording, arm).all()
-    if found and not arm.motor_torque:  # friction of gears that nobody knew of looks like a change
+class Changes(NamedTuple):
+    """times: [s, on the log's clock] at which the payload changes. statistic: the largest T of the whole log."""
+
+    times: list[float]
+    statistic: float
+
+
+def changes_of_payload(
+    recording: Recording,
+    arm: Arm,
+    tare: Recording | None = None,
+    profile: Profile | None = None,
+    kappa: float | None = None,
+) -> Changes:
+    """Where the payload changes within a log; no time: it is the same throughout.
+
+    Args:
+        tare, profile: what else is known of the arm, where there is one.
+        kappa: by how much the physics overrates the evidence of this log; None: nobody knows.
+    """
+    kappa = KAPPA_UNKNOWN if kappa is None else kappa
+    found = _Search.of(recording, arm, tare, profile, kappa).all()
+    if found.times and not arm.motor_torque:  # friction of gears that nobody knew of looks like a change
         physics = SmoothPosteriorLeastSquares(arm)
         physics.run(recording)
         if physics.posterior.torque == "motor":
-            found = _Search.of(recording, replace(arm, motor_torque=True)).all()
+            found = _Search.of(recording, replace(arm, motor_torque=True), tare, profile, kappa).all()
     return found
 
 
 class _Search:
     """The rows of a log, and the cuts in them."""
 
-    def __init__(self, physics: SmoothPosteriorLeastSquares, rows: Rows) -> None:
-        self.physics, self.rows = physics, rows
+    def __init__(self, physics: SmoothPosteriorLeastSquares, rows: Rows, kappa: float) -> None:
+        self.physics, self.rows, self.kappa = physics, rows, kappa
         self.weak = solution_prior_std(physics.arm)
+        self.known = [_without_payload(tare, physics.arm, physics.start) for tare in physics.stream.tares]
+        self.session = Session(1, TESTED) if physics.profile is None and self.known else physics.session
 
     @classmethod
-    def of(cls, recording: Recording, arm: Arm) -> _Search:
-        physics = SmoothPosteriorLeastSquares(arm)
-        return cls(physics, physics.stream.rows_of(recording.t, recording.q, recording.dq, recording.tau))
+    def of(
+        cls, recording: Recording, arm: Arm, tare: Recording | None, profile: Profile | None, kappa: float
+    ) -> _Search:
+        physics = SmoothPosteriorLeastSquares(arm, tare, profile=profile)
+        rows = physics.stream.rows_of(recording.t, recording.q, recording.dq, recording.tau)
+        return cls(physics, rows, kappa)
 
-    def all(self) -> list[float]:
+    def all(self) -> Changes:
         """Changes of the whole log."""
         return self.within(0, len(self.rows.t))
 
-    def within(self, start: int, stop: int) -> list[float]:
+    def within(self, start: int, stop: int) -> Changes:
         """Changes between two rows."""
         t = self.rows.t
         if stop - start < 3 or t[stop - 1] - t[start] < 2.0 * PART_LEAST:
-            return []
+            return Changes([], 0.0)
         first, last = np.searchsorted(t, [t[start] + PART_LEAST, t[stop - 1] - PART_LEAST])
         count = int(np.clip((t[last - 1] - t[first]) / CUT, CUTS_LEAST, CUTS_MOST))
         best, most = self._best(start, stop, np.unique(np.linspace(first, last - 1, count).astype(int)))
         if most <= PAYLOAD_CHANGED:
-            return []
+            return Changes([], most)
         spacing = max((last - first) // max(count - 1, 1), 1)
         for _ in range(2):
             spacing = max(spacing // _FINER, 1)
             near = best + spacing * np.arange(-_FINER, _FINER + 1)
             best, _ = self._best(start, stop, np.unique(np.clip(near, first, last - 1)))
         after = int(np.searchsorted(t, t[best] + SETTLED))  # the rows' lag still holds what was there before
-        return [*self.within(start, best), float(t[best]) - 1.0 / GAIN, *self.within(after, stop)]
+        earlier, later = self.within(start, best).times, self.within(after, stop).times
+        return Changes([*earlier, float(t[best]) - 1.0 / GAIN, *later], most)
 
     def _best(self, start: int, stop: int, cuts: np.ndarray) -> tuple[int, float]:
         """The cut with the largest T, and T."""
@@ -91,6 +130,19 @@ class _Search:
 
     def _statistic(self, before: list[RegressionData], after: list[RegressionData]) -> float:
         parts = [RegressionData.joined(before), RegressionData.joined(after)]
-        said = solve(parts, self.weak, None, SMOOTH, _ITERATIONS)
+        for part in parts:
+            part.session = self.session
+        said = solve([*self.known, *parts], self.weak, None, SMOOTH, _ITERATIONS, self.physics.start)
         wide = np.diag(self.weak**-2.0)  # directions that neither part tells
-        return float(said.vector @ np.linalg.solve(said.information + wide, said.vector)) / SMOOTH.overrated
+        return float(said.vector @ np.linalg.solve(said.information + wide, said.vector)) / self.kappa
+
+
+def _without_payload(data: RegressionData, arm: Arm, start: Scales | None) -> RegressionData:
+    """What a tare or a profile says of the arm, less what it seems to carry, which is then known to be nothing."""
+    found = solve([data], payload_prior_std(arm), None, SMOOTH, 1, start)
+    out = copy(data)
+    out.A, out.b, out.c, out.blocks = data.A.copy(), data.b.copy(), data.c.copy(), data.blocks.mapped(np.copy)
+    out.less(found.phi)
+    out.A[:, :10], out.A[:, :, :10], out.b[:, :10] = 0.0, 0.0, 0.0
+    out.blocks.sums[:, :, :10] = 0.0
+    return out

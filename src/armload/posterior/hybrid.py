@@ -95,6 +95,11 @@ class HybridIdentifier(PosteriorLeastSquares):
         return self._weak if self._trusted is None else std_under_weak_prior(self._trusted.information, self._weak)
 
     @property
+    def kappa(self) -> float | None:
+        """By how much the physics overrates the evidence of the last answer; None before the first sample."""
+        return None if self._trusted is None else self.model.calibration.kappa(self._trusted.traits)
+
+    @property
     def unprojected(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
         """What the log says without the learned prior, as far as it can be trusted; None before the first sample."""
         return None if self._trusted is None else without_learned_prior(self._trusted, solution_prior_std(self.arm))

@@ -191,6 +191,11 @@ class PosteriorLeastSquares(Identifier):
     # ------------------------------------------------------------------ what the answer rests on
 
     @property
+    def start(self) -> Scales | None:
+        """The scales that the tare or the profile begin a solution with."""
+        return self._start
+
+    @property
     def stream(self) -> StreamingPosterior:
         """The posterior of the run."""
         if self._stream is None:
