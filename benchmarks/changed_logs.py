@@ -5,8 +5,8 @@
 sound     logs of the benchmark's populations, with their tares, of which nothing changes: share in which a change is
           found, and share called approximate as one may be there
 changes   a payload of 0.1, 0.2, 0.5 and 1.5 kg taken up or put down somewhere in the middle of 6 s, at once: share
-          found, share that is found or doubted, and how far off the time is [s, median]; two changes: taken up after 2 s
-          and put down after 4 s. With a tare of 20 s near the log's poses, and without
+          found, share that is found or doubted, and how far off the time is [s, median]; two changes: taken up after
+          2 s and put down after 4 s. With a tare of 20 s near the log's poses, and without
 
 Pandas that differ from their model as real ones do, and UR10e where it is said. Written to
 benchmarks/results/changed_logs.json and a table of docs/hybrid.md.

@@ -16,20 +16,24 @@ from armload.arms import Arm
 from armload.devices import Simulator
 from armload.inertia import InertialParameters
 from armload.lab.episodes import Episode, draw_episodes, simulate_episodes
+from armload.lab.episodes.motion_kinds import MotionSource
 from armload.motion import Motion
 from armload.payloads import draw_payload, franka_hand
-from armload.simulation import Sensors
+from armload.posterior import Profile, learn_profile, with_known_weight
+from armload.simulation import Run, Sensors, simulate_many
+from armload.simulation.resolution import COARSE
 
 TILT = 5.0  # [°]
 RATE = 200.0  # [Hz]
 
 
 class Wrong(NamedTuple):
-    """A run, its tare, and the truth phi (10,) that `identify` promises: what was added since the tare."""
+    """A run, its tare or a profile, and the truth phi (10,) that `identify` promises: what was added since."""
 
     run: Recording
     tare: Recording | None
     truth: NDArray[np.float64]
+    profile: Profile | None = None
 
 
 @cache
@@ -73,6 +77,22 @@ def gain(size: float, each: bool, count: int, seed: int) -> Iterator[Wrong]:
         by = rng.choice([-1.0, 1.0], 7) * rng.uniform(size / 3.0, size, 7) if each else np.full(7, size)
         run, tare = (replace(x, tau=x.tau * (1.0 + by)) for x in (log.run, log.tare) if x is not None)
         yield Wrong(run, tare, log.truth)
+
+
+def weighed(size: float, each: bool, count: int, seed: int) -> Iterator[Wrong]:
+    """The same, but the arm has a profile of four empty logs of one session, and 2.000 kg were hung on for 20 s."""
+    panda, source = arm("panda"), MotionSource(arm("panda"), 0.0)
+    weight = InertialParameters.from_com(2.0, (0.0, 0.0, 0.08), np.diag([4e-3, 4e-3, 2e-3]))
+    for k, (e, log) in enumerate(zip(episodes(count, seed), gain(size, each, count, seed), strict=True)):
+        rng, around = np.random.default_rng([seed, k, 7]), source.centre(e.motion)
+        by = rng.choice([-1.0, 1.0], 7) * rng.uniform(size / 3.0, size, 7) if each else np.full(7, size)
+        motions = [source.draw("long", rng, 20.0, f"{k}-{i}", around, 0.3) for i in range(5)]
+        runs = [Run(motion, None, e.world, e.sensors, e.seed + i, e.gains) for i, motion in enumerate(motions)]
+        runs[-1] = replace(runs[-1], payload=weight)
+        logs = simulate_many(panda, runs, rate=RATE, duration=20.0, workers=1, resolution=COARSE)
+        *empty, loaded = (replace(x, tau=x.tau * (1.0 + by)) for x in logs)
+        known = learn_profile(panda, empty, sessions=[0] * len(empty))
+        yield Wrong(log.run, None, log.truth, with_known_weight(known, panda, loaded, 2.0, 0.002))
 
 
 def tilted(degrees: float, tared: bool, count: int, seed: int) -> Iterator[Wrong]:
@@ -206,6 +226,8 @@ CASES: dict[str, Callable[[int, int], Iterator[Wrong]]] = {
     "old tare": partial(changed, 1.0),
     "torque gain +3 %": partial(gain, 0.03, False),
     "torque gain ±1–3 % by joint": partial(gain, 0.03, True),
+    "torque gain +3 %, known weight": partial(weighed, 0.03, False),
+    "torque gain ±1–3 %, known weight": partial(weighed, 0.03, True),
     "base tilted by 5°": partial(tilted, TILT, True),
     "base tilted by 5°, no tare": partial(tilted, TILT, False),
     "base tilted by 2°": partial(tilted, 2.0, True),

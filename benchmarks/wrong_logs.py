@@ -37,7 +37,7 @@ def answered(logs: Iterable[Wrong]) -> dict[str, Any]:
     error, half, inside, calibrated, silent, notes = [], [], [], [], [], {}
     panda = arm("panda")
     for log in logs:
-        answer = identify(log.run, panda, tare=log.tare)
+        answer = identify(log.run, panda, tare=log.tare, profile=log.profile)
         error.append(np.abs(answer.phi - log.truth))
         half.append(0.5 * (answer.phi_high - answer.phi_low))
         inside.append((log.truth >= answer.phi_low) & (log.truth <= answer.phi_high))

@@ -41,6 +41,7 @@ KEYS = [
     "inertia_com_high",
     "covariance",
     "rests_on_prior",
+    "torque_gain_std",
     "notes",
     "log",
     "date",

@@ -82,6 +82,8 @@ class Identification:
         wide as they are where they are not.
     rests_on_prior: for each parameter (10,), whether its interval comes from what was known before more than from the
         log; always so of what is not determined.
+    torque_gain_std: relative standard deviation of the torque's scale that the intervals allow for: assumed for the
+        kind of sensor, or as a known weight showed it (`armload profile --mass`); None: the method knows nothing of it.
     notes: what else the user should know, a sentence each.
     segments: the log's parts, throughout each of which the payload is the same, with their answers; one where it never
         changes. All else is of the last.
@@ -112,6 +114,7 @@ class Identification:
     inertia_com_high: NDArray[np.float64]
     covariance: NDArray[np.float64]
     rests_on_prior: NDArray[np.bool_]
+    torque_gain_std: float | None = None
     notes: tuple[str, ...] = ()
     segments: tuple[Segment, ...] = field(default=(), metadata={"json": False})
     log: str = ""

@@ -53,6 +53,7 @@ class Found(NamedTuple):
     restlessness: how restless the torques are, of what they were at the tare (`posterior.restless`).
     exchanged: whether the estimate is rather the difference of two bodies, one put on for another.
     kappa: by how much the physics overrates the log's evidence, of a method that knows.
+    gain_std: relative standard deviation of the torque's scale, of a method that allows for one.
     mass: that was given. mass_alone: what the log alone says of it, and its standard deviation [kg].
     """
 
@@ -75,6 +76,7 @@ class Found(NamedTuple):
     mass: KnownMass | None = None
     mass_alone: tuple[float, float] | None = None
     kappa: float | None = None
+    gain_std: float | None = None
 
     @property
     def explained(self) -> bool:
@@ -152,6 +154,7 @@ def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Foun
         restlessness=0.0 if posterior is None else posterior.stream.restlessness,
         exchanged=posterior is not None and posterior.exchanged,
         kappa=identifier.kappa if isinstance(identifier, HybridIdentifier) else None,
+        gain_std=None if posterior is None else posterior.posterior.gain_std,
         mass=asked.mass,
         mass_alone=None if posterior is None else posterior.mass_alone,
     )

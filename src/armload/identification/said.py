@@ -90,6 +90,7 @@ def answered(
         held=is_held,
         **found_of._asdict(),
         rests_on_prior=~determined | leaning,
+        torque_gain_std=found.gain_std,
         notes=tuple(said),
         log=Path(recording.source).name,
         date=datetime.now(UTC).isoformat(timespec="seconds"),

@@ -124,9 +124,11 @@ def html(result: Identification) -> str:
 def rests_on(result: Identification) -> str:
     """What ± means, the method, and how much of a log it saw."""
     why = f" ({result.why})" if result.why else ""
+    scale = result.torque_gain_std
+    known = "" if scale is None else f" for a torque scale known to {100 * scale:.1g} %"
     return (
-        f"± is half of the 95 % interval, {result.interval}; method {result.method}{why}, {result.n_samples} samples, "
-        f"{result.duration:.2f} s"
+        f"± is half of the 95 % interval, {result.interval}{known}; method {result.method}{why}, "
+        f"{result.n_samples} samples, {result.duration:.2f} s"
     )
 
 
