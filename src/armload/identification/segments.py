@@ -111,8 +111,9 @@ class _Search:
             spacing = max(spacing // _FINER, 1)
             near = best + spacing * np.arange(-_FINER, _FINER + 1)
             best, _ = self._best(start, stop, np.unique(np.clip(near, first, last - 1)))
-        after = int(np.searchsorted(t, t[best] + SETTLED))  # the rows' lag still holds what was there before
-        earlier, later = self.within(start, best).times, self.within(after, stop).times
+        # the rows' lag still holds what was there before, and the cut is off by some rows
+        until, after = (int(np.searchsorted(t, t[best] + aside)) for aside in (-SETTLED, SETTLED))
+        earlier, later = self.within(start, until).times, self.within(after, stop).times
         return Changes([*earlier, float(t[best]) - 1.0 / GAIN, *later], most)
 
     def _best(self, start: int, stop: int, cuts: np.ndarray) -> tuple[int, float]:
