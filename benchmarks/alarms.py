@@ -2,7 +2,7 @@
 
     python benchmarks/alarms.py [--arms 7] [--streams 5] [--seed 3]
 
-Each Panda has a profile of six empty days (drift as in `life.py`). Then come streams of a minute at 50 Hz, every one on
+Each Panda has a profile of six empty days (drift as in `life.py`). Then come streams of a minute at 25 Hz, every one on
 another motion and another day, all offered to the profile as `armload live --learn` does:
 
 empty          nothing is held: share called another arm (false alarms), share learned
@@ -40,7 +40,7 @@ from armload.simulation.resolution import COARSE
 
 MASSES = {"empty": 0.0, "30 g": 0.03, "60 g": 0.06, "120 g": 0.12, "1 kg": 1.0, "hand-over": 1.0}
 CASES = (*MASSES, "push", "repaired", "other arm")
-SECONDS, RATE = 60.0, 50.0
+SECONDS, RATE = 60.0, 25.0
 DAYS = 6
 
 

@@ -57,7 +57,7 @@ def phi_interval(
         otherwise: how far off the truth may be beyond the error bars.
     """
     half, half_before = Z95 * std, Z95 * before.std
-    reach = np.minimum(half, half_before) if before.used else half
+    reach = np.minimum(half, half_before)  # wider than what was known before is of no use to anyone
     low = np.where(determined, around - half, np.minimum(before.mean - half_before, around - reach))
     high = np.where(determined, around + half, np.maximum(before.mean + half_before, around + reach))
     if otherwise is not None:
