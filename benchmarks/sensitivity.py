@@ -60,7 +60,7 @@ SEED = 70_000
 GROUPS = {  # home → constants, None: all; what they are tried on
     "online.thresholds": (r"(?s)# -+ the detector.*(?=# -+ notes)", ("streams",)),
     "identification.thresholds": (r"(?s).*", ("logs",)),
-    "posterior.problem": (r"(?m)(^#.*\n)*^(_MOTOR_SIDE|_GAIN_STD) = .*\n", ("streams", "logs")),
+    "posterior.problem": (r"(?m)(^#.*\n)*^(_MOTOR_SIDE|GAIN_STD) = .*\n", ("streams", "logs")),
     "posterior.hybrid": (r"(?m)(^#.*\n)*^_REMOVED = .*\n", ("streams", "logs")),
     "regression.mismatch": (r"(?m)(^#.*\n)*^DAILY = .*\n", ("tares",)),
     "posterior.drift": (r"(?m)(^#.*\n)*^(TESTED|ALLOWED|CHANGED) = .*\n", ("tares",)),

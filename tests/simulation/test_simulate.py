@@ -228,7 +228,7 @@ def test_with_the_friction_of_a_motors_side_the_controller_misreads_its_torque_b
     command = Command.along(ur, motion, clock.step, clock.steps)
     prepared = runs.prepare(world.arm(ur), gains, Run(motion, PAYLOAD, world), world, command, clock)
     left = rms(rollout.iteration_error([prepared], clock, 1)[0])
-    assert np.all(left < 0.05 * ur.limits.effort)
+    assert np.all(left < 0.06 * ur.limits.effort)
 
 
 def test_friction_disturbs_the_motion(panda):

@@ -90,6 +90,7 @@ class Identification:
     log, date: name of the log's file, and when it was answered (ISO 8601, UTC).
     why: what is special about the method, in a few words; not in the JSON.
     kappa: by how much the physics overrates this log's evidence, of a method that knows; not in the JSON.
+    moves: whether no rigid body explains the torques; not in the JSON.
     """
 
     method: str
@@ -121,6 +122,7 @@ class Identification:
     date: str = ""
     why: str = field(default="", metadata={"json": False})
     kappa: float | None = field(default=None, metadata={"json": False})
+    moves: bool = field(default=False, metadata={"json": False})
 
     def __post_init__(self) -> None:
         for name, shape in _ARRAYS.items():

@@ -88,6 +88,8 @@ def identify(
         others = replace(asked, mass=None)  # what was weighed is what is held at the end
         answers = [_of_one_payload(part, arm, tare, mounted, others, notes) for part in parts[:-1]]
         answers.append(_of_one_payload(parts[-1], arm, tare, mounted, asked, notes))
+        if whole.moves and 2 * sum(answer.moves for answer in answers) > len(answers):
+            edges, answers = [edges[0], edges[-1]], [whole]  # there is no rigid body in the parts either: it swings
     elif statistic > PAYLOAD_MAY_CHANGE:
         answers = [replace(whole, interval="approximate", notes=(MAY_CHANGE, *whole.notes))]
     segments = tuple(
@@ -121,7 +123,7 @@ def _of_one_payload(
         return answered(found_in(recording, arm, None, asked), arm, recording, False, "tool", notes, unsure=unsure)
     carried, sure = _carries(arm, known, tare, asked.profile)
     before = "at the tare" if tare is not None else "in the profile's logs"
-    since = "since the tare" if tare is not None else "since the profile"
+    since = "after the tare" if tare is not None else "after the profile's logs"
     if carried:
         if asked.profile is None:
             arm = arm.with_payload(known)  # a profile holds what was mounted already

@@ -96,6 +96,7 @@ def answered(
         date=datetime.now(UTC).isoformat(timespec="seconds"),
         why=found.why,
         kappa=found.kappa,
+        moves=found.restlessness > RESTLESS or not found.explained,
     )
 
 

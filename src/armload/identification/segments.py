@@ -26,6 +26,7 @@ from armload.identification.thresholds import (
     CUTS_LEAST,
     CUTS_MOST,
     KAPPA_UNKNOWN,
+    MOTOR_SIDE,
     PART_LEAST,
     PAYLOAD_CHANGED,
     SETTLED,
@@ -65,7 +66,7 @@ def changes_of_payload(
         tare, profile: what else is known of the arm, where there is one.
         kappa: by how much the physics overrates the evidence of this log; None: nobody knows.
     """
-    kappa = KAPPA_UNKNOWN if kappa is None else kappa
+    kappa = KAPPA_UNKNOWN if kappa is None else kappa * (MOTOR_SIDE if arm.motor_torque else 1.0)
     found = _Search.of(recording, arm, tare, profile, kappa).all()
     if found.times and not arm.motor_torque:  # friction of gears that nobody knew of looks like a change
         physics = SmoothPosteriorLeastSquares(arm)

@@ -217,7 +217,8 @@ def _on_use(load: Load, to: str) -> list[str]:
     if to in ("ur", "ur-payload") and load.relative_to == "tool":
         notes.append("a UR's payload is everything on the flange: add the tool with --plus")
     if to in ("ur", "ur-payload") and load.relative_to in ("tare", "profile", "before"):
-        notes.append("a UR's payload is everything on the flange: add what was mounted before, if any, with --plus")
+        then = "in the profile's logs" if load.relative_to == "profile" else "at the tare"
+        notes.append(f"a UR's payload is everything on the flange: add what was mounted {then}, if any, with --plus")
     if to in CONTROLLERS and load.frame is None:
         notes.append("the payload names no frame: it is taken to be about the flange")
     return notes
