@@ -1,8 +1,8 @@
 """Can a profile be poisoned, and does it notice an arm that is another? Hours of streams that teach it.
 
-    python benchmarks/alarms.py [--arms 7] [--streams 5] [--seed 3]
+    python benchmarks/alarms.py [--arms 4] [--streams 3] [--seed 3]
 
-Each Panda has a profile of six empty days (drift as in `life.py`). Then come streams of a minute at 25 Hz, every one on
+Each Panda has a profile of six empty days (drift as in `life.py`). Then come streams of three minutes at 25 Hz, every one on
 another motion and another day, all offered to the profile as `armload live --learn` does:
 
 empty          nothing is held: share called another arm (false alarms), share learned
@@ -40,7 +40,7 @@ from armload.simulation.resolution import COARSE
 
 MASSES = {"empty": 0.0, "30 g": 0.03, "60 g": 0.06, "120 g": 0.12, "1 kg": 1.0, "hand-over": 1.0}
 CASES = (*MASSES, "push", "repaired", "other arm")
-SECONDS, RATE = 60.0, 25.0
+SECONDS, RATE = 180.0, 25.0
 DAYS = 6
 
 
@@ -52,7 +52,7 @@ def known(e: Episode, k: int) -> Profile:
 
 
 def stream_of(e: Episode, case: str, k: int, i: int) -> Recording:
-    """A minute of one case."""
+    """A stream of one case."""
     rng = np.random.default_rng([k, i, 17])
     source = MotionSource(e.arm, 0.0)
     motion = source.draw("long", rng, SECONDS, f"stream-{k}-{i}", source.centre(e.motion), 0.5)
@@ -76,7 +76,7 @@ def stream_of(e: Episode, case: str, k: int, i: int) -> Recording:
             log, **{x: np.where(late[:, None], getattr(log, x), getattr(logs[1], x)) for x in ("q", "dq", "tau")}
         )
     if case == "push":
-        begin = log.t[0] + rng.uniform(15.0, 40.0)
+        begin = log.t[0] + rng.uniform(15.0, 160.0)
         pushed = (log.t >= begin) & (log.t < begin + 10.0)
         direction = rng.normal(size=3)
         force = rng.uniform(5.0, 20.0) * direction / np.linalg.norm(direction)
@@ -109,7 +109,7 @@ def followed(e: Episode, profile: Profile, log: Recording) -> tuple[Profile | No
 
 
 def main() -> None:
-    asked = options(__doc__, arms=7, streams=5, seed=3)
+    asked = options(__doc__, arms=4, streams=3, seed=3)
     panda = arm("panda")
     found: dict[str, dict[str, Any]] = {case: {"learned": [], "said": [], "moved": []} for case in CASES}
     for k, e in enumerate(draw_episodes(panda, "reference", asked.arms, asked.seed, motions=asked.arms)):
@@ -139,7 +139,7 @@ def main() -> None:
         after = "" if not told else f"{out[case]['said after [s]']:.0f}"
         rows.append([case, str(count), *share, after, "{:.0f} · {:.0f}".format(*out[case]["moved [g]"])])
     hours = asked.arms * asked.streams * len(CASES) * SECONDS / 3600.0
-    columns = ["stream", "minutes", "learned", "said not to be the arm's", "after [s]", "moved [g]"]
+    columns = ["stream", "streams", "learned", "said not to be the arm's", "after [s]", "moved [g]"]
     say(markdown_table(columns, "lrrrrr", rows))
     if asked.arms > 2:
         write("alarms", {"arms": asked.arms, "seed": asked.seed, "hours": hours, "cases": out})
