@@ -2,8 +2,8 @@
 
     python benchmarks/alarms.py [--arms 4] [--streams 3] [--seed 3]
 
-Each Panda has a profile of six empty days (drift as in `life.py`). Then come streams of three minutes at 25 Hz, every one on
-another motion and another day, all offered to the profile as `armload live --learn` does:
+Each Panda has a profile of six empty days (drift as in `life.py`). Then come streams of three minutes at 25 Hz, every
+one on another motion and another day, all offered to the profile as `armload live --learn` does:
 
 empty          nothing is held: share called another arm (false alarms), share learned
 30, 60, 120 g  a light thing on the arm from the first sample on, in every stream one after another
