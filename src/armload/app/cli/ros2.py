@@ -102,10 +102,12 @@ def _node(options: argparse.Namespace) -> None:
     from armload.devices.ros2 import PayloadNode
     from armload.inertia import InertialParameters
     from armload.online import OnlineIdentifier
+    from armload.posterior import load_profile
 
     arm = arm_of(options)
     _, tare = read_logs(options, arm, None, options.tare, topics=(None, None))
-    identifier = OnlineIdentifier(arm, tare, options.method)
+    profile = None if options.profile is None else load_profile(options.profile)
+    identifier = OnlineIdentifier(arm, tare, options.method, profile)
     begun = False
 
     def tell(body: InertialParameters) -> None:
