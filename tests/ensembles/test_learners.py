@@ -149,6 +149,7 @@ def test_scikit_learns_own_checks_pass_for_trees():
     }
 
 
+@pytest.mark.full  # each of them compiles networks of its own; trees pass all of scikit-learn's checks above
 @pytest.mark.parametrize(
     "name",
     [
