@@ -409,7 +409,7 @@ def table(result: dict[str, Any]) -> str:
     far = any("thousandth" in tried for tried in result["constants"].values())
     took = ", ".join(f"{what} {seconds:.0f} s" for what, seconds in result["cpu_s"].items())
     lines = [
-        "As they are: "
+        "As they are (a constant that was measured alone stands beside the measures of its own run): "
         + "; ".join(f"{on}: " + ", ".join(f"{k} {v:g}" for k, v in base[on].items()) for on in PARTS)
         + f". Processor time of the runs: {took}.",
         "",
@@ -419,10 +419,11 @@ def table(result: dict[str, Any]) -> str:
     ]
     for constant in constants():
         tried = result["constants"][constant.name]
-        cells = [_cell(tried[factor], base) for factor in NEAR]
+        own = base | tried.get("as they are", {})  # a row may be of a later run than the rest
+        cells = [_cell(tried[factor], own) for factor in NEAR]
         if "thousandth" in tried:
             cells = [
-                f"nothing; {word}: {_cell(tried[far], base)}" for word, far in zip(("1/1000", "1000"), FAR, strict=True)
+                f"nothing; {word}: {_cell(tried[far], own)}" for word, far in zip(("1/1000", "1000"), FAR, strict=True)
             ]
         value = json.dumps(tried["value"], ensure_ascii=False).strip("{}[]").replace('"', "")
         name = f"`{constant.home}` `{constant.name}`"
@@ -495,7 +496,8 @@ def measured(
     for constant in constants():
         if (only and constant.name not in only) or not set(constant.on) & set(parts):
             continue
-        row = out[constant.name] = {"home": constant.home, "value": plain(constant.value)}
+        own = {on: found for on, found in as_they_are.items() if on in constant.on}
+        row = out[constant.name] = {"home": constant.home, "value": plain(constant.value), "as they are": own}
         left = list(factors.items())
         while left:
             word, factor = left.pop(0)
@@ -521,22 +523,26 @@ def idle(row: dict[str, Any]) -> bool:
 
 
 def with_what_was_measured_before(result: dict[str, Any], before: dict[str, Any]) -> dict[str, Any]:
-    """Parts and constants that were not asked for, as they were."""
+    """Parts and constants that were not asked for, as they were, each beside what was measured as all stood then."""
     merged = {}
     for constant in constants():
         now, then = (one["constants"].get(constant.name, {}) for one in (result, before))
         row = merged[constant.name] = {"home": constant.home, "value": plain(constant.value)}
+        base = {"as they are": before["as they are"]} | then
+        row["as they are"] = {
+            on: (now if on in now.get("as they are", {}) else base)["as they are"][on] for on in constant.on
+        }
         for word in (*NEAR, *FAR):
             both = then.get(word, {}) | now.get(word, {})
             if word in NEAR or (idle(row) and both.keys() >= set(constant.on)):
                 row[word] = {on: both[on] for on in constant.on}
-    kept = {key: before[key] | result[key] for key in ("cpu_s", "as they are")}
+    kept = {"cpu_s": before["cpu_s"] | result["cpu_s"], "as they are": result["as they are"] | before["as they are"]}
     return result | kept | {"constants": merged}
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", default="", help="some constants, printed and not written")
+    parser.add_argument("--only", default="", help="some constants; the others keep what was measured of them")
     parser.add_argument("--parts", default=",".join(PARTS))
     parser.add_argument("--far", action="store_true", help="a thousandth and a thousand times alone")
     parser.add_argument("--page", action="store_true", help="write the page from the committed result")
@@ -549,9 +555,7 @@ def main() -> None:
         with threadpool_limits(1):
             known = before["as they are"] if asked.far else None
             result = measured(only, asked.parts.split(","), FAR if asked.far else NEAR, known)
-        if asked.only:
-            return
-        if asked.far or asked.parts != parser.get_default("parts"):
+        if asked.only or asked.far or asked.parts != parser.get_default("parts"):
             result = with_what_was_measured_before(result, before)
         RESULT.write_text(json.dumps(result, indent=1) + "\n")
     write_page(json.loads(RESULT.read_text()))
