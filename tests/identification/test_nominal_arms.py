@@ -1,12 +1,15 @@
 """A built-in arm whose links are nominal, with a hybrid or without: motion, simulation and answer work by its name."""
 
+import re
+
 import pytest
 
-from armload.arms import arm
+from armload.arms import ARMS, arm
 from armload.errors import ArmloadError
 from armload.identification import identify
 from armload.motion import check_motion, excitation, random_motion, rated_load
 from armload.payloads import draw_payload
+from armload.posterior import shipped_model
 from armload.posterior.model_file import SHIPPED
 from armload.simulation import Sensors, World, simulate
 
@@ -26,15 +29,21 @@ def test_it_is_answered_with_intervals_that_hold_the_mass_and_are_calibrated_whe
         robot,
         tare=simulate(robot, random_motion(robot, 10), seed=2, **how),
     )
-    method, interval = ("hybrid", "calibrated") if name in SHIPPED else ("map-gp", "approximate")
-    assert (answer.robot, answer.frame, answer.method) == (name, robot.frame, method)
+    assert (answer.robot, answer.frame, answer.method) == (name, robot.frame, "hybrid")
+    interval = "calibrated" if shipped_model(robot).calibrated else "approximate"
     assert (answer.interval, answer.consistent, answer.held) == (interval, True, True)
     assert answer.phi_low[0] < payload.mass < answer.phi_high[0]
     assert answer.phi_high[0] - answer.phi_low[0] < 0.3 * payload.mass
 
 
-def test_a_hybrid_that_is_asked_for_by_name_is_refused_with_what_there_is():
-    robot = arm("xarm7")
-    log = simulate(robot, excitation(robot), rate=250.0)
-    with pytest.raises(ArmloadError, match=r"xarm7.*train"):
+def test_every_built_in_arm_has_a_hybrid():
+    assert set(SHIPPED) == set(ARMS)
+
+
+def test_a_hybrid_that_is_asked_for_by_name_is_refused_with_what_there_is(tmp_path):
+    heavier = re.sub(r'mass value="([\d.e+-]+)"', lambda m: f'mass value="{1.01 * float(m[1])}"', arm("xarm7").urdf)
+    (tmp_path / "stranger.urdf").write_text(heavier)
+    robot = arm(tmp_path / "stranger.urdf", "link_eef")
+    log = simulate(robot, excitation(arm("xarm7")), rate=250.0)
+    with pytest.raises(ArmloadError, match=r"no hybrid is shipped.*train"):
         identify(log, robot, method="hybrid")

@@ -26,7 +26,7 @@ from armload.posterior.payload_prior import MixturePrior
 FORMAT = 3  # 1: the widths scaled the torque's gain too; 2: whether they were checked stood in the provenance
 _HEADER = "armload-hybrid"
 # arms of the catalogue whose model is part of the package
-SHIPPED = ("panda", "fr3", "ur3e", "ur5", "ur5e", "ur10", "ur10e", "ur16e", "ur20", "iiwa7", "iiwa14", "gen3")
+SHIPPED = ("panda", "fr3", "ur3e", "ur5", "ur5e", "ur10", "ur10e", "ur16e", "ur20", "iiwa7", "iiwa14", "gen3", "xarm7")
 ENOUGH = 1000  # episodes: the share of a parameter's intervals that hold is then within 1.5 points of what is said
 
 
