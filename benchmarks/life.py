@@ -1,6 +1,6 @@
 """An arm over fifteen days: what a profile is worth, with and without a few empty seconds today.
 
-    python benchmarks/life.py [--arms 12] [--seed 11] [--parts days,same-day]
+    python benchmarks/life.py [--arms 8] [--seed 11] [--parts days,same-day]
 
 Pandas that differ from their model as real ones do. On each of 15 days an empty log of 20 s is recorded, about poses of
 the place where the arm works; offsets and friction of a day differ from the arm's own by (1 sigma) 0.08 0.12 0.06 0.10
@@ -178,7 +178,7 @@ def table(found: dict[str, Any]) -> str:
 
 
 def main() -> None:
-    asked = options(__doc__, arms=12, seed=11, parts="days,same-day")
+    asked = options(__doc__, arms=8, seed=11, parts="days,same-day")
     found: dict[str, Any] = {"arms": asked.arms, "seed": asked.seed}
     page = ROOT / "docs" / "profiles.md"
     if "days" in asked.parts.split(","):
