@@ -63,8 +63,7 @@ GROUPS = {  # home → constants, None: all; what they are tried on
     "posterior.problem": (r"(?m)(^#.*\n)*^(_MOTOR_SIDE|GAIN_STD) = .*\n", ("streams", "logs")),
     "posterior.hybrid": (r"(?m)(^#.*\n)*^_REMOVED = .*\n", ("streams", "logs")),
     "regression.mismatch": (r"(?m)(^#.*\n)*^DAILY = .*\n", ("tares",)),
-    "posterior.drift": (r"(?m)(^#.*\n)*^(TESTED|ALLOWED|CHANGED) = .*\n", ("tares",)),
-    "identification.tare_age": (r"(?m)(^#.*\n)*^SESSION = .*\n", ("tares",)),
+    "posterior.drift": (r"(?m)(^#.*\n)*^(TESTED|ALLOWED|CHANGED|SESSION) = .*\n", ("tares",)),
 }
 PARTS = ("streams", "logs", "tares")
 NEAR = {"half": 0.5, "double": 2.0}

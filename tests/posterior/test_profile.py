@@ -187,6 +187,8 @@ def test_logs_within_an_hour_are_of_one_session(life):
     clocks = [1.7e9, 1.7e9 + 600.0, 1.7e9 + day, None, 1.7e9 + 5400.0]
     logs = [log if t is None else replace(log, t=log.t - log.t[0] + t) for t, log in zip(clocks, life[1], strict=False)]
     assert by_clock(logs) == [0, 0, 2, 3, 4]
+    counted = [replace(log, t=log.t - log.t[0], epoch=float(log.t[0])) for log in logs]  # as bags and dates are read
+    assert by_clock(counted)[:3] == [0, 0, 2]
 
 
 def test_a_profile_needs_a_log(panda):

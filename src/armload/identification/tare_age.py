@@ -12,15 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from armload.errors import IdentificationError
-from armload.posterior.drift import ALLOWED
+from armload.posterior.drift import ALLOWED, SESSION
 from armload.recording import Recording
 
 DAY = 86400.0  # [s]
-# [s] within which a tare is of the same session: an arm that is warm changes little in an hour. A stated prior
-SESSION = 3600.0
-# [s] since 1970 from which a log's clock is taken for the time of day, and not for the time since something began:
-# September 2001
-_CLOCK = 1e9
 
 
 def drift_after(seconds: float) -> float:
@@ -42,7 +37,7 @@ def drift_since(tare: Recording, recording: Recording, age: float | None) -> tup
         if not (np.isfinite(age) and age >= 0.0):
             raise IdentificationError(f"the tare's age is {age:g} s: expected a time of 0 or more")
         return drift_after(age), ()
-    if tare.epoch + tare.t[0] > _CLOCK and recording.epoch + recording.t[0] > _CLOCK:
+    if tare.date is not None and recording.date is not None:
         seconds = abs(float(recording.epoch - tare.epoch + recording.t[0] - tare.t[-1]))
         drift = drift_after(seconds)
         said = f"by the logs' clocks the tare is {in_words(seconds)} old: offsets and friction may have changed since"

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from armload.arms import Arm, rated_effort
 from armload.errors import IdentificationError
 from armload.inertia import HELD, Z95
-from armload.posterior.drift import drift_of
+from armload.posterior.drift import SESSION, drift_of
 from armload.posterior.problem import Problem
 from armload.posterior.profile import Profile, SessionRecord, attached_mass, fingerprint
 from armload.posterior.scales import Scales
@@ -49,8 +49,6 @@ _STATED = 3.0  # [sessions] that the stated size of the drift counts for: of so 
 _PREDICTED = 1.0  # [s] of a block that is predicted: residuals stay correlated for about as long
 _MOST_BLOCKS = 64  # of a log: their covariance is a matrix
 _POSES = 20  # of each log that are kept, to show where the arm was seen
-_CLOCK = 1e9  # [s since 1970] from which a log's clock shows the time of day: September 2001
-_SESSION = 3600.0  # [s] between logs of one session at most, as of a tare (`identification.tare_age`)
 
 
 def learn_profile(
@@ -102,13 +100,13 @@ def learn_profile(
 
 
 def by_clock(logs: Sequence[Recording]) -> list[int]:
-    """A session's number for each log: one for those that follow each other within `_SESSION` by the time of day."""
-    numbers, last = list(range(len(logs))), -1
-    order = sorted((k for k in range(len(logs)) if logs[k].t[0] > _CLOCK), key=lambda k: float(logs[k].t[0]))
-    for k in order:
-        if last >= 0 and logs[k].t[0] - logs[last].t[-1] < _SESSION:
+    """A session's number for each log: one for those that follow each other within `SESSION` by the time of day."""
+    numbers, ended, last = list(range(len(logs))), -np.inf, 0
+    dated = sorted((date, k) for k, log in enumerate(logs) if (date := log.date) is not None)
+    for date, k in dated:
+        if date - ended < SESSION:
             numbers[k] = numbers[last]
-        last = k
+        ended, last = date + logs[k].duration, k
     return numbers
 
 
@@ -308,7 +306,7 @@ def _record(
     logs: Sequence[Recording],
     name: str,
 ) -> SessionRecord:
-    dates = [float(log.t[0]) for log in logs if log.t[0] > _CLOCK]
+    dates = [log.date for log in logs if log.date is not None]
     return SessionRecord(
         name or ", ".join(log.source for log in logs),
         float(duration),

@@ -27,7 +27,7 @@ from armload.posterior.profile_learning import log_data
 from armload.posterior.scales import Scales
 from armload.posterior.solve import solve, threads
 from armload.recording import Recording
-from armload.regression import Correction, payload_prior_std
+from armload.regression import Correction, payload_prior_std, solution_prior_std
 from armload.regression.lag import GAIN
 from armload.regression.noise import SMOOTH
 
@@ -57,9 +57,9 @@ def with_known_weight(profile: Profile, arm: Arm, log: Recording, mass: float, s
     profile.check(arm)
     correction = Correction(arm, rated_effort(arm))
     data = log_data(correction, log, profile.features, profile.session(correction))
-    runs, weak = [profile.data(correction, GAIN, SMOOTH.block), data], payload_prior_std(arm)
+    runs, wide = [profile.data(correction, GAIN, SMOOTH.block), data], solution_prior_std(arm)
     with threads().limit(limits=1):
-        found = solve(runs, 4.0 * weak, None, SMOOTH, 3, profile.scales)
+        found = solve(runs, wide, None, SMOOTH, 3, profile.scales)
         phi, alone = found.phi, float(np.sqrt(found.covariance[0, 0]))
         side = GAIN_STD[found.torque]
         if abs(phi[0] - mass) > HELD * np.hypot(alone, _WIDE * side * mass):
@@ -67,13 +67,13 @@ def with_known_weight(profile: Profile, arm: Arm, log: Recording, mass: float, s
                 f"{log.source} carries {phi[0]:.4g} ± {Z95 * alone:.2g} kg by the profile: expected the weight of "
                 f"{mass:.4g} kg that is known; check what was hung on, and what was mounted in the profile's logs"
             )
-        problem = Problem(runs, 4.0 * weak, None, SMOOTH)
-        gamma, C = np.zeros(arm.n), np.zeros((arm.n, arm.n))
+        problem = Problem(runs, wide, None, SMOOTH)
+        gamma, C = np.zeros(arm.n), np.zeros((arm.n, arm.n))  # found in the first step
         for _ in range(_STEPS):
             phi, gamma, C = _solved(problem, found.scales, phi, mass, max(std, 1e-6), _WIDE * side)
     seen = data.A[:, :10, :10] / found.scales.noise[-1][:, None, None]
     # what each joint's gain does to the mass: d ln m / d gamma_j, 1 in all
-    total = np.linalg.inv(seen.sum(axis=0) + np.diag(weak**-2.0))
+    total = np.linalg.inv(seen.sum(axis=0) + np.diag(payload_prior_std(arm) ** -2.0))
     weight = (total @ (seen @ phi).T)[0] / mass
     share = float(np.sqrt(SMOOTH.overrated * weight @ C @ weight + (std / mass) ** 2))
     return replace(profile, gain=gamma, gain_std=max(share, _LEAST))

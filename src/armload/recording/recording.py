@@ -14,6 +14,9 @@ from armload.errors import RecordingError
 
 # What a torque column can mean; "measured" is the contract: rigid body + friction, gravity included.
 CHANNELS = ("measured", "desired", "external")
+# [s] since 1970 from which a log's clock is taken for the time of day, and not for the time since something began:
+# September 2001
+_CLOCK = 1e9
 GAP = 0.1  # [s] a longer pause between samples ends whatever has a memory of those before it
 JITTERED = 0.9  # of a rate's sample time, after which the next sample of that rate is due: clocks jitter
 
@@ -112,6 +115,12 @@ class Recording:
     def __iter__(self) -> Iterator[Sample]:
         """The samples, one by one, as a live robot would give them."""
         return (Sample(float(t), *row) for t, *row in zip(self.t, self.q, self.dq, self.tau, strict=True))
+
+    @property
+    def date(self) -> float | None:
+        """Time of day of the first sample [s since 1970]; None: the clock counts from something else."""
+        began = self.epoch + float(self.t[0])
+        return began if began > _CLOCK else None
 
     @property
     def n(self) -> int:
