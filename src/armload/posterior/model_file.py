@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm, link_fingerprint, prefixed_frame
-from armload.atomic import replacing
 from armload.ensembles.artefact import from_structure, to_structure
 from armload.errors import ModelError
 from armload.inertia import InertialParameters
 from armload.posterior.calibration import COVERAGE, Calibration
 from armload.posterior.evidence import KINDS, TRAITS
 from armload.posterior.payload_prior import MixturePrior
+from armload.posterior.tensor_file import read_tensors, write_tensors
 
 FORMAT = 3  # 1: the widths scaled the torque's gain too; 2: whether they were checked stood in the provenance
 _HEADER = "armload-hybrid"
@@ -107,8 +107,6 @@ class HybridModel:
         Raises:
             ModelError: the file cannot be written.
         """
-        from safetensors.numpy import save
-
         prior, calibration = self.prior, self.calibration
         tensors = {
             "weights": prior.weights,
@@ -128,13 +126,7 @@ class HybridModel:
             "provenance": self.provenance,
         }
         path = Path(path)
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with replacing(path) as part:
-                arrays = {name: np.ascontiguousarray(array) for name, array in tensors.items()}
-                part.write_bytes(save(arrays, {_HEADER: json.dumps(header)}))
-        except OSError as error:
-            raise ModelError(f"the model cannot be written to {path}: {error.strerror}") from None
+        write_tensors(path, tensors, _HEADER, header, "the model")
         return path
 
     @classmethod
@@ -144,18 +136,13 @@ class HybridModel:
         Raises:
             ModelError: missing, damaged or foreign file, or one of another armload.
         """
-        from safetensors import SafetensorError, safe_open
-
-        try:
-            with safe_open(Path(path), framework="np") as file:
-                text = (file.metadata() or {}).get(_HEADER)
-                tensors = {name: np.ascontiguousarray(file.get_tensor(name)) for name in file.keys()}  # noqa: SIM118
-        except FileNotFoundError:
-            raise ModelError(f"no hybrid model at {path}: train one with `armload train --method hybrid`") from None
-        except (SafetensorError, OSError, ValueError, TypeError):
-            raise ModelError(f"{path} is not a readable model: expected a .safetensors file; copy it again") from None
-        if text is None:
-            raise ModelError(f"{path} is no hybrid model: expected one that armload trained with --method hybrid")
+        tensors, text = read_tensors(
+            Path(path),
+            _HEADER,
+            f"no hybrid model at {path}: train one with `armload train --method hybrid`",
+            f"{path} is not a readable model: expected a .safetensors file; copy it again",
+            f"{path} is no hybrid model: expected one that armload trained with --method hybrid",
+        )
         try:
             header = json.loads(text)
             if header["format"] != FORMAT or header["traits"] != list(TRAITS):

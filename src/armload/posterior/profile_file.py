@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.atomic import replacing
 from armload.errors import ModelError
 from armload.posterior.profile import Profile, SessionRecord
 from armload.posterior.scales import Scales
+from armload.posterior.tensor_file import read_tensors, write_tensors
 from armload.regression import JointFeatures
 
 FORMAT = 1
@@ -36,8 +36,6 @@ def save_profile(profile: Profile, path: str | PathLike[str]) -> Path:
     Raises:
         ModelError: the file cannot be written.
     """
-    from safetensors.numpy import save
-
     scales = profile.scales
     tensors = {
         **_factors(profile.A, profile.b, profile.features.size, scales.features),
@@ -66,13 +64,7 @@ def save_profile(profile: Profile, path: str | PathLike[str]) -> Path:
         "sessions": [asdict(session) for session in profile.sessions],
     }
     path = Path(path)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with replacing(path) as part:
-            arrays = {name: np.ascontiguousarray(array) for name, array in tensors.items()}
-            part.write_bytes(save(arrays, {_HEADER: json.dumps(header)}))
-    except OSError as error:
-        raise ModelError(f"the profile cannot be written to {path}: {error.strerror}; name a file elsewhere") from None
+    write_tensors(path, tensors, _HEADER, header, "the profile")
     return path
 
 
@@ -82,18 +74,13 @@ def load_profile(path: str | PathLike[str]) -> Profile:
     Raises:
         ModelError: missing, damaged or foreign file, or one of another armload.
     """
-    from safetensors import SafetensorError, safe_open
-
-    try:
-        with safe_open(Path(path), framework="np") as file:
-            text = (file.metadata() or {}).get(_HEADER)
-            tensors = {name: np.array(file.get_tensor(name)) for name in file.keys()}  # noqa: SIM118
-    except FileNotFoundError:
-        raise ModelError(f"no profile at {path}: learn one with `armload profile`") from None
-    except (SafetensorError, OSError, ValueError, TypeError):
-        raise ModelError(f"{path} is not a readable profile: expected a file that `armload profile` wrote") from None
-    if text is None:
-        raise ModelError(f"{path} is no profile of an arm: expected a file that `armload profile` wrote")
+    tensors, text = read_tensors(
+        Path(path),
+        _HEADER,
+        f"no profile at {path}: learn one with `armload profile`",
+        f"{path} is not a readable profile: expected a file that `armload profile` wrote",
+        f"{path} is no profile of an arm: expected a file that `armload profile` wrote",
+    )
     try:
         header = json.loads(text)
         if header["format"] != FORMAT:

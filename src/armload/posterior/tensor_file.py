@@ -1,0 +1,58 @@
+"""A safetensors file with JSON in its header: written whole or not at all; nothing in it is executed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.atomic import replacing
+from armload.errors import ModelError
+
+
+def write_tensors(path: Path, tensors: Mapping[str, NDArray], name: str, header: Any, what: str) -> None:
+    """Write tensors, and a header under its name.
+
+    Args:
+        what: the file is, for the message.
+
+    Raises:
+        ModelError: the file cannot be written.
+    """
+    from safetensors.numpy import save
+
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(path) as part:
+            arrays = {key: np.ascontiguousarray(array) for key, array in tensors.items()}
+            part.write_bytes(save(arrays, {name: json.dumps(header)}))
+    except OSError as error:
+        raise ModelError(f"{what} cannot be written to {path}: {error.strerror}; name a file elsewhere") from None
+
+
+def read_tensors(path: Path, name: str, missing: str, unreadable: str, foreign: str) -> tuple[dict[str, NDArray], str]:
+    """The tensors of a file, and the text of its header.
+
+    Args:
+        name: of the header. missing, unreadable, foreign: what to say where the file is none, or none of ours.
+
+    Raises:
+        ModelError: one of these three.
+    """
+    from safetensors import SafetensorError, safe_open
+
+    try:
+        with safe_open(path, framework="np") as file:
+            text = (file.metadata() or {}).get(name)
+            tensors = {key: np.ascontiguousarray(file.get_tensor(key)) for key in file.keys()}  # noqa: SIM118
+    except FileNotFoundError:
+        raise ModelError(missing) from None
+    except (SafetensorError, OSError, ValueError, TypeError):
+        raise ModelError(unreadable) from None
+    if text is None:
+        raise ModelError(foreign)
+    return tensors, text
