@@ -154,6 +154,7 @@ def test_the_name_of_the_method_without_a_model_says_how_to_get_one(call, small)
     assert "armload train --method hybrid" in call(*argv, code=2).err
 
 
+@pytest.mark.full  # some seconds
 def test_report_draws_a_hybrid_beside_the_others(call, small):
     argv = ("report", small / "run.csv", "--robot", small / "two.urdf", "--tare", small / "tare.csv")
     call(*argv, "--model", small / "checked.safetensors", "--out", small / "r.html")

@@ -272,6 +272,7 @@ def test_report_with_truth_shows_errors_and_baselines(call, tmp_path):
 
 
 @pytest.mark.usefixtures("few_points")
+@pytest.mark.full  # some seconds
 def test_report_of_a_data_set_takes_held_out_payloads_only(call, work):
     argv = ("report", "--dataset", work / "data", "--seed", "5", "--runs", "2", "--out", work / "r.html")
     call(*argv, "--model", work / "trees.safetensors")

@@ -243,6 +243,7 @@ def test_a_standing_arm_lacks_motion(panda):
     assert all(name in said for name in ("Ixx", "Iyy", "Izz"))
 
 
+@pytest.mark.full  # some seconds
 def test_what_is_said_to_lack_motion_a_tare_does_not_tell_either(panda):
     """Short everyday motions: a tare tells what is said to be hidden, and nothing of what is said to lack motion."""
     recipe = Recipe(duration=1.0, motions=("point-to-point", "slow", "partial"))

@@ -242,6 +242,7 @@ def test_where_the_tare_does_not_tell_of_the_tool_the_intervals_hold_both_cases(
     assert answer.phi_low[0] < 2.5 * BOX.mass < answer.phi_high[0]
 
 
+@pytest.mark.full  # some seconds
 def test_a_base_that_stands_otherwise_than_was_said_is_noticed(real_like):
     panda, how = real_like
     true = arm("panda", gravity=(0.0, -4.0, -8.96))
@@ -252,6 +253,7 @@ def test_a_base_that_stands_otherwise_than_was_said_is_noticed(real_like):
     assert (right.interval, wrong.interval) == ("calibrated", "approximate")
 
 
+@pytest.mark.full  # some seconds
 def test_arms_as_they_are_are_not_called_strange(panda):
     """Half a minute of slow motion, on arms further from their description than most."""
     recipe = Recipe(worlds=("beyond",), motions=("slow",), untared=1.0, duration=30.0)
@@ -293,6 +295,7 @@ def test_what_a_log_says_is_judged_before_a_body_is_made_of_it(panda, loaded, na
     assert identifier.unprojected is None
 
 
+@pytest.mark.full  # some seconds
 def test_sound_logs_have_a_body_within_the_error_bars(panda):
     for logs in simulate_episodes(draw_episodes(panda, "broad", 4, seed=31)):
         for tare in (None, logs.tare):

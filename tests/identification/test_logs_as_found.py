@@ -98,8 +98,9 @@ FOUND = {
 
 # the default method with and without a tare; its physics alone mostly with one
 TRIED = [(name, tared, None) for name in FOUND for tared in (True, False)]
-TRIED += [(name, True, method) for name in FOUND for method in METHODS[1:]]
-TRIED += [(name, False, method) for name in ("irregular", "torque 20 ms late") for method in METHODS[1:]]
+OTHERS = [(name, True, method) for name in FOUND for method in METHODS[1:]]
+OTHERS += [(name, False, method) for name in ("irregular", "torque 20 ms late") for method in METHODS[1:]]
+TRIED += [pytest.param(*other, marks=pytest.mark.full) for other in OTHERS]  # some seconds
 
 
 @pytest.mark.parametrize(("name", "tared", "method"), TRIED)

@@ -286,6 +286,7 @@ def finished(tmp_path_factory):
     return folder
 
 
+@pytest.mark.full  # some seconds
 def test_what_is_measured_is_not_measured_again_and_a_further_method_is_all_that_is_left(finished, capsys):
     before = {path.name: path.stat().st_mtime_ns for path in (finished / "cells").iterdir()}
     assert len(before) == 2 * 4  # two seeds; the method, two baselines, the bound

@@ -137,13 +137,13 @@ def test_a_tare_moves_near_the_run_unless_it_is_elsewhere(panda):
 
 
 @pytest.mark.parametrize("name", sorted(POPULATIONS))
-def test_what_an_episode_carries_is_a_body_the_arm_is_rated_for(any_arm, name):
+def test_what_an_episode_carries_is_a_body_the_arm_is_rated_for(panda, name):
     recipe = replace(
         POPULATIONS[name], motions=("point-to-point",), untared=1.0
     )  # found at once; what is held is the same
-    for episode in draw_episodes(any_arm, recipe, 12, seed=7, motions=1):
+    for episode in draw_episodes(panda, recipe, 12, seed=7, motions=1):
         carried = [p for p in (episode.payload, episode.tool) if p is not None]
-        assert sum(p.parameters.mass for p in carried) <= any_arm.rated_payload
+        assert sum(p.parameters.mass for p in carried) <= panda.rated_payload
         assert all(is_consistent(p.parameters.phi) for p in carried if p.parameters.mass > 0)
 
 

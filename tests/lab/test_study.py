@@ -145,6 +145,7 @@ def written(small):
     }
 
 
+@pytest.mark.full  # some seconds
 def test_a_study_that_was_stopped_goes_on_and_measures_nothing_twice(small):
     folder, first, cells, messages = small
     assert len(first) < len(cells) == len(plan(SMALL))

@@ -74,6 +74,7 @@ def test_nothing_is_learned_from_a_payload(panda, world, profile):
     assert learned is None
 
 
+@pytest.mark.full  # some seconds
 def test_a_light_thing_that_nobody_noticed_does_not_become_the_arm_s(panda, world, profile):
     light = draw_payload("boxes", 2, 0.04)
     _, learned = streamed(panda, world, profile, [(0.0, light)])
@@ -82,6 +83,7 @@ def test_a_light_thing_that_nobody_noticed_does_not_become_the_arm_s(panda, worl
         assert abs(after - before) < 0.25 * light.parameters.mass
 
 
+@pytest.mark.full  # some seconds
 def test_nothing_is_learned_from_another_arm_and_it_is_said_within_a_minute(panda, profile):
     last, learned = streamed(panda, World.real_like(panda, 77), profile, [(0.0, None)])
     assert learned is None
@@ -89,6 +91,7 @@ def test_nothing_is_learned_from_another_arm_and_it_is_said_within_a_minute(pand
     assert any("not as its profile says" in note for note in last.notes)
 
 
+@pytest.mark.full  # some seconds
 def test_what_was_taken_up_on_the_way_is_left_out(panda, world, profile):
     _, learned = streamed(panda, world, profile, [(0.0, None), (21.5, draw_payload("boxes", 3, 1.5))])
     if learned is not None:

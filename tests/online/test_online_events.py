@@ -107,6 +107,7 @@ def test_what_is_put_down_is_gone_and_what_is_taken_up_again_is_recognised():
     assert np.all(again.std[:4] < first.std[:4])
 
 
+@pytest.mark.full  # some seconds
 def test_a_cycle_in_step_with_the_motion_stays_as_good_in_its_second_half_as_in_its_first():
     payload, motion = box(0.3), taie2024()  # always taken up in one pose and put down in another
     changes = np.arange(4.0, 82.0, 0.5 * motion.duration)

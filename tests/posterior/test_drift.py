@@ -75,6 +75,7 @@ def test_an_arm_that_has_not_changed_is_answered_as_without_the_question(panda, 
         assert asked.stream.drift.statistic < 0.6 * CHANGED
 
 
+@pytest.mark.full  # some seconds
 def test_a_tare_of_known_age_is_worth_less_and_its_change_is_expected(panda, old, sound):
     for log in (*old, *sound):
         same_day, aged = HybridIdentifier(panda, log.tare), HybridIdentifier(panda, log.tare)

@@ -55,6 +55,7 @@ def test_two_hypotheses_are_weighed_by_bayes_rule():
     np.testing.assert_allclose(found.covariance, np.cov(draws.T), atol=0.02)
 
 
+@pytest.mark.full  # some seconds
 def test_what_was_exchanged_since_the_tare_is_covered_or_said(panda, exchanged):
     logs, _ = exchanged
     fine = []

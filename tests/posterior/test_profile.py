@@ -93,6 +93,7 @@ def test_the_first_waves_of_many_are_those_of_few(panda, life):
         np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.full  # some seconds
 def test_a_profile_knows_the_payload_better_than_a_tare_of_another_day(panda, life, run, profile):
     truth = life[0].truth.phi
     unit = np.array([1.0] + 3 * [0.1] + 6 * [0.01])
@@ -170,6 +171,7 @@ def test_a_tare_that_carries_something_beside_is_refused(panda, run, profile, li
         identify(life[1][0], panda, profile=profile, tare=run)
 
 
+@pytest.mark.full  # some seconds
 def test_a_tool_in_all_logs_of_the_profile_is_found_to_be_in_them(panda, life, run):
     tool = InertialParameters.from_com(0.7, (0.0, 0.02, 0.06), np.diag([2e-3, 2e-3, 1e-3]))
     gripping = [
@@ -196,6 +198,7 @@ def test_a_profile_needs_a_log(panda):
         learn_profile(panda, [])
 
 
+@pytest.mark.full  # some seconds
 def test_a_base_that_leans_since_the_profile_is_said(panda, life, profile):
     leaning = panda.leaning(np.radians([6.0, 0.0]))
     load = InertialParameters(life[0].payload.parameters.phi)

@@ -61,6 +61,7 @@ def test_a_rigid_payload_is_no_more_restless_than_its_tare(panda, sound):
         assert identifier.stream.restlessness == 0.0  # nobody knows how restless the arm is
 
 
+@pytest.mark.full  # some seconds
 def test_a_payload_that_swings_is_said_to(panda, sound):
     log = sound[0]
     answer = identify(swinging(panda, log.run), panda, tare=log.tare)

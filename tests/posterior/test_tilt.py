@@ -68,6 +68,7 @@ def test_gravity_is_believed_until_somebody_asks(panda):
     assert not ours.adaptive[ours.tilt].any()
 
 
+@pytest.mark.full  # some seconds
 def test_a_base_that_leans_is_found_and_answered_for(panda, leaning):
     """The answer is, but for the last of the angle, what the right gravity gives; and it is said what to pass."""
     for log in leaning:

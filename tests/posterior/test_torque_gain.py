@@ -55,6 +55,7 @@ def weighed(panda, logs, profile):
     return with_known_weight(profile, panda, logs[4], 2.0, 0.002)
 
 
+@pytest.mark.full  # some seconds
 def test_the_gains_of_the_joints_that_carry_the_weight_are_found(weighed):
     assert weighed.gain[1] == pytest.approx(GAIN[1] - 1.0, abs=0.03)  # joints 2 and 4 bear most of it
     assert weighed.gain[3] == pytest.approx(GAIN[3] - 1.0, abs=0.015)
