@@ -20,8 +20,8 @@ from armload.posterior.known_mass import KnownMass
 from armload.posterior.profile import Profile
 from armload.posterior.same_motion import SameMotion
 from armload.posterior.scales import Posterior, Scales
-from armload.posterior.solve import solve
 from armload.posterior.stream import StreamingPosterior
+from armload.posterior.tare import tare_data
 from armload.recording import GAP, Recording, Sample
 from armload.regression import Correction, GaussianPrior, JointFeatures, payload_prior_std, solution_prior_std
 from armload.regression.information import SAME, RegressionData, Session
@@ -92,11 +92,13 @@ class PosteriorLeastSquares(Identifier):
             self.session = profile.session(self._correction)
         if tare is not None:
             self._check(tare)
-            data = self.empty_data()
-            data.add(tare.t, tare.q, tare.dq, tare.tau)
-            self._tares.append(data)
             if profile is None:
-                self._start = self._from_tare(data)
+                data, self._start = tare_data(tare, arm, gain, self._features, self._noise, self._iterations)
+                self._correction = data.correction
+            else:  # the unknowns, and what begins a solution, are the profile's
+                data = self.empty_data()
+                data.add(tare.t, tare.q, tare.dq, tare.tau)
+            self._tares.append(data)
         self.reset()
 
     @property
@@ -107,12 +109,6 @@ class PosteriorLeastSquares(Identifier):
     def empty_data(self) -> RegressionData:
         """An empty regression of the kind this method accumulates."""
         return RegressionData(self._correction, self.gain, self._features, self._noise.block, self.session)
-
-    def _from_tare(self, tare: RegressionData) -> Scales | None:
-        """Scales found from the tare once, for all later solutions to begin with; without features those stated."""
-        if not self._features.size:
-            return None
-        return solve([tare], self._weak, None, self._noise, self._iterations).scales
 
     # ------------------------------------------------------------------ samples in, estimates out
 
