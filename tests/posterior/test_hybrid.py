@@ -386,8 +386,7 @@ def test_a_shipped_model_is_small_and_calibrated_and_belongs_to_its_arm(path):
     own, model = arm(path.stem), HybridModel.load(path)
     assert path == HybridModel.shipped(own)
     assert path.stat().st_size < 5e6
-    # two were trained before gear losses were among the unknowns, and are not called so until they are trained anew
-    assert model.calibrated == (own.name not in ("ur5", "ur10"))
+    assert model.calibrated
     assert model.prior_for(own).mean[0] > 0.0
     for other in (other for other in ARMS if other != own.name):
         with pytest.raises(ModelError, match=f"trained for {own.name}: {other} "):
