@@ -54,6 +54,9 @@ WHOLE = {
     "actual_current_as_torque": ("tau", "external"),  # gravity is taken out already: see devices/ur/source.py
 }
 
+# moment and current that a controller wants of each joint: torque per ampere follows from them (`torque_constants.py`)
+WANTED = ("target_moment", "target_current")
+
 TIMES = frozenset(
     ("t", "time", "timestamp", "timestamps", "stamp", "header_stamp", "time_stamp", "elapsed", "elapsed_time")
 )

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from armload.arms import ARMS, Arm
 from armload.errors import RecordingError
-from armload.recording.aliases import AMPERE, CALLED, EPISODE, FORMS, QUANTITIES, UNITS, Form
+from armload.recording.aliases import AMPERE, CALLED, EPISODE, FORMS, QUANTITIES, UNITS, WANTED, Form
 from armload.recording.choice import Header, TimeColumns, some
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.columns import check_joint_count, column_names
@@ -32,6 +32,8 @@ class ColumnMap:
         joints: names of the joints, where they are known.
         episode: the column that tells several episodes apart.
         notes: what was read from where.
+        wanted: where the torque is motor current of unknown constants, the places of the moments and of the currents
+            (n,) that the controller itself wanted, from which they follow; None: they are among the scales.
     """
 
     time: TimeColumns | None
@@ -40,6 +42,7 @@ class ColumnMap:
     joints: tuple[str, ...] | None
     episode: int | None
     notes: tuple[str, ...]
+    wanted: tuple[list[int], list[int]] | None = None
 
 
 def map_columns(
@@ -81,7 +84,7 @@ def map_columns(
             f"{where} has no columns named q1, dq1, tau1, …: found {found}; name the columns with --columns"
         )
     header = Header(names, families, times, form, _joint_count(families, given, where, arm), arm, where, dates)
-    places, scales, notes = {}, {}, []
+    places, scales, notes, wanted = {}, {}, [], None
     for key in QUANTITIES:
         places[key] = given[key] if key in given else header.family(key).order(header.n, header.joints)
         if len(places[key]) != header.n:
@@ -89,13 +92,16 @@ def map_columns(
                 f"{where}: --columns names {len(places[key])} column(s) of {CALLED[key]} for {header.n} joints: "
                 "expected one per joint"
             )
-        scales[key], note = _scale(header, key, places[key], spec)
+        scale = _scale(header, key, places[key], spec)
+        if scale is None and (wanted := _wanted(header)) is None:
+            raise _no_constants(header, places[key])
+        scales[key], note = scale or ((1.0,) * header.n, [])
         notes += note
     if not given:
         _check_bases(header, places)
     time = header.time(spec)
     episode = list(names).index(EPISODE) if EPISODE in names else None
-    return ColumnMap(time, places, scales, header.joints, episode, (*_notes(header, places, time), *notes))
+    return ColumnMap(time, places, scales, header.joints, episode, (*_notes(header, places, time), *notes), wanted)
 
 
 def _form_of(names: Sequence[str], families: Sequence[Family]) -> Form | None:
@@ -160,8 +166,11 @@ def _joint_count(families: Sequence[Family], given: dict[str, list[int]], where:
     return arm.n
 
 
-def _scale(header: Header, key: str, places: list[int], spec: ColumnSpec) -> tuple[tuple[float, ...], list[str]]:
-    """What the columns of a quantity are multiplied with (n,), and a note where that is more than a unit."""
+def _scale(header: Header, key: str, places: list[int], spec: ColumnSpec) -> tuple[tuple[float, ...], list[str]] | None:
+    """What the columns of a quantity are multiplied with (n,), and a note where that is more than a unit.
+
+    None: they are motor currents, and nobody said how much torque an ampere is.
+    """
     readings = [
         read_name(header.names[place], () if header.arm is None else header.arm.joint_names) for place in places
     ]
@@ -186,28 +195,48 @@ def _scale(header: Header, key: str, places: list[int], spec: ColumnSpec) -> tup
         )
     if unit.strip().lower() != AMPERE:
         return (UNITS[key][unit.strip().lower()],) * header.n, []
-    constants = _torque_constants(header, places, spec)
-    shown = " ".join(f"{constant:g}" for constant in constants)
-    return constants, [f"{header.where}: torque is motor current times {shown} N·m/A, with the gears' friction in it"]
+    constants = _torque_constants(header, spec)
+    return None if constants is None else (constants, [of_currents(header.where, constants)])
 
 
-def _torque_constants(header: Header, places: list[int], spec: ColumnSpec) -> tuple[float, ...]:
-    """Joint torque per motor current (n,) [N·m/A]: the user's, or those of the arm's sheet."""
+def of_currents(where: str, constants: Sequence[float], by: str = "") -> str:
+    """A note of what the torque was made of; `by`: where the constants come from."""
+    shown = " ".join(f"{constant:.4g}" for constant in constants)
+    return f"{where}: torque is motor current times {shown} N·m/A{by}, with the gears' friction in it"
+
+
+def _torque_constants(header: Header, spec: ColumnSpec) -> tuple[float, ...] | None:
+    """Joint torque per motor current (n,) [N·m/A]: the user's, or those of the arm's sheet; None: nobody knows."""
     arm = header.arm
     facts = None if arm is None else ARMS.get(arm.known_as or arm.name)
     constants = spec.torque_constants or (None if facts is None else facts.torque_constants)
-    if constants is None:
-        called = "this arm" if arm is None else arm.name
-        raise RecordingError(
-            f"{header.where}: {some([header.names[place] for place in places])} look like motor currents [A], and no "
-            f"torque constants are known for {called}: give {header.n} numbers in N·m/A, from a scale test with a "
-            'known load, with --columns "torque_constants=12 12 10 11 11 11"'
-        )
-    if len(constants) != header.n:
+    if constants is not None and len(constants) != header.n:
         raise RecordingError(
             f"{header.where}: {len(constants)} torque constants for {header.n} joints: expected one per joint"
         )
     return constants
+
+
+def _wanted(header: Header) -> tuple[list[int], list[int]] | None:
+    """Places of the moments and of the currents (n,) that the controller wanted, where the header has all of them."""
+    at = {tuple(words_of(name)): place for place, name in enumerate(header.names)}
+    for first in (0, 1):
+        numbers = [str(k) for k in range(first, first + header.n)]
+        found = [[at.get((*stem.split("_"), k)) for k in numbers] for stem in WANTED]
+        moments, currents = ([place for place in places if place is not None] for places in found)
+        if len(moments) == len(currents) == header.n:
+            return moments, currents
+    return None
+
+
+def _no_constants(header: Header, places: list[int]) -> RecordingError:
+    called = "this arm" if header.arm is None else header.arm.name
+    return RecordingError(
+        f"{header.where}: {some([header.names[place] for place in places])} look like motor currents [A], and no "
+        f"torque constants are known for {called}: log {WANTED[0]} and {WANTED[1]} as well, from which they follow, or "
+        f"give {header.n} numbers in N·m/A, from a scale test with a known load, with "
+        '--columns "torque_constants=12 12 10 11 11 11"'
+    )
 
 
 def _check_bases(header: Header, places: dict[str, list[int]]) -> None:

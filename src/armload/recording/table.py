@@ -14,8 +14,9 @@ from armload.recording.aliases import EPISODE, QUANTITIES, TIME_UNITS
 from armload.recording.choice import DATE, TimeColumns
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.columns import checked_recording
-from armload.recording.mapping import ColumnMap, map_columns
+from armload.recording.mapping import ColumnMap, map_columns, of_currents
 from armload.recording.recording import GAP, Recording
+from armload.recording.torque_constants import controller_constants
 
 
 class Table(Protocol):
@@ -75,6 +76,16 @@ def read_table(table: Table, where: str, arm: Arm | None, spec: ColumnSpec, chan
     names = [table.names[place] for place in places]
     scales = np.array([scale for key in QUANTITIES for scale in columns.scales[key]])
     motion = values[:, len(extra) : len(extra) + len(places)] * scales
+    notes = columns.notes
+    if columns.wanted is not None:
+        n = len(columns.wanted[0])
+        moment, current = (table.numbers(at)[keep] for at in columns.wanted)
+        constants = controller_constants(moment, current, motion[keep, n : 2 * n], where)
+        motion[:, 2 * n :] *= constants
+        notes = (
+            *notes,
+            of_currents(where, constants.tolist(), " (the controller's own target_moment over target_current)"),
+        )
     if time is None:
         assert spec.rate is not None
         (t, epoch), label = (np.maximum(np.cumsum(keep) - 1, 0) / spec.rate, 0.0), "t"
@@ -88,7 +99,7 @@ def read_table(table: Table, where: str, arm: Arm | None, spec: ColumnSpec, chan
         labels=[label, *names],
         channel=channel,
         joint_names=columns.joints,
-        notes=(*table.notes, *columns.notes),
+        notes=(*table.notes, *notes),
         epoch=epoch,
     )
 
