@@ -4,18 +4,23 @@ The tests marked full run `armload ros2` and plain rclpy programs (tests/devices
 Python is ARMLOAD_ROS_PYTHON, one that can import rclpy and armload, or else that of `make .venv-ros/.stamp`.
 """
 
+import ast
 import importlib.util
 import json
 import os
+import re
 import signal
 import subprocess
+import sys
 import time
 from contextlib import contextmanager
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
 import pytest
+import yaml
 from rosbags.typesys import Stores, get_typestore
 
 from armload.arms import arm
@@ -464,3 +469,81 @@ def test_a_topic_that_cannot_serve_ends_in_one_sentence(ros, panda, tmp_path):
                 wait_until(lambda node=node: node.poll() is not None, 30, node)
             assert node.returncode == 2, node.noted()
             assert sentence in node.noted().splitlines()[-1]
+
+
+@pytest.mark.full
+def test_the_lifecycle_node_has_states_services_remapping_and_a_namespace(ros, ros_python):
+    look = "import diagnostic_msgs.msg, std_srvs.srv, visualization_msgs.msg, lifecycle_msgs.srv"
+    done = subprocess.run([ros_python, "-c", look], capture_output=True, text=True)
+    if done.returncode:
+        pytest.skip(f"messages are missing: {done.stderr.strip().splitlines()[-1]}")
+    package = ROOT / "ros2" / "armload_ros" / "armload_ros" / "payload_identifier.py"
+    names = ("__ns:=/left", "joint_states:=/joint_states")
+    renamed = [word for name in names for word in ("-r", name)]
+    given = [word for name in ("robot:=panda", "tare_duration:=4.0") for word in ("-p", name)]
+    held = example_payload().parameters
+    with (
+        ros(*ARMLOAD, "simulate", "--robot", "panda", "--payload", "test", "--motion", "taie2024") as robot,
+        ros(package, "--ros-args", *renamed, *given) as node,
+        ros(ROOT / "tests/devices/ros/drive_lifecycle.py", "/left/payload_identifier", 8) as driver,
+    ):
+        wait_until(lambda: driver.poll() is not None, 120, driver, node, robot)
+        said = [json.loads(line) for line in driver.printed_lines()]
+    steps = {line["step"]: (line["success"], line["state"]) for line in said if "step" in line}
+    assert steps == {
+        "configure": (True, "inactive"),
+        "activate": (True, "active"),
+        "deactivate": (True, "inactive"),
+        "cleanup": (True, "unconfigured"),
+    }
+    assert [line["tare"] for line in said if "tare" in line] == [False, True]  # nobody listens before it is active
+    reset = said.index({"reset": True})
+    before, after = said[:reset], said[reset:]
+    *_, body = (line for line in before if "payload" in line)
+    assert body["frame"] == "panda_link8"
+    assert abs(body["payload"] - held.mass) < 0.05
+    *_, answer = (line["answer"] for line in before if "answer" in line)
+    assert answer["phi_low"][0] < held.mass < answer["phi_high"][0]
+    assert np.shape(answer["covariance"]) == (10, 10)
+    assert any(line.get("level") == 0 and "kg, calibrated" in line["diagnostics"] for line in before)
+    assert any("taring" in line.get("diagnostics", "") for line in after)
+    *_, tared = (line["answer"] for line in after if "answer" in line)
+    assert (tared["relative_to"], tared["held"]) == ("tare", False)  # what was mounted at the tare is the arm's
+
+
+@pytest.mark.full
+def test_the_lifecycle_node_stays_unconfigured_with_a_wrong_parameter_and_says_which(ros):
+    package = ROOT / "ros2" / "armload_ros" / "armload_ros" / "payload_identifier.py"
+    with (
+        ros(package, "--ros-args", "-p", "robot:=pandas") as node,
+        ros(ROOT / "tests/devices/ros/drive_lifecycle.py", "/payload_identifier", 1) as driver,
+    ):
+        wait_until(lambda: any("configure" in line for line in driver.printed_lines()), 60, driver, node)
+        (line,) = driver.printed_lines()[:1]
+        assert json.loads(line) == {"step": "configure", "success": False, "state": "unconfigured"}
+        assert "unknown robot 'pandas'" in node.noted()
+
+
+def test_the_ros_package_names_what_it_imports_and_installs_what_it_needs():
+    folder = ROOT / "ros2" / "armload_ros"
+    manifest = ElementTree.parse(folder / "package.xml").getroot()
+    needs = {element.text for element in manifest.iter("exec_depend")}
+    imported = set()
+    for path in [*folder.glob("armload_ros/*.py"), *folder.glob("launch/*.py")]:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.module is not None:
+                imported.add(node.module.split(".")[0])
+            elif isinstance(node, ast.Import):
+                imported |= {alias.name.split(".")[0] for alias in node.names}
+    ours = {"armload", "numpy", *sys.stdlib_module_names, "__future__"}
+    assert imported - ours == needs
+    assert manifest.findtext("name") == "armload_ros"
+    setup = (folder / "setup.py").read_text(encoding="utf-8")
+    for path in ("launch/payload.launch.py", "config/payload.yaml", "package.xml"):
+        assert path in setup
+        assert (folder / path).exists()
+    parameters = (folder / "config" / "payload.yaml").read_text(encoding="utf-8")
+    source = (folder / "armload_ros" / "payload_identifier.py").read_text(encoding="utf-8")
+    defaults = re.search(r"DEFAULTS.*?= (\{.*?^\})", source, re.DOTALL | re.MULTILINE)
+    assert defaults is not None
+    assert yaml.safe_load(parameters)["/**"]["ros__parameters"] == ast.literal_eval(defaults[1])
