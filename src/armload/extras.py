@@ -5,6 +5,7 @@ The sentence names the packages themselves, so that it holds for a wheel, a clon
 
 from __future__ import annotations
 
+import importlib
 import re
 import shlex
 import sys
@@ -55,6 +56,19 @@ def missing(error: ModuleNotFoundError) -> str | None:
     if module not in MODULES:
         return None
     return f"this needs {MODULES[module][0]}, which is not installed: {install(module)}"
+
+
+def require(*modules: str) -> None:
+    """See that modules of an extra are there, before the work that needs them begins.
+
+    Raises:
+        ModuleNotFoundError: one is not installed; the sentence says how to install it.
+    """
+    for module in modules:
+        try:
+            importlib.import_module(module)
+        except ModuleNotFoundError as error:
+            raise ModuleNotFoundError(missing(error) or str(error), name=error.name) from None
 
 
 def _required(extra: str) -> dict[str, str]:

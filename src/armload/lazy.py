@@ -40,7 +40,12 @@ def on_first_use(package: str) -> tuple[Callable[[str], Any], Callable[[], list[
     def get(name: str) -> Any:
         if name.startswith("__") or name not in homes():
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        value = getattr(importlib.import_module(homes()[name]), name)
+        try:
+            value = getattr(importlib.import_module(homes()[name]), name)
+        except ModuleNotFoundError as error:
+            from armload.extras import missing
+
+            raise (error if (said := missing(error)) is None else ModuleNotFoundError(said, name=error.name)) from None
         setattr(module, name, value)
         return value
 

@@ -9,6 +9,7 @@ wheel itself, as pip installs it into an environment of its own. That pip finds 
 
 import json
 import os
+import re
 import subprocess
 import sys
 import sysconfig
@@ -152,6 +153,14 @@ def test_what_needs_an_extra_says_in_one_sentence_how_to_install_it(
     assert "Traceback" not in done.stderr
     (wanted,) = [r for e in PROJECT["optional-dependencies"].values() for r in e if r.startswith(f"{package}>")][:1]
     assert f"'{wanted.partition(';')[0].strip()}'" in line.partition("pip install ")[2]
+
+
+def test_python_that_needs_an_extra_is_told_how_to_install_it(light):
+    done = light(
+        "-c", "import armload; from armload.motion import taie2024; armload.simulate(armload.arm('panda'), taie2024())"
+    )
+    assert done.returncode == 1
+    assert re.search(r"ModuleNotFoundError: this needs \w+, which is not installed: pip install ", done.stderr)
 
 
 def test_each_extra_and_each_package_of_it_is_known_and_named_as_in_pyproject():

@@ -782,7 +782,7 @@ def test_a_file_that_is_no_description_is_an_arm_error(tmp_path):
     binary.write_bytes(bytes(range(256)))
     with pytest.raises(ArmError, match="cannot be read as text"):
         arm(binary)
-    with pytest.raises(ArmError, match="unknown robot"):
+    with pytest.raises(ArmError, match="is not there: expected the path of a URDF file"):
         arm(tmp_path)  # a folder
-    with pytest.raises(ArmError, match=r"unknown robot .*missing\.urdf.*path of a URDF file that exists"):
+    with pytest.raises(ArmError, match=r"missing\.urdf is not there: expected the path of a URDF file"):
         arm(tmp_path / "missing.urdf")

@@ -120,8 +120,21 @@ def test_a_reader_that_is_not_installed_is_named(tmp_path, monkeypatch, suffix, 
     path = tmp_path / f"log{suffix}"
     path.write_bytes(b"PAR1" if suffix == ".parquet" else b"\x89HDF\r\n\x1a\n")
     monkeypatch.setitem(sys.modules, missing, None)
-    with pytest.raises(RecordingError, match=rf"{missing}, which is missing: pip install 'armload\[{suffix[1:]}\]'"):
+    with pytest.raises(RecordingError, match=rf"{missing}, which is missing: pip install '?{missing}"):
         read_recording(path, PANDA)
+
+
+@pytest.mark.parametrize(
+    ("name", "begins"),
+    [("run.bag", b"#ROSBAG V2.0\n"), ("run.db3", b"SQLite format 3\0"), ("run.mcap", b"\x89MCAP0\r\n")],
+)
+def test_a_bag_without_a_reader_is_not_called_damaged(tmp_path, monkeypatch, name, begins):
+    (tmp_path / name).write_bytes(begins + bytes(84))
+    for module in [module for module in sys.modules if module.startswith("rosbags")]:
+        monkeypatch.delitem(sys.modules, module)
+    monkeypatch.setitem(sys.modules, "rosbags", None)
+    with pytest.raises(RecordingError, match=r"through rosbags: this needs rosbags, .* pip install '?rosbags"):
+        read_recording(tmp_path / name, PANDA)
 
 
 def test_csv_is_read_and_written_without_pyarrow(tmp_path, monkeypatch):
@@ -132,7 +145,7 @@ def test_csv_is_read_and_written_without_pyarrow(tmp_path, monkeypatch):
 
 @pytest.fixture
 def h5py():
-    return pytest.importorskip("h5py", reason="h5py is not installed: pip install 'armload[hdf5]'")
+    return pytest.importorskip("h5py", reason="h5py is not installed: it comes with the extra hdf5")
 
 
 def test_an_episode_of_aloha_reads_with_its_rate(tmp_path, h5py):

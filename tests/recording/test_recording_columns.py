@@ -110,7 +110,7 @@ def test_motor_currents_are_multiplied_with_the_constants(tmp_path, log):
         (SPEC + ",tau=", r"'tau=' is not KEY=VALUE"),
         (
             SPEC.replace("load", "lode"),
-            r"has no column 'lode_\{i\}', which --columns names for tau: found 'clock'",
+            r"has no column 'lode_\{i\}', which --columns names for tau: found clock",
         ),
         (SPEC.replace("clock", "time"), r"has no column 'time', which --columns names for t"),
         ("t=clock,q=enc_{0..5},dq=rate_{i},tau=load_{i}", r"names 6 column\(s\) of position for 7 joints"),

@@ -377,3 +377,12 @@ def test_identify_says_the_same_of_every_form(tmp_path, analytic_log):
         path = write(tmp_path / f"{name}.csv", columns(log))
         found = identify(read_recording(path, PANDA), PANDA, method="rls")
         np.testing.assert_allclose(found.parameters.phi, expected.parameters.phi, rtol=0, atol=1e-9)
+
+
+def test_wanted_torque_that_is_asked_for_by_name_is_read_and_said_to_be_that(tmp_path):
+    log = canonical(UR)
+    moments = numbered("target_moment_{}", log.tau)
+    columns = {k: v for k, v in rtde(log, CONSTANTS, True).items() if "current" not in k} | moments
+    found = read_recording(write(tmp_path / "log.csv", columns), UR, columns="tau=target_moment_{i}")
+    same(found, log)
+    assert any("not told of does not show in it" in note for note in found.notes)

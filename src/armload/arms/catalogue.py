@@ -42,8 +42,11 @@ def arm(robot: str | Path, frame: str | None = None, gravity: tuple[float, float
         return Arm(name, description_of(name), facts.flange if frame is None else frame, gravity, **facts.of_arm)
     path = Path(robot)
     if not path.is_file():
+        if path.suffix or len(path.parts) > 1:
+            raise ArmError(f"robot description {name} is not there: expected the path of a URDF file that exists")
         raise ArmError(
-            f"unknown robot {name!r}: expected one of {', '.join(ARMS)}, or the path of a URDF file that exists"
+            f"unknown robot {name!r}: expected one of {', '.join(ARMS)}, or the path of a URDF file that exists, with "
+            "masses and inertias of its links, as its maker or its ROS package gives it"
         )
     try:
         text = path.read_text(encoding="utf-8")

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from armload.payloads import Payload
 
 _KNOWN = (True,) * 10
+_MOMENTS = (4, 7, 9)  # places of Ixx, Iyy, Izz
 _RELATIVE = {"before": "empty arm before"}  # what reads otherwise than it is called
 _MISFIT = 3.0  # standard deviations between what is left and the nearest body, beyond which too much was taken off
 
@@ -72,10 +73,9 @@ class Load:
             known = tuple(bool(x) for x in result.determined)
             return cls(result.parameters, known, None if arm is None else arm.name, result.relative_to, result.std)
         std = (result.phi_high - result.phi_low) / (2 * Z95)
-        known, remarks = (
-            tuple(result.determined.tolist()),
-            _leaning(result.determined.tolist(), result.rests_on_prior.tolist()),
-        )
+        known, resting = tuple(result.determined.tolist()), result.rests_on_prior.tolist()
+        inertia = (result.inertia_com, result.inertia_com_low, result.inertia_com_high)
+        remarks = _leaning(known, resting) + _loose(*map(np.diag, inertia), known=known)
         return cls(result.parameters, known, result.robot, result.relative_to, std, remarks)
 
     @property
@@ -222,7 +222,13 @@ def read_load(path: str | Path) -> Load:
     except (KeyError, TypeError, ValueError):
         pass  # written by hand: the numbers themselves are enough
     resting = _flags(content, "rests_on_prior", path) or (False,) * 10
-    return Load(parameters, determined, robot, relative_to, std, _leaning(determined, resting) + assumed(payload))
+    remarks = _leaning(determined, resting) + assumed(payload)
+    try:
+        inertia = (content[key] for key in ("inertia_com", "inertia_com_low", "inertia_com_high"))
+        remarks += _loose(*(np.diag(np.array(x, dtype=float)) for x in inertia), known=determined)
+    except (KeyError, TypeError, ValueError):
+        pass
+    return Load(parameters, determined, robot, relative_to, std, remarks)
 
 
 def assumed(payload: Payload) -> tuple[str, ...]:
@@ -236,6 +242,16 @@ def _leaning(determined: Sequence[bool], rests_on_prior: Sequence[bool]) -> tupl
     """A remark on parameters that the log determines, though less than what payloads are usually like does."""
     names = [n for n, known, prior in zip(NAMES, determined, rests_on_prior, strict=True) if known and prior]
     return (f"rests on what payloads are usually like more than on the log: {', '.join(names)}",) if names else ()
+
+
+def _loose(value: NDArray, low: NDArray, high: NDArray, known: Sequence[bool]) -> tuple[str, ...]:
+    """A remark on moments of inertia about the centre of mass (3,) that are hardly known, though determined.
+
+    Hardly: the interval is wider than the value, which a controller takes for exact.
+    """
+    which = (np.shape(value) == np.shape(low) == np.shape(high) == (3,)) and (high - low > value)
+    names = [NAMES[k] for k, hardly in zip(_MOMENTS, np.broadcast_to(which, 3), strict=True) if hardly and known[k]]
+    return (f"moments of inertia known to no better than half of themselves: {', '.join(names)}",) if names else ()
 
 
 def _flags(content: dict[str, Any], key: str, path: str | Path) -> tuple[bool, ...] | None:

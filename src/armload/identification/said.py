@@ -58,6 +58,7 @@ def answered(
     leaning = np.zeros(10, dtype=bool)
     if found.weak_std is not None:
         leaning = determined & (found.weak_std > LEANS * estimate.std)
+        leaning[0] = leaning[0] and found.mass is None  # what was weighed rests on the scale
     phi = body_of(estimate, determined[0], found.exchanged)
     low, high = phi_interval(phi, estimate.phi, estimate.std, determined, before, otherwise)
     if unsure is not None:

@@ -13,7 +13,7 @@ from armload.inertia import InertialParameters, is_consistent
 from armload.payloads import solids
 
 _WATER = 1000.0  # [kg/m³]
-INERTIA_ASSUMED = "its inertia is not given, a ball's as dense as water about its centre of mass is taken"
+INERTIA_ASSUMED = "the inertia is not given: that of a ball as dense as water about the centre of mass is taken"
 
 
 @dataclass(frozen=True)

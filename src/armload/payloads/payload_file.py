@@ -128,7 +128,10 @@ def read_content(path: str | Path) -> dict[str, Any]:
     try:
         content = json.loads(text)
     except json.JSONDecodeError as error:
-        raise PayloadError(f"payload file {path} is not JSON: {error.msg} at line {error.lineno}") from None
+        raise PayloadError(
+            f"payload file {path} is not JSON: {error.msg} at line {error.lineno}; of a log, first make one with "
+            "`armload identify LOG --robot NAME --out payload.json`"
+        ) from None
     except (ValueError, RecursionError) as error:
         raise PayloadError(f"payload file {path} cannot be read as JSON: {error}") from None
     if not isinstance(content, dict):

@@ -11,9 +11,9 @@ from armload.errors import RecordingError
 from armload.recording.aliases import CALLED, TIME_UNITS, Form
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.header import Family, Reading
-from armload.recording.templates import place_of
+from armload.recording.templates import abridged, place_of
 
-_WHY_NOT = {
+WHY_NOT = {
     "desired": "is what the controller wants or its model expects, not what was measured",
     "external": "has gravity and the arm's own torque taken out",
 }
@@ -175,7 +175,7 @@ class Header:
 
     def _two(self, quantity: str, one: Family, other: Family) -> RecordingError:
         if other.kind == "desired":
-            what, ways = f", which {_WHY_NOT['desired']}", f'"{quantity}={self.template(one)}"'
+            what, ways = f", which {WHY_NOT['desired']}", f'"{quantity}={self.template(one)}"'
         else:
             what, ways = "", f'"{quantity}={self.template(one)}" or "{quantity}={self.template(other)}"'
         return RecordingError(
@@ -213,17 +213,18 @@ class Header:
                 f"{self.where}: {self.shown(measured[0])} are {len(measured[0].places)} columns of {called}: expected "
                 f'{self.n}; name the arm\'s own with --columns "{quantity}={self.template(measured[0], ranged=True)}"'
             )
-        for kind, why in _WHY_NOT.items():
+        for kind, why in WHY_NOT.items():
             found = [family for family in mine if family.kind == kind]
             if found:
                 return RecordingError(
                     f"{self.where} lacks the measured {called}: {self.shown(found[0])} {why}; record the measured one, "
-                    f"or name its columns with --columns {quantity}=…"
+                    f"or, if it is there under a name of its own, say so with --columns {quantity}=NAME{{i}}"
                 )
-        also = "; it is not differentiated here: record it too" if quantity == "dq" else ""
-        found = ", ".join(self.names[:6]) + (", …" if len(self.names) > 6 else "")
+        smoothed = "; it is not differentiated here: record it, too, add columns smoothed as suits your log"
+        also = smoothed if quantity == "dq" else ""
         return RecordingError(
-            f"{self.where} lacks columns of {called}{also}, or name them with --columns {quantity}=… (found {found})"
+            f"{self.where} lacks columns of {called}{also}, or name them with --columns {quantity}=NAME{{i}} "
+            f"(found {abridged(self.names)})"
         )
 
     def shown(self, family: Family) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 
 from armload.arms import Arm
 from armload.errors import RecordingError, one_line
+from armload.extras import install
 from armload.recording.array_table import WIDEST, ArrayTable, Column
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.recording import Recording
@@ -18,9 +19,7 @@ def read_hdf5(path: Path, where: str, arm: Arm | None = None, spec: ColumnSpec |
     try:
         import h5py  # type: ignore[import-not-found]
     except ImportError:
-        raise RecordingError(
-            f"{where}: HDF5 is read through h5py, which is missing: pip install 'armload[hdf5]'"
-        ) from None
+        raise RecordingError(f"{where}: HDF5 is read through h5py, which is missing: {install('h5py')}") from None
     columns: dict[str, Column] = {}
 
     def add(name: str, data: Any) -> None:

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from armload.arms import ARMS, Arm
 from armload.errors import RecordingError
 from armload.recording.aliases import AMPERE, CALLED, EPISODE, FORMS, QUANTITIES, UNITS, WANTED, Form
-from armload.recording.choice import Header, TimeColumns, some
+from armload.recording.choice import WHY_NOT, Header, TimeColumns, some
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.columns import check_joint_count, column_names
 from armload.recording.header import Family, Reading, families_of, read_name, words_of
-from armload.recording.templates import named_columns
+from armload.recording.templates import abridged, named_columns
 
 
 @dataclass(frozen=True)
@@ -79,9 +79,9 @@ def map_columns(
         if (template := getattr(spec, key)) is not None:
             given[key] = named_columns(template, key, names, where, arm)
     if not given and not any(family.quantity in QUANTITIES for family in families):
-        found = ", ".join(names[:6]) + (", …" if len(names) > 6 else "")
         raise RecordingError(
-            f"{where} has no columns named q1, dq1, tau1, …: found {found}; name the columns with --columns"
+            f"{where} has no columns named q1, dq1, tau1, …: found {abridged(names)}; name yours, such as "
+            '--columns "t=TIME,q=POSITION{i},dq=VELOCITY{i},tau=TORQUE{i}"'
         )
     header = Header(names, families, times, form, _joint_count(families, given, where, arm), arm, where, dates)
     places, scales, notes, wanted = {}, {}, [], None
@@ -97,6 +97,7 @@ def map_columns(
             raise _no_constants(header, places[key])
         scales[key], note = scale or ((1.0,) * header.n, [])
         notes += note
+    notes += _not_measured(header, places["tau"])
     if not given:
         _check_bases(header, places)
     time = header.time(spec)
@@ -197,6 +198,17 @@ def _scale(header: Header, key: str, places: list[int], spec: ColumnSpec) -> tup
         return (UNITS[key][unit.strip().lower()],) * header.n, []
     constants = _torque_constants(header, spec)
     return None if constants is None else (constants, [of_currents(header.where, constants)])
+
+
+def _not_measured(header: Header, places: list[int]) -> list[str]:
+    """That torque was taken, as the user asked for, from columns of what a controller wants."""
+    readings = [read_name(header.names[place], ()) for place in places]
+    if not any(reading is not None and reading.kind == "desired" for reading in readings):
+        return []
+    return [
+        f"{header.where}: tau is {some([header.names[place] for place in places])}, as was asked for; by its name it "
+        f"{WHY_NOT['desired']}: a payload that the controller was not told of does not show in it"
+    ]
 
 
 def of_currents(where: str, constants: Sequence[float], by: str = "") -> str:

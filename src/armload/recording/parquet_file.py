@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.errors import RecordingError, one_line
+from armload.extras import install
 from armload.recording.array_table import WIDEST, ArrayTable, Column
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.columns import column_names
@@ -72,7 +73,7 @@ def pyarrow_for(where: str | Path) -> tuple[Any, Any]:
         from pyarrow import parquet
     except ImportError:
         raise RecordingError(
-            f"{where}: Parquet is read and written through pyarrow, which is missing: pip install 'armload[parquet]'"
+            f"{where}: Parquet is read and written through pyarrow, which is missing: {install('pyarrow')}"
         ) from None
     return pyarrow, parquet
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm, names_among
 from armload.errors import RecordingError, one_line
+from armload.extras import missing
 from armload.recording.columns import checked_recording
 from armload.recording.recording import Recording
 
@@ -41,6 +42,8 @@ def read_bag(path: Path, where: str, arm: Arm | None = None, topic: str | None =
             return _recording(bag, _choose(bag, where, arm, topic), where, arm)
     except RecordingError:
         raise
+    except ModuleNotFoundError as error:
+        raise RecordingError(f"{where}: ROS bags are read through rosbags: {missing(error) or error}") from None
     except Exception as error:  # a damaged bag can fail anywhere between the index, the chunks and the messages
         raise RecordingError(
             f"{where} is not a bag that can be read (damaged or cut off?): {one_line(error)[:160]}"

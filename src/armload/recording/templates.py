@@ -61,6 +61,16 @@ def place_of(name: str, key: str, names: Sequence[str], where: str) -> int:
     places = [k for k, there in enumerate(names) if there == name]
     if len(places) == 1:
         return places[0]
-    found = ", ".join(repr(there) for there in names[:8]) + (", …" if len(names) > 8 else "")
+    numbered = [there for there in names if re.fullmatch(re.escape(name) + "[0-9]{1,3}", there)]
+    instead = f"; did you mean {name}{{i}}?" if numbered and not places else ""
     has = f"has the column {name!r} more than once" if places else f"has no column {name!r}"
-    raise RecordingError(f"{where} {has}, which --columns names for {key}: found {found}")
+    raise RecordingError(f"{where} {has}, which --columns names for {key}: found {abridged(names)}{instead}")
+
+
+def abridged(names: Sequence[str]) -> str:
+    """The names of a header, the first and the last ones.
+
+    >>> abridged([f"a{k}" for k in range(22)])
+    'a0, a1, a2, a3, …, a19, a20, a21'
+    """
+    return ", ".join(names if len(names) < 10 else [*names[:4], "…", *names[-3:]])

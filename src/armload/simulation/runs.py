@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.errors import ArmError, MotionError, PayloadError
+from armload.extras import require
 from armload.inertia import InertialParameters
 from armload.motion import Motion
 from armload.recording import Recording
@@ -100,7 +101,11 @@ def simulate_many(
         workers: threads.
         resolution: how finely the engine works; `simulate` does it finely.
         progress: called as progress(done, total) after every batch.
+
+    Raises:
+        ModuleNotFoundError: MuJoCo or SciPy is not installed; the sentence says how to install them.
     """
+    require("mujoco", "scipy.interpolate")
     if not (np.isfinite(rate) and rate > 0):
         raise ArmError(f"the log's rate is {rate}: expected a positive number of Hz")
     batches: dict[int, list[int]] = {}

@@ -155,8 +155,9 @@ def _print(profile: Profile) -> None:
     from armload.posterior.drift import CHANGED
 
     n, drift = profile.n, profile.drift.reshape(-1, profile.n) ** 0.5
+    count = "1 session" if len(profile.sessions) == 1 else f"{len(profile.sessions)} sessions"
     print(
-        f"{profile.arm_name} about {profile.frame}: {len(profile.sessions)} sessions, {profile.duration:.0f} s, "
+        f"{profile.arm_name} about {profile.frame}: {count}, {profile.duration:.0f} s, "
         f"{profile.features.pose} features of the pose, noise counted {profile.repeated:g} times"
     )
     rows = table("from session to session, 1 sigma [N·m]", "", *(f"joint {j + 1}" for j in range(n)))
