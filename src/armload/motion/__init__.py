@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from armload.motion.motion import Motion
     from armload.motion.motion_file import load_motion, save_motion, taie2024
     from armload.motion.random_fourier import excitation, random_motion
+    from armload.motion.spline import SplineMotion
 
 __all__ = [
     "EndlessMotion",
@@ -22,6 +23,7 @@ __all__ = [
     "Motion",
     "MotionCheck",
     "MotionFingerprint",
+    "SplineMotion",
     "check_motion",
     "excitation",
     "export_motion",

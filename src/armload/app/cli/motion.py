@@ -1,10 +1,11 @@
-"""`armload motion`: excitation motions shown, checked against an arm, exported for a robot, or drawn at random."""
+"""`armload motion`: excitation motions designed, shown, checked against an arm, exported for a robot, or drawn."""
 
 from __future__ import annotations
 
 import argparse
 from typing import TYPE_CHECKING
 
+from armload.app.cli import motion_design
 from armload.app.cli.arguments import Parser, add_arm_arguments, add_column_arguments, at_least, file_name
 from armload.app.cli.named import arm_of, motion_of, payload_of
 from armload.app.cli.printing import console, print_json, print_note, table, working
@@ -21,6 +22,7 @@ examples:
   armload motion show taie2024
   armload motion check mine.json --robot panda --payload tool.json
   armload motion check run.csv --robot ur10e --tare empty.csv
+  armload motion design --robot panda --from 0,-0.5,0,-2,0,1.6,0.8 --time 3 --out mine.json
   armload motion random --robot ur10e --seed 3 --out excite.json
   armload motion export excite.json --format ur --out excite.script
   armload motion export taie2024 --format ros2 --robot panda --out excite.yaml
@@ -33,9 +35,18 @@ says which parameters of a payload it can tell, and how well; it takes a log (CS
 def parser() -> Parser:
     """The arguments of `armload motion`."""
     parser = Parser(
-        prog="armload motion", description="Show, check, export or draw an excitation motion.", epilog=_EXAMPLES
+        prog="armload motion", description="Design, show, check, export or draw an excitation motion.", epilog=_EXAMPLES
     )
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
+
+    design = actions.add_parser(
+        "design",
+        help="the motion that tells most of a payload, about a pose, within limits",
+        description="Design the motion that tells most of a payload in a given time: from rest at a pose, and back to "
+        "it, within a share of every limit with the worst payload there may be, clear of floor, boxes and the arm "
+        "itself. It is checked 1000 times a second by other code before it is written.",
+    )
+    motion_design.add_design_arguments(design)
 
     show = actions.add_parser("show", help="what each joint does", description="Show what each joint does.")
     show.add_argument("motion", metavar="MOTION", help="taie2024, a JSON file, or random:SEED")
@@ -92,7 +103,7 @@ def parser() -> Parser:
 
 def run(options: argparse.Namespace) -> int:
     """Do the action."""
-    return {"show": _show, "check": _check, "export": _export, "random": _random}[options.action](options)
+    return {"design": motion_design.run_design, "show": _show, "check": _check, "export": _export, "random": _random}[options.action](options)
 
 
 def _show(options: argparse.Namespace) -> int:

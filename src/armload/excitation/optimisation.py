@@ -1,0 +1,198 @@
+"""The motion that tells most of a payload in a given time, about a given pose.
+
+    maximise J(c) = −log det B(c)   subject to the constraints,   q(t) = q_0 + Σ_k c_k·B_k(t)
+
+c are the control points of quintic splines (`motion.spline`), at rest at both ends by construction, J the information
+of `criterion.py`, the constraints those of `constraints.py`. They enter as a quadratic penalty whose weight rises from
+stage to stage; L-BFGS follows the exact gradient from several seeded starts, the best of which goes on. What is found
+is checked at 1 kHz by other code (`verification.py`) and drawn together about the start pose until it passes: the pose
+itself keeps to every constraint, so that such a motion exists.
+
+Sources: Swevers et al., T-RO 1997 (D-optimal excitation); Liu & Nocedal 1989 (L-BFGS); Nocedal & Wright, Numerical
+Optimization, ch. 17 (quadratic penalties).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from armload.errors import MotionError
+from armload.excitation.constraints import LONGEST, SHORTEST, Constraints
+from armload.excitation.criterion import Criterion, Told
+from armload.excitation.penalty import Penalty
+from armload.excitation.verification import Used, used
+from armload.motion.spline import SplineMotion, spline_basis
+
+_POINTS_PER_SECOND = 4.0  # control points: motions up to about 2 Hz, below what joints' elasticity and the lag take away
+_FEWEST, _MOST = 4, 48
+_RATE = 50.0  # [Hz] of the samples while designing: the bound differs by less than 0.1 in J from that at 200 Hz
+_STARTS = 4  # seeded
+# iterations of L-BFGS and weight of the penalty: of each start, then of the best one
+_STAGES = ((12, 30.0), (30, 200.0), (40, 2000.0))
+_SHRINKS, _SHRINK = 60, 0.97  # how often, and by what at least, a motion is drawn together
+_INSIDE = 0.999  # of each limit that a finished motion may use: room for the rounding of exports
+_STIRRING = 0.02  # [rad] a motion that goes no farther tells nothing
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """A designed motion, what it tells, and what it uses of its limits.
+
+    motion: the loaded run. empty: the empty run that goes with it; None: it is the loaded run's own motion, or none.
+    half_width: of the 95 % intervals (10,) at best. used: of each limit, the most first. evaluations: of the gradient.
+    """
+
+    motion: SplineMotion
+    empty: SplineMotion | None
+    half_width: NDArray[np.float64]
+    information: float
+    used: list[Used]
+    evaluations: int
+
+
+def design_motion(
+    constraints: Constraints,
+    criterion: Criterion,
+    time: float,
+    *,
+    tare_time: float | None = None,
+    seed: int = 0,
+    name: str = "designed",
+) -> Design:
+    """The motion of `time` seconds, and its own empty run of `tare_time`, that tell most of a payload.
+
+    Args:
+        constraints: what is allowed, and the pose.
+        criterion: what is wanted; with a tare of its "own" exactly where `tare_time` is given.
+        time: of the loaded run [s].
+        tare_time: of the empty run [s].
+        seed: of the starts; the same seed gives the same motion.
+        name: of the motion; the empty run's ends in "-empty".
+
+    Raises:
+        MotionError: a time out of range, or no motion that keeps to the constraints, with the limit in the way.
+    """
+    times = [time] if tare_time is None else [time, tare_time]
+    for t in times:
+        if not SHORTEST <= t <= LONGEST:
+            raise MotionError(f"a motion of {t:g} s asked for: expected {SHORTEST:g} to {LONGEST:g} s")
+    if len(times) != criterion.motions:
+        raise MotionError("an empty run of its own is designed where its time is given, and only there")
+    problem = _Problem(constraints, criterion, times)
+    rng = np.random.default_rng(seed)
+    (few, light), *later = _STAGES
+    found = [problem.climb(0.5 * rng.normal(size=problem.size), few, light) for _ in range(_STARTS)]
+    x = max(found, key=lambda one: one[1])[0]
+    for iterations, weight in later:
+        x = problem.climb(x, iterations, weight)[0]
+    names = [name, f"{name}-empty"]
+    motions = [
+        _drawn_together(constraints, SplineMotion(constraints.start, c, t, label))
+        for c, t, label in zip(problem.points(x), times, names, strict=False)
+    ]
+    told = problem.told(motions)
+    return Design(
+        motions[0],
+        motions[1] if len(motions) > 1 else None,
+        told.half_width,
+        told.value,
+        used(constraints, motions[0]),
+        problem.evaluations,
+    )
+
+
+class _Problem:
+    """J − weight·P and its gradient, as a function of the scaled control points of all motions together."""
+
+    def __init__(self, constraints: Constraints, criterion: Criterion, times: Sequence[float]) -> None:
+        self.constraints, self.criterion, self.times = constraints, criterion, times
+        self.penalty = Penalty(constraints)
+        self.evaluations = 0
+        moving = constraints.moving
+        self.counts = [int(np.clip(round(_POINTS_PER_SECOND * t), _FEWEST, _MOST)) for t in times]
+        self.bases = []
+        for count, lasting in zip(self.counts, times, strict=True):
+            rate = max(_RATE, 40.0 / lasting)
+            t = np.linspace(0.0, lasting, round(lasting * rate) + 1)
+            self.bases.append((t[1], [spline_basis(count, lasting, t, order) for order in range(4)]))
+        self.scale = [self._amplitude(t)[moving] for t in times]
+        self.size = sum(count * len(moving) for count in self.counts)
+
+    def _amplitude(self, lasting: float) -> NDArray[np.float64]:
+        """How far each joint (n,) gets within its limits on a swing of the time at hand, a second and a half at most."""
+        c, omega = self.constraints, 2.0 * np.pi / min(lasting, 1.5)
+        room = np.minimum(c.high - c.start, c.start - c.low) + 0.05
+        reach = [room, c.most["velocity"] / omega, c.most["acceleration"] / omega**2, c.most["jerk"] / omega**3]
+        return np.min(reach, axis=0)
+
+    def points(self, x: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        """Control points (n, K) of each motion."""
+        out, first, moving = [], 0, self.constraints.moving
+        for count, scale in zip(self.counts, self.scale, strict=True):
+            c = np.zeros((self.constraints.arm.n, count))
+            c[moving] = x[first : first + count * len(moving)].reshape(len(moving), count) * scale[:, None]
+            first += count * len(moving)
+            out.append(c)
+        return out
+
+    def climb(self, x: NDArray[np.float64], iterations: int, weight: float) -> tuple[NDArray[np.float64], float]:
+        """The control points after so many iterations, and what they reach."""
+        options = {"maxiter": iterations, "maxcor": 20, "ftol": 1e-7}
+        found = minimize(self.loss, x, args=(weight,), jac=True, method="L-BFGS-B", options=options)
+        return found.x, -float(found.fun)
+
+    def loss(self, x: NDArray[np.float64], weight: float) -> tuple[float, NDArray[np.float64]]:
+        """weight·P − J and its gradient."""
+        self.evaluations += 1
+        model, start = self.criterion.model, self.constraints.start
+        controls = self.points(x)
+        rows = []
+        for (step, basis), c in zip(self.bases, controls, strict=True):
+            rows.append(model.forward(start + basis[0] @ c.T, basis[1] @ c.T, step))
+        told = self.criterion(rows)
+        total, out = -told.value, []
+        for k, change in enumerate(told.changes):
+            basis, c, scale = self.bases[k][1], controls[k], self.scale[k]
+            for part in (change.q, change.dq, change.momentum, change.drift):
+                part *= -1.0
+            beyond = self.penalty(rows[k], basis[2] @ c.T, basis[3] @ c.T, change, weight)
+            total += weight * beyond.value
+            q, dq = model.at_joints(rows[k], change)
+            slope = basis[0].T @ q + basis[1].T @ dq + basis[2].T @ beyond.ddq + basis[3].T @ beyond.jerk  # (K, n)
+            out.append((slope.T[self.constraints.moving] * scale[:, None]).ravel())
+        return total, np.concatenate(out)
+
+    def told(self, motions: Sequence[SplineMotion]) -> Told:
+        """J and the bound of finished motions."""
+        rows = []
+        for motion in motions:
+            t = np.linspace(0.0, motion.duration, max(2, round(4 * _RATE * motion.duration) + 1))
+            rows.append(self.criterion.model.forward(motion(t)[0], motion.velocity(t), t[1]))
+        return self.criterion(rows)
+
+
+def _drawn_together(constraints: Constraints, motion: SplineMotion) -> SplineMotion:
+    """The motion, its deviations from the start pose made smaller until it passes the check.
+
+    Raises:
+        MotionError: nothing worth running is left; it says which limit stands in the way.
+    """
+    worst = None
+    for _ in range(_SHRINKS):
+        worst = used(constraints, motion)[0]
+        if worst.share <= _INSIDE:
+            break
+        motion = replace(motion, control=motion.control * min(_SHRINK, 0.5 * (1.0 + _INSIDE / worst.share)))
+    farthest = float(np.abs(motion(np.linspace(0.0, motion.duration, 200))[0] - constraints.start).max())
+    if worst is None or worst.share > _INSIDE or farthest < _STIRRING:
+        reason = "it allows no motion worth running" if worst is None else worst.text
+        raise MotionError(
+            f"no motion of {motion.duration:g} s from this pose keeps to the constraints: {reason}; start elsewhere, "
+            "allow a larger share or a longer time"
+        )
+    return motion
