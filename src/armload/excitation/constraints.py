@@ -56,7 +56,9 @@ class Constraints:
             )
         for name, value, most in (("share", self.share, 1.0), ("travel", self.travel, np.inf)):
             if not (np.isfinite(value) and 0 < value <= most):
-                raise MotionError(f"{name} is {value}: expected a number above 0" + (", at most 1" if most == 1 else ""))
+                raise MotionError(
+                    f"{name} is {value}: expected a number above 0" + (", at most 1" if most == 1 else "")
+                )
         if not self.speed > 0:
             raise MotionError(f"the tool speed limit is {self.speed} m/s: expected a number above 0")
         object.__setattr__(self, "start", start)
@@ -124,20 +126,29 @@ class Constraints:
         for j in np.flatnonzero((self.start < low) | (self.start > high)):
             limits = arm.limits
             raise MotionError(
-                f"{arm.joint_names[j]} starts at {self.start[j]:.4g} rad, outside {self.share:g} of its range about the "
-                f"middle, {low[j]:.4g} to {high[j]:.4g} rad (its limits are {limits.position_low[j]:.4g} and "
+                f"{arm.joint_names[j]} starts at {self.start[j]:.4g} rad, outside {self.share:g} of its range about "
+                f"the middle, {low[j]:.4g} to {high[j]:.4g} rad (its limits are {limits.position_low[j]:.4g} and "
                 f"{limits.position_high[j]:.4g}): start elsewhere, or allow a larger share"
             )
-        held = arm.torque(self.start) + self._static()
+        bare, each = arm.torque(self.start), self._static()
+        held = bare + each
         over = np.abs(held).max(axis=0) - self.most["torque"]
         j = int(np.argmax(over / np.where(np.isfinite(self.most["torque"]), self.most["torque"], 1.0)))
         if over[j] >= 0.0:
             raise MotionError(
-                f"at the start {arm.joint_names[j]} needs {np.abs(held[:, j]).max():.4g} N·m to hold the worst payload "
-                f"of the range (up to {payload.mass:g} kg), more than {self.most['torque'][j]:.4g} N·m, {self.share:g} "
-                "of its limit: start elsewhere, allow a larger share, or give the payload's mass"
+                f"at the start {arm.joint_names[j]} needs {np.abs(held[:, j]).max():.4g} N·m to hold the worst "
+                f"payload of the range (up to {payload.mass:g} kg), more than {self.most['torque'][j]:.4g} N·m, "
+                f"{self.share:g} of its limit: start elsewhere, allow a larger share, or give the payload's mass "
+                f"({self._holds(bare, each)})"
             )
         self.around.check_start(self.start)
+
+    def _holds(self, bare: NDArray[np.float64], each: NDArray[np.float64]) -> str:
+        """How much of the heaviest payload the start can hold: a torque grows with the mass."""
+        assert self.payload is not None
+        room = np.maximum(self.most["torque"] - np.sign(each) * bare, 0.0)
+        share = float((room / np.maximum(np.abs(each), 1e-9)).min())
+        return f"{share * self.payload.mass:.3g} kg can be held"
 
     def _static(self) -> NDArray[np.float64]:
         rest = np.zeros((1, self.arm.n))

@@ -3,7 +3,7 @@
     J = log det (Λ + P_phi⁻¹) = −log det B
 
 B is the Bayesian Cramér–Rao bound of `posterior.cramer_rao`: prior, tare and the arm's mismatch are in it. J grows by 1
-for each parameter whose standard deviation falls to e^(−1/2). Let run k have the rows X_j(t) of joint j, the information
+for each parameter whose standard deviation falls to e^(−1/2). Let run k have the rows X_j(t) of joint j, information
 A_j = ∫ w·X_jᵀ·X_j dt / S_j, and K_j = Cov(phi, x_j) what the posterior says of payload and unknowns together. Then
 
     dJ = Σ_k Σ_j tr(G_j·dA_j),   G_j = K_jᵀ·B⁻¹·K_j / S_j
@@ -119,15 +119,20 @@ class Criterion:
             B = found.covariance[problem.last, problem.last]
             L = np.linalg.cholesky(B)
             with_phi = np.linalg.solve(L, found.covariance[problem.last]).T  # Cov(z, phi)·L⁻ᵀ, (z, 10)
-            changes = [RowAdjoint.zero(rows) for rows in motions]
-            first = len(self._fixed)
-            for k, which in enumerate(order, start=first):
-                shared = problem.selections[k] @ with_phi  # (10 + p, 10)
-                own = -found.slope @ with_phi  # (n, R, 10)
-                F = np.concatenate([np.broadcast_to(shared, (len(own), *shared.shape)), own], axis=1)
-                F = F / np.sqrt(scales.noise[k])[:, None, None]
-                self._back(motions[which], F, changes[which])
+            changes, first = [RowAdjoint.zero(rows) for rows in motions], len(self._fixed)
+            for which, rows in enumerate(motions):
+                places = [k for k, its in enumerate(order, start=first) if its == which]
+                parts = [self._root(problem.selections[k], found.slope, with_phi, scales.noise[k]) for k in places]
+                self._back(rows, np.concatenate(parts, axis=2), changes[which])
         return Told(-2.0 * float(np.log(np.diag(L)).sum()), changes, B)
+
+    @staticmethod
+    def _root(selection: NDArray, slope: NDArray, with_phi: NDArray, noise: NDArray) -> NDArray[np.float64]:
+        """F (n, size, 10) of one run, F_j·F_jᵀ = G_j; from Cov(z, phi)·L⁻ᵀ (z, 10), L·Lᵀ = B."""
+        shared = selection @ with_phi  # (10 + p, 10)
+        own = -slope @ with_phi  # (n, R, 10)
+        F = np.concatenate([np.broadcast_to(shared, (len(own), *shared.shape)), own], axis=1)
+        return F / np.sqrt(noise)[:, None, None]
 
     def _data(self, rows: MotionRows) -> RegressionData:
         session: Session = self._session
@@ -143,7 +148,7 @@ class Criterion:
         return whole_noise(self.correction, self.noise) * max(1.0, duration / self.noise.novelty)
 
     def _back(self, rows: MotionRows, F: NDArray[np.float64], out: RowAdjoint) -> None:
-        """F (n, size, 10) with G_j = F_j·F_jᵀ."""
+        """F (n, size, K) with F_j·F_jᵀ = G_j, summed over the runs that the rows are of."""
         XF = np.einsum("tjs,jsk->tjk", rows.X, F, optimize=True)
         XF[0] = 0.0
         X = 2.0 * rows.step * rows.weights[:, :, None] * np.einsum("tjk,jsk->tjs", XF, F, optimize=True)

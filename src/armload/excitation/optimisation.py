@@ -28,12 +28,14 @@ from armload.excitation.penalty import Penalty
 from armload.excitation.verification import Used, used
 from armload.motion.spline import SplineMotion, spline_basis
 
-_POINTS_PER_SECOND = 4.0  # control points: motions up to about 2 Hz, below what joints' elasticity and the lag take away
+_POINTS_PER_SECOND = (
+    4.0  # control points: motions up to about 2 Hz, below what joints' elasticity and the lag take away
+)
 _FEWEST, _MOST = 4, 48
 _RATE = 50.0  # [Hz] of the samples while designing: the bound differs by less than 0.1 in J from that at 200 Hz
-_STARTS = 4  # seeded
+STARTS = 4  # seeded
 # iterations of L-BFGS and weight of the penalty: of each start, then of the best one
-_STAGES = ((12, 30.0), (30, 200.0), (40, 2000.0))
+STAGES = ((12, 30.0), (30, 200.0), (40, 2000.0))
 _SHRINKS, _SHRINK = 60, 0.97  # how often, and by what at least, a motion is drawn together
 _INSIDE = 0.999  # of each limit that a finished motion may use: room for the rounding of exports
 _STIRRING = 0.02  # [rad] a motion that goes no farther tells nothing
@@ -63,6 +65,8 @@ def design_motion(
     tare_time: float | None = None,
     seed: int = 0,
     name: str = "designed",
+    starts: int = STARTS,
+    stages: Sequence[tuple[int, float]] = STAGES,
 ) -> Design:
     """The motion of `time` seconds, and its own empty run of `tare_time`, that tell most of a payload.
 
@@ -72,6 +76,7 @@ def design_motion(
         time: of the loaded run [s].
         tare_time: of the empty run [s].
         seed: of the starts; the same seed gives the same motion.
+        starts, stages: how long it looks, as the constants of the same names.
         name: of the motion; the empty run's ends in "-empty".
 
     Raises:
@@ -85,8 +90,8 @@ def design_motion(
         raise MotionError("an empty run of its own is designed where its time is given, and only there")
     problem = _Problem(constraints, criterion, times)
     rng = np.random.default_rng(seed)
-    (few, light), *later = _STAGES
-    found = [problem.climb(0.5 * rng.normal(size=problem.size), few, light) for _ in range(_STARTS)]
+    (few, light), *later = stages
+    found = [problem.climb(0.5 * rng.normal(size=problem.size), few, light) for _ in range(starts)]
     x = max(found, key=lambda one: one[1])[0]
     for iterations, weight in later:
         x = problem.climb(x, iterations, weight)[0]
@@ -124,7 +129,7 @@ class _Problem:
         self.size = sum(count * len(moving) for count in self.counts)
 
     def _amplitude(self, lasting: float) -> NDArray[np.float64]:
-        """How far each joint (n,) gets within its limits on a swing of the time at hand, a second and a half at most."""
+        """How far each joint (n,) gets within its limits on a swing of the whole time, 1.5 s at most."""
         c, omega = self.constraints, 2.0 * np.pi / min(lasting, 1.5)
         room = np.minimum(c.high - c.start, c.start - c.low) + 0.05
         reach = [room, c.most["velocity"] / omega, c.most["acceleration"] / omega**2, c.most["jerk"] / omega**3]
@@ -182,17 +187,17 @@ def _drawn_together(constraints: Constraints, motion: SplineMotion) -> SplineMot
     Raises:
         MotionError: nothing worth running is left; it says which limit stands in the way.
     """
-    worst = None
+    worst = used(constraints, motion)[0]
     for _ in range(_SHRINKS):
-        worst = used(constraints, motion)[0]
         if worst.share <= _INSIDE:
             break
         motion = replace(motion, control=motion.control * min(_SHRINK, 0.5 * (1.0 + _INSIDE / worst.share)))
+        worst = used(constraints, motion)[0]
     farthest = float(np.abs(motion(np.linspace(0.0, motion.duration, 200))[0] - constraints.start).max())
-    if worst is None or worst.share > _INSIDE or farthest < _STIRRING:
-        reason = "it allows no motion worth running" if worst is None else worst.text
+    if worst.share > _INSIDE or farthest < _STIRRING:
+        what = f"no joint goes farther than {farthest:.3f} rad, as " if farthest < _STIRRING else ""
         raise MotionError(
-            f"no motion of {motion.duration:g} s from this pose keeps to the constraints: {reason}; start elsewhere, "
-            "allow a larger share or a longer time"
+            f"no motion of {motion.duration:g} s from this pose keeps to the constraints: {what}{worst.text}; start "
+            "elsewhere, allow a larger share or a longer time"
         )
     return motion

@@ -149,12 +149,13 @@ class RowModel:
         keep, mix = self._lag(step)
         u = D - self.gain * Y
         first = (-self.gain * Y[0] - mix * u[0])[None]
-        return self.gain * Y + lfilter([mix, mix], [1.0, -keep], u, axis=0, zi=first)[0]
+        out, _ = lfilter([mix, mix], [1.0, -keep], u, axis=0, zi=first)
+        return self.gain * Y + out
 
     def _back(self, X: NDArray, step: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """How a function changes with Y and D that changes with the lagged rows by X."""
         keep, mix = self._lag(step)
-        later = lfilter([1.0], [1.0, -keep], X[::-1], axis=0)[::-1]
+        later = np.asarray(lfilter([1.0], [1.0, -keep], X[::-1], axis=0))[::-1]
         u = np.zeros_like(later)
         u[1:] = mix * later[1:]
         u[:-1] += mix * later[1:]

@@ -51,7 +51,9 @@ class Surroundings:
     def __post_init__(self) -> None:
         for box in self.boxes:
             if not np.all(np.isfinite([*box.centre, *box.edges])) or min(box.edges) <= 0:
-                raise MotionError(f"the box at {box.centre} has edges {box.edges}: expected finite lengths above 0 in m")
+                raise MotionError(
+                    f"the box at {box.centre} has edges {box.edges}: expected finite lengths above 0 in m"
+                )
         edges = self.held if isinstance(self.held, tuple) else (self.held,)
         if not np.all(np.isfinite(edges)) or min(edges) < 0 or (len(edges) == 3 and min(edges) == 0):
             raise MotionError(f"the held body has the size {self.held}: expected a radius or three edges in m")

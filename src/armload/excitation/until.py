@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,8 +47,7 @@ def design_until(
     accuracy: Accuracy,
     *,
     tare_time: float | None = None,
-    seed: int = 0,
-    name: str = "designed",
+    **settings: Any,
 ) -> Design:
     """The shortest motion found whose bound is within the accuracy, to 5 % of its time.
 
@@ -61,7 +61,7 @@ def design_until(
     seen: list[tuple[float, float]] = []  # log time, log of what is over
     time = _FIRST
     for _ in range(_DESIGNS):
-        found = design_motion(constraints, criterion, time, tare_time=tare_time, seed=seed, name=name)
+        found = design_motion(constraints, criterion, time, tare_time=tare_time, **settings)
         over = accuracy.over(found.half_width)
         seen.append((float(np.log(time)), float(np.log(over))))
         if over <= 1.0:
@@ -69,6 +69,8 @@ def design_until(
         else:
             low = time
         if high <= low * (1.0 + _CLOSE) or low >= LONGEST or high <= SHORTEST:
+            break
+        if best is None and time * over > LONGEST:  # even if half-widths fell as 1/T
             break
         time = _next(seen, low, high, best is not None)
     if best is None:
@@ -80,7 +82,7 @@ def design_until(
 
 
 def _next(seen: list[tuple[float, float]], low: float, high: float, reached: bool) -> float:
-    """Where the power law through the last two designs (a slope of −1 to begin with) meets the accuracy, a bit beyond."""
+    """Where the power law through the last two designs (slope −1 to begin with) meets the accuracy, a bit beyond."""
     (x, y), slope = seen[-1], -1.0
     if len(seen) > 1 and abs(x - seen[-2][0]) > 1e-3:
         slope = float(np.clip((y - seen[-2][1]) / (x - seen[-2][0]), -3.0, -0.3))

@@ -77,7 +77,13 @@ def motion_to_json(motion: Motion) -> str:
         head = {"format": FORMAT, "name": motion.name, "note": motion.note, "period": motion.period}
         parts = {"offset": motion.offset, "sine": motion.sine, "cosine": motion.cosine}
     elif isinstance(motion, SplineMotion):
-        head = {"format": FORMAT, "kind": _SPLINE, "name": motion.name, "note": motion.note, "duration": motion.duration}
+        head = {
+            "format": FORMAT,
+            "kind": _SPLINE,
+            "name": motion.name,
+            "note": motion.note,
+            "duration": motion.duration,
+        }
         parts = {"start": motion.start, "control": motion.control}
     else:
         raise MotionError(
@@ -150,5 +156,6 @@ def _spline(content: dict[str, Any], where: str) -> SplineMotion:
         raise MotionError(f"{where}: {error}") from None
     except (TypeError, ValueError):
         raise MotionError(
-            f"{where} is not a motion: duration must be a number of seconds, start n numbers, control n rows of K numbers"
+            f"{where} is not a motion: duration must be a number of seconds, start n numbers, control n rows of K "
+            "numbers each"
         ) from None

@@ -12,11 +12,9 @@ Source: de Boor, A Practical Guide to Splines, 1978.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline
 
 from armload.errors import MotionError
 from armload.motion.motion import Motion
@@ -79,25 +77,40 @@ class SplineMotion(Motion):
         """T [s]."""
         return self.lasting
 
-    @cached_property
-    def _spline(self) -> BSpline:
-        inner = np.zeros((self.control.shape[1] + 2 * _ENDS, self.n))
-        inner[_ENDS:-_ENDS] = self.control.T
-        return BSpline(_knots(self.control.shape[1], self.lasting), inner, DEGREE)
-
     def derivative(self, t: NDArray[np.float64], order: int) -> NDArray[np.float64]:
         """The derivative of q of any order ≥ 0 at times t (N,) within 0 … T; (N, n)."""
-        out = self._spline(np.asarray(t, dtype=float), nu=order)
+        out = spline_basis(self.control.shape[1], self.lasting, t, order) @ self.control.T
         return out + self.start if order == 0 else out
 
 
 def spline_basis(count: int, lasting: float, t: NDArray[np.float64], order: int) -> NDArray[np.float64]:
-    """The derivative of B_1 … B_K of the given order at times t (N,); (N, K)."""
-    inner = np.zeros((count + 2 * _ENDS, count))
+    """The derivative of B_1 … B_K of the given order at times t (N,); (N, K).
+
+    The basis of degree 5 − order by the recursion of Cox and de Boor, and B′ = p·(B_i/Δ_i − B_(i+1)/Δ_(i+1)), by which
+    a derivative has the differences of the control points over the knots' distances for control points.
+    """
+    inner = np.zeros((count + 2 * _ENDS, count))  # control points of each function
     inner[_ENDS:-_ENDS] = np.eye(count)
-    return BSpline(_knots(count, lasting), inner, DEGREE)(np.asarray(t, dtype=float), nu=order)
-
-
-def _knots(count: int, lasting: float) -> NDArray[np.float64]:
     breaks = np.linspace(0.0, lasting, count + 2 * _ENDS - DEGREE + 1)
-    return np.concatenate([np.zeros(DEGREE), breaks, np.full(DEGREE, lasting)])
+    knots = np.concatenate([np.zeros(DEGREE), breaks, np.full(DEGREE, lasting)])
+    degree = DEGREE
+    for _ in range(min(order, DEGREE + 1)):
+        if degree == 0:
+            return np.zeros((len(t), count))
+        wide = knots[degree + 1 : -1] - knots[1 : -degree - 1]
+        inner = degree * np.diff(inner, axis=0) / wide[:, None]
+        knots, degree = knots[1:-1], degree - 1
+    return _basis(knots, degree, np.asarray(t, dtype=float)) @ inner
+
+
+def _basis(knots: NDArray[np.float64], degree: int, t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """All functions of a clamped basis at times t (N,)."""
+    last = len(knots) - degree - 2
+    within = np.clip(np.searchsorted(knots, t, side="right") - 1, degree, last)
+    out = np.zeros((len(t), len(knots) - 1))
+    out[np.arange(len(t)), within] = 1.0
+    for d in range(1, degree + 1):
+        wide = knots[d:] - knots[:-d]  # 0 where knots are repeated, and there the function is 0
+        up = np.divide(t[:, None] - knots[:-d], wide, out=np.zeros((len(t), len(wide))), where=wide > 0)
+        out = up[:, :-1] * out[:, :-1] + (1.0 - up[:, 1:]) * out[:, 1:]
+    return out

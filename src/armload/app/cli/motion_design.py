@@ -14,7 +14,7 @@ from armload.errors import UsageError
 
 if TYPE_CHECKING:
     from armload.arms import Arm
-    from armload.excitation import Accuracy, Constraints, Criterion, Design, Obstacle, Surroundings
+    from armload.excitation import Constraints, Criterion, Design, Obstacle, Surroundings
     from armload.motion import Motion
     from armload.recording import Recording
 
