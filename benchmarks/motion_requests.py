@@ -149,6 +149,8 @@ def objections(request: Request, motion: Motion, seed: int = 0) -> list[str]:
     must("tool speed", np.linalg.norm(np.diff(places, axis=0), axis=1) / h, request.speed)
     found = clearances(request.surroundings, q[::5])
     kept = np.minimum(KEPT, 0.5 * clearances(request.surroundings, request.start[None])[0])
+    if isinstance(request.surroundings.held, tuple):  # its corners are farther away than it is
+        kept = np.minimum(kept, request.surroundings.kept(request.start))
     for what, distance, least in zip(("floor", "itself", "boxes"), found.min(axis=0), kept, strict=True):
         if distance < least - _ALLOWANCE:
             out.append(f"{distance:.4f} m from {what}, {least:.4f} m are to be kept")

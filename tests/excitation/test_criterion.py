@@ -6,7 +6,7 @@ from scipy.interpolate import BSpline
 
 from armload.arms import arm, payload_regressor
 from armload.excitation import Constraints, Criterion, PayloadRange
-from armload.excitation.optimisation import _Problem
+from armload.excitation.optimisation import about_a_pose
 from armload.motion import SplineMotion, random_motion
 from armload.motion.spline import spline_basis
 from armload.posterior import bound
@@ -47,7 +47,7 @@ def test_what_is_maximised_is_the_bound(name, tare):
 def test_the_gradient_is_that_of_central_differences_penalties_included(name, tare):
     robot = arm(name)
     constraints = Constraints(robot, POSES[name], payload=PayloadRange(1.0))
-    problem = _Problem(constraints, Criterion(robot, tare), [1.0, 1.3] if tare == "own" else [1.0])
+    problem = about_a_pose(constraints, Criterion(robot, tare), [1.0, 1.3] if tare == "own" else [1.0])
     rng = np.random.default_rng(1)
     x, weight = 0.8 * rng.normal(size=problem.size), 50.0
     _, slope = problem.loss(x, weight)

@@ -9,6 +9,7 @@ from armload.lazy import on_first_use
 if TYPE_CHECKING:
     from armload.excitation.constraints import Constraints
     from armload.excitation.criterion import Criterion
+    from armload.excitation.enrichment import Enriched, enrich
     from armload.excitation.optimisation import Design, design_motion
     from armload.excitation.payload_range import PayloadRange
     from armload.excitation.surroundings import Obstacle, Surroundings
@@ -20,11 +21,13 @@ __all__ = [
     "Constraints",
     "Criterion",
     "Design",
+    "Enriched",
     "Obstacle",
     "PayloadRange",
     "Surroundings",
     "design_motion",
     "design_until",
+    "enrich",
     "problems",
     "used",
 ]

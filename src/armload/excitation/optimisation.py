@@ -25,8 +25,11 @@ from armload.errors import MotionError
 from armload.excitation.constraints import LONGEST, SHORTEST, Constraints
 from armload.excitation.criterion import Criterion, Told
 from armload.excitation.penalty import Penalty
+from armload.excitation.track import Track
+from armload.excitation.tube import Tube
 from armload.excitation.verification import Used, used
-from armload.motion.spline import SplineMotion, spline_basis
+from armload.motion import Motion
+from armload.motion.spline import SplineMotion
 
 _POINTS_PER_SECOND = (
     4.0  # control points: motions up to about 2 Hz, below what joints' elasticity and the lag take away
@@ -88,7 +91,7 @@ def design_motion(
             raise MotionError(f"a motion of {t:g} s asked for: expected {SHORTEST:g} to {LONGEST:g} s")
     if len(times) != criterion.motions:
         raise MotionError("an empty run of its own is designed where its time is given, and only there")
-    problem = _Problem(constraints, criterion, times)
+    problem = about_a_pose(constraints, criterion, times)
     rng = np.random.default_rng(seed)
     (few, light), *later = stages
     found = [problem.climb(0.5 * rng.normal(size=problem.size), few, light) for _ in range(starts)]
@@ -111,37 +114,32 @@ def design_motion(
     )
 
 
-class _Problem:
-    """J − weight·P and its gradient, as a function of the scaled control points of all motions together."""
+class Climb:
+    """J − weight·P and its gradient, as a function of the scaled control points of all tracks together."""
 
-    def __init__(self, constraints: Constraints, criterion: Criterion, times: Sequence[float]) -> None:
-        self.constraints, self.criterion, self.times = constraints, criterion, times
-        self.penalty = Penalty(constraints)
+    def __init__(
+        self,
+        constraints: Constraints,
+        criterion: Criterion,
+        tracks: Sequence[Track],
+        reach: Sequence[NDArray[np.float64]],
+        tube: Tube | None = None,
+    ) -> None:
+        self.constraints, self.criterion, self.tracks = constraints, criterion, tracks
+        self.penalty, self.tube = Penalty(constraints), tube
         self.evaluations = 0
-        moving = constraints.moving
-        self.counts = [int(np.clip(round(_POINTS_PER_SECOND * t), _FEWEST, _MOST)) for t in times]
-        self.bases = []
-        for count, lasting in zip(self.counts, times, strict=True):
-            rate = max(_RATE, 40.0 / lasting)
-            t = np.linspace(0.0, lasting, round(lasting * rate) + 1)
-            self.bases.append((t[1], [spline_basis(count, lasting, t, order) for order in range(4)]))
-        self.scale = [self._amplitude(t)[moving] for t in times]
-        self.size = sum(count * len(moving) for count in self.counts)
-
-    def _amplitude(self, lasting: float) -> NDArray[np.float64]:
-        """How far each joint (n,) gets within its limits on a swing of the whole time, 1.5 s at most."""
-        c, omega = self.constraints, 2.0 * np.pi / min(lasting, 1.5)
-        room = np.minimum(c.high - c.start, c.start - c.low) + 0.05
-        reach = [room, c.most["velocity"] / omega, c.most["acceleration"] / omega**2, c.most["jerk"] / omega**3]
-        return np.min(reach, axis=0)
+        self.samples = [track.sampled(_RATE) for track in tracks]
+        self.scale = [each[constraints.moving] for each in reach]
+        self.size = sum(track.count * len(constraints.moving) for track in tracks)
 
     def points(self, x: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-        """Control points (n, K) of each motion."""
+        """Control points (n, K) of each track."""
         out, first, moving = [], 0, self.constraints.moving
-        for count, scale in zip(self.counts, self.scale, strict=True):
-            c = np.zeros((self.constraints.arm.n, count))
-            c[moving] = x[first : first + count * len(moving)].reshape(len(moving), count) * scale[:, None]
-            first += count * len(moving)
+        for track, scale in zip(self.tracks, self.scale, strict=True):
+            c = np.zeros((self.constraints.arm.n, track.count))
+            last = first + track.count * len(moving)
+            c[moving] = x[first:last].reshape(len(moving), track.count) * scale[:, None]
+            first = last
             out.append(c)
         return out
 
@@ -154,31 +152,49 @@ class _Problem:
     def loss(self, x: NDArray[np.float64], weight: float) -> tuple[float, NDArray[np.float64]]:
         """weight·P − J and its gradient."""
         self.evaluations += 1
-        model, start = self.criterion.model, self.constraints.start
-        controls = self.points(x)
-        rows = []
-        for (step, basis), c in zip(self.bases, controls, strict=True):
-            rows.append(model.forward(start + basis[0] @ c.T, basis[1] @ c.T, step))
+        model, controls = self.criterion.model, self.points(x)
+        moved = [
+            [b + B @ c.T for b, B in zip(s.base, s.basis, strict=True)]
+            for s, c in zip(self.samples, controls, strict=True)
+        ]
+        rows = [model.forward(m[0], m[1], s.step) for m, s in zip(moved, self.samples, strict=True)]
         told = self.criterion(rows)
         total, out = -told.value, []
         for k, change in enumerate(told.changes):
-            basis, c, scale = self.bases[k][1], controls[k], self.scale[k]
+            basis, (_, _, ddq, jerk) = self.samples[k].basis, moved[k]
             for part in (change.q, change.dq, change.momentum, change.drift):
                 part *= -1.0
-            beyond = self.penalty(rows[k], basis[2] @ c.T, basis[3] @ c.T, change, weight)
+            beyond = self.penalty(rows[k], ddq, jerk, change, weight)
             total += weight * beyond.value
+            if self.tube is not None:
+                total += self.tube(moved[k][0], change, weight)
             q, dq = model.at_joints(rows[k], change)
             slope = basis[0].T @ q + basis[1].T @ dq + basis[2].T @ beyond.ddq + basis[3].T @ beyond.jerk  # (K, n)
-            out.append((slope.T[self.constraints.moving] * scale[:, None]).ravel())
+            out.append((slope.T[self.constraints.moving] * self.scale[k][:, None]).ravel())
         return total, np.concatenate(out)
 
-    def told(self, motions: Sequence[SplineMotion]) -> Told:
+    def told(self, motions: Sequence[Motion]) -> Told:
         """J and the bound of finished motions."""
         rows = []
         for motion in motions:
             t = np.linspace(0.0, motion.duration, max(2, round(4 * _RATE * motion.duration) + 1))
             rows.append(self.criterion.model.forward(motion(t)[0], motion.velocity(t), t[1]))
         return self.criterion(rows)
+
+
+def about_a_pose(constraints: Constraints, criterion: Criterion, times: Sequence[float]) -> Climb:
+    """The problem of motions from rest at the start, and back."""
+    counts = [int(np.clip(round(_POINTS_PER_SECOND * t), _FEWEST, _MOST)) for t in times]
+    tracks = [Track(constraints.start, t, ((0.0, t, count),)) for t, count in zip(times, counts, strict=True)]
+    return Climb(constraints, criterion, tracks, [amplitude(constraints, t) for t in times])
+
+
+def amplitude(constraints: Constraints, lasting: float) -> NDArray[np.float64]:
+    """How far each joint (n,) gets within its limits on a swing of the whole time, 1.5 s at most."""
+    c, omega = constraints, 2.0 * np.pi / min(lasting, 1.5)
+    room = np.minimum(c.high - c.start, c.start - c.low) + 0.05
+    reach = [room, c.most["velocity"] / omega, c.most["acceleration"] / omega**2, c.most["jerk"] / omega**3]
+    return np.min(reach, axis=0)
 
 
 def _drawn_together(constraints: Constraints, motion: SplineMotion) -> SplineMotion:

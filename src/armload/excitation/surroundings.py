@@ -21,7 +21,6 @@ from armload.motion.collision import PAYLOAD_RADIUS, CapsuleArm, capsule_arm
 # [m] clearances that designed motions keep, as random ones do; a start that is nearer keeps half of what it has
 FLOOR, SELF, BOXES = 0.05, 0.01, 0.05
 KINDS = ("floor", "itself", "boxes")
-_KEPT = np.array([FLOOR, SELF, BOXES])
 _OF_START = 0.5
 
 
@@ -37,7 +36,8 @@ class Surroundings:
     """Floor, boxes and what is held.
 
     floor: height in the base's frame [m]; None: there is none. boxes: obstacles. held: radius of a ball [m], or the
-    edges (3,) of a box that begins at the payload frame and lies along its z axis; 0: nothing.
+    edges (3,) of a box that begins at the payload frame and lies along its z axis; 0: nothing. keep: clearances to keep
+    from the floor, itself and boxes [m].
 
     Raises:
         MotionError: an edge or a radius that is not a length.
@@ -47,6 +47,7 @@ class Surroundings:
     floor: float | None = 0.0
     boxes: tuple[Obstacle, ...] = ()
     held: float | tuple[float, float, float] = PAYLOAD_RADIUS
+    keep: tuple[float, float, float] = (FLOOR, SELF, BOXES)
 
     def __post_init__(self) -> None:
         for box in self.boxes:
@@ -65,7 +66,7 @@ class Surroundings:
 
     def kept(self, start: NDArray[np.float64]) -> NDArray[np.float64]:
         """The clearances (3,) [m] that a motion from this pose keeps."""
-        return np.minimum(_KEPT, _OF_START * self.clearance(start[None])[0])
+        return np.minimum(self.keep, _OF_START * self.clearance(start[None])[0])
 
     def check_start(self, start: NDArray[np.float64]) -> None:
         """See that nothing touches at the start.

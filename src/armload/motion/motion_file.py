@@ -1,7 +1,7 @@
 """Motions as JSON files, readable by a person and by any program.
 
 A file without a "kind" holds every number of equations (5) and (6); one of the kind "b-spline" start and control points
-of a `SplineMotion`.
+of a `SplineMotion`, one of the kind "path" the points of a `PathMotion`.
 """
 
 from __future__ import annotations
@@ -17,10 +17,11 @@ from armload.motion.fourier import FourierMotion
 from armload.motion.motion import Motion
 
 if TYPE_CHECKING:
+    from armload.motion.path import PathMotion
     from armload.motion.spline import SplineMotion
 
 FORMAT = "armload-motion-1"
-_SPLINE = "b-spline"
+_SPLINE, _PATH = "b-spline", "path"
 
 
 def taie2024() -> FourierMotion:
@@ -42,7 +43,7 @@ def shipped_motion(name: str) -> FourierMotion:
     return _fourier(_content(text, f"{name}.json"), f"{name}.json")
 
 
-def load_motion(path: str | Path) -> FourierMotion | SplineMotion:
+def load_motion(path: str | Path) -> FourierMotion | SplineMotion | PathMotion:
     """The motion in a JSON file written by `save_motion`.
 
     Raises:
@@ -57,7 +58,8 @@ def load_motion(path: str | Path) -> FourierMotion | SplineMotion:
         reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
         raise MotionError(f"motion file {path} cannot be read: {reason}") from None
     content = _content(text, str(path))
-    return _spline(content, str(path)) if content.get("kind") == _SPLINE else _fourier(content, str(path))
+    kinds = {_SPLINE: _spline, _PATH: _path}
+    return kinds.get(str(content.get("kind")), _fourier)(content, str(path))
 
 
 def save_motion(path: str | Path, motion: Motion) -> None:
@@ -70,7 +72,8 @@ def save_motion(path: str | Path, motion: Motion) -> None:
 
 
 def motion_to_json(motion: Motion) -> str:
-    """The JSON text of a Fourier or a spline motion, one joint per line."""
+    """The JSON text of a Fourier or spline motion, one joint per line, or of a path, one point per line."""
+    from armload.motion.path import PathMotion
     from armload.motion.spline import SplineMotion
 
     if isinstance(motion, FourierMotion):
@@ -85,10 +88,14 @@ def motion_to_json(motion: Motion) -> str:
             "duration": motion.duration,
         }
         parts = {"start": motion.start, "control": motion.control}
+    elif isinstance(motion, PathMotion):
+        head = {"format": FORMAT, "kind": _PATH, "name": motion.name, "note": motion.note}
+        points = {"positions": motion.positions, "velocities": motion.velocities, "accelerations": motion.accelerations}
+        parts = {"times": motion.times, **points}
     else:
         raise MotionError(
-            f"the motion {motion.name!r} is a {type(motion).__name__}: only a FourierMotion or a SplineMotion can be "
-            "saved as JSON; use export_motion for a table"
+            f"the motion {motion.name!r} is a {type(motion).__name__}: only a FourierMotion, a SplineMotion or a "
+            "PathMotion can be saved as JSON; use export_motion for a table"
         )
     lines = [f"  {json.dumps(key)}: {json.dumps(value, ensure_ascii=False)}" for key, value in head.items()]
     for key, numbers in parts.items():
@@ -113,8 +120,10 @@ def _content(text: str, where: str) -> dict[str, Any]:
         raise MotionError(f"{where} is not a motion: it is not JSON ({error})") from None
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise MotionError(f'{where} is not a motion: expected a JSON object with "format": "{FORMAT}"')
-    if content.get("kind", _SPLINE) != _SPLINE:
-        raise MotionError(f'{where} is a motion of the kind {content["kind"]!r}: expected "{_SPLINE}", or no kind')
+    if content.get("kind", _SPLINE) not in (_SPLINE, _PATH):
+        raise MotionError(
+            f'{where} is a motion of the kind {content["kind"]!r}: expected "{_SPLINE}", "{_PATH}", or no kind'
+        )
     return content
 
 
@@ -158,4 +167,20 @@ def _spline(content: dict[str, Any], where: str) -> SplineMotion:
         raise MotionError(
             f"{where} is not a motion: duration must be a number of seconds, start n numbers, control n rows of K "
             "numbers each"
+        ) from None
+
+
+def _path(content: dict[str, Any], where: str) -> PathMotion:
+    from armload.motion.path import PathMotion
+
+    try:
+        points = [content[key] for key in ("times", "positions", "velocities", "accelerations")]
+        return PathMotion(*points, str(content["name"]), str(content.get("note", "")))
+    except KeyError as error:
+        raise MotionError(f"{where} is not a complete motion: the key {error} is missing") from None
+    except MotionError as error:
+        raise MotionError(f"{where}: {error}") from None
+    except (TypeError, ValueError):
+        raise MotionError(
+            f"{where} is not a motion: times must be K numbers, positions, velocities and accelerations K rows of n"
         ) from None

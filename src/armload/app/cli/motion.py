@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from armload.app.cli import motion_design
+from armload.app.cli import motion_design, motion_enrich
 from armload.app.cli.arguments import Parser, add_arm_arguments, add_column_arguments, at_least, file_name
 from armload.app.cli.named import arm_of, motion_of, payload_of
 from armload.app.cli.printing import console, print_json, print_note, table, working
@@ -23,6 +23,7 @@ examples:
   armload motion check mine.json --robot panda --payload tool.json
   armload motion check run.csv --robot ur10e --tare empty.csv
   armload motion design --robot panda --from 0,-0.5,0,-2,0,1.6,0.8 --time 3 --out mine.json
+  armload motion enrich pick.yaml --robot panda --mm 5 --deg 2 --out pick-enriched.yaml
   armload motion random --robot ur10e --seed 3 --out excite.json
   armload motion export excite.json --format ur --out excite.script
   armload motion export taie2024 --format ros2 --robot panda --out excite.yaml
@@ -47,6 +48,14 @@ def parser() -> Parser:
         "itself. It is checked 1000 times a second by other code before it is written.",
     )
     motion_design.add_design_arguments(design)
+
+    enrich = actions.add_parser(
+        "enrich",
+        help="a task's own path, with the smallest change that lets it tell a payload",
+        description="Change a task's own path by so many millimetres and degrees at most, so that it tells more of a "
+        "payload: its ends, its stops and its times stay as they are.",
+    )
+    motion_enrich.add_enrich_arguments(enrich)
 
     show = actions.add_parser("show", help="what each joint does", description="Show what each joint does.")
     show.add_argument("motion", metavar="MOTION", help="taie2024, a JSON file, or random:SEED")
@@ -103,7 +112,7 @@ def parser() -> Parser:
 
 def run(options: argparse.Namespace) -> int:
     """Do the action."""
-    return {"design": motion_design.run_design, "show": _show, "check": _check, "export": _export, "random": _random}[
+    return {"design": motion_design.run_design, "enrich": motion_enrich.run_enrich, "show": _show, "check": _check, "export": _export, "random": _random}[
         options.action
     ](options)
 
