@@ -15,6 +15,7 @@ docs/pictures/designed_motions.png from the worlds there are.
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,7 @@ from script import ROOT, markdown_table, options, say, write, write_table
 from armload.arms import Arm, arm
 from armload.excitation import Constraints, Criterion, PayloadRange, Surroundings, design_motion, enrich
 from armload.identification import choose
-from armload.inertia import InertialParameters
+from armload.inertia import Z95, InertialParameters
 from armload.lab.cells import key_of
 from armload.lab.experiment import Task, run_tasks, source_key
 from armload.lab.report.style import look, new_figure
@@ -34,12 +35,16 @@ from armload.motion import FourierMotion, Motion, MotionFingerprint, excitation,
 from armload.motion.point_to_point import PointToPoint
 from armload.payloads import draw_payload
 from armload.posterior import bound
+from armload.recording import Recording
 from armload.simulation import Run, Sensors, World, simulate_many
+from armload.simulation.resolution import COARSE
 
-TIMES = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0)  # [s]
+Candidates = dict[str, tuple[Motion | None, Motion | None]]
+TIMES = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0)  # [s]
 SHOWN = (1.0, 2.0, 3.0, 6.0)  # [s] of the tables
 WANTED = np.array([10e-3, 1.5e-3, 1e-3])  # [kg, kg·m, kg·m²]
 LASTING = 6.0  # [s] of a loaded run
+_RATE = 500.0  # [Hz] of the logs
 POSES = {"panda": (0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8), "ur10e": (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)}
 RATED = {"panda": 3.0, "ur10e": 6.0}  # [kg] payloads drawn and allowed for: a UR10e cannot hold 12.5 kg at this pose
 SHARE = 0.8
@@ -67,6 +72,10 @@ class Repeated(Motion):
 
     inner: Motion
     lasting: float
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        return f"{self.inner.name}, repeated"
 
     @property
     def n(self) -> int:
@@ -105,7 +114,7 @@ def place(robot: Arm) -> Motion:
     return PointToPoint(stops, starts, ends, name="pick and place")
 
 
-def motions_of(robot: Arm) -> dict[str, tuple[Motion | None, Motion | None]]:
+def motions_of(robot: Arm) -> Candidates:
     """Loaded run and own empty run of each candidate; None: another in each world, the common tare."""
     pose, n, tare = np.array(POSES[robot.name]), robot.n, elsewhere(robot)
     wrist = random_motion(robot, 3, duration=LASTING, around=pose)
@@ -176,31 +185,40 @@ def kept(robot: Arm, name: str, make: Any) -> list[Motion]:
     return [load_motion(file) for file in files]
 
 
-def measure(robot: Arm, name: str, run: Motion | None, empty: Motion | None, seed: int) -> dict[str, Any]:
-    """Errors (T, 3), half-widths of estimator and bound (T, 10) in one world."""
+def measure(names: Sequence[str], robot: Arm, chosen: Candidates, seed: int) -> Iterator[dict[str, Any]]:
+    """Of the cells named, ARM CANDIDATE SEED each: errors, half-widths of estimator and bound (T, 10) in one world."""
     world, sensors = World.real_like(robot, seed), Sensors.of(robot)
     held = draw_payload("boxes", _SEED + seed, RATED[robot.name]).parameters
     truth = InertialParameters(held.phi, robot.frame)
-    motion = run if run is not None else random_motion(robot, 9000 + seed, duration=LASTING)
-    loaded = Repeated(motion, LASTING) if motion.duration < LASTING else motion
-    before, lasting = (elsewhere(robot), 20.0) if empty is None else (empty, 5.0)
-    tare = simulate_many(robot, [Run(before, None, world, sensors, _SEED + 2 * seed)], duration=lasting, workers=1)[0]
-    log = simulate_many(robot, [Run(loaded, truth, world, sensors, _SEED + 2 * seed + 1)], duration=LASTING, workers=1)[
-        0
-    ]
-    found = choose(robot, tare).identifier.at(log, TIMES)
-    off = np.array([one.phi - truth.phi for one in found])
-    before_log = Repeated(before, lasting) if before.duration < lasting else before
-    best = bound(robot, loaded, tare=before_log, times=TIMES)
-    return {
-        "mass": truth.mass,
-        "errors": np.round(off, 7).tolist(),
-        "half_width": np.round([1.96 * one.std for one in found], 7).tolist(),
-        "bound": np.round(best.half_width, 7).tolist(),
-        "arm": robot.name,
-        "candidate": name,
-        "seed": seed,
-    }
+
+    def logged(motion: Motion, payload: InertialParameters | None, lasting: float, noise: int) -> Recording:
+        repeated = Repeated(motion, lasting) if motion.duration < lasting else motion
+        run = Run(repeated, payload, world, sensors, _SEED + 2 * seed + noise)
+        return simulate_many(robot, [run], rate=_RATE, duration=lasting, workers=1, resolution=COARSE)[0]
+
+    common = None
+    for cell in names:
+        candidate = cell.removeprefix(f"{robot.name} ").removesuffix(f" {seed}")
+        run, empty = chosen[candidate]
+        motion = run if run is not None else random_motion(robot, 9000 + seed, duration=LASTING)
+        before, lasting = (elsewhere(robot), 20.0) if empty is None else (empty, 5.0)
+        if empty is None:
+            tare = common = logged(before, None, lasting, 0) if common is None else common
+        else:
+            tare = logged(before, None, lasting, 0)
+        log = logged(motion, truth, LASTING, 1)
+        found = choose(robot, tare).identifier.at(log, TIMES)
+        followed = [Repeated(m, t) if m.duration < t else m for m, t in ((motion, LASTING), (before, lasting))]
+        best = bound(robot, followed[0], tare=followed[1], times=TIMES)
+        yield {
+            "mass": truth.mass,
+            "errors": np.round([one.phi - truth.phi for one in found], 7).tolist(),
+            "half_width": np.round([Z95 * one.std for one in found], 7).tolist(),
+            "bound": np.round(best.half_width, 7).tolist(),
+            "arm": robot.name,
+            "candidate": candidate,
+            "seed": seed,
+        }
 
 
 def in_three(off: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -274,14 +292,11 @@ def main() -> None:
     tasks = []
     robots = {name: arm(name) for name in asked.arms.split(",")}
     chosen = {name: motions_of(robot) for name, robot in robots.items()}
+    texts = {name: {c: [_text(m) for m in pair] for c, pair in chosen[name].items()} for name in robots}
     for seed in range(asked.worlds):
         for name, robot in robots.items():
-            for candidate, (run, empty) in chosen[name].items():
-                text = [_text(motion) for motion in (run, empty)]
-                key = key_of(code, name, candidate, *text, seed, TIMES)
-                tasks.append(
-                    Task.of_one(f"{name} {candidate} {seed}", key, measure, robot, candidate, run, empty, seed)
-                )
+            keys = {f"{name} {c} {seed}": key_of(code, name, c, *texts[name][c], seed, TIMES) for c in chosen[name]}
+            tasks.append(Task(f"{name} {seed}", keys, measure, (robot, chosen[name], seed), "candidate"))
     cells = run_tasks(tasks, OUT / "cells", jobs=asked.jobs, until=60 * asked.minutes, say=say).values()
     found: dict[str, dict[str, Any]] = {}
     for name in robots:

@@ -1,7 +1,7 @@
 """A path through many points with their velocities and accelerations: quintics from point to point.
 
-Between two points h seconds apart each joint follows the polynomial of degree 5 with position, velocity and
-acceleration of both: q, dq and ddq are continuous. It is what ROS 2's joint trajectory controller does with such points.
+Between two points each joint follows the polynomial of degree 5 with position, velocity and acceleration of both, as
+ROS 2's joint trajectory controller does: q, dq and ddq are continuous.
 """
 
 from __future__ import annotations

@@ -112,9 +112,14 @@ def parser() -> Parser:
 
 def run(options: argparse.Namespace) -> int:
     """Do the action."""
-    return {"design": motion_design.run_design, "enrich": motion_enrich.run_enrich, "show": _show, "check": _check, "export": _export, "random": _random}[
-        options.action
-    ](options)
+    return {
+        "design": motion_design.run_design,
+        "enrich": motion_enrich.run_enrich,
+        "show": _show,
+        "check": _check,
+        "export": _export,
+        "random": _random,
+    }[options.action](options)
 
 
 def _show(options: argparse.Namespace) -> int:
