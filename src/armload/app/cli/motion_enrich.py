@@ -196,9 +196,9 @@ def _table(text: str, name: str, arm: Arm) -> Motion:
     if "t" not in names or any(column not in names for column in wanted["q"]):
         raise MotionError(f"{name} has the columns {', '.join(names)}: expected t, q1 … q{arm.n} in s and rad")
     try:
-        rows = np.array([[float(cell) for cell in line.split(",")] for line in lines])
+        rows = np.array([[float(cell) for cell in line.split(",")] for line in lines]).reshape(-1, len(names))
         t = rows[:, names.index("t")]
-    except (ValueError, IndexError):
+    except ValueError:
         raise MotionError(f"{name} has a row that is not {len(names)} numbers") from None
     found: dict[str, Any] = {
         kind: rows[:, [names.index(column) for column in columns]]
