@@ -47,6 +47,19 @@ def test_a_design_is_exported_with_the_pose_first_at_rest_and_the_pose_again(des
     assert (folder / "m-empty.json").exists()
 
 
+def test_an_export_without_a_file_is_printed_and_a_figure_is_a_picture(designed, tmp_path, capsys):
+    _, said = designed
+    export = ["motion", "export", said["motion"], "--format", "csv"]
+    assert main([*export, "--out", str(tmp_path / "m.csv")]) == 0
+    capsys.readouterr()
+    assert main(export) == 0
+    assert capsys.readouterr().out == (tmp_path / "m.csv").read_text()
+    assert main(["motion", "show", said["motion"], "--figure", str(tmp_path / "m.png")]) == 0
+    assert (tmp_path / "m.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+    assert main(["motion", "show", said["motion"], "--robot", "ur10e", "--figure", str(tmp_path / "n.png")]) == 2
+    assert "moves 7 joints: ur10e has 6" in capsys.readouterr().err
+
+
 def test_the_json_says_what_is_told_and_what_is_used(designed):
     _, said = designed
     assert said["duration"] == 0.5

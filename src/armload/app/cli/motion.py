@@ -19,7 +19,7 @@ NOT_ALLOWED = 3  # exit code of a check that says no
 
 _EXAMPLES = """\
 examples:
-  armload motion show taie2024
+  armload motion show taie2024 --figure taie2024.png
   armload motion check mine.json --robot panda --payload tool.json
   armload motion check run.csv --robot ur10e --tare empty.csv
   armload motion design --robot panda --from 0,-0.5,0,-2,0,1.6,0.8 --time 3 --out mine.json
@@ -60,6 +60,7 @@ def parser() -> Parser:
     show = actions.add_parser("show", help="what each joint does", description="Show what each joint does.")
     show.add_argument("motion", metavar="MOTION", help="taie2024, a JSON file, or random:SEED")
     add_arm_arguments(show, default="panda")
+    show.add_argument("--figure", type=file_name, metavar="F.png", help="draw the joints against their limits")
 
     check = actions.add_parser(
         "check",
@@ -93,7 +94,7 @@ def parser() -> Parser:
     add_arm_arguments(export, default="panda")
     export.add_argument("--format", required=True, choices=("csv", "ros2", "ur"))
     export.add_argument("--rate", type=at_least(1e-3, float, 1e4), metavar="HZ", help="samples per second")
-    export.add_argument("--out", required=True, type=file_name, metavar="FILE")
+    export.add_argument("--out", type=file_name, metavar="FILE", help="file to write (default: standard output)")
 
     random = actions.add_parser(
         "random",
@@ -125,7 +126,8 @@ def run(options: argparse.Namespace) -> int:
 def _show(options: argparse.Namespace) -> int:
     import numpy as np
 
-    motion = motion_of(options.motion, arm_of(options))
+    arm = arm_of(options)
+    motion = motion_of(options.motion, arm)
     q, dq, ddq = motion(np.linspace(0.0, motion.duration, 1001))
     rows = table(
         f"{motion.name}: {motion.n} joints, {motion.duration:g} s",
@@ -141,6 +143,11 @@ def _show(options: argparse.Namespace) -> int:
     console().print(rows)
     if note := getattr(motion, "note", ""):
         print(note)
+    if options.figure is not None:
+        from armload.lab.report.motion_figure import write_motion_figure
+
+        write_motion_figure(motion, arm, options.figure)
+        print_note(f"wrote {options.figure}")
     return 0
 
 
@@ -205,9 +212,13 @@ def _limits(payload_name: str, arm: Arm, motion: Motion) -> tuple[MotionCheck, s
 
 def _export(options: argparse.Namespace) -> int:
     from armload.motion import export_motion
+    from armload.motion.export import motion_text
 
     arm = arm_of(options)
     motion = motion_of(options.motion, arm)
+    if options.out is None:
+        print(motion_text(motion, options.format, options.rate, joint_names=arm.joint_names), end="")
+        return 0
     export_motion(motion, options.out, options.format, options.rate, joint_names=arm.joint_names)
     print_note(f"wrote {options.out}; check the motion before a robot runs it (armload motion check)")
     return 0
