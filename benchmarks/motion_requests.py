@@ -1,17 +1,18 @@
 """Do designed motions keep to what was asked, by code that shares nothing with the design? Requests at random.
 
-    nice -n 15 python benchmarks/motion_requests.py [--requests 1000] [--first 0] [--thorough]
+    nice -n 15 python benchmarks/motion_requests.py [--requests 1000] [--first 0] [--thorough] [--page]
 
 Each request draws an arm, a pose, a share of the limits, a payload range, a time, joints, a tare, boxes, a held body,
 a floor. Where a motion is designed, it is exported as CSV at 1 kHz and read again; the file's own difference quotients,
 Pinocchio's inverse dynamics of the arm with payloads drawn from the range, and distances of capsules in closed form
 then say whether it is allowed. A refusal must say which limit stands in the way. Without --thorough the design looks
 less long, which changes what a motion tells and not what it may do. Results go to
-benchmarks/results/motion_requests.json, after every 20 requests.
+benchmarks/results/motion_requests.json after every 20 requests, and with --page in a sentence on docs/motion.md.
 """
 
 from __future__ import annotations
 
+import json
 import tempfile
 from pathlib import Path
 from time import process_time
@@ -19,7 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from script import RESULTS, options, say, write
+from script import RESULTS, ROOT, options, say, write, write_table
 
 from armload.arms import ARMS, Arm, arm
 from armload.errors import MotionError
@@ -211,7 +212,11 @@ def segments_apart(a: NDArray, b: NDArray, c: NDArray, d: NDArray) -> NDArray[np
 
 def main() -> None:
     """Draw, design, object."""
-    chosen = options(__doc__, requests=1000, first=0, thorough=False)
+    chosen = options(__doc__, requests=1000, first=0, thorough=False, page=False)
+    if chosen.page:
+        found = json.loads((RESULTS / "motion_requests.json").read_text(encoding="utf-8"))
+        write_table(ROOT / "docs" / "motion.md", "motion requests", sentence(found))
+        return
     how = {} if chosen.thorough else QUICK
     rejected, refused, designed, seconds, reasons = [], 0, 0, 0.0, {}
     for k in range(chosen.first, chosen.first + chosen.requests):
@@ -244,6 +249,17 @@ def main() -> None:
                 },
                 None,
             )
+
+
+def sentence(found: dict[str, Any]) -> str:
+    """What was drawn, and what became of it."""
+    reasons = ", ".join(f"{name} {count}" for name, count in found["refused_for"].items() if count > 1)
+    return (
+        f"Of {found['requests']} requests drawn at random (arm, pose, share, payload range, time, joints, tare, boxes, held\n"
+        f"body, floor) {found['designed']} led to motions and {found['refused']} were refused ({reasons}).\n"
+        f"Code that shares nothing with the design or with its check rejected {len(found['rejected'])} of the motions\n"
+        "(`python benchmarks/motion_requests.py`)."
+    )
 
 
 def reason(why: str) -> str:

@@ -29,7 +29,7 @@ class SplineMotion(Motion):
 
     >>> motion = SplineMotion(np.array([0.5]), np.array([[0.0, 0.3, 0.0]]), 2.0)
     >>> [round(float(motion([t])[0][0, 0]), 3) for t in (0.0, 1.0, 2.0)]
-    [0.5, 0.665, 0.5]
+    [0.5, 0.633, 0.5]
 
     Args:
         start: q_0 (n,) [rad].
