@@ -255,8 +255,8 @@ def sentence(found: dict[str, Any]) -> str:
     """What was drawn, and what became of it."""
     reasons = ", ".join(f"{name} {count}" for name, count in found["refused_for"].items() if count > 1)
     return (
-        f"Of {found['requests']} requests drawn at random (arm, pose, share, payload range, time, joints, tare, boxes, held\n"
-        f"body, floor) {found['designed']} led to motions and {found['refused']} were refused ({reasons}).\n"
+        f"Of {found['requests']} requests at random (arm, pose, share, payload range, time, joints, tare, boxes,\n"
+        f"held body, floor) {found['designed']} led to motions and {found['refused']} were refused ({reasons}).\n"
         f"Code that shares nothing with the design or with its check rejected {len(found['rejected'])} of the motions\n"
         "(`python benchmarks/motion_requests.py`)."
     )
