@@ -61,9 +61,9 @@ NAMES = {
     "designed 3 s": "designed, 3 s",
     "wiggle pair": "all joints ±0.12 rad, after 5 s of it empty",
     "excitation pair": "taie2024 after 5 s of it empty",
-    "pair": "designed, 2 s, after its own 5 s empty",
+    "designed same": "designed, 2 s, after 5 s of it empty",
+    "pair": "designed, 2 s, after an empty run of its own, 5 s",
 }
-_OWN_TARE = {"wiggle pair", "excitation pair", "pair"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,6 +130,7 @@ def motions_of(robot: Arm) -> Candidates:
     wiggle = FourierMotion(pose, sine, cosine, 2.0, "wiggle").smooth()
     wiggle = wiggle.scaled(0.12 / np.abs(wiggle(np.linspace(0, 2, 200))[0] - pose).max(axis=0))
     taie, keep = excitation(robot, 0), allowed(robot)
+    (same,) = kept(robot, "designed same", lambda: [design_motion(keep, Criterion(robot, "same"), 2.0).motion])
     return {
         "excitation": (taie, None),
         "random": (None, None),
@@ -150,6 +151,7 @@ def motions_of(robot: Arm) -> Candidates:
         ),
         "wiggle pair": (wiggle, Repeated(wiggle, 5.0)),
         "excitation pair": (taie, taie),
+        "designed same": (same, Repeated(same, 5.0)),
         "pair": tuple(kept(robot, "pair", lambda: _pair(robot, keep))),  # type: ignore[dict-item]
     }
 

@@ -174,8 +174,14 @@ def _path(content: dict[str, Any], where: str) -> PathMotion:
     from armload.motion.path import PathMotion
 
     try:
-        points = [content[key] for key in ("times", "positions", "velocities", "accelerations")]
-        return PathMotion(*points, str(content["name"]), str(content.get("note", "")))
+        return PathMotion(
+            content["times"],
+            content["positions"],
+            content["velocities"],
+            content["accelerations"],
+            str(content["name"]),
+            str(content.get("note", "")),
+        )
     except KeyError as error:
         raise MotionError(f"{where} is not a complete motion: the key {error} is missing") from None
     except MotionError as error:

@@ -74,7 +74,8 @@ class PathMotion(Motion):
     def of(cls, motion: Motion, rate: float = 100.0, name: str | None = None, note: str = "") -> PathMotion:
         """Another motion at so many points per second [Hz]."""
         t = np.linspace(0.0, motion.duration, max(2, round(motion.duration * rate) + 1))
-        return cls(t, *(motion.derivative(t, order) for order in range(3)), motion.name if name is None else name, note)
+        q, dq, ddq = (motion.derivative(t, order) for order in range(3))
+        return cls(t, q, dq, ddq, motion.name if name is None else name, note)
 
     def derivative(self, t: NDArray[np.float64], order: int) -> NDArray[np.float64]:
         """The derivative of q of any order ≥ 0 at times t (N,) within 0 … the last; (N, n)."""
