@@ -25,6 +25,7 @@ MODULES = {
     "h5py": ("h5py", "hdf5"),
     "viser": ("viser", "live"),
     "rosbags": ("rosbags", "bags"),
+    "ruamel": ("rosbags", "bags"),  # which brings it: YAML
     "pylibfranka": ("pylibfranka", "franka"),
     "panda_py": ("panda-python", "panda"),
     "rtde_receive": ("ur-rtde", "ur"),

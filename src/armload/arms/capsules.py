@@ -1,8 +1,9 @@
-"""Capsules that ride on an arm's links: which of them are nearest to each other or to the ground, by coal."""
+"""Solids that ride on an arm's links: which of them are nearest to each other, to boxes or to the ground, by coal."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import coal
 import numpy as np
@@ -13,19 +14,28 @@ from armload.arms.facts import Capsule
 from armload.arms.model import Arm
 
 
+class Box(NamedTuple):
+    """A box that is fixed to a link (0 is the base): its centre [m], its edges [m], its axes as columns (3, 3)."""
+
+    link: int
+    centre: tuple[float, float, float]
+    edges: tuple[float, float, float]
+    axes: NDArray[np.float64] = np.eye(3)
+
+
 class NearestCapsules:
-    """The nearest of given pairs of capsules at each pose; negative distances are depths of penetration.
+    """The nearest of given pairs of solids at each pose; negative distances are depths of penetration.
 
     Coal's distances of capsules are exact. They agree with the distance of two segments in closed form to 4e-16 m; 24
     pairs at 300 poses take 0.6 ms, the closed form on arrays 4 to 8 ms.
 
     Args:
         arm: whose links carry them.
-        capsules: C of them; one whose ends are one point is a ball.
+        capsules: C of them, boxes among them; a capsule whose ends are one point is a ball.
         pairs: (P, 2) which are tested against each other; −1 in place of the second is the ground z ≤ 0 of the base.
     """
 
-    def __init__(self, arm: Arm, capsules: Sequence[Capsule], pairs: Sequence[tuple[int, int]]) -> None:
+    def __init__(self, arm: Arm, capsules: Sequence[Capsule | Box], pairs: Sequence[tuple[int, int]]) -> None:
         self._model = arm._model
         self._data = self._model.createData()
         geometry = pin.GeometryModel()
@@ -49,8 +59,10 @@ class NearestCapsules:
         return distance, pair
 
 
-def _solid(capsule: Capsule) -> tuple[pin.SE3, coal.ShapeBase]:
+def _solid(capsule: Capsule | Box) -> tuple[pin.SE3, coal.ShapeBase]:
     """Coal's capsule lies along its own z axis, about its middle."""
+    if isinstance(capsule, Box):
+        return pin.SE3(np.asarray(capsule.axes), np.array(capsule.centre)), coal.Box(*(float(x) for x in capsule.edges))
     start, end = np.asarray(capsule.start, dtype=float), np.asarray(capsule.end, dtype=float)
     length = float(np.linalg.norm(end - start))
     if length == 0.0:

@@ -14,7 +14,9 @@ if TYPE_CHECKING:
     from armload.motion.fourier import FourierMotion, start_and_stop_at_rest
     from armload.motion.motion import Motion
     from armload.motion.motion_file import load_motion, save_motion, taie2024
+    from armload.motion.path import PathMotion
     from armload.motion.random_fourier import excitation, random_motion
+    from armload.motion.spline import SplineMotion
 
 __all__ = [
     "EndlessMotion",
@@ -22,6 +24,8 @@ __all__ = [
     "Motion",
     "MotionCheck",
     "MotionFingerprint",
+    "PathMotion",
+    "SplineMotion",
     "check_motion",
     "excitation",
     "export_motion",

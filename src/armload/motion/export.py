@@ -49,6 +49,17 @@ def export_motion(
         MotionError: an unknown format, a rate or lead that is not positive, joint names missing or too few, a "ur"
             motion that has not 6 joints, or a file that cannot be written.
     """
+    write_whole(path, motion_text(motion, format, rate, joint_names, lead))
+
+
+def motion_text(
+    motion: Motion,
+    format: str = "csv",
+    rate: float | None = None,
+    joint_names: Sequence[str] | None = None,
+    lead: float = 5.0,
+) -> str:
+    """The text that `export_motion` writes; arguments and errors as there."""
     if format not in RATES:
         raise MotionError(f"unknown motion format {format!r}: expected one of {', '.join(RATES)}")
     rate = RATES[format] if rate is None else float(rate)
@@ -59,12 +70,8 @@ def export_motion(
     steps = max(1, round(motion.duration * rate))
     t = np.linspace(0.0, motion.duration, steps + 1)
     if format == "csv":
-        text = _csv(motion, t)
-    elif format == "ros2":
-        text = _ros2(motion, t, joint_names, lead)
-    else:
-        text = _ur(motion, t)
-    write_whole(path, text)
+        return _csv(motion, t)
+    return _ros2(motion, t, joint_names, lead) if format == "ros2" else _ur(motion, t)
 
 
 def _csv(motion: Motion, t: NDArray[np.float64]) -> str:

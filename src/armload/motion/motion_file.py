@@ -1,18 +1,27 @@
-"""Motions as JSON files: every number of equations (5) and (6), readable by a person and by any program."""
+"""Motions as JSON files, readable by a person and by any program.
+
+A file without a "kind" holds every number of equations (5) and (6); one of the kind "b-spline" start and control points
+of a `SplineMotion`, one of the kind "path" the points of a `PathMotion`.
+"""
 
 from __future__ import annotations
 
 import json
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from armload.atomic import replacing
 from armload.errors import MotionError
 from armload.motion.fourier import FourierMotion
 from armload.motion.motion import Motion
 
+if TYPE_CHECKING:
+    from armload.motion.path import PathMotion
+    from armload.motion.spline import SplineMotion
+
 FORMAT = "armload-motion-1"
+_SPLINE, _PATH = "b-spline", "path"
 
 
 def taie2024() -> FourierMotion:
@@ -31,10 +40,10 @@ def taie2024() -> FourierMotion:
 def shipped_motion(name: str) -> FourierMotion:
     """A motion that comes with armload, by name."""
     text = resources.files("armload.motion").joinpath(f"motions/{name}.json").read_text(encoding="utf-8")
-    return _from_text(text, f"{name}.json")
+    return _fourier(_content(text, f"{name}.json"), f"{name}.json")
 
 
-def load_motion(path: str | Path) -> FourierMotion:
+def load_motion(path: str | Path) -> FourierMotion | SplineMotion | PathMotion:
     """The motion in a JSON file written by `save_motion`.
 
     Raises:
@@ -48,7 +57,9 @@ def load_motion(path: str | Path) -> FourierMotion:
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
         raise MotionError(f"motion file {path} cannot be read: {reason}") from None
-    return _from_text(text, str(path))
+    content = _content(text, str(path))
+    kinds = {_SPLINE: _spline, _PATH: _path}
+    return kinds.get(str(content.get("kind")), _fourier)(content, str(path))
 
 
 def save_motion(path: str | Path, motion: Motion) -> None:
@@ -61,18 +72,35 @@ def save_motion(path: str | Path, motion: Motion) -> None:
 
 
 def motion_to_json(motion: Motion) -> str:
-    """The JSON text of a Fourier motion, one joint per line."""
-    if not isinstance(motion, FourierMotion):
+    """The JSON text of a Fourier or spline motion, one joint per line, or of a path, one point per line."""
+    from armload.motion.path import PathMotion
+    from armload.motion.spline import SplineMotion
+
+    if isinstance(motion, FourierMotion):
+        head = {"format": FORMAT, "name": motion.name, "note": motion.note, "period": motion.period}
+        parts = {"offset": motion.offset, "sine": motion.sine, "cosine": motion.cosine}
+    elif isinstance(motion, SplineMotion):
+        head = {
+            "format": FORMAT,
+            "kind": _SPLINE,
+            "name": motion.name,
+            "note": motion.note,
+            "duration": motion.duration,
+        }
+        parts = {"start": motion.start, "control": motion.control}
+    elif isinstance(motion, PathMotion):
+        head = {"format": FORMAT, "kind": _PATH, "name": motion.name, "note": motion.note}
+        points = {"positions": motion.positions, "velocities": motion.velocities, "accelerations": motion.accelerations}
+        parts = {"times": motion.times, **points}
+    else:
         raise MotionError(
-            f"the motion {motion.name!r} is a {type(motion).__name__}: only a FourierMotion can be saved as JSON; "
-            "use export_motion for a table"
+            f"the motion {motion.name!r} is a {type(motion).__name__}: only a FourierMotion, a SplineMotion or a "
+            "PathMotion can be saved as JSON; use export_motion for a table"
         )
-    head = {"format": FORMAT, "name": motion.name, "note": motion.note, "period": motion.period}
     lines = [f"  {json.dumps(key)}: {json.dumps(value, ensure_ascii=False)}" for key, value in head.items()]
-    lines.append(f'  "offset": {json.dumps(motion.offset.tolist())}')
-    for key in ("sine", "cosine"):
-        rows = ",\n".join(f"    {json.dumps(row)}" for row in getattr(motion, key).tolist())
-        lines.append(f'  "{key}": [\n{rows}\n  ]')
+    for key, numbers in parts.items():
+        rows = ",\n".join(f"    {json.dumps(row)}" for row in numbers.tolist()) if numbers.ndim == 2 else ""
+        lines.append(f'  "{key}": ' + (f"[\n{rows}\n  ]" if rows else json.dumps(numbers.tolist())))
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
@@ -85,13 +113,21 @@ def write_whole(path: str | Path, text: str) -> None:
         raise MotionError(f"{path} cannot be written: {error.strerror}") from None
 
 
-def _from_text(text: str, where: str) -> FourierMotion:
+def _content(text: str, where: str) -> dict[str, Any]:
     try:
         content: Any = json.loads(text)
     except ValueError as error:
         raise MotionError(f"{where} is not a motion: it is not JSON ({error})") from None
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise MotionError(f'{where} is not a motion: expected a JSON object with "format": "{FORMAT}"')
+    if content.get("kind", _SPLINE) not in (_SPLINE, _PATH):
+        raise MotionError(
+            f'{where} is a motion of the kind {content["kind"]!r}: expected "{_SPLINE}", "{_PATH}", or no kind'
+        )
+    return content
+
+
+def _fourier(content: dict[str, Any], where: str) -> FourierMotion:
     try:
         return FourierMotion(
             content["offset"],
@@ -109,4 +145,48 @@ def _from_text(text: str, where: str) -> FourierMotion:
         raise MotionError(
             f"{where} is not a motion: period must be a number of seconds, offset n numbers, sine and cosine n rows of "
             "K numbers each"
+        ) from None
+
+
+def _spline(content: dict[str, Any], where: str) -> SplineMotion:
+    from armload.motion.spline import SplineMotion
+
+    try:
+        return SplineMotion(
+            content["start"],
+            content["control"],
+            float(content["duration"]),
+            str(content["name"]),
+            str(content.get("note", "")),
+        )
+    except KeyError as error:
+        raise MotionError(f"{where} is not a complete motion: the key {error} is missing") from None
+    except MotionError as error:
+        raise MotionError(f"{where}: {error}") from None
+    except (TypeError, ValueError):
+        raise MotionError(
+            f"{where} is not a motion: duration must be a number of seconds, start n numbers, control n rows of K "
+            "numbers each"
+        ) from None
+
+
+def _path(content: dict[str, Any], where: str) -> PathMotion:
+    from armload.motion.path import PathMotion
+
+    try:
+        return PathMotion(
+            content["times"],
+            content["positions"],
+            content["velocities"],
+            content["accelerations"],
+            str(content["name"]),
+            str(content.get("note", "")),
+        )
+    except KeyError as error:
+        raise MotionError(f"{where} is not a complete motion: the key {error} is missing") from None
+    except MotionError as error:
+        raise MotionError(f"{where}: {error}") from None
+    except (TypeError, ValueError):
+        raise MotionError(
+            f"{where} is not a motion: times must be K numbers, positions, velocities and accelerations K rows of n"
         ) from None

@@ -87,8 +87,13 @@ class JointFeatures:
 
     def of_velocity(self, dq: ArrayLike) -> NDArray[np.float64]:
         """g (N, n, velocity) at velocities (N, n); the mean square of a weighted sum is the weights'."""
-        angle = np.arcsinh(np.atleast_2d(dq) / _SLOW)[:, :, None] * self.velocity_waves
+        angle = self.stretched(dq)[0][:, :, None] * self.velocity_waves
         return np.concatenate([np.cos(angle), np.sin(angle)], axis=2) / np.sqrt(max(self.velocity // 2, 1))
+
+    def stretched(self, dq: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """u = asinh(dq/0.03) at velocities (N, n), and du/d(dq) [s/rad]."""
+        ratio = np.atleast_2d(dq) / _SLOW
+        return np.arcsinh(ratio), 1.0 / (_SLOW * np.sqrt(1.0 + ratio**2))
 
     def of_sample(self, q: NDArray[np.float64], dq: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
         """f (pose,) and g (n, velocity) of one sample (n,): for a live stream, at its pace."""

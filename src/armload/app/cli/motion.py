@@ -1,10 +1,11 @@
-"""`armload motion`: excitation motions shown, checked against an arm, exported for a robot, or drawn at random."""
+"""`armload motion`: excitation motions designed, shown, checked against an arm, exported for a robot, or drawn."""
 
 from __future__ import annotations
 
 import argparse
 from typing import TYPE_CHECKING
 
+from armload.app.cli import motion_design, motion_enrich
 from armload.app.cli.arguments import Parser, add_arm_arguments, add_column_arguments, at_least, file_name
 from armload.app.cli.named import arm_of, motion_of, payload_of
 from armload.app.cli.printing import console, print_json, print_note, table, working
@@ -18,9 +19,11 @@ NOT_ALLOWED = 3  # exit code of a check that says no
 
 _EXAMPLES = """\
 examples:
-  armload motion show taie2024
+  armload motion show taie2024 --figure taie2024.png
   armload motion check mine.json --robot panda --payload tool.json
   armload motion check run.csv --robot ur10e --tare empty.csv
+  armload motion design --robot panda --from 0,-0.5,0,-2,0,1.6,0.8 --time 3 --out mine.json
+  armload motion enrich pick.yaml --robot panda --mm 5 --deg 2 --out pick-enriched.yaml
   armload motion random --robot ur10e --seed 3 --out excite.json
   armload motion export excite.json --format ur --out excite.script
   armload motion export taie2024 --format ros2 --robot panda --out excite.yaml
@@ -33,13 +36,31 @@ says which parameters of a payload it can tell, and how well; it takes a log (CS
 def parser() -> Parser:
     """The arguments of `armload motion`."""
     parser = Parser(
-        prog="armload motion", description="Show, check, export or draw an excitation motion.", epilog=_EXAMPLES
+        prog="armload motion", description="Design, show, check, export or draw an excitation motion.", epilog=_EXAMPLES
     )
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
+
+    design = actions.add_parser(
+        "design",
+        help="the motion that tells most of a payload, about a pose, within limits",
+        description="Design the motion that tells most of a payload in a given time: from rest at a pose, and back to "
+        "it, within a share of every limit with the worst payload there may be, clear of floor, boxes and the arm "
+        "itself. It is checked 1000 times a second by other code before it is written.",
+    )
+    motion_design.add_design_arguments(design)
+
+    enrich = actions.add_parser(
+        "enrich",
+        help="a task's own path, with the smallest change that lets it tell a payload",
+        description="Change a task's own path by so many millimetres and degrees at most, so that it tells more of a "
+        "payload: its ends, its stops and its times stay as they are.",
+    )
+    motion_enrich.add_enrich_arguments(enrich)
 
     show = actions.add_parser("show", help="what each joint does", description="Show what each joint does.")
     show.add_argument("motion", metavar="MOTION", help="taie2024, a JSON file, or random:SEED")
     add_arm_arguments(show, default="panda")
+    show.add_argument("--figure", type=file_name, metavar="F.png", help="draw the joints against their limits")
 
     check = actions.add_parser(
         "check",
@@ -73,7 +94,7 @@ def parser() -> Parser:
     add_arm_arguments(export, default="panda")
     export.add_argument("--format", required=True, choices=("csv", "ros2", "ur"))
     export.add_argument("--rate", type=at_least(1e-3, float, 1e4), metavar="HZ", help="samples per second")
-    export.add_argument("--out", required=True, type=file_name, metavar="FILE")
+    export.add_argument("--out", type=file_name, metavar="FILE", help="file to write (default: standard output)")
 
     random = actions.add_parser(
         "random",
@@ -92,13 +113,21 @@ def parser() -> Parser:
 
 def run(options: argparse.Namespace) -> int:
     """Do the action."""
-    return {"show": _show, "check": _check, "export": _export, "random": _random}[options.action](options)
+    return {
+        "design": motion_design.run_design,
+        "enrich": motion_enrich.run_enrich,
+        "show": _show,
+        "check": _check,
+        "export": _export,
+        "random": _random,
+    }[options.action](options)
 
 
 def _show(options: argparse.Namespace) -> int:
     import numpy as np
 
-    motion = motion_of(options.motion, arm_of(options))
+    arm = arm_of(options)
+    motion = motion_of(options.motion, arm)
     q, dq, ddq = motion(np.linspace(0.0, motion.duration, 1001))
     rows = table(
         f"{motion.name}: {motion.n} joints, {motion.duration:g} s",
@@ -114,6 +143,11 @@ def _show(options: argparse.Namespace) -> int:
     console().print(rows)
     if note := getattr(motion, "note", ""):
         print(note)
+    if options.figure is not None:
+        from armload.lab.report.motion_figure import write_motion_figure
+
+        write_motion_figure(motion, arm, options.figure)
+        print_note(f"wrote {options.figure}")
     return 0
 
 
@@ -178,9 +212,13 @@ def _limits(payload_name: str, arm: Arm, motion: Motion) -> tuple[MotionCheck, s
 
 def _export(options: argparse.Namespace) -> int:
     from armload.motion import export_motion
+    from armload.motion.export import motion_text
 
     arm = arm_of(options)
     motion = motion_of(options.motion, arm)
+    if options.out is None:
+        print(motion_text(motion, options.format, options.rate, joint_names=arm.joint_names), end="")
+        return 0
     export_motion(motion, options.out, options.format, options.rate, joint_names=arm.joint_names)
     print_note(f"wrote {options.out}; check the motion before a robot runs it (armload motion check)")
     return 0

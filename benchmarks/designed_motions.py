@@ -1,0 +1,317 @@
+"""What designed motions are worth: errors over time against other motions, on the same arms with the same payloads.
+
+    nice -n 15 python benchmarks/designed_motions.py [--worlds 100] [--jobs 1] [--arms panda,ur10e] [--minutes 600]
+
+Every world is another arm that differs from its model as real ones do (`World.real_like`), with another payload of
+boxes and its arm's sensors. The candidates run on the same worlds, with the same estimator: the default of `identify`.
+Motions shorter than the run are repeated. The tare of most is 20 s of the empty arm on another motion elsewhere; of the
+pairs it is 5 s at the place itself. Errors are those of mass, of the three moments and of the six inertias (mean of
+their magnitudes); an accuracy is reached when all three are within 10 g, 1.5 g·m, 1e-3 kg·m², and stay so. "predicted"
+is the bound's 95 % half-width over the one that the estimator gives. What is measured is kept in out/, so that the
+script goes on where it stopped. Writes benchmarks/results/designed_motions.json, the tables in docs/motion.md and
+docs/pictures/designed_motions.png from the worlds there are.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from script import ROOT, markdown_table, options, say, write, write_table
+
+from armload.arms import Arm, arm
+from armload.excitation import Constraints, Criterion, PayloadRange, Surroundings, design_motion, enrich
+from armload.identification import choose
+from armload.inertia import Z95, InertialParameters
+from armload.lab.cells import key_of
+from armload.lab.experiment import Task, run_tasks, source_key
+from armload.lab.report.style import look, new_figure
+from armload.motion import FourierMotion, Motion, MotionFingerprint, excitation, load_motion, random_motion, save_motion
+from armload.motion.point_to_point import PointToPoint
+from armload.payloads import draw_payload
+from armload.posterior import bound
+from armload.recording import Recording
+from armload.simulation import Run, Sensors, World, simulate_many
+from armload.simulation.resolution import COARSE
+
+Candidates = dict[str, tuple[Motion | None, Motion | None]]
+TIMES = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0)  # [s]
+SHOWN = (1.0, 2.0, 3.0, 6.0)  # [s] of the tables
+WANTED = np.array([10e-3, 1.5e-3, 1e-3])  # [kg, kg·m, kg·m²]
+LASTING = 6.0  # [s] of a loaded run
+_RATE = 500.0  # [Hz] of the logs
+POSES = {"panda": (0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8), "ur10e": (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)}
+RATED = {"panda": 3.0, "ur10e": 6.0}  # [kg] payloads drawn and allowed for: a UR10e cannot hold 12.5 kg at this pose
+SHARE = 0.8
+_SEED = 70_000  # of payloads and sensors, apart from those the shipped models were trained on
+OUT = ROOT / "out" / "designed_motions"
+NAMES = {
+    "excitation": "taie2024 (UR10e: a random 6 s motion)",
+    "random": "random motion, another in each world",
+    "wrist": "wrist only, random",
+    "poses": "four static poses",
+    "place": "pick and place",
+    "enriched": "pick and place, enriched (5 mm, 2°)",
+    "designed 2 s": "designed, 2 s",
+    "designed 3 s": "designed, 3 s",
+    "wiggle pair": "all joints ±0.12 rad, after 5 s of it empty",
+    "excitation pair": "taie2024 after 5 s of it empty",
+    "designed same": "designed, 2 s, after 5 s of it empty",
+    "pair": "designed, 2 s, after an empty run of its own, 5 s",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Repeated(Motion):
+    """A motion from rest to rest, again and again."""
+
+    inner: Motion
+    lasting: float
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        return f"{self.inner.name}, repeated"
+
+    @property
+    def n(self) -> int:
+        return self.inner.n
+
+    @property
+    def duration(self) -> float:
+        return self.lasting
+
+    def derivative(self, t: NDArray[np.float64], order: int) -> NDArray[np.float64]:
+        return self.inner.derivative(np.mod(t, self.inner.duration), order)
+
+
+def allowed(robot: Arm) -> Constraints:
+    """What the designs keep to."""
+    return Constraints(robot, POSES[robot.name], share=SHARE, payload=PayloadRange(RATED[robot.name]))
+
+
+def elsewhere(robot: Arm) -> Motion:
+    """The tare of 20 s that most candidates share."""
+    return random_motion(robot, 4711, duration=20.0, harmonics=10)
+
+
+def place(robot: Arm) -> Motion:
+    """Pick, lift, carry, lower and the way back, with stops: 6 s."""
+    q = np.array(POSES[robot.name])
+    low, high, over = q.copy(), q.copy(), q.copy()
+    low[1] += 0.15
+    low[3] += 0.15 if robot.n == 7 else 0.0
+    high[0] -= 0.4
+    over[0] -= 0.8
+    over[-1] += 0.6
+    stops = np.array([q, low, q, high, over, q])
+    starts = np.array([0.2, 1.2, 2.3, 3.2, 4.4])
+    ends = np.array([1.0, 2.0, 3.0, 4.2, 5.8])
+    return PointToPoint(stops, starts, ends, name="pick and place")
+
+
+def motions_of(robot: Arm) -> Candidates:
+    """Loaded run and own empty run of each candidate; None: another in each world, the common tare."""
+    pose, n, tare = np.array(POSES[robot.name]), robot.n, elsewhere(robot)
+    wrist = random_motion(robot, 3, duration=LASTING, around=pose)
+    still = np.arange(n) < n - 3
+    fixed = FourierMotion(
+        pose, *(np.where(still[:, None], 0.0, x) for x in (wrist.sine, wrist.cosine)), LASTING, "wrist"
+    )
+    four = pose + np.zeros((5, n))
+    four[1, -1], four[2, -2], four[3, -2:] = pose[-1] + 1.2, pose[-2] + 0.8, pose[-2:] - 0.7
+    poses = PointToPoint(four, np.arange(4) * 1.5 + 1.0, np.arange(4) * 1.5 + 1.5, name="poses")
+    rng = np.random.default_rng(5)
+    sine, cosine = rng.normal(size=(2, n, 4))
+    wiggle = FourierMotion(pose, sine, cosine, 2.0, "wiggle").smooth()
+    wiggle = wiggle.scaled(0.12 / np.abs(wiggle(np.linspace(0, 2, 200))[0] - pose).max(axis=0))
+    taie, keep = excitation(robot, 0), allowed(robot)
+    (same,) = kept(robot, "designed same", lambda: [design_motion(keep, Criterion(robot, "same"), 2.0).motion])
+    return {
+        "excitation": (taie, None),
+        "random": (None, None),
+        "wrist": (fixed, None),
+        "poses": (poses, None),
+        "place": (place(robot), None),
+        "enriched": (
+            kept(robot, "enriched", lambda: [enrich(place(robot), _around(robot), Criterion(robot, tare)).motion])[0],
+            None,
+        ),
+        "designed 2 s": (
+            kept(robot, "designed 2 s", lambda: [design_motion(keep, Criterion(robot, tare), 2.0).motion])[0],
+            None,
+        ),
+        "designed 3 s": (
+            kept(robot, "designed 3 s", lambda: [design_motion(keep, Criterion(robot, tare), 3.0).motion])[0],
+            None,
+        ),
+        "wiggle pair": (wiggle, Repeated(wiggle, 5.0)),
+        "excitation pair": (taie, taie),
+        "designed same": (same, Repeated(same, 5.0)),
+        "pair": tuple(kept(robot, "pair", lambda: _pair(robot, keep))),  # type: ignore[dict-item]
+    }
+
+
+def _pair(robot: Arm, keep: Constraints) -> list[Motion]:
+    found = design_motion(keep, Criterion(robot, "own"), 2.0, tare_time=5.0)
+    assert found.empty is not None
+    return [found.motion, found.empty]
+
+
+def _around(robot: Arm) -> Constraints:
+    return Constraints(
+        robot,
+        POSES[robot.name],
+        share=1.0,
+        payload=PayloadRange(RATED[robot.name]),
+        travel=10.0,
+        speed=3.0,
+        surroundings=Surroundings(robot),
+    )
+
+
+def kept(robot: Arm, name: str, make: Any) -> list[Motion]:
+    """The motions of a candidate, designed once."""
+    folder = OUT / "motions"
+    folder.mkdir(parents=True, exist_ok=True)
+    files = sorted(folder.glob(f"{robot.name} {name} [0-9].json"))
+    if not files:
+        say(f"designing {name} for {robot.name}")
+        for k, motion in enumerate(make()):
+            save_motion(folder / f"{robot.name} {name} {k}.json", motion)
+        files = sorted(folder.glob(f"{robot.name} {name} [0-9].json"))
+    return [load_motion(file) for file in files]
+
+
+def measure(names: Sequence[str], robot: Arm, chosen: Candidates, seed: int) -> Iterator[dict[str, Any]]:
+    """Of the cells named, ARM CANDIDATE SEED each: errors, half-widths of estimator and bound (T, 10) in one world."""
+    world, sensors = World.real_like(robot, seed), Sensors.of(robot)
+    held = draw_payload("boxes", _SEED + seed, RATED[robot.name]).parameters
+    truth = InertialParameters(held.phi, robot.frame)
+
+    def logged(motion: Motion, payload: InertialParameters | None, lasting: float, noise: int) -> Recording:
+        repeated = Repeated(motion, lasting) if motion.duration < lasting else motion
+        run = Run(repeated, payload, world, sensors, _SEED + 2 * seed + noise)
+        return simulate_many(robot, [run], rate=_RATE, duration=lasting, workers=1, resolution=COARSE)[0]
+
+    common = None
+    for cell in names:
+        candidate = cell.removeprefix(f"{robot.name} ").removesuffix(f" {seed}")
+        run, empty = chosen[candidate]
+        motion = run if run is not None else random_motion(robot, 9000 + seed, duration=LASTING)
+        before, lasting = (elsewhere(robot), 20.0) if empty is None else (empty, 5.0)
+        if empty is None:
+            tare = common = logged(before, None, lasting, 0) if common is None else common
+        else:
+            tare = logged(before, None, lasting, 0)
+        log = logged(motion, truth, LASTING, 1)
+        found = choose(robot, tare).identifier.at(log, TIMES)
+        followed = [Repeated(m, t) if m.duration < t else m for m, t in ((motion, LASTING), (before, lasting))]
+        best = bound(robot, followed[0], tare=followed[1], times=TIMES)
+        yield {
+            "mass": truth.mass,
+            "errors": np.round([one.phi - truth.phi for one in found], 7).tolist(),
+            "half_width": np.round([Z95 * one.std for one in found], 7).tolist(),
+            "bound": np.round(best.half_width, 7).tolist(),
+            "arm": robot.name,
+            "candidate": candidate,
+            "seed": seed,
+        }
+
+
+def in_three(off: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean magnitudes of mass, moments and inertias (..., 3) of (..., 10)."""
+    off = np.abs(off)
+    return np.stack([off[..., 0], off[..., 1:4].mean(axis=-1), off[..., 4:].mean(axis=-1)], axis=-1)
+
+
+def summary(cells: list[dict[str, Any]]) -> dict[str, Any]:
+    """Of one candidate on one arm."""
+    three = in_three(np.array([c["errors"] for c in cells]))  # (worlds, T, 3)
+    within = np.all(three <= WANTED, axis=2)
+    stays = np.flip(np.logical_and.accumulate(np.flip(within, axis=1), axis=1), axis=1)
+    reached = np.where(stays.any(axis=1), np.array(TIMES)[stays.argmax(axis=1)], np.inf)
+    ratio = np.array([c["bound"] for c in cells]) / np.array([c["half_width"] for c in cells])
+    off = np.abs(np.array([c["errors"] for c in cells])) / np.array([c["bound"] for c in cells])
+    return {
+        "worlds": len(cells),
+        "error": {str(t): three[:, TIMES.index(t)].mean(axis=0).tolist() for t in TIMES},
+        "reached_median_s": _finite(np.quantile(reached, 0.5, method="higher")),
+        "reached_90_s": _finite(np.quantile(reached, 0.9, method="higher")),
+        "reached_share": float(np.isfinite(reached).mean()),
+        "predicted_over_given": [float(np.median(ratio[:, -1])), *np.quantile(ratio[:, -1], [0.05, 0.95]).tolist()],
+        "within_bound_95": float((off[:, -1] <= 1.0).mean()),
+    }
+
+
+def _text(motion: Motion | None) -> str:
+    """A motion, to tell it from others: its positions at 50 Hz."""
+    return "" if motion is None else json.dumps(MotionFingerprint.of(motion).to_dict(), sort_keys=True)
+
+
+def _finite(x: float) -> float | None:
+    return float(x) if np.isfinite(x) else None
+
+
+def table(rows: dict[str, dict[str, Any]]) -> str:
+    """A row for each candidate: errors, time to reach, predicted over given."""
+    columns = ["motion", *(f"{t:g} s" for t in SHOWN), "median [s]", "90 % [s]", "predicted"]
+    out = []
+    for name, row in rows.items():
+        errors = [" · ".join(f"{1e3 * x:.2g}" for x in row["error"][str(t)]) for t in SHOWN]
+        times = [f"{x:g}" if (x := row[key]) is not None else "> 6" for key in ("reached_median_s", "reached_90_s")]
+        middle, low, high = row["predicted_over_given"]
+        out.append([NAMES[name], *errors, *times, f"{middle:.2f} ({low:.2f}–{high:.2f})"])
+    return markdown_table(columns, "l" + "r" * (len(columns) - 1), out)
+
+
+def draw(found: dict[str, dict[str, Any]], file: Path) -> None:
+    """Error over time of the candidates."""
+    titles = ("mass [g]", "moments [g·m]", "inertias [10⁻³ kg·m²]")
+    with look():
+        figure = new_figure(2.6 * len(found))
+        axes = figure.subplots(len(found), 3, squeeze=False)
+        for row, (name, candidates) in zip(axes, found.items(), strict=True):
+            for k, (axis, title) in enumerate(zip(row, titles, strict=True)):
+                for number, (candidate, one) in enumerate(candidates.items()):
+                    values = [1e3 * one["error"][str(t)][k] for t in TIMES]
+                    style = "-" if candidate.startswith(("designed", "pair", "enriched")) else ":"
+                    axis.plot(TIMES, values, style, color=f"C{number % 10}", label=candidate)
+                axis.axhline(1e3 * WANTED[k], color="0.6", lw=0.8)
+                axis.set(yscale="log", xlabel="time [s]", title=f"{name}: {title}")
+        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=7)
+        figure.savefig(file)
+
+
+def main() -> None:
+    """Design, run, table."""
+    asked = options(__doc__, worlds=100, jobs=1, arms="panda,ur10e", minutes=600.0)
+    code = source_key(*(ROOT / "src" / "armload" / room for room in ("simulation", "regression", "posterior")))
+    tasks = []
+    robots = {name: arm(name) for name in asked.arms.split(",")}
+    chosen = {name: motions_of(robot) for name, robot in robots.items()}
+    texts = {name: {c: [_text(m) for m in pair] for c, pair in chosen[name].items()} for name in robots}
+    for seed in range(asked.worlds):
+        for name, robot in robots.items():
+            keys = {f"{name} {c} {seed}": key_of(code, name, c, *texts[name][c], seed, TIMES) for c in chosen[name]}
+            tasks.append(Task(f"{name} {seed}", keys, measure, (robot, chosen[name], seed), "candidate"))
+    cells = run_tasks(tasks, OUT / "cells", jobs=asked.jobs, until=60 * asked.minutes, say=say).values()
+    found: dict[str, dict[str, Any]] = {}
+    for name in robots:
+        mine = {c: [x for x in cells if (x["arm"], x["candidate"]) == (name, c)] for c in NAMES}
+        paired = set.intersection(*(set(x["seed"] for x in xs) for xs in mine.values()))
+        found[name] = {c: summary([x for x in xs if x["seed"] in paired]) for c, xs in mine.items() if paired}
+    found = {name: rows for name, rows in found.items() if rows}
+    for name, rows in found.items():
+        print(table(rows))
+        write_table(ROOT / "docs" / "motion.md", f"designed motions {name}", table(rows))
+    draw(found, ROOT / "docs" / "pictures" / "designed_motions.png")
+    write("designed_motions", {"times": list(TIMES), "wanted": WANTED.tolist(), "rated": RATED, "arms": found}, None)
+
+
+if __name__ == "__main__":
+    main()

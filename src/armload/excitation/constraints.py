@@ -1,0 +1,156 @@
+"""What a designed motion keeps to: the numbers of the promise, which design and check both read.
+
+A share s of each limit: velocity, acceleration, jerk and torque stay below s times the limit; position stays within s
+times the half range about the middle of the range. Torque is that of the worst payload of a range. Limits that the
+maker does not give are assumed (`motion.random_fourier.filled_limits`: velocity is reached in 0.25 s, acceleration in
+0.1 s), a range wider than a turn counts as it is, and no joint goes farther than `travel` from the start.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm, payload_regressor
+from armload.errors import MotionError
+from armload.excitation.payload_range import PayloadRange
+from armload.excitation.surroundings import Surroundings
+from armload.motion.random_fourier import filled_limits
+
+SHARE = 0.8  # of each limit, as the shipped excitation keeps to
+TRAVEL = 1.0  # [rad] the farthest a joint goes from the start, as of the shipped excitation
+TOOL_SPEED = 1.5  # [m/s] of the payload frame: Franka's Cartesian limit is 1.7, a UR's safety setting 1.5
+SHORTEST, LONGEST = 0.2, 60.0  # [s] of a designed motion
+
+
+@dataclass(frozen=True, eq=False)
+class Constraints:
+    """What a motion from `start` (n,) [rad] and back must keep to.
+
+    joints: (n,) which of them may move. share: of each limit. travel [rad]; speed: of the payload frame [m/s].
+    payload: what may be mounted. surroundings: floor, boxes, what is held.
+
+    Raises:
+        MotionError: a number out of range, or a start that the constraints forbid, with the limit that stands in the
+            way.
+    """
+
+    arm: Arm
+    start: NDArray[np.float64]
+    share: float = SHARE
+    payload: PayloadRange | None = None
+    surroundings: Surroundings | None = None
+    travel: float = TRAVEL
+    speed: float = TOOL_SPEED
+    joints: NDArray[np.bool_] | None = None
+
+    def __post_init__(self) -> None:
+        arm, n = self.arm, self.arm.n
+        start = np.array(self.start, dtype=float)
+        if start.shape != (n,) or not np.all(np.isfinite(start)):
+            raise MotionError(
+                f"the start has {start.size} joint positions: {arm.name} has {n} joints; give {n} finite numbers in rad"
+            )
+        for name, value, most in (("share", self.share, 1.0), ("travel", self.travel, np.inf)):
+            if not (np.isfinite(value) and 0 < value <= most):
+                raise MotionError(
+                    f"{name} is {value}: expected a number above 0" + (", at most 1" if most == 1 else "")
+                )
+        if not self.speed > 0:
+            raise MotionError(f"the tool speed limit is {self.speed} m/s: expected a number above 0")
+        object.__setattr__(self, "start", start)
+        if self.payload is None:
+            object.__setattr__(self, "payload", PayloadRange.rated(arm))
+        if self.surroundings is None:
+            object.__setattr__(self, "surroundings", Surroundings(arm))
+        moving = np.ones(n, bool) if self.joints is None else np.asarray(self.joints, dtype=bool)
+        object.__setattr__(self, "joints", moving)
+        if moving.shape != (n,) or not moving.any():
+            raise MotionError(f"no joint of {arm.name} may move: name some of its {n} joints")
+        self._check_start()
+
+    @cached_property
+    def low(self) -> NDArray[np.float64]:
+        """Lowest positions (n,) of the promise [rad]."""
+        return np.maximum(self._band[0], self.start - self.travel)
+
+    @cached_property
+    def high(self) -> NDArray[np.float64]:
+        """Highest positions (n,) of the promise [rad]."""
+        return np.minimum(self._band[1], self.start + self.travel)
+
+    @cached_property
+    def most(self) -> dict[str, NDArray[np.float64]]:
+        """By quantity, the largest magnitude (n,) of velocity, acceleration, jerk and torque."""
+        filled = filled_limits(self.arm.limits)
+        return {
+            "velocity": self.share * filled.velocity,
+            "acceleration": self.share * filled.acceleration,
+            "jerk": self.share * filled.jerk,
+            "torque": self.share * self.arm.limits.effort,
+        }
+
+    @cached_property
+    def corners(self) -> NDArray[np.float64]:
+        """Of the payload range (V, 10)."""
+        assert self.payload is not None
+        return self.payload.corners()
+
+    @property
+    def around(self) -> Surroundings:
+        """The surroundings."""
+        assert self.surroundings is not None
+        return self.surroundings
+
+    @property
+    def moving(self) -> NDArray[np.intp]:
+        """Which joints may move."""
+        assert self.joints is not None
+        return np.flatnonzero(self.joints)
+
+    @cached_property
+    def _band(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        limits = self.arm.limits
+        low, high = limits.position_low, limits.position_high
+        endless = ~(np.isfinite(low) & np.isfinite(high))
+        middle = np.where(endless, 0.0, (np.where(endless, 0.0, low) + np.where(endless, 0.0, high)) / 2)
+        half = np.where(endless, np.inf, self.share * (high - low) / 2)
+        return middle - half, middle + half
+
+    def _check_start(self) -> None:
+        arm, (low, high), payload = self.arm, self._band, self.payload
+        assert payload is not None
+        for j in np.flatnonzero((self.start < low) | (self.start > high)):
+            limits = arm.limits
+            raise MotionError(
+                f"{arm.joint_names[j]} starts at {self.start[j]:.4g} rad, outside {self.share:g} of its range about "
+                f"the middle, {low[j]:.4g} to {high[j]:.4g} rad (its limits are {limits.position_low[j]:.4g} and "
+                f"{limits.position_high[j]:.4g}): start elsewhere, or allow a larger share"
+            )
+        bare, each = arm.torque(self.start), self._static()
+        held = bare + each
+        over = np.abs(held).max(axis=0) - self.most["torque"]
+        j = int(np.argmax(over / np.where(np.isfinite(self.most["torque"]), self.most["torque"], 1.0)))
+        if over[j] >= 0.0:
+            raise MotionError(
+                f"at the start {arm.joint_names[j]} needs {np.abs(held[:, j]).max():.4g} N·m to hold the worst "
+                f"payload of the range (up to {payload.mass:g} kg), more than {self.most['torque'][j]:.4g} N·m, "
+                f"{self.share:g} of its limit: start elsewhere, allow a larger share, or give the payload's mass "
+                f"({self._holds(bare, each)})"
+            )
+        self.around.check_start(self.start)
+
+    def _holds(self, bare: NDArray[np.float64], each: NDArray[np.float64]) -> str:
+        """How much of the heaviest payload the start can hold: a torque grows with the mass."""
+        assert self.payload is not None
+        room = np.maximum(self.most["torque"] - np.sign(each) * bare, 0.0)
+        share = float((room / np.maximum(np.abs(each), 1e-9)).min())
+        return f"{share * self.payload.mass:.3g} kg can be held"
+
+    def _static(self) -> NDArray[np.float64]:
+        rest = np.zeros((1, self.arm.n))
+        Y = payload_regressor(self.arm.frame_motion(self.start[None]), rest, rest)[0]  # (n, 10)
+        return self.corners @ Y.T

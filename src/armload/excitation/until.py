@@ -1,0 +1,92 @@
+"""The shortest designed motion that reaches an accuracy, by its bound."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.errors import MotionError
+from armload.excitation.constraints import LONGEST, SHORTEST, Constraints
+from armload.excitation.criterion import Criterion
+from armload.excitation.optimisation import Design, design_motion
+
+_FIRST = 2.0  # [s] looked at first
+_DESIGNS = 6  # at most
+_CLOSE = 0.05  # of the time: shorter is not looked for any more
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """95 % half-widths that are to be reached: of mass [kg], of each moment [kg·m], of each inertia [kg·m²].
+
+    Raises:
+        MotionError: nothing is to be reached, or a width that is not a positive number.
+    """
+
+    mass: float = np.inf
+    moment: float = np.inf
+    inertia: float = np.inf
+
+    def __post_init__(self) -> None:
+        each = np.array([self.mass, self.moment, self.inertia])
+        if not (each > 0).all() or np.isinf(each).all():
+            raise MotionError(f"the accuracy {each.tolist()} is not possible: expected positive half-widths")
+
+    def over(self, half_width: NDArray[np.float64]) -> float:
+        """The largest of the half-widths (10,) over the one wanted; 1 or less: all are reached."""
+        wanted = np.repeat([self.mass, self.moment, self.inertia], [1, 3, 6])
+        return float((half_width / wanted).max())
+
+
+def design_until(
+    constraints: Constraints,
+    criterion: Criterion,
+    accuracy: Accuracy,
+    *,
+    tare_time: float | None = None,
+    **settings: Any,
+) -> Design:
+    """The shortest motion found whose bound is within the accuracy, to 5 % of its time.
+
+    Half-widths fall with a power of the time; each design says where to look next. Arguments as of `design`.
+
+    Raises:
+        MotionError: as of `design`, or the accuracy is out of reach within a minute.
+    """
+    low, high = SHORTEST, LONGEST
+    best: Design | None = None
+    seen: list[tuple[float, float]] = []  # log time, log of what is over
+    time = _FIRST
+    for _ in range(_DESIGNS):
+        found = design_motion(constraints, criterion, time, tare_time=tare_time, **settings)
+        over = accuracy.over(found.half_width)
+        seen.append((float(np.log(time)), float(np.log(over))))
+        if over <= 1.0:
+            best, high = found, time
+        else:
+            low = time
+        if high <= low * (1.0 + _CLOSE) or low >= LONGEST or high <= SHORTEST:
+            break
+        if best is None and time * over > LONGEST:  # even if half-widths fell as 1/T
+            break
+        time = _next(seen, low, high, best is not None)
+    if best is None:
+        raise MotionError(
+            f"the accuracy asked for is out of reach: after {time:.3g} s the bound is still {over:.3g} times too wide; "
+            "allow a larger share or more joints, give --tare-time, or ask for less"
+        )
+    return best
+
+
+def _next(seen: list[tuple[float, float]], low: float, high: float, reached: bool) -> float:
+    """Where the power law through the last two designs (slope −1 to begin with) meets the accuracy, a bit beyond."""
+    (x, y), slope = seen[-1], -1.0
+    if len(seen) > 1 and abs(x - seen[-2][0]) > 1e-3:
+        slope = float(np.clip((y - seen[-2][1]) / (x - seen[-2][0]), -3.0, -0.3))
+    guess = float(np.exp(x - y / slope)) * (1.0 + 0.4 * _CLOSE)
+    if reached:  # within the bracket, not at its ends
+        guess = float(np.clip(guess, low * (1.0 + 0.5 * _CLOSE), high / (1.0 + 0.5 * _CLOSE)))
+    return round(float(np.clip(guess, SHORTEST, LONGEST)), 2)

@@ -1,0 +1,141 @@
+"""`armload motion design` and `enrich` on the command line: files others read, and refusals in one sentence."""
+
+import json
+
+import numpy as np
+import pytest
+
+from armload.app.cli import main
+from armload.app.cli.motion_design import accuracy, joints
+from armload.arms import arm
+from armload.motion import export_motion, load_motion
+from armload.motion.point_to_point import PointToPoint
+
+READY = "0.0123,-0.5,0,-2,0,1.6,0.8"
+
+
+@pytest.fixture(scope="module")
+def designed(tmp_path_factory):
+    """One short design with its own empty run, and what was printed."""
+    import contextlib
+    import io
+
+    folder, printed = tmp_path_factory.mktemp("motion"), io.StringIO()
+    words = (
+        f"motion design --robot panda --from {READY} --time 0.5 --tare-time 0.6 --share 0.6 --payload 1 --json --out"
+    )
+    with contextlib.redirect_stdout(printed):
+        assert main([*words.split(), str(folder / "m.json")]) == 0
+    return folder, json.loads(printed.getvalue())
+
+
+def test_a_design_is_exported_with_the_pose_first_at_rest_and_the_pose_again(designed, tmp_path):
+    folder, said = designed
+    for file, lasting in ((said["motion"], 0.5), (said["empty_motion"], 0.6)):
+        assert main(["motion", "export", file, "--format", "csv", "--out", str(tmp_path / "m.csv")]) == 0
+        header, *_ = (tmp_path / "m.csv").read_text().splitlines()
+        assert header.split(",")[:15] == ["t", *(f"q{k}" for k in range(1, 8)), *(f"dq{k}" for k in range(1, 8))]
+        table = np.loadtxt(tmp_path / "m.csv", delimiter=",", skiprows=1)
+        pose = [float(x) for x in READY.split(",")]
+        np.testing.assert_array_equal(table[[0, -1], 1:8], [pose, pose])
+        np.testing.assert_array_equal(table[[0, -1], 8:15], 0.0)
+        assert table[-1, 0] == lasting
+        limits, middle = arm("panda").limits, 0.0
+        assert np.all(np.abs(table[:, 8:15]) <= 0.6 * limits.velocity)
+        middle = (limits.position_low + limits.position_high) / 2
+        assert np.all(np.abs(table[:, 1:8] - middle) <= 0.6 * (limits.position_high - limits.position_low) / 2)
+    assert (folder / "m-empty.json").exists()
+
+
+def test_an_export_without_a_file_is_printed_and_a_figure_is_a_picture(designed, tmp_path, capsys):
+    _, said = designed
+    export = ["motion", "export", said["motion"], "--format", "csv"]
+    assert main([*export, "--out", str(tmp_path / "m.csv")]) == 0
+    capsys.readouterr()
+    assert main(export) == 0
+    assert capsys.readouterr().out == (tmp_path / "m.csv").read_text()
+    assert main(["motion", "show", said["motion"], "--figure", str(tmp_path / "m.png")]) == 0
+    assert (tmp_path / "m.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+    assert main(["motion", "show", said["motion"], "--robot", "ur10e", "--figure", str(tmp_path / "n.png")]) == 2
+    assert "moves 7 joints: ur10e has 6" in capsys.readouterr().err
+
+
+def test_the_json_says_what_is_told_and_what_is_used(designed):
+    _, said = designed
+    assert said["duration"] == 0.5
+    assert said["empty_duration"] == 0.6
+    assert len(said["half_width"]) == len(said["parameters"]) == len(said["units"]) == 10
+    assert all(0 < after < before for after, before in zip(said["half_width"], said["prior_half_width"], strict=True))
+    assert max(said["used"].values()) <= 1.0
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("--from 0,-0.5,0,-3.0,0,1.6,0.8 --share 0.6", "outside 0.6 of its range"),
+        ("--from 0,-0.5,0,-2,0,1.6", "has 6 joint positions: panda has 7"),
+        (f"--from {READY} --payload 30", "to hold the worst payload"),
+        (f"--from {READY} --box 0,0,1", "is not a box"),
+        (f"--from {READY} --joints 9", "joints 1 to 7"),
+        (f"--from {READY} --joints a", "names no joints"),
+        (f"--from {READY} --until mass=3apples", "is not an accuracy"),
+        (f"--from {READY} --until mass=10g --time 2", "exclude each other"),
+        (f"--from {READY} --tare none --tare-time 2", "leave --tare out"),
+        (f"--from {READY} --held 1,2", "is not a body"),
+    ],
+)
+def test_a_request_that_cannot_be_met_is_one_sentence(words, expected, tmp_path, capsys):
+    out = tmp_path / "m.json"
+    assert main(["motion", "design", "--robot", "panda", *words.split(), "--out", str(out)]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert expected in printed.err
+    assert printed.err.count("\n") == 1
+    assert not out.exists()
+
+
+def test_a_box_in_the_way_of_the_start_is_refused_by_its_number(tmp_path, capsys):
+    place = arm("panda").frame_pose(np.array([[float(x) for x in READY.split(",")]]))[1][0]
+    box = ",".join(f"{x:.3f}" for x in place) + ",0.1,0.1,0.1"
+    words = ["motion", "design", "--robot", "panda", "--from", READY, "--box", "2,2,2,0.1,0.1,0.1", "--box", box]
+    assert main([*words, "--out", str(tmp_path / "m.json")]) == 2
+    assert "box 2" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("form", ["csv", "ros2"])
+def test_a_path_of_a_table_or_a_trajectory_is_enriched(form, tmp_path, capsys):
+    robot = arm("panda")
+    start = np.array([float(x) for x in READY.split(",")])
+    path = PointToPoint(np.array([start, start + 0.2]), np.array([0.1]), np.array([1.0]), name="move")
+    file = tmp_path / {"csv": "move.csv", "ros2": "move.yaml"}[form]
+    export_motion(path, file, form, rate=50.0, joint_names=robot.joint_names)
+    out = tmp_path / "enriched.json"
+    words = ["motion", "enrich", str(file), "--robot", "panda", "--payload", "1", "--json", "--out", str(out)]
+    assert main(words) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert 0 < said["distance"] <= 5e-3
+    assert np.prod(np.array(said["half_width"]) / said["half_width_before"]) < 0.1
+    found = load_motion(out)
+    np.testing.assert_allclose(found([0.0, found.duration])[0], [start, start + 0.2], atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("a.csv", "time,x\n0,1\n", "expected t, q1"),
+        ("a.csv", "t,q1,q2,q3,q4,q5,q6,q7\n0,1\n", "not 8 numbers"),
+        ("a.yaml", "joint_names: [a]\npoints: []\n", "no JointTrajectory of panda"),
+        ("a.yaml", "- 1\n", "is no path"),
+        ("a.yaml", "{]", "neither JSON nor YAML"),
+    ],
+)
+def test_a_file_that_is_no_path_is_refused(name, text, words, tmp_path, capsys):
+    (tmp_path / name).write_text(text)
+    assert main(["motion", "enrich", str(tmp_path / name), "--robot", "panda", "--out", str(tmp_path / "o.json")]) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_accuracies_and_joints_are_read_with_their_units():
+    assert accuracy("mass=10g,moment=1.5g·m") == {"mass": 0.01, "moment": 0.0015}
+    assert accuracy("mass=0.01kg,inertia=1e-3kg.m2") == {"mass": 0.01, "inertia": 1e-3}
+    assert joints("7,1-2") == (1, 2, 7)

@@ -1,0 +1,109 @@
+"""An enriched path stays in its tube, keeps ends, stops and times, and tells what the path alone leaves open."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from armload.arms import arm
+from armload.errors import MotionError
+from armload.excitation import Constraints, Criterion, PayloadRange, Surroundings, enrich, problems
+from armload.motion import PathMotion, load_motion, save_motion
+from armload.motion.point_to_point import PointToPoint
+
+READY = np.array([0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8])
+
+
+@pytest.fixture(scope="module")
+def panda():
+    return arm("panda")
+
+
+@pytest.fixture(scope="module")
+def path():
+    there = READY + np.array([-0.4, 0.1, 0.0, 0.1, 0.0, 0.0, 0.3])
+    return PointToPoint(np.array([READY, there, READY]), np.array([0.2, 1.4]), np.array([1.0, 2.2]), name="carry")
+
+
+@pytest.fixture(scope="module")
+def allowed(panda):
+    return Constraints(panda, READY, share=1.0, payload=PayloadRange(2.0), travel=10.0, speed=5.0)
+
+
+@pytest.fixture(scope="module")
+def enriched(panda, path, allowed):
+    return enrich(path, allowed, Criterion(panda, "same"))
+
+
+def test_the_flange_stays_within_its_tube(panda, path, enriched):
+    t = np.linspace(0.0, path.duration, 900)
+    (R, p), (S, r) = panda.frame_pose(path(t)[0]), panda.frame_pose(enriched.motion(t)[0])
+    turned = np.arccos(np.clip((np.einsum("tij,tij->t", R, S) - 1.0) / 2.0, -1.0, 1.0))
+    assert 1e-3 < np.linalg.norm(p - r, axis=1).max() <= 5e-3 * (1 + 1e-6)
+    assert np.deg2rad(0.5) < turned.max() <= np.deg2rad(2.0) + 1e-6
+    assert enriched.distance == pytest.approx(np.linalg.norm(p - r, axis=1).max(), rel=0.01)
+    assert enriched.angle == pytest.approx(turned.max(), rel=0.01)
+
+
+def test_ends_stops_and_times_stay_as_they_are(path, enriched):
+    assert enriched.motion.duration == path.duration
+    t = np.concatenate([np.linspace(0.0, 0.19, 9), np.linspace(1.01, 1.39, 9), [path.duration]])
+    for order in (0, 1, 2):
+        np.testing.assert_allclose(enriched.motion.derivative(t, order), path.derivative(t, order), atol=2e-4)
+    np.testing.assert_allclose(enriched.motion(t)[0], path(t)[0], atol=1e-9)
+
+
+def test_what_the_path_left_open_is_narrowed_to_half_at_least(enriched):
+    open_before = enriched.before > 0.5 * Criterion(arm("panda")).prior_half_width
+    assert open_before.any()
+    assert np.all(enriched.after[open_before] < 0.5 * enriched.before[open_before])
+    assert np.all(enriched.after < 1.02 * enriched.before)
+
+
+def test_an_enriched_path_keeps_to_the_limits_and_to_its_file(allowed, enriched, tmp_path):
+    assert [text for text in problems(allowed, enriched.motion) if "at rest" not in text] == []
+    save_motion(tmp_path / "m.json", enriched.motion)
+    back = load_motion(tmp_path / "m.json")
+    t = np.linspace(0.0, back.duration, 77)
+    for order in range(4):
+        np.testing.assert_array_equal(back.derivative(t, order), enriched.motion.derivative(t, order))
+
+
+def test_no_room_nothing_that_moves_and_a_path_beyond_a_limit_are_refused(panda, path, allowed):
+    known = Criterion(panda, "same")
+    with pytest.raises(MotionError, match="room in one of them"):
+        enrich(path, allowed, known, distance=0.0, angle=0.0)
+    still = PathMotion(np.array([0.0, 1.0]), np.tile(READY, (2, 1)), np.zeros((2, 7)), np.zeros((2, 7)))
+    with pytest.raises(MotionError, match="nothing to change"):
+        enrich(still, allowed, known)
+    with pytest.raises(MotionError, match="passes a limit by itself"):
+        enrich(path, replace(allowed, speed=0.1, surroundings=Surroundings(panda)), known)
+
+
+def test_a_path_motion_is_its_own_derivative_and_goes_through_its_points(path):
+    motion = PathMotion.of(path, 50.0)
+    np.testing.assert_allclose(motion(motion.times)[0], motion.positions, atol=1e-12)
+    t = np.linspace(0.3, 0.9, 23) + 1e-3
+    for order in (1, 2, 3):
+        slope = (motion.derivative(t + 1e-6, order - 1) - motion.derivative(t - 1e-6, order - 1)) / 2e-6
+        np.testing.assert_allclose(motion.derivative(t, order), slope, rtol=1e-4, atol=1e-3)
+    np.testing.assert_allclose(motion(t)[0], path(t)[0], atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"times": np.array([0.0, 0.0])},
+        {"times": np.array([0.1, 1.0])},
+        {"times": np.array([0.0])},
+        {"velocities": np.zeros((2, 6))},
+        {"positions": np.full((2, 7), np.nan)},
+    ],
+)
+def test_points_that_make_no_path_are_refused(changed):
+    points = {
+        "times": np.array([0.0, 1.0]),
+        **{k: np.zeros((2, 7)) for k in ("positions", "velocities", "accelerations")},
+    }
+    with pytest.raises(MotionError):
+        PathMotion(**(points | changed))
