@@ -70,6 +70,8 @@ def run(options: argparse.Namespace) -> None:
         return
     if options.robot is None:
         raise UsageError("a survey needs --robot, the arms' kind; see 'armload survey --help'")
+    if options.learn_profiles is not None and options.profile is not None:
+        raise UsageError("--learn-profiles learns from answers without a profile: leave --profile out, and use it next")
     from armload.recording import ColumnSpec
     from armload.survey import Settings, survey
 
