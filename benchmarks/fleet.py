@@ -49,8 +49,8 @@ WALK = 0.3  # [N·m] a day
 BEGAN, DAY = 1_790_000_000.0, 86400.0  # [s since 1970], [s]
 BROKEN = 0.03
 NEAR = 0.5  # [s] between a change and where it is found
-LIGHTEST = 0.5  # [kg] of a part's time that one payload was held, at least, for its mass to be judged: share below
-SHARE = 0.8
+LIGHTEST = 0.5  # [kg] of the changes that are counted apart
+SHARE = 0.8  # of a part's time that one payload was held, at least, for its mass to be judged
 KINDS = ("cut", "empty", "text", "degrees", "no torque", "not a number", "frozen", "six joints")
 
 

@@ -59,7 +59,8 @@ def answered(found: Identification, where: dict[str, Any]) -> list[dict[str, Any
 
 def unusable(reason: str, where: dict[str, Any]) -> dict[str, Any]:
     """The row of a log that cannot be answered."""
-    return where | {"status": UNUSABLE, "reason": " ".join(reason.split())}
+    empty = dict.fromkeys(("determined", "interval", "method", "relative_to", "notes"), "")
+    return where | empty | {"status": UNUSABLE, "reason": " ".join(reason.split())}
 
 
 def _of_payload(found: Identification) -> dict[str, Any]:
