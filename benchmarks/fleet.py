@@ -125,7 +125,12 @@ def drawn_payloads(rng: np.random.Generator) -> list[tuple[float, Any]]:
         payload = draw_payload("boxes", int(rng.integers(1 << 30)), mass)
         if payload.parameters.mass > 0.3:
             break
-    plans = {0: [(0.0, None)], 1: [(0.0, payload)], 2: [(0.0, None), (early, payload)], 3: [(0.0, payload), (late, None)]}
+    plans = {
+        0: [(0.0, None)],
+        1: [(0.0, payload)],
+        2: [(0.0, None), (early, payload)],
+        3: [(0.0, payload), (late, None)],
+    }
     return plans.get(int(kind), [(0.0, None), (early, payload), (late, None)])
 
 
@@ -219,11 +224,20 @@ def judge(folder: Path) -> dict[str, Any]:
                 if min(b, row["t1"]) - max(a, row["t0"]) > SHARE * (row["t1"] - row["t0"]):
                     into["error"].append([mass, row["mass"] - mass])
                     into["inside"].append(row["mass_low"] <= mass <= row["mass_high"])
-    groups = {name: summed(tally[name]) for name in ("sound", "before", "walking", "exchanged", "loose") if name in tally}
+    groups = {
+        name: summed(tally[name]) for name in ("sound", "before", "walking", "exchanged", "loose") if name in tally
+    }
     broken = [one for one in made["logs"] if one["broken"] and one["log"] in parts]
     arms = {one["arm"]: one["role"] for one in made["logs"]}
     findings = [
-        {"arm": f.arm, "role": arms[f.arm], "changed": f.changed, "moves": f.moves, "retare": f.retare, "loose": f.loose}
+        {
+            "arm": f.arm,
+            "role": arms[f.arm],
+            "changed": f.changed,
+            "moves": f.moves,
+            "retare": f.retare,
+            "loose": f.loose,
+        }
         | {"since day": None if not isinstance(f.since, float) else round((f.since - BEGAN) / DAY, 2), "joint": f.joint}
         for f in arm_findings(rows)
     ]
@@ -257,7 +271,11 @@ def speed(folder: Path, count: int) -> dict[str, Any]:
         (some / path.parent.name).mkdir(parents=True, exist_ok=True)
         shutil.copy(path, some / path.parent.name / path.name)
     out: dict[str, Any] = {"logs": len(chosen)}
-    for name, jobs, more in (("1 process", 1, ()), ("2 processes", 2, ()), ("2 Dask workers", 2, ("--cluster", "local"))):
+    for name, jobs, more in (
+        ("1 process", 1, ()),
+        ("2 processes", 2, ()),
+        ("2 Dask workers", 2, ("--cluster", "local")),
+    ):
         table = f"speed-{name.replace(' ', '-')}.parquet"
         shutil.rmtree(folder / f"{table}.cells", ignore_errors=True)
         began, used = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -285,7 +303,11 @@ def tables(found: dict[str, Any]) -> dict[str, str]:
     names = ("recall", "recall from 0.5 kg", "precision", "inside", "changed", "moves")
     heads = ["logs", "changes found", "of 0.5 kg and more", "of those found, true", "masses inside", "changed", "moves"]
     rows = [
-        [group, *(rate(of.get(name)) for name in names), f"{of['mass error [g]'][1]:.0f} · {of['mass error [g]'][0]:.0f}"]
+        [
+            group,
+            *(rate(of.get(name)) for name in names),
+            f"{of['mass error [g]'][1]:.0f} · {of['mass error [g]'][0]:.0f}",
+        ]
         for group, of in found["groups"].items()
     ]
     payloads = markdown_table([*heads, "mass error [g]"], "lrrrrrrr", rows)

@@ -27,7 +27,7 @@ def row(arm, day, **more):
 
 @pytest.fixture
 def rows():
-    """Twenty days of four arms: sound but for one log, exchanged on day 12, loose from day 8 on, and put right again."""
+    """Twenty days of four arms: sound but for a log, exchanged on day 12, loose from day 8 on, and put right again."""
     made = []
     for day in range(20):
         made.append(row("sound", day, changed=day == 15, moves=day == 16))

@@ -139,7 +139,20 @@ def test_another_question_is_another_key(fleet, tmp_path):
 
 def test_a_survey_that_was_killed_goes_on_and_ends_with_the_same_bytes(surveyed, fleet, tmp_path):
     out = tmp_path / "survey.parquet"
-    words = ["-m", "armload", "survey", str(fleet), "--robot", "panda", "--method", "map", "--jobs", "1", "--out", str(out)]
+    words = [
+        "-m",
+        "armload",
+        "survey",
+        str(fleet),
+        "--robot",
+        "panda",
+        "--method",
+        "map",
+        "--jobs",
+        "1",
+        "--out",
+        str(out),
+    ]
     process = subprocess.Popen([sys.executable, *words], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
     cells = cells_of(out)
     while process.poll() is None and not list(cells.glob("[!.]*.json")):

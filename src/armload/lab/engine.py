@@ -53,12 +53,13 @@ class Engine:
     def _run(self, work: Callable[[T], R], items: Iterable[T], jobs: int) -> Iterator[tuple[T, R]]:
         from joblib import Parallel, delayed
 
+        parallel: Any = Parallel  # its annotations are narrower than what it takes
         ahead = jobs if jobs > 0 else "2*n_jobs"
         how: dict[str, Any] = {"pre_dispatch": ahead, "batch_size": 1, "return_as": "generator_unordered"}
         with warnings.catch_warnings():
             # joblib says so when a process of its pool has ended; what was lost is given out again
             warnings.filterwarnings("ignore", message=".*A worker stopped while some jobs were given.*")
-            yield from Parallel(n_jobs=jobs, **how)(delayed(_with_item)(work, item) for item in items)
+            yield from parallel(n_jobs=jobs, **how)(delayed(_with_item)(work, item) for item in items)
 
 
 @contextmanager
@@ -78,8 +79,10 @@ def engine(jobs: int = 1, cluster: str | None = None) -> Iterator[Engine]:
         yield Engine(jobs)
         return
     if cluster != "local" and not _ADDRESS.match(cluster):
-        raise UsageError(f"--cluster {cluster!r}: expected local, or the address of a scheduler such as tcp://HOST:8786")
-    import distributed
+        raise UsageError(
+            f"--cluster {cluster!r}: expected local, or the address of a scheduler such as tcp://HOST:8786"
+        )
+    import distributed  # type: ignore[import-not-found]
     from joblib import parallel_config
 
     if cluster == "local":
@@ -90,7 +93,9 @@ def engine(jobs: int = 1, cluster: str | None = None) -> Iterator[Engine]:
     try:
         client = distributed.Client(made, timeout=_WAIT, set_as_default=True)
     except (OSError, TimeoutError) as error:
-        raise UsageError(f"--cluster {cluster}: no scheduler answers there ({error}); start one, or name another") from None
+        raise UsageError(
+            f"--cluster {cluster}: no scheduler answers there ({error}); start one, or name another"
+        ) from None
     try:
         with client, parallel_config("dask", n_jobs=-1):
             yield Engine(-1, cluster)
@@ -108,7 +113,7 @@ def _killed() -> tuple[type[BaseException], ...]:
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
     try:
-        from distributed.scheduler import KilledWorker
+        from distributed.scheduler import KilledWorker  # type: ignore[import-not-found]
     except ImportError:
         return (TerminatedWorkerError,)
     return TerminatedWorkerError, KilledWorker

@@ -72,7 +72,7 @@ def filesystem(url: str) -> tuple[Any, str]:
         UsageError: fsspec, or what it needs for this kind of store, is not installed.
     """
     try:
-        from fsspec.core import url_to_fs
+        from fsspec.core import url_to_fs  # type: ignore[import-not-found]
 
         return url_to_fs(url)
     except ImportError as error:

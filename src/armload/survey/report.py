@@ -78,7 +78,9 @@ def _what_to_do(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) 
         )
         for f in findings
     )
-    note = f"changed and payload moves: share of an arm's last {LAST} logs that say so; ! asks for something to be done."
+    note = (
+        f"changed and payload moves: share of an arm's last {LAST} logs that say so; ! asks for something to be done."
+    )
     return Section("What to do", "\n\n".join(x for x in text if x), (Table("Arms", columns, cells, note),))
 
 
@@ -93,7 +95,12 @@ def _payloads(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) ->
             of = [row for row in held if row["arm"] == finding.arm]
             x, mass = _days(of), np.array([row["mass"] for row in of])
             half = np.abs(np.array([[row["mass_low"], row["mass_high"]] for row in of]).reshape(-1, 2).T - mass)
-            style: dict[str, Any] = {"rasterized": len(held) > _MOST_DRAWN, "color": COLOURS[k % len(COLOURS)], "markersize": 3.5, "elinewidth": 0.7}
+            style: dict[str, Any] = {
+                "rasterized": len(held) > _MOST_DRAWN,
+                "color": COLOURS[k % len(COLOURS)],
+                "markersize": 3.5,
+                "elinewidth": 0.7,
+            }
             ax.errorbar(x, mass, half, fmt="osD^v"[k // len(COLOURS) % 5], label=finding.arm, alpha=0.75, **style)
             _dated(ax, x, 9)
         ax.set_xlabel(_time_label(held))
@@ -133,7 +140,11 @@ def _drift(rows: Sequence[dict[str, Any]], shown: Sequence[ArmFinding], n: int, 
         figure = new_figure(0.7 + 1.5 * down)
         panels = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False).ravel()
         for ax, finding in zip(panels, shown, strict=False):
-            logs = [of for of in by_log([row for row in rows if row["arm"] == finding.arm]) if of[0][f"{name}_1"] is not None]
+            logs = [
+                of
+                for of in by_log([row for row in rows if row["arm"] == finding.arm])
+                if of[0][f"{name}_1"] is not None
+            ]
             x = _days([of[0] for of in logs])
             for j in range(n):
                 y = [float(np.mean([row[f"{name}_{j + 1}"] for row in of])) for of in logs]
@@ -163,9 +174,18 @@ def _doubts(rows: Sequence[dict[str, Any]]) -> Section:
         return Section("Logs in doubt", "None.")
     more = f" The first {_MOST_ROWS} of {len(found)}." if len(found) > _MOST_ROWS else ""
     columns = ("log", "arm", "time [s]", "mass [kg]", "why")
-    return Section("Logs in doubt", f"Look at these before anything is concluded from them.{more}", (
-        Table("Logs that cannot be answered, and answers that are doubted", columns, cells, "The table has the whole text."),
-    ))
+    return Section(
+        "Logs in doubt",
+        f"Look at these before anything is concluded from them.{more}",
+        (
+            Table(
+                "Logs that cannot be answered, and answers that are doubted",
+                columns,
+                cells,
+                "The table has the whole text.",
+            ),
+        ),
+    )
 
 
 def _days(rows: Sequence[dict[str, Any]]) -> np.ndarray:

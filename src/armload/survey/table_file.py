@@ -78,7 +78,9 @@ def read_rows(path: str | Path) -> tuple[list[dict[str, Any]], int]:
     except ModuleNotFoundError:
         raise
     except Exception as error:  # a damaged file can fail anywhere in the decoder
-        raise UsageError(f"{path} is no survey that can be read ({error}): expected what `armload survey` wrote") from None
+        raise UsageError(
+            f"{path} is no survey that can be read ({error}): expected what `armload survey` wrote"
+        ) from None
 
 
 def _write_parquet(path: Path, rows: Sequence[dict[str, Any]], kinds: dict[str, str]) -> None:

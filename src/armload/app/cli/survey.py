@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from armload.app.cli.arguments import COLUMNS, Parser, add_arm_arguments, at_least, file_name
+from armload.app.cli.arguments import COLUMNS, Parser, add_arm_arguments, add_cluster_argument, at_least, file_name
 from armload.app.cli.printing import print_json, print_note, working
 from armload.errors import UsageError
 
@@ -47,7 +47,11 @@ def parser() -> Parser:
     add("paths", nargs="+", type=file_name, metavar="PATH", help="logs, folders, globs, URLs, @lists; or: report TABLE")
     add_arm_arguments(parser, required=False)
     add("--out", type=file_name, metavar="FILE", help="the table (.parquet, .csv, .json), or the report (.html)")
-    add("--arm-of", metavar="REGEX", help="its first group, searched in a log's path, names the arm (default: the folder)")
+    add(
+        "--arm-of",
+        metavar="REGEX",
+        help="its first group, searched in a log's path, names the arm (default: the folder)",
+    )
     add("--profile", type=file_name, metavar="P", help="of the arm, or of each: profiles/{arm}.profile")
     add("--tare", type=file_name, metavar="LOG0", help="an empty log of the arm, or of each: empty/{arm}.csv")
     add("--tool", type=file_name, metavar="FILE", help="a mounted tool that is known (JSON, or franka-hand)")
@@ -55,7 +59,7 @@ def parser() -> Parser:
     add("--columns", type=file_name, metavar="SPEC", help=f"of logs that are tables: {COLUMNS}")
     add("--topic", metavar="T", help="JointState topic of bags that have several")
     add("--jobs", type=at_least(1), metavar="N", help="processes (default: all cores); same rows")
-    add("--cluster", metavar="C", help="Dask in their place: local, or tcp://HOST:8786; same rows")
+    add_cluster_argument(parser)
     add("--learn-profiles", type=file_name, metavar="DIR", help="then learn each arm from its empty stretches")
     add("--json", action="store_true", help="print one JSON object and nothing else")
     return parser
@@ -121,7 +125,9 @@ def _report(options: argparse.Namespace) -> None:
     from armload.survey.report import write_survey_report
 
     if len(options.paths) != 2:
-        raise UsageError("armload survey report takes one table: armload survey report survey.parquet --out report.html")
+        raise UsageError(
+            "armload survey report takes one table: armload survey report survey.parquet --out report.html"
+        )
     with working("drawing and writing"):
         findings = write_survey_report(options.paths[1], options.out)
     for line in findings:
