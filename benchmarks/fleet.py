@@ -312,8 +312,15 @@ def tables(found: dict[str, Any]) -> dict[str, str]:
     ]
     payloads = markdown_table([*heads, "mass error [g]"], "lrrrrrrr", rows)
     rows = [
-        [f["arm"], f["role"], share(f["changed"]), "yes" if f["retare"] else "", share(f["moves"])]
-        + ["yes" if f["loose"] else "", "" if f["since day"] is None else f"{f['since day']:g}"]
+        [
+            f["arm"],
+            f["role"],
+            share(f["changed"]),
+            "yes" if f["retare"] else "",
+            share(f["moves"]),
+            "yes" if f["loose"] else "",
+            "" if f["since day"] is None else f"{f['since day']:g}",
+        ]
         for f in found["arms"]
     ]
     heads = ["arm", "truth", "changed, last logs", "to re-tare", "moves, last logs", "to look at", "since day"]

@@ -124,8 +124,8 @@ def test_a_task_whose_process_is_killed_each_time_is_said_to_be_lost(tmp_path):
     )
     assert found["of-0"] == {"name": "of-0", "key": "a", "lost": True}
     assert [found[f"of-{x}"]["square"] for x in (1, 2)] == [1, 4]
+    others = Task.of_one("of-9", "b", killed_at_first, tmp_path, 9, True)
     with pytest.raises(DatasetError, match="was killed 3 times"):
-        others = Task.of_one("of-9", "b", killed_at_first, tmp_path, 9, True)
         run_tasks([wanted[0], others], tmp_path / "x", jobs=2)
 
 

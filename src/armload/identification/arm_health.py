@@ -1,4 +1,4 @@
-"""What a log says of the arm itself, beside the payload: offsets, friction, what is left over, whether it is as before."""
+"""What a log says of the arm itself: offsets, friction, what is left over, and whether the arm is as it was."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from armload.regression.noise import whole_noise
 class ArmHealth:
     """An arm as one log, or a part of one, shows it.
 
-    offset, coulomb: (n,) torque offsets and Coulomb friction [N·m]: by how much they differ from those at the tare or of
-        the profile's mean session where there is one (`relative`), else as found beside the model.
+    offset, coulomb: (n,) torque offsets and Coulomb friction [N·m]: by how much they differ from those at the tare, or
+        of the profile's mean session, where there is one (`relative`), else as found beside the model.
     residual: rms over the joints of the residual's long-run deviation √S, over the one expected of such an arm.
     restlessness: how restless the torques are, of what they were at the tare or in the profile (`posterior.restless`).
         None: there was neither, or torque is motor current.

@@ -88,7 +88,7 @@ def simulate_inverse(
 
 
 def _tracking_error(t: NDArray, n: int, size: float, rng: np.random.Generator) -> tuple[NDArray, NDArray, NDArray]:
-    """e, its velocity and its acceleration (N, n): waves of one amplitude, at frequencies uniform in their logarithm."""
+    """e, its velocity and acceleration (N, n): waves of one amplitude, frequencies uniform in their logarithm."""
     omega = 2.0 * np.pi * np.exp(rng.uniform(*np.log(_BAND), size=(_WAVES, n)))
     angle = t[:, None, None] * omega + rng.uniform(0.0, 2.0 * np.pi, size=(_WAVES, n))
     a = size * np.sqrt(2.0 / _WAVES)

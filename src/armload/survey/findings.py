@@ -56,8 +56,8 @@ class ArmFinding:
         said = []
         if self.retare:
             said.append(
-                f"is not as it was at its tare or in its profile, at joint {self.joint} most: record it empty, and tare "
-                "it or learn its profile anew; if it was exchanged, learn the new one from its own logs alone"
+                f"is not as it was at its tare or in its profile, at joint {self.joint} most: record it empty, and "
+                "tare it or learn its profile anew; if it was exchanged, learn the new one from its own logs alone"
             )
         if self.loose:
             said.append("holds things that seem to move: look at its gripper")
@@ -70,7 +70,7 @@ def arm_findings(rows: Sequence[dict[str, Any]]) -> list[ArmFinding]:
 
 
 def doubtful(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Rows that should be looked at: logs that cannot be answered, and answers of which something is said to be wrong."""
+    """Rows to look at: logs that cannot be answered, and answers of which something is said to be wrong."""
     return [row for row in rows if row["status"] == UNUSABLE or row["moves"] or row["changed"] or not row["consistent"]]
 
 

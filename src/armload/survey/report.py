@@ -1,4 +1,4 @@
-"""The page of a survey: what was held, when and by which arm, which logs are in doubt, how each arm drifts, what to do."""
+"""The page of a survey: what was held, when and by which arm, how each arm drifts, what to look at and to do."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ _MISSING = "missing"  # content of a file that cannot be read
 
 @dataclass(frozen=True)
 class Survey:
-    """What a survey found: its rows, sorted by log, episode and time; how many logs, and how many were answered anew."""
+    """What a survey found: rows, sorted by log, episode and time; how many logs, how many of them answered anew."""
 
     rows: list[dict[str, Any]]
     logs: int

@@ -107,8 +107,8 @@ def run(options: argparse.Namespace) -> None:
         print_json(about | {"out": options.out, "profiles": learned})
         return
     print(
-        f"{found.logs} logs ({found.anew} answered anew): {len(found.rows)} rows, {found.unusable} of them of logs that "
-        "cannot be answered"
+        f"{found.logs} logs ({found.anew} answered anew): {len(found.rows)} rows, {found.unusable} of them of logs "
+        "that cannot be answered"
     )
     for arm, said in learned.items():
         print(f"profile of {arm}: {said}")
