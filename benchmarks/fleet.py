@@ -20,6 +20,7 @@ logs that were asked for.
 from __future__ import annotations
 
 import json
+import os
 import resource
 import shutil
 import subprocess
@@ -289,7 +290,27 @@ def speed(folder: Path, count: int) -> dict[str, Any]:
         out[name] = {"seconds": seconds, "cpu seconds": cpu, "logs per s": rate}
         out[name]["same bytes"] = (folder / table).read_bytes() == (folder / "speed-1-process.parquet").read_bytes()
         say(f"{name}: {out[name]}")
+    out["peak memory"] = {f"{seconds:g} s": peak(folder, seconds) for seconds in (12.0, 120.0)}
     return out
+
+
+def peak(folder: Path, seconds: float) -> dict[str, float]:
+    """What the survey of one empty log of so many seconds at 1 kHz takes at most, all in one process [MB]."""
+    panda = arm("panda")
+    motion = MotionSource(panda, 0.0).draw("long", np.random.default_rng(1), seconds, "peak")
+    log = simulate_inverse(panda, motion, sensors=Sensors.panda(panda).evenly(), rate=1000.0, duration=seconds)
+    path = folder / f"peak-{seconds:g}" / "log.npz"
+    path.parent.mkdir(exist_ok=True)
+    write_recording(path, log)
+    words = [sys.executable, "-m", "armload", "survey", str(path), "--robot", "panda", "--jobs", "1"]
+    table = folder / f"peak-{seconds:g}.json"
+    shutil.rmtree(table.with_name(f"{table.name}.cells"), ignore_errors=True)
+    process = subprocess.Popen([*words, "--out", str(table)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    _, status, used = os.wait4(process.pid, 0)
+    assert status == 0, "the survey of a long log failed"
+    found = {"file [MB]": path.stat().st_size / 1e6, "peak [MB]": used.ru_maxrss / 1e3}
+    say(f"{seconds:g} s: {found}")
+    return found
 
 
 def tables(found: dict[str, Any]) -> dict[str, str]:

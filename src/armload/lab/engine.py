@@ -38,6 +38,10 @@ class Engine:
             work: a function that can be sent to another process.
             items: gives what is not done yet, whenever it is asked.
         """
+        if self.jobs == 1 and self.cluster is None:  # here and now, and without joblib
+            for item in items():
+                yield item, work(item)
+            return
         for _ in range(ATTEMPTS - 1):
             try:
                 yield from self._run(work, items(), self.jobs)
