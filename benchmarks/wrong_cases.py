@@ -131,14 +131,14 @@ def moving(count: int, seed: int, liquid: bool) -> Iterator[Wrong]:
     for k, (e, log) in enumerate(zip(episodes(count, seed), sound("reference", count, seed), strict=True)):
         rng = np.random.default_rng([seed, k, 9])
         frequency = rng.uniform(1.5, 4.0) if liquid else np.sqrt(9.81 / rng.uniform(0.05, 0.15)) / (2.0 * np.pi)
-        part = _Part(0.3 * log.truth[0], 2.0 * np.pi * frequency, rng.uniform(0.03, 0.2), liquid)
+        part = Part(0.3 * log.truth[0], 2.0 * np.pi * frequency, rng.uniform(0.03, 0.2), liquid)
         torque, shift = part.beside(e.arm, e.motion, log.truth[1:4] / log.truth[0], log.run.t)
         truth = log.truth.copy()
         truth[1:4] += part.mass * shift
         yield Wrong(replace(log.run, tau=log.run.tau + torque), log.tare, truth)
 
 
-class _Part(NamedTuple):
+class Part(NamedTuple):
     """A point mass [kg] about a point of the payload: natural frequency [rad/s], damping, spring or string."""
 
     mass: float

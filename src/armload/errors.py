@@ -30,6 +30,14 @@ class RecordingError(ArmloadError, ValueError):
     """A log that is missing, unreadable, malformed or not plausible for the arm."""
 
 
+class EpisodesError(RecordingError):
+    """A file of several episodes, of which none was named; `episodes` are those there are."""
+
+    def __init__(self, message: str, episodes: tuple[int, ...]) -> None:
+        super().__init__(message)
+        self.episodes = episodes
+
+
 class DatasetError(ArmloadError, ValueError):
     """A data set that is incomplete, damaged or of another arm or motion."""
 

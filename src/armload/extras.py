@@ -22,6 +22,7 @@ MODULES = {
     "matplotlib": ("matplotlib", "lab"),
     "jinja2": ("jinja2", "lab"),
     "pyarrow": ("pyarrow", "parquet"),
+    "distributed": ("distributed", "cluster"),
     "h5py": ("h5py", "hdf5"),
     "viser": ("viser", "live"),
     "rosbags": ("rosbags", "bags"),

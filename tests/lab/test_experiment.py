@@ -1,9 +1,12 @@
 """The runner of all experiments: nothing is measured twice or lost once finished, and processes change no number."""
 
 import json
+import os
+import signal
 
 import pytest
 
+from armload.errors import DatasetError, UsageError
 from armload.lab.cells import key_of, load_cells
 from armload.lab.experiment import Task, provenance, run_tasks, source_key, write_json
 
@@ -97,3 +100,54 @@ def test_a_result_says_the_command_and_the_versions_it_rests_on():
     content = provenance("python benchmarks/x.py --seeds 3")
     assert content["command"] == "python benchmarks/x.py --seeds 3"
     assert {"python", "numpy", "pin", "mujoco"} <= set(content["versions"])
+
+
+def killed_at_first(folder, x, always=False):
+    """Kills its own process: once, or each time."""
+    file = folder / f"killed-{x}"
+    if always or not file.exists():
+        file.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return {"square": x * x}
+
+
+def test_a_process_that_is_killed_costs_its_task_only(tmp_path):
+    wanted = [Task.of_one("of-0", "a", killed_at_first, tmp_path, 0), *tasks(tmp_path, 3)[1:]]
+    found = run_tasks(wanted, tmp_path / "cells", jobs=2)
+    assert [cell["square"] for cell in found.values()] == [0, 1, 4]
+
+
+def test_a_task_whose_process_is_killed_each_time_is_said_to_be_lost(tmp_path):
+    wanted = [Task.of_one("of-0", "a", killed_at_first, tmp_path, 0, True), *tasks(tmp_path, 3)[1:]]
+    found = run_tasks(
+        wanted, tmp_path / "cells", jobs=2, lost=lambda task: {name: {"lost": True} for name in task.keys}
+    )
+    assert found["of-0"] == {"name": "of-0", "key": "a", "lost": True}
+    assert [found[f"of-{x}"]["square"] for x in (1, 2)] == [1, 4]
+    others = Task.of_one("of-9", "b", killed_at_first, tmp_path, 9, True)
+    with pytest.raises(DatasetError, match="was killed 3 times"):
+        run_tasks([wanted[0], others], tmp_path / "x", jobs=2)
+
+
+def test_what_a_kill_leaves_of_a_file_is_no_cell(tmp_path):
+    run_tasks(tasks(tmp_path, 1), tmp_path / "cells")
+    (tmp_path / "cells" / ".of-1.json.a1b2.json").write_text('{"name": "of-')
+    assert list(load_cells(tmp_path / "cells")) == ["of-0"]
+
+
+@pytest.mark.full
+def test_dask_workers_give_the_cells_of_one_process_and_a_lost_one_costs_its_task_only(tmp_path):
+    pytest.importorskip("distributed")
+    one = run_tasks(tasks(tmp_path, 6), tmp_path / "1")
+    assert list(run_tasks(tasks(tmp_path, 6), tmp_path / "2", jobs=2, cluster="local").items()) == list(one.items())
+    for file in (tmp_path / "1").iterdir():
+        assert file.read_bytes() == (tmp_path / "2" / file.name).read_bytes()
+    wanted = [Task.of_one("of-0", "a", killed_at_first, tmp_path, 0), *tasks(tmp_path, 3)[1:]]
+    found = run_tasks(wanted, tmp_path / "3", jobs=2, cluster="local")
+    assert [cell["square"] for cell in found.values()] == [0, 1, 4]
+
+
+@pytest.mark.parametrize("where", ["8786", "http://x", "tcp://x"])
+def test_a_cluster_is_local_or_an_address(tmp_path, where):
+    with pytest.raises(UsageError, match="expected local, or the address"):
+        run_tasks(tasks(tmp_path, 1), tmp_path / "cells", cluster=where)

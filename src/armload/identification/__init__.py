@@ -1,6 +1,7 @@
 """One log in, one answer out: plausibility, choice of method, answer."""
 
 from armload.identification.answer import Identification
+from armload.identification.arm_health import ArmHealth
 from armload.identification.choice import Choice, choose
 from armload.identification.identify_log import check_usable, identify, plausible_tool
 from armload.identification.methods import DEFAULT, LEFT_OUT, METHODS, Method, default_for
@@ -10,6 +11,7 @@ __all__ = [
     "DEFAULT",
     "LEFT_OUT",
     "METHODS",
+    "ArmHealth",
     "Choice",
     "Identification",
     "Method",

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from armload.estimators import Estimate
 from armload.identification import text
+from armload.identification.arm_health import ArmHealth
 from armload.inertia import HELD, NAMES, InertialParameters, nearest_body
 from armload.version import __version__
 
@@ -91,6 +92,7 @@ class Identification:
     why: what is special about the method, in a few words; not in the JSON.
     kappa: by how much the physics overrates this log's evidence, of a method that knows; not in the JSON.
     moves: whether no rigid body explains the torques; not in the JSON.
+    health: the arm itself, as the log shows it, of a method that asks; not in the JSON.
     """
 
     method: str
@@ -123,6 +125,7 @@ class Identification:
     why: str = field(default="", metadata={"json": False})
     kappa: float | None = field(default=None, metadata={"json": False})
     moves: bool = field(default=False, metadata={"json": False})
+    health: ArmHealth | None = field(default=None, metadata={"json": False})
 
     def __post_init__(self) -> None:
         for name, shape in _ARRAYS.items():

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from armload.arms import Arm
 from armload.errors import IdentificationError
 from armload.estimators import ArmMismatch, Estimate
+from armload.identification.arm_health import ArmHealth
 from armload.identification.choice import Choice, choose
 from armload.identification.intervals import Before
 from armload.identification.thresholds import LARGEST_OFFSETS, MISFIT, MOVES
@@ -55,6 +56,7 @@ class Found(NamedTuple):
     kappa: by how much the physics overrates the log's evidence, of a method that knows.
     gain_std: relative standard deviation of the torque's scale, of a method that allows for one.
     mass: that was given. mass_alone: what the log alone says of it, and its standard deviation [kg].
+    health: the arm itself, of a method that asks.
     """
 
     estimate: Estimate
@@ -77,6 +79,7 @@ class Found(NamedTuple):
     mass_alone: tuple[float, float] | None = None
     kappa: float | None = None
     gain_std: float | None = None
+    health: ArmHealth | None = None
 
     @property
     def explained(self) -> bool:
@@ -157,6 +160,7 @@ def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Foun
         gain_std=None if posterior is None else posterior.posterior.gain_std,
         mass=asked.mass,
         mass_alone=None if posterior is None else posterior.mass_alone,
+        health=None if posterior is None else ArmHealth.of(posterior),
     )
 
 

@@ -98,6 +98,7 @@ def answered(
         why=found.why,
         kappa=found.kappa,
         moves=found.restlessness > RESTLESS or not found.explained,
+        health=found.health,
     )
 
 

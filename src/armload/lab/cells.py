@@ -30,7 +30,8 @@ def load_cells(folder: str | Path) -> dict[str, dict[str, Any]]:
     Raises:
         DatasetError: a file that is not a cell.
     """
-    cells = (_read(path) for path in sorted(Path(folder).glob("*.json")))
+    whole = (path for path in sorted(Path(folder).glob("*.json")) if not path.name.startswith("."))  # else cut off
+    cells = (_read(path) for path in whole)
     return {cell["name"]: cell for cell in cells}
 
 

@@ -13,13 +13,16 @@ import platform
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from armload.atomic import replacing
+from armload.errors import DatasetError
 from armload.lab.cells import finished_cell, key_of, load_cells, save_cell
+from armload.lab.engine import ATTEMPTS, engine
 from armload.version import __version__, package_versions
 
 Cells = dict[str, dict[str, Any]]  # by name
@@ -55,8 +58,11 @@ def run_tasks(
     folder: str | Path,
     *,
     jobs: int = 1,
+    cluster: str | None = None,
     until: float | None = None,
     say: Callable[[str], None] = lambda _: None,
+    progress: Callable[[int, int], None] = lambda _done, _total: None,
+    lost: Callable[[Task], Cells] | None = None,
     part: str = "part",
     indent: int | None = None,
 ) -> Cells:
@@ -66,15 +72,17 @@ def run_tasks(
         tasks: in the order in which they are to be measured.
         folder: of the cells' files.
         jobs: processes; the numbers do not depend on it.
+        cluster: a Dask cluster in place of them, as of `engine`; its workers see the files that tasks name.
         until: begin nothing after so many seconds.
         say: called with what is next. part: its word for a task.
+        progress: called as progress(done, total) after every task.
+        lost: makes the cells of a task whose process was killed `ATTEMPTS` times, by the system for want of memory,
+            say; None: then the run ends with an error.
         indent: of the cells' JSON; None: each on one line.
 
     Raises:
-        DatasetError: a file in the folder that is not a cell.
+        DatasetError: a file in the folder that is not a cell, or a task whose process was killed each time.
     """
-    from joblib import Parallel, delayed
-
     folder, started, there = Path(folder), time.monotonic(), load_cells(folder)
     keys = {name: key for task in tasks for name, key in task.keys.items()}
     cells = {name: there[name] for name, key in keys.items() if name in there and there[name].get("key") == key}
@@ -91,10 +99,24 @@ def run_tasks(
             say(f"{part} {number} of {len(tasks)}: {left}")
             yield left
 
-    one_by_one: dict[str, Any] = {"pre_dispatch": jobs, "batch_size": 1, "return_as": "generator_unordered"}
-    finished: Any = Parallel(n_jobs=jobs, **one_by_one)(delayed(_measured)(t, folder, indent) for t in unfinished())
-    for measured in finished:
-        cells |= measured
+    def keep(measured: Cells) -> None:
+        for cell in measured.values():  # where a worker's disk is not ours
+            if finished_cell(folder, cell["name"], cell["key"]) is None:
+                save_cell(folder, cell, indent)
+        cells.update(measured)
+        progress(sum(all(name in cells for name in task.keys) for task in tasks), len(tasks))
+
+    with engine(jobs, cluster) as on:
+        measured = partial(_measured, folder=folder, indent=indent)
+        for task, found in on.each(measured, unfinished):
+            if found is None:  # its process was killed each time
+                if lost is None:
+                    raise DatasetError(
+                        f"{task}: the process that worked on it was killed {ATTEMPTS} times, by the system for want of "
+                        "memory, say: expected it to end; run it with fewer --jobs"
+                    )
+                found = {name: {"name": name, "key": task.keys[name], **cell} for name, cell in lost(task).items()}
+            keep(found)
     return {name: cells[name] for name in keys if name in cells}
 
 

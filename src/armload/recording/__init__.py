@@ -5,6 +5,7 @@ from armload.recording.column_spec import ColumnSpec
 from armload.recording.compensated import with_gravity
 from armload.recording.copies import check_own_measurements, shared_samples
 from armload.recording.files import LOG_SUFFIXES, has_topics, read_recording, write_recording
+from armload.recording.lerobot import data_set_episodes, is_data_set
 from armload.recording.recording import CHANNELS, GAP, JITTERED, Recording, Sample
 
 __all__ = [
@@ -17,7 +18,9 @@ __all__ = [
     "Recording",
     "Sample",
     "check_own_measurements",
+    "data_set_episodes",
     "has_topics",
+    "is_data_set",
     "read_recording",
     "same_motion",
     "shared_samples",

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from armload.arms import Arm
-from armload.errors import RecordingError, one_line
+from armload.errors import EpisodesError, RecordingError, one_line
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.header import read_name
 from armload.recording.parquet_file import pyarrow_for, read_parquet
@@ -38,27 +38,48 @@ def read_data_set(path: Path, where: str, arm: Arm | None = None, spec: ColumnSp
     """
     spec = spec or ColumnSpec()
     info = _info(path)
-    template = str(info.get("data_path"))
-    if "{episode_index" in template:
-        episode = _chosen(range(_whole(info, "total_episodes", path)), spec, where)
-        places = {"episode_index": episode, "episode_chunk": episode // _whole(info, "chunks_size", path, _CHUNK)}
-    elif "{file_index" in template:
-        index = _index(path, where)
-        episode = _chosen(sorted(index), spec, where)
-        places = dict(zip(("chunk_index", "file_index"), index[episode], strict=True))
-    else:
-        raise RecordingError(
-            f"{path / _INFO} has the data_path {template!r}: expected that of a LeRobot data set of version 2 or 3; "
-            "convert it, or give the episode's Parquet file"
-        )
-    try:
-        file = path / template.format(**places)
-    except (KeyError, ValueError, IndexError, AttributeError):
-        raise RecordingError(f"{path / _INFO} has the data_path {template!r}: expected only {sorted(places)}") from None
+    there = _places(path, where, info)
+    episode = _chosen(list(there), spec, where)
+    file = _file(path, info, there[episode])
     if not file.is_file():
         raise RecordingError(f"{where}: episode {episode} is in {file}, which is not there: download it, too")
     called = f"{where}, episode {episode}"
     return read_parquet(file, called, arm, spec.over(episode=episode), _elements(info, arm))
+
+
+def data_set_episodes(path: str | Path) -> dict[int, Path]:
+    """The episodes of a LeRobot data set, and the Parquet file that each of them is in.
+
+    Raises:
+        RecordingError: the data set's own files do not say.
+    """
+    path = Path(path)
+    info = _info(path)
+    return {episode: _file(path, info, places) for episode, places in _places(path, str(path), info).items()}
+
+
+def _places(path: Path, where: str, info: Mapping[str, Any]) -> dict[int, dict[str, int]]:
+    """What `data_path` of meta/info.json asks for, of each episode."""
+    template = str(info.get("data_path"))
+    if "{episode_index" in template:
+        size = _whole(info, "chunks_size", path, _CHUNK)
+        count = _whole(info, "total_episodes", path)
+        return {k: {"episode_index": k, "episode_chunk": k // size} for k in range(count)}
+    if "{file_index" in template:
+        index = _index(path, where)
+        return {k: dict(zip(("chunk_index", "file_index"), index[k], strict=True)) for k in sorted(index)}
+    raise RecordingError(
+        f"{path / _INFO} has the data_path {template!r}: expected that of a LeRobot data set of version 2 or 3; "
+        "convert it, or give the episode's Parquet file"
+    )
+
+
+def _file(path: Path, info: Mapping[str, Any], places: Mapping[str, int]) -> Path:
+    template = str(info.get("data_path"))
+    try:
+        return path / template.format(**places)
+    except (KeyError, ValueError, IndexError, AttributeError):
+        raise RecordingError(f"{path / _INFO} has the data_path {template!r}: expected only {sorted(places)}") from None
 
 
 def _info(path: Path) -> dict[str, Any]:
@@ -100,7 +121,8 @@ def _chosen(there: Sequence[int], spec: ColumnSpec, where: str) -> int:
     """The episode that was asked for, or the only one."""
     shown = f"{there[0]}" if len(there) == 1 else f"{there[0]} … {there[-1]}"
     if spec.episode is None and len(there) > 1:
-        raise RecordingError(f"{where} holds {len(there)} episodes ({shown}): expected one; name it with --episode K")
+        said = f"{where} holds {len(there)} episodes ({shown}): expected one; name it with --episode K"
+        raise EpisodesError(said, tuple(there))
     if spec.episode is not None and spec.episode not in there:
         raise RecordingError(f"{where} has no episode {spec.episode}: expected one of {shown}")
     return there[0] if spec.episode is None else spec.episode

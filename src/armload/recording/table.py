@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
-from armload.errors import RecordingError
+from armload.errors import EpisodesError, RecordingError
 from armload.recording.aliases import EPISODE, QUANTITIES, TIME_UNITS
 from armload.recording.choice import DATE, TimeColumns
 from armload.recording.column_spec import ColumnSpec
@@ -153,7 +153,8 @@ def _episode(episodes: NDArray[np.float64], spec: ColumnSpec, where: str) -> NDA
     there = np.unique(episodes)
     shown = ", ".join(f"{episode:g}" for episode in there[:8]) + (", …" if len(there) > 8 else "")
     if spec.episode is None and len(there) > 1:
-        raise RecordingError(f"{where} holds {len(there)} episodes ({shown}): expected one; name it with --episode K")
+        said = f"{where} holds {len(there)} episodes ({shown}): expected one; name it with --episode K"
+        raise EpisodesError(said, tuple(int(episode) for episode in there if np.isfinite(episode)))
     if spec.episode is not None and spec.episode not in there:
         raise RecordingError(f"{where} has no episode {spec.episode}: expected one of {shown}")
     return np.ones(len(episodes), dtype=bool) if spec.episode is None else episodes == spec.episode

@@ -3,6 +3,7 @@
 from armload.simulation.continued import ContinuedRun
 from armload.simulation.controller import Command, Gains
 from armload.simulation.friction import Friction
+from armload.simulation.inverse import simulate_inverse
 from armload.simulation.plant import build_model, settled_start
 from armload.simulation.residual import SmoothTorque
 from armload.simulation.resolution import Resolution
@@ -31,6 +32,7 @@ __all__ = [
     "moderate_stiffness",
     "settled_start",
     "simulate",
+    "simulate_inverse",
     "simulate_many",
     "torque_controlled",
 ]

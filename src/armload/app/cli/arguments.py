@@ -182,6 +182,15 @@ def add_identifier_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_cluster_argument(parser: argparse.ArgumentParser) -> None:
+    """`--cluster`."""
+    parser.add_argument(
+        "--cluster",
+        metavar="C",
+        help="Dask workers in place of processes: local, or the address of a scheduler, tcp://HOST:8786; same numbers",
+    )
+
+
 def add_tool_and_topic_arguments(parser: argparse.ArgumentParser) -> None:
     """`--tool` and `--topic`."""
     parser.add_argument(

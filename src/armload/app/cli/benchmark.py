@@ -6,7 +6,7 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from armload.app.cli.arguments import Parser, at_least
+from armload.app.cli.arguments import Parser, add_cluster_argument, at_least
 from armload.app.cli.printing import print_note, print_table
 
 _EXAMPLES = """\
@@ -38,6 +38,7 @@ def parser() -> Parser:
     add("--episodes", type=at_least(1), metavar="N", help="episodes of a population (default: 100)")
     add("--rate", type=at_least(20.0, float), metavar="HZ", help="of the logs (default: 1000)")
     add("--jobs", type=at_least(1), default=1, metavar="N", help="processes (default: 1); same numbers")
+    add_cluster_argument(parser)
     add("--hours", type=at_least(0.0, float), metavar="H", help="begin nothing after so many hours")
     add("--out", metavar="DIR", help="cells and report (default: out/benchmark)")
     add("--summary", metavar="FILE", help="the JSON (default: benchmarks/results/benchmark.json)")
@@ -64,7 +65,7 @@ def run(options: argparse.Namespace) -> None:
     )
     page = Path(options.page or (out / "benchmark.md" if options.quick else "docs/benchmark.md"))
     until = None if options.hours is None else 3600.0 * options.hours
-    cells = run_benchmark(size, out / "cells", jobs=options.jobs, until=until, say=print_note)
+    cells = run_benchmark(size, out / "cells", jobs=options.jobs, cluster=options.cluster, until=until, say=print_note)
     written = write_results(cells, size, summary, page, out / "report.html")
     results = gather(cells, size)
     for table in (targets_table(results), losses_table(results)):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from armload.app.cli.arguments import Parser, add_arm_arguments, at_least, file_name
+from armload.app.cli.arguments import Parser, add_arm_arguments, add_cluster_argument, at_least, file_name
 from armload.app.cli.named import arm_of, motion_of, whole_number, world_of
 
 _EXAMPLES = """\
@@ -51,6 +51,7 @@ def parser() -> Parser:
         default=True,
         help="sensors as measured on real robots, or ideal ones (default: --noise)",
     )
+    add_cluster_argument(parser)
     add("--seed", type=at_least(0), default=0, metavar="N", help="of noise and random payloads")
     return parser
 
@@ -80,5 +81,6 @@ def run(options: argparse.Namespace) -> None:
         rows_per_run=options.rows,
         seed=options.seed,
         progress=sys.stderr.isatty(),
+        cluster=options.cluster,
     )
     print(f"{options.out}: {dataset}")

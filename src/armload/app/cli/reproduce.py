@@ -7,7 +7,7 @@ import os
 import sys
 from pathlib import Path
 
-from armload.app.cli.arguments import Parser, at_least
+from armload.app.cli.arguments import Parser, add_cluster_argument, at_least
 from armload.app.cli.printing import print_note
 from armload.errors import UsageError
 
@@ -38,6 +38,7 @@ def parser() -> Parser:
     add("--results", metavar="DIR", help="finished cells (default: benchmarks/results/taie2024)")
     add("--page", metavar="FILE", help="the page to write (default: docs/paper.md)")
     add("--jobs", type=at_least(1), default=1, metavar="N", help="cells at once (default: 1); same numbers")
+    add_cluster_argument(parser)
     add("--hours", type=at_least(0.0, float), metavar="H", help="begin nothing after so many hours")
     add(
         "--real-log",
@@ -62,6 +63,7 @@ def run(options: argparse.Namespace) -> None:
         results,
         until=None if options.hours is None else 3600.0 * options.hours,
         jobs=options.jobs,
+        cluster=options.cluster,
         progress=sys.stderr.isatty(),
         say=print_note,
     )

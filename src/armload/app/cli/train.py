@@ -6,7 +6,7 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
-from armload.app.cli.arguments import Parser, at_least, file_name
+from armload.app.cli.arguments import Parser, add_cluster_argument, at_least, file_name
 from armload.app.cli.named import arm_of_dataset, motion_of
 from armload.app.cli.printing import print_note, print_table
 from armload.errors import UsageError
@@ -50,7 +50,7 @@ _ENSEMBLE = {
     "split": "payload",
     "motion": [],
 }
-_HYBRID = {"frame": None, "episodes": None, "jobs": None, "work": None, "report": None, "json": False}
+_HYBRID = {"frame": None, "episodes": None, "jobs": None, "cluster": None, "work": None, "report": None, "json": False}
 
 
 def parser() -> Parser:
@@ -89,6 +89,7 @@ def parser() -> Parser:
         metavar="N",
         help="episodes at a time (default: one for each core); no number changes",
     )
+    add_cluster_argument(hybrid)
     hybrid.add_argument(
         "--work", type=file_name, metavar="DIR", help="finished episodes are kept here (default: out/hybrid-ROBOT)"
     )

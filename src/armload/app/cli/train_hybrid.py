@@ -29,6 +29,7 @@ def run(options: argparse.Namespace) -> None:
     import joblib
 
     from armload.arms import arm
+    from armload.lab.engine import engine
     from armload.lab.training import train_hybrid
     from armload.lab.training.hybrid import EPISODES, versions
     from armload.posterior.model_file import ENOUGH
@@ -43,9 +44,9 @@ def run(options: argparse.Namespace) -> None:
         f"{'going on from' if resumed else 'kept in'} {work}"
     )
     began = time.perf_counter()
-    with episodes_shown() as progress:
+    with episodes_shown() as progress, engine(jobs, options.cluster) as on:
         model, coverage = train_hybrid(
-            robot, episodes=episodes, seed=options.seed, folder=work, jobs=jobs, progress=progress
+            robot, episodes=episodes, seed=options.seed, folder=work, jobs=on.jobs, progress=progress
         )
     model.save(out)
     report = {

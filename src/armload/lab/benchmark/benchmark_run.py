@@ -106,6 +106,7 @@ def run_benchmark(
     folder: str | Path,
     *,
     jobs: int = 1,
+    cluster: str | None = None,
     until: float | None = None,
     say: Callable[[str], None] = lambda _: None,
 ) -> Cells:
@@ -115,7 +116,7 @@ def run_benchmark(
         size: how much is measured.
         folder: of the cells' files. Cells of other populations and methods of the same size are returned too: the
             tables show all there is.
-        jobs, until, say: see `run_tasks`.
+        jobs, cluster, until, say: see `run_tasks`.
     """
     robot = arm(size.robot)
     cells = load_cells(folder)
@@ -123,7 +124,7 @@ def run_benchmark(
     wanted = {name: rows_for(population(name), size.methods) for name in size.populations}
     valid = keys(size, robot, _with_finished(cells, wanted))
     others = {name: cell for name, cell in cells.items() if cell["key"] == valid.get(name)}
-    return others | run_tasks(_tasks(size, wanted, valid), folder, jobs=jobs, until=until, say=say)
+    return others | run_tasks(_tasks(size, wanted, valid), folder, jobs=jobs, cluster=cluster, until=until, say=say)
 
 
 def _with_finished(cells: Cells, wanted: dict[str, list[Row]]) -> dict[str, list[Row]]:

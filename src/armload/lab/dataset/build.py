@@ -7,9 +7,11 @@ Each file appears whole or not at all, so that a build may be stopped at any mom
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +29,7 @@ from armload.lab.dataset.provenance import (
     read_provenance,
     write_provenance,
 )
+from armload.lab.engine import engine
 from armload.motion import Motion
 from armload.payloads import Payload
 from armload.recording import Recording
@@ -52,6 +55,7 @@ def build_dataset(
     rows_per_run: int = ROWS_PER_RUN,
     seed: int = 0,
     progress: bool = True,
+    cluster: str | None = None,
 ) -> Dataset:
     """Simulate every payload on every motion in every world and write one table with the paper's columns.
 
@@ -66,6 +70,7 @@ def build_dataset(
         rows_per_run: samples kept of each run.
         seed: of the sensors' noise, which differs from run to run.
         progress: show a bar on stderr.
+        cluster: where the runs are simulated, as of `armload.lab.engine.engine`; its workers see the folder.
 
     Raises:
         DatasetError: the folder holds something else or a data set made otherwise, or nothing to run was given.
@@ -84,7 +89,7 @@ def build_dataset(
             for start in range(0, len(runs), len(payloads))
             for first in range(start, start + len(payloads), _BATCH)
         ]  # no batch mixes motions, whose rates may differ
-        _build_parts(folder, provenance, arm, runs, batches, progress)
+        _build_parts(folder, provenance, arm, runs, batches, progress, cluster)
         _finish(folder, provenance, batches)
     except OSError as error:
         raise DatasetError(
@@ -153,20 +158,42 @@ def _build_parts(
     runs: list[tuple[Run, Payload, int, int, int]],
     batches: list[range],
     progress: bool,
+    cluster: str | None,
 ) -> None:
-    from pyarrow import parquet
+    def missing() -> Iterator[tuple[range, list[tuple[Run, Payload, int, int, int]]]]:
+        for batch in batches:
+            if not _is_whole(_part(folder, batch), provenance, batch):
+                yield batch, [runs[k] for k in batch]
 
     (folder / _PARTS).mkdir(exist_ok=True)
     with _bar(progress, len(runs), f"simulating {arm.name}") as advance:
-        for batch in batches:
-            part = _part(folder, batch)
-            if not _is_whole(part, provenance, batch):
-                rate = provenance["rows_per_run"] / runs[batch[0]][0].motion.duration
-                logs = simulate_many(arm, [runs[k][0] for k in batch], rate=rate)
-                table = _table(arm, provenance, [(k, log, *runs[k][1:]) for k, log in zip(batch, logs, strict=True)])
-                with replacing(part) as temporary:
-                    parquet.write_table(table, temporary, compression="zstd", write_page_checksum=True)
-            advance(len(batch))
+        advance(len(runs) - sum(len(batch) for batch, _ in missing()))
+        with engine(1 if cluster is None else os.cpu_count() or 1, cluster) as on:
+            for (batch, _), written in on.each(partial(_write_part, folder, provenance, arm), missing):
+                if written is None:
+                    raise DatasetError(
+                        f"the process that simulated runs {batch.start} to {batch.stop - 1} was killed each time: "
+                        "expected it to end; build again on workers with more memory"
+                    )
+                advance(len(batch))
+
+
+def _write_part(
+    folder: Path,
+    provenance: dict[str, Any],
+    arm: Arm,
+    item: tuple[range, list[tuple[Run, Payload, int, int, int]]],
+) -> bool:
+    """Simulate a batch of runs and write its part."""
+    from pyarrow import parquet
+
+    batch, runs = item
+    rate = provenance["rows_per_run"] / runs[0][0].motion.duration
+    logs = simulate_many(arm, [run for run, *_ in runs], rate=rate)
+    table = _table(arm, provenance, [(k, log, *one[1:]) for k, log, one in zip(batch, logs, runs, strict=True)])
+    with replacing(_part(folder, batch)) as temporary:
+        parquet.write_table(table, temporary, compression="zstd", write_page_checksum=True)
+    return True
 
 
 def _table(arm: Arm, provenance: dict[str, Any], logs: list[tuple[int, Recording, Payload, int, int, int]]) -> pa.Table:

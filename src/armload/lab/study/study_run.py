@@ -37,6 +37,7 @@ def run_study(
     *,
     until: float | None = None,
     jobs: int = 1,
+    cluster: str | None = None,
     progress: bool = False,
     say: Callable[[str], None] = lambda _: None,
 ) -> Cells:
@@ -45,16 +46,20 @@ def run_study(
     Args:
         basis: what it rests on.
         results: folder of the cells' files; those with the right key are not measured again.
-        jobs, until, say: see `run_tasks`.
+        jobs, cluster, until, say: see `run_tasks`.
         progress: bars on stderr, for one job.
     """
     todo = plan(basis.size)
-    if jobs > 1:  # or each process would build them
+    if jobs > 1 or cluster is not None:  # or each process would build them
         for sensors in sorted({spec.sensors for spec in todo}):
             basis.dataset(sensors, progress)
-    rests_on, bars, fingerprint = (basis.folder, basis.size, basis.real_log), progress and jobs == 1, basis.fingerprint
+    rests_on, bars, fingerprint = (
+        (basis.folder, basis.size, basis.real_log),
+        progress and jobs == 1 and cluster is None,
+        basis.fingerprint,
+    )
     tasks = [Task.of_one(spec.name, spec.key(fingerprint), _measured, spec, rests_on, bars) for spec in todo]
-    return run_tasks(tasks, results, jobs=jobs, until=until, say=say, part="cell", indent=1)
+    return run_tasks(tasks, results, jobs=jobs, cluster=cluster, until=until, say=say, part="cell", indent=1)
 
 
 def _measured(spec: Spec, rests_on: tuple[Path, Size, Path | None], progress: bool) -> dict[str, Any]:

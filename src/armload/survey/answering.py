@@ -1,0 +1,95 @@
+"""From one log to its rows. Whatever is wrong with the log is said in a row: a survey never stops at one."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from threadpoolctl import threadpool_limits
+
+from armload.errors import ArmloadError, EpisodesError, one_line
+from armload.identification import identify
+from armload.survey.logs import Log, filesystem
+from armload.survey.rows import answered, unusable
+from armload.survey.settings import Settings
+from armload.version import __version__
+
+
+def answer_log(log: Log, settings: Settings, key: str, stamp: str, content: str) -> dict[str, Any]:
+    """The cell of a log: its rows, and what is known of its content (`Log.stamp`, `Log.content`)."""
+    about = {"log": log.name, "arm": log.arm, "episode": log.episode, "version": __version__, "key": key}
+    with threadpool_limits(limits=1):  # sums of several threads have another order: the same numbers on any machine
+        rows = _rows(log, settings, about)
+    return {"rows": rows, "stamp": stamp, "content": content}
+
+
+def lost_log(log: Log, key: str) -> dict[str, Any]:
+    """The cell of a log whose worker ended again and again; without a stamp, so that it is tried anew next time."""
+    about = {"log": log.name, "arm": log.arm, "episode": log.episode, "version": __version__, "key": key}
+    reason = f"{log.name}: the process that worked on it was killed each time: too little memory for so large a log?"
+    return {"rows": [unusable(reason, about)], "stamp": "", "content": ""}
+
+
+def _rows(log: Log, settings: Settings, about: dict[str, Any]) -> list[dict[str, Any]]:
+    try:
+        with _here(log) as path:
+            try:
+                return _of_one(log, settings, path, about)
+            except EpisodesError as error:
+                of_each = []
+                for episode in error.episodes:
+                    of_each += _of_episode(log, settings, path, about | {"episode": episode})
+                return of_each
+    except Exception as error:
+        return [unusable(_reason(error), about)]
+
+
+def _of_episode(log: Log, settings: Settings, path: Path, about: dict[str, Any]) -> list[dict[str, Any]]:
+    try:
+        return _of_one(log, settings, path, about)
+    except Exception as error:
+        return [unusable(_reason(error), about)]
+
+
+def _of_one(log: Log, settings: Settings, path: Path, about: dict[str, Any]) -> list[dict[str, Any]]:
+    recording = settings.recording(log, path, about["episode"])
+    about = about | {"date": recording.date}
+    try:
+        found = identify(
+            recording,
+            settings.arm(),
+            tare=settings.tare_of(log.arm),
+            profile=settings.profile_of(log.arm),
+            tool=settings.mounted(),
+            method=settings.method,
+        )
+    except ArmloadError as error:
+        return [unusable(str(error), about)]
+    rows, lacking = answered(found, about), settings.lacking(log.arm)
+    for row in rows:
+        row["notes"] = " | ".join([*lacking, row["notes"]]) if lacking else row["notes"]
+    return rows
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, ArmloadError):
+        return str(error)
+    if isinstance(error, OSError):
+        return f"{error.filename or 'the log'} cannot be read: {error.strerror or one_line(error)}"
+    return f"{type(error).__name__}: {one_line(error)}; this is a bug in armload: identify the log alone to see where"
+
+
+@contextmanager
+def _here(log: Log) -> Iterator[Path]:
+    """The log as a path on this machine; an object is fetched, and removed afterwards."""
+    if not log.remote:
+        yield Path(log.name)
+        return
+    fs, path = filesystem(log.name)
+    with tempfile.TemporaryDirectory() as folder:
+        local = Path(folder) / PurePosixPath(path).name
+        fs.get_file(path, str(local))
+        yield local

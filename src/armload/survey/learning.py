@@ -1,0 +1,123 @@
+"""What the empty stretches of a survey teach: a profile of each arm, and never anything that it may have held.
+
+A profile is learned from an arm's first sessions, then goes on session by session, each only if it fits what is known:
+an arm that was exchanged or repaired is another one, and is not averaged with it.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from armload.atomic import replacing
+from armload.errors import ArmloadError
+from armload.identification import check_usable
+from armload.inertia import NAMES
+from armload.lab.cells import key_of
+from armload.online.thresholds import LEARN_FROM
+from armload.posterior import Profile, learn_profile, save_profile
+from armload.posterior.profile_learning import by_clock, check_fits
+from armload.recording import Recording
+from armload.survey.logs import Log
+from armload.survey.rows import ANSWERED, SEPARATOR
+from armload.survey.settings import Settings
+
+# sessions that a profile is learned from at once: twice what its capacity is chosen from, and few enough that an arm is
+# seldom exchanged meanwhile
+FIRST = 8
+# sessions at most, an even choice of those after the first: what a session adds becomes small, its cost does not
+MOST = 20
+
+
+def learn_profiles(
+    rows: Sequence[dict[str, Any]], settings: Settings, folder: str | Path, say: Callable[[str], None] = lambda _: None
+) -> dict[str, str]:
+    """Write `folder/ARM.profile` for every arm that was seen empty for long enough, and say of each what was done.
+
+    Beside it lies `ARM.json`: the stretches it was learned from, those that did not fit, and a key; an arm whose
+    stretches are the same is not learned again.
+
+    Args:
+        rows: of a survey. settings: with which it was made. say: told what is being done.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    return {arm: _of_arm(arm, rows, settings, folder, say) for arm in sorted({row["arm"] for row in rows})}
+
+
+def empty_stretches(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The rows that a profile may learn from, the oldest first: empty beyond doubt, and `LEARN_FROM` long."""
+    found = [
+        row
+        for row in rows
+        if row["status"] == ANSWERED
+        and not row["held"]
+        and NAMES[0] in row["determined"].split(SEPARATOR)
+        and row["mass_low"] <= 0.0 <= row["mass_high"]
+        and row["t1"] - row["t0"] >= LEARN_FROM
+        and not (row["moves"] or row.get("changed"))
+    ]
+    return sorted(found, key=lambda row: (row["date"] is None, row["date"] or 0.0, row["log"], row["part"]))
+
+
+def _of_arm(
+    arm: str, rows: Sequence[dict[str, Any]], settings: Settings, folder: Path, say: Callable[[str], None]
+) -> str:
+    stretches = empty_stretches([row for row in rows if row["arm"] == arm])
+    if not stretches:
+        return f"none, as it was never seen empty for {LEARN_FROM:g} s"
+    later = stretches[FIRST:]
+    step = max(-(-len(later) // (MOST - FIRST)), 1)
+    chosen = [*stretches[:FIRST], *later[::step]]
+    about = folder / f"{arm}.json"
+    key = key_of([[row["key"], row["t0"], row["t1"]] for row in chosen])
+    before = json.loads(about.read_text(encoding="utf-8")) if about.is_file() else {}
+    if before.get("key") == key and (folder / f"{arm}.profile").is_file():
+        return f"as before, of {len(before['learned_from'])} stretches"
+    say(f"learning the profile of {arm} from {len(chosen)} stretches")
+    profile, learned, left_out = _learned(chosen, settings)
+    if profile is None:
+        return f"none, as no stretch could be used ({left_out[0]['reason']})"
+    save_profile(profile, folder / f"{arm}.profile")
+    with replacing(about) as temporary:
+        whole = {"key": key, "learned_from": learned, "left_out": left_out}
+        temporary.write_text(json.dumps(whole, indent=1) + "\n", encoding="utf-8")
+    return f"learned from {len(learned)} stretches" + (f", {len(left_out)} did not fit" if left_out else "")
+
+
+def _learned(
+    chosen: Sequence[dict[str, Any]], settings: Settings
+) -> tuple[Profile | None, list[dict[str, Any]], list[dict[str, Any]]]:
+    arm, tool = settings.arm(), settings.mounted()
+    mounted = None if tool is None else arm.in_frame(tool.parameters).phi
+    first: list[Recording] = []
+    profile, learned, left_out = None, [], []
+    for k, row in enumerate(chosen):
+        place = {"log": row["log"], "t0": row["t0"], "t1": row["t1"]}
+        try:
+            log = _stretch(row, settings)
+            check_usable(log, arm)
+            if k < FIRST:
+                first.append(log)
+            else:
+                assert profile is not None
+                check_fits(profile, arm, log, mounted)
+                profile = learn_profile(arm, [log], [mounted], known=profile)
+            learned.append(place)
+        except ArmloadError as error:
+            left_out.append(place | {"reason": str(error)})
+        if first and k + 1 == min(FIRST, len(chosen)):
+            profile = learn_profile(arm, first, [mounted] * len(first), sessions=by_clock(first))
+        elif k + 1 == FIRST:
+            return None, learned, left_out
+    return profile, learned, left_out
+
+
+def _stretch(row: dict[str, Any], settings: Settings) -> Recording:
+    log = settings.recording(Log(row["log"], row["arm"], row["episode"]), Path(row["log"]), row["episode"])
+    return log.between(log.t[0] + row["t0"], log.t[0] + row["t1"])

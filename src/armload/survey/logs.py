@@ -1,0 +1,194 @@
+"""Which logs there are: files, folders, globs, lists and object stores become units of work, each known by its content.
+
+A unit is what is answered at a time and what an interruption loses at most: a log file, a ROS 2 bag's folder, or an
+episode of a LeRobot data set.
+"""
+
+from __future__ import annotations
+
+import glob
+import hashlib
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from armload.errors import ArmloadError, UsageError
+from armload.recording import LOG_SUFFIXES, data_set_episodes, is_data_set
+
+_URL = re.compile(r"[a-z][a-z0-9+.-]*://")
+_WILD = re.compile(r"[*?\[]")
+_BLOCK = 1 << 20  # bytes that are hashed at a time
+
+
+@dataclass(frozen=True)
+class Log:
+    """A unit of work.
+
+    name: path or URL, as it was found. arm: whose log it is. episode: of a data set; None: whatever the file holds.
+    files: whose content the answer depends on; of a URL none.
+    """
+
+    name: str
+    arm: str
+    episode: int | None = None
+    files: tuple[Path, ...] = ()
+
+    @property
+    def remote(self) -> bool:
+        """Whether it is in an object store."""
+        return is_url(self.name)
+
+    def stamp(self) -> str:
+        """What changes with the content and is known without reading it: sizes and times, or the store's own key."""
+        if self.remote:
+            fs, path = filesystem(self.name)
+            return str(fs.ukey(path))
+        seen = [(str(file), (about := file.stat()).st_size, about.st_mtime_ns) for file in self.files]
+        return hashlib.sha256(repr(seen).encode()).hexdigest()
+
+    def content(self) -> str:
+        """SHA-256 of the content; of an object the store's own key, which changes with it.
+
+        Raises:
+            OSError: a file cannot be read.
+        """
+        if self.remote:
+            return self.stamp()
+        return hashlib.sha256("".join(file_hash(file) for file in self.files).encode()).hexdigest()
+
+
+def is_url(path: str) -> bool:
+    """Whether a path names an object store, as fsspec understands it."""
+    return _URL.match(path) is not None
+
+
+def filesystem(url: str) -> tuple[Any, str]:
+    """fsspec's file system of a URL, and the path in it.
+
+    Raises:
+        UsageError: fsspec, or what it needs for this kind of store, is not installed.
+    """
+    try:
+        from fsspec.core import url_to_fs  # type: ignore[import-not-found]
+
+        return url_to_fs(url)
+    except ImportError as error:
+        raise UsageError(
+            f"{url}: object stores are read through fsspec, and {error.name or 'a package of the store'} is missing: "
+            "pip install fsspec, and the store's package (s3fs, gcsfs, adlfs)"
+        ) from None
+    except ValueError as error:
+        raise UsageError(f"{url}: {error}") from None
+
+
+def file_hash(file: Path) -> str:
+    """SHA-256 of a file, which is not hashed again while its size and time stay."""
+    about = file.stat()
+    return _hash(file, about.st_size, about.st_mtime_ns)
+
+
+@lru_cache(maxsize=4096)
+def _hash(file: Path, _size: int, _time: int) -> str:
+    digest = hashlib.sha256()
+    with file.open("rb") as stream:
+        while block := stream.read(_BLOCK):
+            digest.update(block)
+    return digest.hexdigest()
+
+
+def find_logs(paths: Sequence[str], arm_of: str | None = None, without: Sequence[Path] = ()) -> list[Log]:
+    """All logs behind some paths, each once, by name.
+
+    Args:
+        paths: files; folders, searched to their bottom for files with the suffix of a log; globs (`**` too); URLs with
+            globs; and `@LIST`, a file with one of these on each line. What is named itself is a log whatever its name.
+        arm_of: a regular expression searched in a log's path: its first group names the arm. None: the folder that
+            the log lies in.
+        without: files and folders that are passed over, as the survey's own.
+
+    Raises:
+        UsageError: nothing was found, a list cannot be read, or an expression that is none, has no group or fits not.
+    """
+    pattern = _expression(arm_of)
+    hidden = {path.resolve() for path in without}
+    found: dict[tuple[str, int | None], Log] = {}
+    for path in _expanded(paths):
+        for name, episode, files in _units(path, hidden):
+            found.setdefault((name, episode), Log(name, _arm(name, pattern), episode, files))
+    if not found:
+        raise UsageError(
+            f"no log in {', '.join(paths)}: expected files with the suffix {', '.join(LOG_SUFFIXES)}, or data sets"
+        )
+    return [found[key] for key in sorted(found, key=lambda key: (key[0], -1 if key[1] is None else key[1]))]
+
+
+def _expression(arm_of: str | None) -> re.Pattern[str] | None:
+    if arm_of is None:
+        return None
+    try:
+        pattern = re.compile(arm_of)
+    except re.error as error:
+        raise UsageError(f"--arm-of {arm_of!r} is no regular expression: {error}") from None
+    if pattern.groups < 1:
+        raise UsageError(f"--arm-of {arm_of!r} has no group: expected one that names the arm, such as 'cell-([0-9]+)'")
+    return pattern
+
+
+def _arm(name: str, pattern: re.Pattern[str] | None) -> str:
+    if pattern is None:
+        return PurePosixPath(name).parent.name or Path(name).resolve().parent.name
+    match = pattern.search(name)
+    if match is None or match[1] is None:
+        raise UsageError(f"--arm-of {pattern.pattern!r} names no arm in {name}: expected it to fit every log")
+    return match[1]
+
+
+def _expanded(paths: Sequence[str]) -> Iterator[str]:
+    for path in paths:
+        if path.startswith("@"):
+            try:
+                lines = Path(path[1:]).read_text(encoding="utf-8").splitlines()
+            except (OSError, UnicodeDecodeError) as error:
+                raise UsageError(f"the list {path[1:]} cannot be read: {error}") from None
+            yield from _expanded([line.strip() for line in lines if line.strip() and not line.startswith("#")])
+        elif is_url(path):
+            fs, inside = filesystem(path)
+            there = fs.glob(inside) if _WILD.search(inside) else fs.find(inside) if fs.isdir(inside) else [inside]
+            suffixes = tuple(LOG_SUFFIXES)
+            yield from (fs.unstrip_protocol(one) for one in there if one == inside or one.lower().endswith(suffixes))
+        elif _WILD.search(path) and not Path(path).exists():
+            yield from sorted(glob.glob(path, recursive=True))
+        else:
+            yield path
+
+
+def _units(path: str, hidden: set[Path]) -> Iterator[tuple[str, int | None, tuple[Path, ...]]]:
+    """Name, episode and files of every unit behind a path."""
+    here = Path(path)
+    if is_url(path):
+        yield path, None, ()
+    elif not here.is_dir():
+        yield path, None, (here,)
+    elif is_data_set(here):
+        yield from _episodes(here)
+    elif (here / "metadata.yaml").is_file():
+        yield str(here), None, tuple(sorted(file for file in here.iterdir() if file.is_file()))
+    elif here.resolve() not in hidden:
+        for inner in sorted(here.iterdir()):
+            known = inner.is_dir() or inner.suffix.lower() in LOG_SUFFIXES
+            if known and not inner.name.startswith(".") and inner.resolve() not in hidden:
+                yield from _units(str(inner), hidden)
+
+
+def _episodes(folder: Path) -> Iterator[tuple[str, int | None, tuple[Path, ...]]]:
+    info = folder / "meta" / "info.json"
+    try:
+        episodes = data_set_episodes(folder)
+    except ArmloadError:  # its one row will say why
+        yield str(folder), None, (info,)
+        return
+    for episode, file in episodes.items():
+        yield str(folder), episode, (info, file)

@@ -1,0 +1,225 @@
+"""The page of a survey: what was held, when and by which arm, how each arm drifts, what to look at and to do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from armload.lab.report import Section, write_report
+from armload.lab.report.shown import Table
+from armload.lab.report.style import COLOURS, look, new_figure
+from armload.survey.findings import LAST, ArmFinding, arm_findings, by_log, doubtful
+from armload.survey.rows import ANSWERED, SEPARATOR, UNUSABLE
+from armload.survey.table_file import read_rows
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_DAY = 86400.0  # [s]
+_MOST_ROWS = 60  # of the table of doubtful logs: the survey itself has them all
+_MOST_ARMS = 24  # that are drawn each in a panel, those with something to do first
+_MOST_DRAWN = 500  # points that are drawn as lines, each: a page of thousands would be slow
+_LONGEST = 110  # characters of a reason in a table
+
+
+def write_survey_report(table: str | Path, out: str | Path) -> list[str]:
+    """Write one HTML file of a survey, and return what to do, a sentence for each arm that asks for it.
+
+    Args:
+        table: what `survey` wrote. out: the page.
+
+    Raises:
+        UsageError: the table cannot be read. ReportError: the page cannot be written.
+    """
+    rows, n = read_rows(table)
+    findings = arm_findings(rows)
+    write_report(out, survey_sections(rows, findings, n), f"Survey of {len(findings)} arms")
+    return [finding.advice for finding in findings if finding.advice]
+
+
+def survey_sections(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding], n: int) -> list[Section]:
+    """The page's sections, for `write_report`. rows: of arms with n joints. findings: what they say of each arm."""
+    return [
+        _what_to_do(rows, findings),
+        _payloads(rows, findings),
+        _arms(rows, findings, n),
+        _doubts(rows),
+    ]
+
+
+def _what_to_do(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) -> Section:
+    logs = {(row["log"], row["episode"]) for row in rows}
+    held = [row for row in rows if row["status"] == ANSWERED and row["held"]]
+    lost = sum(row["status"] == UNUSABLE for row in rows)
+    advice = [f"**{_since(f)}** {f.advice}." for f in findings if f.advice] or ["No arm asks for anything."]
+    asked = any(f.changed is not None for f in findings)
+    text = [
+        f"{len(logs)} logs of {len(findings)} arms: {len(held)} payloads were carried, {lost} logs cannot be answered.",
+        *advice,
+        ""
+        if asked
+        else "Without a tare or a profile nobody can say whether an arm is as it was: see `--tare` and `--profile`.",
+    ]
+    columns = ("arm", "logs", "not answered", "payloads", "median mass [kg]", "changed", "payload moves", "since")
+    cells = tuple(
+        (
+            f.arm,
+            str(f.logs),
+            str(f.unusable),
+            str(f.payloads),
+            "" if f.mass is None else f"{f.mass:.3f}",
+            _share(f.changed, f.retare),
+            _share(f.moves, f.loose),
+            _since(f),
+        )
+        for f in findings
+    )
+    note = (
+        f"changed and payload moves: share of an arm's last {LAST} logs that say so; ! asks for something to be done."
+    )
+    return Section("What to do", "\n\n".join(x for x in text if x), (Table("Arms", columns, cells, note),))
+
+
+def _payloads(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) -> Section:
+    held = [row for row in rows if row["status"] == ANSWERED and row["held"]]
+    if not held:
+        return Section("Payloads", "Nothing was held in any log.")
+    with look():
+        over_time = new_figure(4.2)
+        ax = over_time.subplots()
+        for k, finding in enumerate(findings):
+            of = [row for row in held if row["arm"] == finding.arm]
+            x, mass = _days(of), np.array([row["mass"] for row in of])
+            half = np.abs(np.array([[row["mass_low"], row["mass_high"]] for row in of]).reshape(-1, 2).T - mass)
+            style: dict[str, Any] = {
+                "rasterized": len(held) > _MOST_DRAWN,
+                "color": COLOURS[k % len(COLOURS)],
+                "markersize": 3.5,
+                "elinewidth": 0.7,
+            }
+            ax.errorbar(x, mass, half, fmt="osD^v"[k // len(COLOURS) % 5], label=finding.arm, alpha=0.75, **style)
+            _dated(ax, x, 9)
+        ax.set_xlabel(_time_label(held))
+        ax.set_ylabel("mass [kg]")
+        if len(findings) <= 30:
+            over_time.legend(*ax.get_legend_handles_labels(), loc="outside right upper", fontsize=8)
+        histogram = new_figure(2.6)
+        ax = histogram.subplots()
+        ax.hist([row["mass"] for row in held], bins="auto", color=COLOURS[0], edgecolor="white")
+        ax.set_xlabel("mass [kg]")
+        ax.set_ylabel("payloads")
+    return Section(
+        "Payloads",
+        "",
+        figures=(
+            (over_time, "What each arm held; bars are 95 % intervals."),
+            (histogram, "How heavy it was."),
+        ),
+    )
+
+
+def _arms(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding], n: int) -> Section:
+    """Offsets and friction, a panel for each arm, over time."""
+    shown = sorted(findings, key=lambda f: not f.advice)[:_MOST_ARMS]
+    figures = []
+    for name, what in (("offset", "torque offset"), ("coulomb", "Coulomb friction")):
+        figures.append((_drift(rows, shown, n, name), f"{what} of each joint [N·m], beside the model or its tare's."))
+    more = len(findings) > _MOST_ARMS
+    left = f" The first {_MOST_ARMS} of {len(findings)} arms, those that ask for something first." if more else ""
+    return Section("Drift of the arms", f"A dot is a log.{left}", figures=tuple(figures))
+
+
+def _drift(rows: Sequence[dict[str, Any]], shown: Sequence[ArmFinding], n: int, name: str) -> Figure:
+    across = min(4, len(shown))
+    down = -(-len(shown) // across)
+    with look():
+        figure = new_figure(0.7 + 1.5 * down)
+        panels = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False).ravel()
+        for ax, finding in zip(panels, shown, strict=False):
+            logs = [
+                of
+                for of in by_log([row for row in rows if row["arm"] == finding.arm])
+                if of[0][f"{name}_1"] is not None
+            ]
+            x = _days([of[0] for of in logs])
+            for j in range(n):
+                y = [float(np.mean([row[f"{name}_{j + 1}"] for row in of])) for of in logs]
+                ax.plot(x, y, ".", markersize=3, color=COLOURS[j % len(COLOURS)], label=f"joint {j + 1}")
+            _dated(ax, x, 4)
+            ax.set_title(finding.arm + (" !" if finding.advice else ""), loc="left", fontsize=8.5)
+        for ax in panels[len(shown) :]:
+            ax.set_visible(False)
+        figure.supxlabel(_time_label(rows), fontsize=9)
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=n, markerscale=2)
+    return figure
+
+
+def _doubts(rows: Sequence[dict[str, Any]]) -> Section:
+    found = doubtful(rows)
+    cells = tuple(
+        (
+            row["log"] + ("" if row["episode"] is None else f", episode {row['episode']}"),
+            row["arm"],
+            "" if row["t0"] is None else f"{row['t0']:.1f}–{row['t1']:.1f}",
+            "" if row["status"] == UNUSABLE else f"{row['mass']:.3f}",
+            _cut(row["reason"].removeprefix(f"{row['log']}").lstrip(" :,") or row["notes"].split(SEPARATOR)[0]),
+        )
+        for row in found[:_MOST_ROWS]
+    )
+    if not found:
+        return Section("Logs in doubt", "None.")
+    more = f" The first {_MOST_ROWS} of {len(found)}." if len(found) > _MOST_ROWS else ""
+    columns = ("log", "arm", "time [s]", "mass [kg]", "why")
+    return Section(
+        "Logs in doubt",
+        f"Look at these before anything is concluded from them.{more}",
+        (
+            Table(
+                "Logs that cannot be answered, and answers that are doubted",
+                columns,
+                cells,
+                "The table has the whole text.",
+            ),
+        ),
+    )
+
+
+def _days(rows: Sequence[dict[str, Any]]) -> np.ndarray:
+    """When rows were recorded: days since the first of January 1970, or their number where no log has a date."""
+    if any(row["date"] is None for row in rows):
+        return np.arange(len(rows), dtype=float)
+    return np.array([np.datetime64(int(1e3 * row["date"]), "ms") for row in rows])
+
+
+def _dated(ax: Any, x: np.ndarray, most: int) -> None:
+    """Few dates on an axis, and short ones."""
+    if x.dtype.kind == "M":
+        from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
+
+        ax.xaxis.set_major_locator(locator := AutoDateLocator(minticks=2, maxticks=most))
+        ax.xaxis.set_major_formatter(ConciseDateFormatter(locator, show_offset=False))
+
+
+def _time_label(rows: Sequence[dict[str, Any]]) -> str:
+    dated = all(row["date"] is not None for row in rows if row["status"] == ANSWERED)
+    return "date" if dated else "logs in order: they do not say when they were recorded"
+
+
+def _since(finding: ArmFinding) -> str:
+    if finding.since is None:
+        return ""
+    if isinstance(finding.since, str):
+        return finding.since
+    return datetime.fromtimestamp(finding.since, UTC).strftime("%Y-%m-%d %H:%M")
+
+
+def _share(value: float | None, act: bool) -> str:
+    return "" if value is None else f"{100 * value:.0f} %{' !' if act else ''}"
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"

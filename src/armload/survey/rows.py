@@ -1,0 +1,105 @@
+"""One row for each payload that was carried, and one for each log that cannot be answered: the columns of a survey."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from armload.identification import ArmHealth, Identification
+from armload.inertia import NAMES
+
+ANSWERED, UNUSABLE = "answered", "unusable"
+_AXES = ("x", "y", "z")
+_PRODUCTS = ("xx", "xy", "xz", "yy", "yz", "zz")
+SEPARATOR = " | "  # between notes, and between determined parameters: sentences have commas
+
+TEXT, WHOLE, FLAG, NUMBER = "text", "whole", "flag", "number"
+
+
+def columns(n: int) -> dict[str, str]:
+    """Names and kinds of the columns, of arms with n joints.
+
+    >>> [name for name, kind in columns(6).items() if kind == "flag"]
+    ['held', 'consistent', 'moves', 'changed']
+    """
+    of_payload = ["mass", *(f"com_{a}" for a in _AXES), *(f"inertia_{p}" for p in _PRODUCTS)]
+    of_joints = [f"{name}_{j}" for name in ("offset", "coulomb") for j in range(1, n + 1)]
+    return {
+        **dict.fromkeys(("log", "arm"), TEXT),
+        **dict.fromkeys(("episode", "part", "parts"), WHOLE),
+        **dict.fromkeys(("t0", "t1", "date"), NUMBER),
+        "samples": WHOLE,
+        **dict.fromkeys(("status", "reason"), TEXT),
+        "held": FLAG,
+        **dict.fromkeys((f"{name}{end}" for name in of_payload for end in ("", "_low", "_high")), NUMBER),
+        **dict.fromkeys(("determined", "interval", "method", "relative_to"), TEXT),
+        **dict.fromkeys(("consistent", "moves"), FLAG),
+        "notes": TEXT,
+        **dict.fromkeys(("residual", "restlessness", "misfit"), NUMBER),
+        "misfit_joint": WHOLE,
+        "changed": FLAG,
+        **dict.fromkeys(of_joints, NUMBER),
+        **dict.fromkeys(("version", "key"), TEXT),
+    }
+
+
+def answered(found: Identification, where: dict[str, Any]) -> list[dict[str, Any]]:
+    """The rows of a log, one for each part throughout which the payload is the same; `date` becomes the part's own."""
+    date = where.get("date")
+    return [
+        where
+        | {"part": k, "parts": len(found.segments), "t0": _number(part.start), "t1": _number(part.stop)}
+        | {"date": None if date is None else _number(date + part.start), "status": ANSWERED, "reason": ""}
+        | _of_payload(part.answer)
+        | _of_arm(part.answer.health)
+        for k, part in enumerate(found.segments)
+    ]
+
+
+def unusable(reason: str, where: dict[str, Any]) -> dict[str, Any]:
+    """The row of a log that cannot be answered."""
+    empty = dict.fromkeys(("determined", "interval", "method", "relative_to", "notes"), "")
+    return where | empty | {"status": UNUSABLE, "reason": " ".join(reason.split())}
+
+
+def _of_payload(found: Identification) -> dict[str, Any]:
+    upper = np.triu_indices(3)
+    values: dict[str, tuple[Any, Any, Any]] = {"mass": (found.mass, found.phi_low[0], found.phi_high[0])}
+    for k, axis in enumerate(_AXES):
+        values[f"com_{axis}"] = (found.com[k], found.com_low[k], found.com_high[k])
+    for name, i, j in zip(_PRODUCTS, *upper, strict=True):
+        inertia = (found.inertia_com, found.inertia_com_low, found.inertia_com_high)
+        values[f"inertia_{name}"] = tuple(x[i, j] for x in inertia)  # type: ignore[assignment]
+    names = [name for name, known in zip(NAMES, found.determined, strict=True) if known]
+    return {
+        "samples": found.n_samples,
+        "held": bool(found.held),
+        **{f"{k}{e}": _number(x) for k, xs in values.items() for e, x in zip(("", "_low", "_high"), xs, strict=True)},
+        "determined": SEPARATOR.join(names),
+        "interval": found.interval,
+        "method": found.method,
+        "relative_to": found.relative_to,
+        "consistent": bool(found.consistent),
+        "moves": bool(found.moves),
+        "notes": SEPARATOR.join(found.notes),
+    }
+
+
+def _of_arm(health: ArmHealth | None) -> dict[str, Any]:
+    if health is None:
+        return {}
+    of_joints = {"offset": health.offset, "coulomb": health.coulomb}
+    return {
+        "residual": _number(health.residual),
+        "restlessness": _number(health.restlessness),
+        "misfit": _number(health.misfit),
+        "misfit_joint": health.joint,
+        "changed": bool(health.changed),
+        **{f"{name}_{j}": _number(x) for name, xs in of_joints.items() for j, x in enumerate(xs, start=1)},
+    }
+
+
+def _number(value: Any) -> float | None:
+    """A float that JSON can hold; None where it is not finite or not there."""
+    return float(value) if value is not None and np.isfinite(value) else None

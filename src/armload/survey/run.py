@@ -1,0 +1,120 @@
+"""A survey: every log answered once, kept as it is finished, and all of them in one table.
+
+Beside the table lies a folder of cells (`armload.lab.cells`), one for each log, with the key of all that its rows
+depend on. A log whose key is still right is not answered again, so that a survey may be stopped in any way and go on,
+and grows with its logs.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from armload.lab.cells import load_cells
+from armload.lab.experiment import Task, run_tasks
+from armload.survey.answering import answer_log, lost_log
+from armload.survey.logs import Log, find_logs
+from armload.survey.rows import UNUSABLE
+from armload.survey.settings import Settings
+from armload.survey.table_file import check_suffix, write_rows
+
+_MISSING = "missing"  # content of a file that cannot be read
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What a survey found: rows, sorted by log, episode and time; how many logs, how many of them answered anew."""
+
+    rows: list[dict[str, Any]]
+    logs: int
+    anew: int
+
+    @property
+    def unusable(self) -> int:
+        """Rows of logs, or episodes, that cannot be answered."""
+        return sum(row["status"] == UNUSABLE for row in self.rows)
+
+
+def cells_of(out: str | Path) -> Path:
+    """The folder of a survey's cells."""
+    out = Path(out)
+    return out.with_name(f"{out.name}.cells")
+
+
+def survey(
+    paths: Sequence[str],
+    settings: Settings,
+    out: str | Path,
+    *,
+    arm_of: str | None = None,
+    jobs: int | None = None,
+    cluster: str | None = None,
+    progress: Callable[[int, int], None] = lambda _done, _total: None,
+    say: Callable[[str], None] = lambda _: None,
+) -> Survey:
+    """Answer every log behind some paths, and write one table.
+
+    Args:
+        paths, arm_of: as of `find_logs`.
+        settings: what is asked of every log.
+        out: the table, .parquet, .csv or .json. What is finished is kept beside it (`cells_of`).
+        jobs: processes; None: as many as there are cores. cluster: as of `armload.lab.engine.engine`.
+        progress: called as progress(done, total) after every log. say: told what is being done.
+
+    Raises:
+        UsageError: no log was found, or something that is named for all logs is not there.
+        ArmloadError: the arm is unknown, or a profile, a tool or a model cannot be read.
+        OSError: the table or a cell cannot be written.
+    """
+    out, jobs = check_suffix(out), jobs or os.cpu_count() or 1
+    folder = cells_of(out)
+    named = [Path(p) for p in (settings.tool, settings.tare, settings.profile) if p is not None]
+    logs = find_logs(paths, arm_of, without=[out, folder, *named])
+    n = settings.arm().n
+    for arm in sorted({log.arm for log in logs}):  # what all logs of an arm would fail of, before the first is answered
+        settings.profile_of(arm)
+    settings.mounted()
+    say(f"{len(logs)} logs: asking which have changed")
+    before = load_cells(folder)
+    with ThreadPoolExecutor(jobs) as pool:
+        tasks = list(pool.map(lambda log: _task(log, settings, before.get(_name(log))), logs))
+    fresh = {t.name for t in tasks if before.get(t.name, {}).get("key") != t.keys[t.name]}
+    say(f"{len(logs)} logs, {len(fresh)} of them new or changed")
+    cells = run_tasks(
+        [task for task in tasks if task.name in fresh],
+        folder,
+        jobs=min(jobs, max(len(fresh), 1)),
+        cluster=cluster,
+        progress=progress,
+        lost=_lost,
+    )
+    rows = [row for task in tasks for row in (cells.get(task.name) or before[task.name])["rows"]]
+    rows.sort(key=lambda row: (row["log"], -1 if row["episode"] is None else row["episode"], row.get("part") or 0))
+    write_rows(out, rows, n)
+    return Survey(rows, len(logs), len(fresh))
+
+
+def _name(log: Log) -> str:
+    """Of a log's cell: what kind of file systems allow, and what tells logs of one name apart."""
+    return hashlib.sha256(f"{log.name}\n{log.episode}".encode()).hexdigest()[:24]
+
+
+def _task(log: Log, settings: Settings, before: dict[str, Any] | None) -> Task:
+    try:
+        stamp = log.stamp()
+        same = before is not None and before.get("stamp") == stamp
+        content = before["content"] if same and before is not None else log.content()
+    except (OSError, ValueError):  # its row will say why
+        stamp, content = "", _MISSING
+    key, name = settings.key(log, content), _name(log)
+    return Task.of_one(name, key, answer_log, log, settings, key, stamp, content)
+
+
+def _lost(task: Task) -> dict[str, dict[str, Any]]:
+    log, key = task.parameters[1], task.parameters[3]
+    return {task.name: lost_log(log, key)}

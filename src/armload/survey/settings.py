@@ -1,0 +1,126 @@
+"""How the logs of a survey are read and asked: the same for all of them, but for what belongs to one arm."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from armload.arms import Arm
+from armload.arms import arm as arm_named
+from armload.errors import UsageError
+from armload.lab.cells import key_of
+from armload.payloads import Payload, hand_on, read_payload
+from armload.posterior import HybridModel, Profile, load_profile
+from armload.recording import ColumnSpec, Recording, read_recording
+from armload.survey.logs import Log, file_hash
+from armload.version import __version__
+
+_ARM = "{arm}"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is asked of every log.
+
+    robot, frame, gravity: the arm, as of `armload.arms.arm`.
+    tare, profile: paths, in which `{arm}` stands for the arm's name (`Log.arm`); an arm without such a file is asked
+        without. tool: path of a mounted tool's file, or franka-hand. method: as of `identify`.
+    columns: as of `ColumnSpec.given`. topic: of bags.
+    """
+
+    robot: str
+    frame: str | None = None
+    gravity: tuple[float, float, float] | None = None
+    tare: str | None = None
+    profile: str | None = None
+    tool: str | None = None
+    method: str | None = None
+    columns: tuple[tuple[str, Any], ...] = ()
+    topic: str | None = None
+
+    def of_arm(self, what: str, arm: str) -> Path | None:
+        """The tare or the profile of an arm; None: none was named, or this arm has none.
+
+        Raises:
+            UsageError: the file is not there, and it was to serve all arms.
+        """
+        template = getattr(self, what)
+        if template is None:
+            return None
+        path = Path(template.replace(_ARM, arm))
+        if path.exists():
+            return path
+        if _ARM in template:
+            return None
+        raise UsageError(f"{path} is not there: expected the --{what} of all logs; for one of each arm write {_ARM}")
+
+    def lacking(self, arm: str) -> list[str]:
+        """What was named by a template, and is not there of this arm."""
+        wanted = [what for what in ("tare", "profile") if getattr(self, what) is not None]
+        return [f"there is no {what} of the arm {arm}" for what in wanted if self.of_arm(what, arm) is None]
+
+    def key(self, log: Log, content: str) -> str:
+        """Of all that the rows of a log depend on: its content, the settings, every file they name, the version."""
+        files = [self.of_arm("tare", log.arm), self.of_arm("profile", log.arm), *self._models()]
+        named = [path for path in (self.tool, self.method, self.robot) if path is not None and Path(path).is_file()]
+        hashes = [None if file is None else _hash_of(file) for file in [*files, *map(Path, named)]]
+        return key_of(__version__, content, log.name, log.arm, log.episode, asdict(self), hashes)
+
+    def _models(self) -> list[Path]:
+        """The shipped model's file, where one may answer."""
+        found = HybridModel.shipped(self.arm()) if self.method in (None, "hybrid") else None
+        return [found] if found is not None and found.is_file() else []
+
+    def arm(self) -> Arm:
+        """The arm, built once for each process."""
+        return _arm(self.robot, self.frame, self.gravity)
+
+    def recording(self, log: Log, path: Path, episode: int | None = None) -> Recording:
+        """Read a log, or one episode of it, from where it lies on this machine."""
+        from armload.recording import has_topics
+
+        wanted = log.episode if episode is None else episode
+        columns = None if has_topics(path) else ColumnSpec.of(dict(self.columns)).over(episode=wanted)
+        topic = self.topic if has_topics(path) else None
+        return read_recording(path, self.arm(), topic=topic, columns=columns)
+
+    def mounted(self) -> Payload | None:
+        """The tool that is mounted, read once for each process."""
+        return None if self.tool is None else _tool(self, self.tool)
+
+    def tare_of(self, arm: str) -> Recording | None:
+        """The arm's tare, read once for each process."""
+        path = self.of_arm("tare", arm)
+        return None if path is None else _tare(self, arm, path, _hash_of(path))
+
+    def profile_of(self, arm: str) -> Profile | None:
+        """The arm's profile, read once for each process."""
+        path = self.of_arm("profile", arm)
+        return None if path is None else _profile(path, _hash_of(path))
+
+
+def _hash_of(path: Path) -> str:
+    files = sorted(file for file in path.rglob("*") if file.is_file()) if path.is_dir() else [path]
+    return key_of([file_hash(file) for file in files])
+
+
+@lru_cache(maxsize=2)
+def _arm(robot: str, frame: str | None, gravity: tuple[float, float, float] | None) -> Arm:
+    return arm_named(robot, frame, **({} if gravity is None else {"gravity": gravity}))
+
+
+@lru_cache(maxsize=2)
+def _tool(settings: Settings, name: str) -> Payload:
+    return hand_on(settings.arm()) if name == "franka-hand" else read_payload(name)
+
+
+@lru_cache(maxsize=2)  # logs come sorted by arm
+def _tare(settings: Settings, arm: str, path: Path, _: str) -> Recording:
+    return settings.recording(Log(str(path), arm), path)
+
+
+@lru_cache(maxsize=2)
+def _profile(path: Path, _: str) -> Profile:
+    return load_profile(path)

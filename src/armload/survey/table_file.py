@@ -1,0 +1,107 @@
+"""A survey as a file: Parquet, CSV or JSON by its suffix, the same rows and columns in each."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from armload.atomic import replacing
+from armload.errors import UsageError
+from armload.survey.rows import FLAG, NUMBER, TEXT, WHOLE, columns
+
+SUFFIXES = (".parquet", ".csv", ".json")
+_JOINTS = "offset_"  # columns that tell how many joints there are
+
+
+def check_suffix(path: str | Path) -> Path:
+    """The path, if it names a form that can be written.
+
+    Raises:
+        UsageError: it does not.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in SUFFIXES:
+        raise UsageError(f"{path}: unsupported suffix {path.suffix!r}: expected {', '.join(SUFFIXES)}")
+    return path
+
+
+def write_rows(path: str | Path, rows: Sequence[dict[str, Any]], n: int) -> None:
+    """Write rows of arms with n joints; the file appears whole or not at all, and equal rows make equal bytes.
+
+    Raises:
+        UsageError: unknown suffix. OSError: it cannot be written. ModuleNotFoundError: pyarrow is not installed.
+    """
+    path, kinds = check_suffix(path), columns(n)
+    suffix = path.suffix.lower()
+    with replacing(path) as temporary:
+        if suffix == ".parquet":
+            _write_parquet(temporary, rows, kinds)
+        elif suffix == ".csv":
+            with temporary.open("w", encoding="utf-8", newline="") as file:
+                writer = csv.writer(file, lineterminator="\n")
+                writer.writerow(kinds)
+                writer.writerows([_cell(row.get(name)) for name in kinds] for row in rows)
+        else:
+            whole = [{name: row.get(name) for name in kinds} for row in rows]
+            temporary.write_text(json.dumps(whole, indent=0, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def read_rows(path: str | Path) -> tuple[list[dict[str, Any]], int]:
+    """The rows of a survey, and how many joints its arms have.
+
+    Raises:
+        UsageError: there is no such file, or it is no survey. ModuleNotFoundError: pyarrow is not installed.
+    """
+    path = check_suffix(path)
+    if not path.is_file():
+        raise UsageError(f"{path} is not there: expected what `armload survey … --out {path.name}` writes")
+    try:
+        if path.suffix.lower() == ".parquet":
+            from pyarrow import parquet
+
+            rows = parquet.read_table(path, use_threads=False).to_pylist()
+        elif path.suffix.lower() == ".csv":
+            with path.open(encoding="utf-8", newline="") as file:
+                rows = list(csv.DictReader(file))
+        else:
+            rows = json.loads(path.read_text(encoding="utf-8"))
+        n = sum(name.startswith(_JOINTS) for name in rows[0])
+        kinds = columns(n)
+        if set(kinds) != set(rows[0]):
+            raise ValueError("other columns")
+        if path.suffix.lower() == ".csv":
+            rows = [{name: _read(row[name], kind) for name, kind in kinds.items()} for row in rows]
+        return rows, n
+    except ModuleNotFoundError:
+        raise
+    except Exception as error:  # a damaged file can fail anywhere in the decoder
+        raise UsageError(
+            f"{path} is no survey that can be read ({error}): expected what `armload survey` wrote"
+        ) from None
+
+
+def _write_parquet(path: Path, rows: Sequence[dict[str, Any]], kinds: dict[str, str]) -> None:
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    types = {TEXT: pa.string(), WHOLE: pa.int64(), FLAG: pa.bool_(), NUMBER: pa.float64()}
+    schema = pa.schema([(name, types[kind]) for name, kind in kinds.items()])
+    made = [pa.array([row.get(name) for row in rows], types[kind]) for name, kind in kinds.items()]
+    parquet.write_table(pa.Table.from_arrays(made, schema=schema), path, compression="zstd")
+
+
+def _cell(value: Any) -> Any:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return repr(value) if isinstance(value, float) else "" if value is None else value
+
+
+def _read(cell: str, kind: str) -> Any:
+    if kind == TEXT:
+        return cell
+    if cell == "":
+        return None
+    return cell == "true" if kind == FLAG else int(cell) if kind == WHOLE else float(cell)

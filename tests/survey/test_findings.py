@@ -1,0 +1,127 @@
+"""What rows say of arms, and the page that shows it."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from armload.app.cli import main
+from armload.survey import write_rows
+from armload.survey.findings import arm_findings, doubtful
+from armload.survey.learning import empty_stretches
+from armload.survey.rows import columns
+
+DAY = 86400.0
+
+
+def row(arm, day, **more):
+    """An answered row of a sound arm."""
+    plain = {name: 0.0 if kind == "number" else 0 if kind == "whole" else "" for name, kind in columns(7).items()}
+    plain |= dict.fromkeys(("held", "moves", "changed"), False)
+    plain |= {"log": f"{arm}/{day:02d}.csv", "arm": arm, "episode": None, "parts": 1, "date": 1.79e9 + DAY * day}
+    plain |= {"status": "answered", "consistent": True, "mass": 1.0, "mass_low": 0.9, "mass_high": 1.1, "misfit": 10.0}
+    return plain | {"t1": 30.0, "determined": "m | mx", "held": True} | more
+
+
+@pytest.fixture
+def rows():
+    """Twenty days of four arms: sound but for a log, exchanged on day 12, loose from day 8 on, and put right again."""
+    made = []
+    for day in range(20):
+        made.append(row("sound", day, changed=day == 15, moves=day == 16))
+        made.append(row("exchanged", day, changed=day >= 12, misfit_joint=3 if day >= 12 else 1))
+        made.append(row("loose", day, moves=day >= 8 and day % 2 == 0))
+        made.append(row("mended", day, changed=5 <= day < 10))
+    made.append(row("sound", 30) | {"status": "unusable", "reason": "cut off", "held": None, "moves": None})
+    return made
+
+
+def test_an_arm_that_changed_is_told_with_its_day_and_joint_and_sound_ones_are_left_alone(rows):
+    found = {f.arm: f for f in arm_findings(rows)}
+    assert [arm for arm, f in found.items() if f.retare] == ["exchanged"]
+    assert [arm for arm, f in found.items() if f.loose] == ["loose"]
+    assert found["exchanged"].since == 1.79e9 + DAY * 12
+    assert found["exchanged"].joint == 3
+    assert (found["loose"].since - 1.79e9) / DAY == pytest.approx(8, abs=1)
+    assert found["sound"].unusable == 1
+    assert found["sound"].logs == 21
+    assert [bool(f.advice) for f in found.values()] == [f.retare or f.loose for f in found.values()]
+
+
+def test_nothing_is_said_of_arms_that_could_not_be_asked(rows):
+    for one in rows:
+        one["misfit"] = None
+    assert {f.changed for f in arm_findings(rows)} == {None}
+    (few,) = arm_findings([row("new", 1, changed=True), row("new", 2, changed=True)])
+    assert few.changed is None
+    assert not few.retare
+
+
+def test_only_stretches_that_are_empty_beyond_doubt_are_learned_from():
+    empty = {"held": False, "mass_low": -0.01, "mass_high": 0.01}
+    sound = row("a", 3, **empty)
+    others = [
+        row("a", 1),  # something is held
+        row("a", 1, held=False, mass_low=0.002, mass_high=0.01),  # perhaps
+        row("a", 1, **empty, t1=10.0),
+        row("a", 1, **empty, moves=True),
+        row("a", 1, **empty, changed=True),
+        row("a", 1, **empty) | {"determined": "Ixx"},
+        row("a", 1, **empty) | {"status": "unusable"},
+    ]
+    earlier = row("a", 2, **empty)
+    assert empty_stretches([sound, *others, earlier]) == [earlier, sound]
+
+
+def test_the_page_says_what_to_do_and_lists_what_is_in_doubt(rows, tmp_path, capsys):
+    write_rows(tmp_path / "survey.parquet", rows, 7)
+    page = tmp_path / "report.html"
+    assert main(["survey", "report", str(tmp_path / "survey.parquet"), "--out", str(page)]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in said] == ["exchanged", "loose", "wrote"]
+    assert "at joint 3 most" in said[0]
+    html = page.read_text(encoding="utf-8")
+    assert html.count("data:image/svg+xml") == 4
+    assert len(re.findall("<tr>", html)) == 2 + 4 + len(doubtful(rows))
+    assert "2026-10-03" in html  # day 12
+    assert "cut off" in html
+
+
+def test_a_survey_without_dates_has_its_page_too(rows, tmp_path):
+    for one in rows:
+        one["date"] = None
+    write_rows(tmp_path / "survey.csv", rows, 7)
+    assert main(["survey", "report", str(tmp_path / "survey.csv"), "--out", str(tmp_path / "r.html")]) == 0
+    assert "do not say when" not in (tmp_path / "r.html").read_text(encoding="utf-8")  # it is in a figure
+    assert np.all([f.since is None or isinstance(f.since, str) for f in arm_findings(rows)])
+
+
+@pytest.mark.parametrize(
+    ("argv", "said"),
+    [
+        (["survey", "."], "needs --out"),
+        (["survey", ".", "--out", "s.parquet"], "needs --robot"),
+        (["survey", ".", "--robot", "panda", "--out", "s.xlsx"], "unsupported suffix '.xlsx'"),
+        (["survey", ".", "--robot", "panda", "--out", "s.csv"], "no log in"),
+        (["survey", "x.csv", "--robot", "panda", "--out", "s.csv", "--tare", "no.csv"], "no.csv is not there"),
+        (["survey", "x.csv", "--robot", "panda", "--out", "s.csv", "--cluster", "x"], "expected local, or the address"),
+        (
+            ["survey", "x.csv", "--robot", "panda", "--out", "s.csv", "--profile", "p", "--learn-profiles", "q"],
+            "leave --profile out",
+        ),
+        (["survey", "report", "--out", "r.html"], "takes one table"),
+        (["survey", "report", "none.parquet", "--out", "r.html"], "none.parquet is not there"),
+        (["survey", "report", "x.csv", "--out", "r.html"], "is no survey"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_a_sentence(tmp_path, monkeypatch, capsys, argv, said):
+    monkeypatch.chdir(tmp_path)
+    if "x.csv" in argv:
+        (tmp_path / "x.csv").write_text("a,b\n1,2\n")
+    assert main(argv) == 2
+    out = capsys.readouterr()
+    assert out.out == ""
+    assert said in out.err.strip().splitlines()[-1]
+    assert not (tmp_path / "s.csv").exists()

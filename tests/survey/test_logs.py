@@ -1,0 +1,87 @@
+"""Which logs there are, and whose."""
+
+import json
+
+import pytest
+
+from armload.errors import UsageError
+from armload.survey import find_logs
+
+
+@pytest.fixture
+def folder(tmp_path):
+    for name in ("cell-1/a.csv", "cell-1/deep/b.npz", "cell-2/c.mcap", "cell-2/readme.txt.md", "cell-2/.hidden.csv"):
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("x")
+    return tmp_path
+
+
+def names(logs, folder):
+    return [log.name.removeprefix(f"{folder}/") for log in logs]
+
+
+def test_a_folder_is_searched_to_its_bottom_for_what_can_be_a_log(folder):
+    assert names(find_logs([str(folder)]), folder) == ["cell-1/a.csv", "cell-1/deep/b.npz", "cell-2/c.mcap"]
+
+
+def test_globs_lists_and_names_give_each_log_once(folder):
+    (folder / "list.txt").write_text(f"# two\n{folder}/cell-1/a.csv\n{folder}/cell-2/readme.txt.md\n")
+    found = find_logs([f"{folder}/*/*.csv", f"@{folder}/list.txt", f"{folder}/cell-1"])
+    assert names(found, folder) == ["cell-1/a.csv", "cell-1/deep/b.npz", "cell-2/readme.txt.md"]
+
+
+def test_arms_are_told_apart_by_the_folder_or_by_an_expression(folder):
+    assert [log.arm for log in find_logs([str(folder)])] == ["cell-1", "deep", "cell-2"]
+    assert [log.arm for log in find_logs([str(folder)], r"cell-([0-9])")] == ["1", "1", "2"]
+
+
+def test_a_bag_is_one_log_and_a_data_set_one_for_each_episode(folder):
+    (folder / "bag").mkdir()
+    for name in ("metadata.yaml", "bag_0.mcap", "bag_1.mcap"):
+        (folder / "bag" / name).write_text("x")
+    meta = folder / "set" / "meta"
+    meta.mkdir(parents=True)
+    template = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet"
+    (meta / "info.json").write_text(json.dumps({"data_path": template, "total_episodes": 2}))
+    bag, *episodes = find_logs([str(folder / "bag"), str(folder / "set")])
+    assert len(bag.files) == 3
+    assert [log.episode for log in episodes] == [0, 1]
+    assert [log.files[1].name for log in episodes] == ["episode_000000.parquet", "episode_000001.parquet"]
+
+
+def test_content_and_stamp_follow_the_bytes(folder):
+    (log,) = find_logs([str(folder / "cell-1" / "a.csv")])
+    before = log.content(), log.stamp()
+    (folder / "cell-1" / "a.csv").write_text("xy")
+    assert log.content() != before[0]
+    assert log.stamp() != before[1]
+
+
+def test_objects_are_logs_by_their_url():
+    fsspec = pytest.importorskip("fsspec")
+    store = fsspec.filesystem("memory")
+    store.pipe({"/cell/arm-7/a.csv": b"x", "/cell/arm-7/a.md": b"x"})
+    (log,) = find_logs(["memory://cell"])
+    assert (log.arm, log.files, log.remote) == ("arm-7", (), True)
+    assert log.name.endswith("/cell/arm-7/a.csv")
+    before = log.content()
+    store.pipe({"/cell/arm-7/a.csv": b"xyz"})
+    assert log.content() != before
+
+
+@pytest.mark.parametrize(
+    ("paths", "arm_of", "said"),
+    [
+        (["cell-3/*.csv"], None, "no log in"),
+        (["@none.txt"], None, "the list none.txt cannot be read"),
+        (["cell-1"], "(", "no regular expression"),
+        (["cell-1"], "cell", "has no group"),
+        (["cell-1"], "arm-([0-9])", "names no arm in"),
+        (["what://x"], None, "what://x"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_a_sentence(folder, monkeypatch, paths, arm_of, said):
+    monkeypatch.chdir(folder)
+    with pytest.raises(UsageError, match=said.replace("(", r"\(")):
+        find_logs(paths, arm_of)

@@ -1,0 +1,43 @@
+"""A survey's empty stretches teach a profile, which the next survey uses; what does not fit is left out."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+
+from armload.motion import random_motion
+from armload.posterior import load_profile
+from armload.recording import write_recording
+from armload.simulation import World, simulate_inverse
+from armload.survey import Settings, learning, survey
+
+
+def test_an_exchanged_arm_is_not_averaged_with_the_one_before(panda, tmp_path, monkeypatch):
+    monkeypatch.setattr(learning, "FIRST", 2)  # fewer logs than a profile chooses its capacity from: quick
+    world = World.real_like(panda, 3)
+    other = replace(world, offset=world.offset + 20.0 * np.sign(world.offset))
+    (tmp_path / "a").mkdir()
+    for day in range(4):
+        log = simulate_inverse(
+            panda, random_motion(panda, day, duration=21.0), world=other if day == 2 else world, rate=50.0, seed=day
+        )
+        write_recording(tmp_path / "a" / f"{day}.npz", replace(log, t=log.t + 1.79e9 + 86400.0 * day))
+    settings = Settings("panda", method="map")
+    found = survey([str(tmp_path / "a")], settings, tmp_path / "s.json", jobs=1)
+    rows = [row | {"held": False, "mass_low": -1.0, "mass_high": 1.0, "moves": False} for row in found.rows]
+    said = learning.learn_profiles(rows, settings, tmp_path / "p")
+    assert said == {"a": "learned from 3 stretches, 1 did not fit"}
+    assert len(load_profile(tmp_path / "p" / "a.profile").sessions) == 3
+    (left,) = json.loads((tmp_path / "p" / "a.json").read_text())["left_out"]
+    assert left["log"].endswith("2.npz")
+    before = (tmp_path / "p" / "a.profile").stat().st_mtime_ns
+    assert learning.learn_profiles(rows, settings, tmp_path / "p") == {"a": "as before, of 3 stretches"}
+    assert (tmp_path / "p" / "a.profile").stat().st_mtime_ns == before
+    paths = [str(tmp_path / "a" / f"{day}.npz") for day in (2, 3)]
+    using = replace(settings, method=None, profile=str(tmp_path / "p" / "{arm}.profile"))
+    exchanged, sound = survey(paths, using, tmp_path / "t.json", jobs=1).rows
+    assert exchanged["changed"]
+    assert not sound["changed"]
+    assert sound["relative_to"] == "profile"
