@@ -182,7 +182,7 @@ def add_identifier_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_cluster_argument(parser: argparse.ArgumentParser) -> None:
+def add_cluster_argument(parser: argparse.ArgumentParser | argparse._ArgumentGroup) -> None:
     """`--cluster`."""
     parser.add_argument(
         "--cluster",
