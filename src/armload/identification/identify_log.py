@@ -80,7 +80,8 @@ def identify(
     mounted = read_payload(tool) if isinstance(tool, str | Path) else tool
     say("identifying")
     whole = _of_one_payload(recording, arm, tare, mounted, asked, notes)
-    times, statistic = changes_of_payload(recording, arm, tare, known, whole.kappa)
+    of_arm = (None, None) if whole.another else (tare, known)
+    times, statistic = changes_of_payload(recording, arm, *of_arm, whole.kappa)
     edges, answers = [recording.t[0], *times, recording.t[-1]], [whole]
     if times:
         parts = [recording.between(a + SETTLED * (k > 0), b) for k, (a, b) in enumerate(pairwise(edges))]

@@ -109,7 +109,7 @@ class HybridIdentifier(PosteriorLeastSquares):
 
     def _answer(self, elapsed: float, concluded: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         self._trusted = self.model.calibration.trusted(self.evidence(elapsed))
-        tool = self.arm.attached is not None
+        tool = self.arm.attached is not None or self.stream.without_tare
         how = (self._trusted, self.model.calibration, self._payloads, tool, not concluded)
         phi, covariance, self.exchanged = answer(*how)
         if self.known_mass is None:
