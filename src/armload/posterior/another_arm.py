@@ -31,11 +31,10 @@ from armload.regression import GaussianPrior
 from armload.regression.information import SAME, RegressionData
 from armload.regression.noise import NoiseModel
 
-# z above which a run surprises as none of the same arm does: sound simulated logs stay below 1, those of arms beyond the
-# measured ones below 6, and there B says that the arm is the same (`benchmarks/tare_drift.py`)
+# z above which a run surprises as one of the same arm seldom does: sound simulated logs and streams stay below 1, but
+# those of arms beyond the measured ones do not, and there B must tell (`benchmarks/tare_drift.py`)
 SURPRISING = 4.0
-# B from which on the same arm is believed no more: it explains the run less than 20 times as well. It explains that of
-# a sound log e^10 times as well at least
+# B above which the same arm is believed no more: it explains the run less than 20 times as well as another one
 LEAST = -3.0
 FROM = 20.0  # [s] of a stream before it is asked: as long as a tare is asked for
 _DRAWS = 24  # of a mean and a standard deviation, of which the latter is then known to 15 %

@@ -337,8 +337,8 @@ def check_fits(known: Profile, arm: Arm, log: Recording, tool: NDArray[np.float6
     """See that a log is of the profile's arm, with the same mounted.
 
     Raises:
-        IdentificationError: it carries something, its offsets or friction are beyond what the other sessions show, or it
-            is of another arm.
+        IdentificationError: it carries something, its offsets or friction are beyond what the other sessions show, or
+            it is of another arm.
     """
     known.check(arm)
     correction = Correction(arm, rated_effort(arm))
