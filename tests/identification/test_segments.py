@@ -91,7 +91,7 @@ def test_a_light_thing_taken_up_is_doubted_by_its_mass_and_a_sound_log_is_not(pa
     source = Simulator(
         panda, episode.motion, [(0.0, None), (3.0, light)], speed=None, duration=6.0, seed=1, world=episode.world, **how
     )
-    log = Recording(*map(np.array, zip(*source, strict=True)))
+    log = Recording(*map(np.array, zip(*source, strict=True)))  # type: ignore[arg-type]
     found = changes_of_payload(log, panda, sound.tare, kappa=1.5)
     assert found.times or max(found.statistic, found.of_mass) > PAYLOAD_MAY_CHANGE
     whole = changes_of_payload(sound.run, panda, sound.tare, kappa=1.5)
@@ -107,7 +107,7 @@ def test_the_mass_of_what_was_added_is_chi_squared_of_one_where_nothing_was():
     draws = [of_mass(Λ, root @ rng.normal(size=10)) for _ in range(4000)]
     for share in (0.5, 0.9, 0.99):
         assert np.quantile(draws, share) <= 1.15 * chi2.ppf(share, 1)
-    assert _OF_MASS == pytest.approx(chi2.isf(1e-3, 10) / chi2.isf(5e-4, 1))
+    assert pytest.approx(chi2.isf(1e-3, 10) / chi2.isf(5e-4, 1)) == _OF_MASS
 
 
 def test_real_logs_are_one_part(real_data):

@@ -68,7 +68,7 @@ def dense(panda, problem, scales, logs, payloads, drifts):
             values.append(r[:, j] / np.sqrt(S[j]))
     H, y = np.concatenate(blocks), np.concatenate(values)
     C = (H * np.concatenate(prior)) @ H.T + np.eye(len(y))
-    return float(multivariate_normal(np.zeros(len(y)), C, allow_singular=True).logpdf(y))
+    return float(multivariate_normal(np.zeros(len(y)), C, allow_singular=True).logpdf(y))  # pyright: ignore
 
 
 def test_the_odds_are_the_ratio_of_the_densities_of_all_rows(panda, short):
@@ -111,7 +111,7 @@ def test_what_is_left_of_the_payload_is_the_difference_of_two_arms_loads(panda, 
 
 def test_the_tare_of_another_arm_is_said_and_the_intervals_hold_without_it(panda):
     drawn = draw_episodes(panda, "reference", 3, seed=81, motions=3)
-    others = [replace(e, tare_world=World.real_like(panda, e.world.seed + 1)) for e in drawn]
+    others = [replace(e, tare_world=World.real_like(panda, (e.world.seed or 0) + 1)) for e in drawn]
     said, inside = [], []
     for log in simulate_episodes(others):
         answer = identify(log.run, panda, tare=log.tare)
@@ -124,7 +124,7 @@ def test_the_tare_of_another_arm_is_said_and_the_intervals_hold_without_it(panda
 
 def test_the_same_arm_is_no_other_after_a_day(panda):
     drawn = draw_episodes(panda, "reference", 3, seed=81, motions=3)
-    then = [replace(e, tare_world=replace(e.world, offset=e.world.offset + 0.1)) for e in drawn]
+    then = [replace(e, tare_world=replace(e.world, offset=np.asarray(e.world.offset) + 0.1)) for e in drawn]
     for e in simulate_episodes([*drawn[:1], *then]):
         identifier = HybridIdentifier(panda, e.tare)
         identifier.run(e.run)

@@ -7,10 +7,12 @@ The log is cut in two at several places. With the part before a cut as the tare 
 
 is chi-squared of ten where nothing was: Λ, phi_ML what the two parts say of it, all that is unknown about the arm
 integrated out, kappa by how much the physics overrates such a log (`posterior.Calibration`). The cut with the largest T
-is sought more finely, and both parts are cut again. Of something light the mass shows first: with a prior on its moments
-that lets it lie near the flange, the mass alone is chi-squared of one. Where a tare or a profile tells the arm's part, it
-raises a doubt, but no cut: what an arm does wrong in half a second looks like a weight, too (a real Panda's). A tare or a profile says what the arm does by itself, so that a
+is sought more finely, and both parts are cut again. A tare or a profile says what the arm does by itself, so that a
 lighter change shows; what was mounted then is taken off, and a day's drift allowed for.
+
+Of something light the mass shows first: with a prior on its moments that lets it lie near the flange, the mass alone is
+chi-squared of one. Where there is a tare or a profile it raises a doubt, but makes no cut: what an arm does wrong in
+half a second looks like a weight, too (a real Panda's).
 """
 
 from __future__ import annotations
@@ -49,8 +51,8 @@ _FINER = 4  # cuts on either side of the best one, twice
 # [kg·m, kg·m²] standard deviations of moments and inertia of something light, 0.2 kg within 8 cm of the frame: a stated
 # prior. What is heavier shows in all ten
 _LIGHT = 0.2 * np.array([0.08] * 3 + [0.08**2] * 6)
-# times chi-squared of one that chi-squared of ten is at 0.05 %, half of the level of `PAYLOAD_CHANGED`: of two tests one
-# is beyond either by chance twice as often
+# what chi-squared of one at 0.05 % counts for of chi-squared of ten at 0.1 %, the level of `PAYLOAD_CHANGED`: the two
+# tests together are beyond it by chance no more than 0.15 % of the time
 _OF_MASS = 29.588298445074422 / 12.115665146397816
 
 
