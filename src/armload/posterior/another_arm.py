@@ -39,6 +39,7 @@ LEAST = -3.0
 FROM = 20.0  # [s] of a stream before it is asked: as long as a tare is asked for
 _DRAWS = 24  # of a mean and a standard deviation, of which the latter is then known to 15 %
 _STEPS = 3  # of expectation–maximisation of the run without its tare, as a tare's scales are another arm's
+_NAT = 1.0  # of B, the least standard deviation: odds that differ by less say nothing, however short the log
 _ROUNDING = 1e-10  # of the largest information: what is below is rounding, and its Cholesky factor would not exist
 
 
@@ -78,7 +79,7 @@ def another_arm(
         b0 = np.repeat(first.b[:, :, None] / S[0][:, None, None], _DRAWS + 1, axis=2)
         B = _log_evidence(other, others, vectors) - _log_evidence(same, together, [b0, *vectors])
         B += _log_evidence(before, alone, [b0])
-    expected, spread = float(B[1:].mean()), float(B[1:].std())
+    expected, spread = float(B[1:].mean()), max(float(B[1:].std()), _NAT)
     surprise = (float(B[0]) - expected) / spread
     return AnotherArm(float(B[0]), expected, spread, surprise, surprise > SURPRISING and B[0] > LEAST)
 
