@@ -1,6 +1,6 @@
 """Can a profile be poisoned, and does it notice an arm that is another? Hours of streams that teach it.
 
-    python benchmarks/alarms.py [--arms 4] [--streams 3] [--seed 3]
+    python benchmarks/alarms.py [--arms 4] [--streams 3] [--seed 3] [--cases "push,other arm"]
 
 Each Panda has a profile of six empty days (drift as in `life.py`). Then come streams of three minutes at 25 Hz, every
 one on another motion and another day, all offered to the profile as `armload live --learn` does:
@@ -15,18 +15,20 @@ other arm      the streams are of another Panda
 
 learned: share of the streams that became a session. said: share that is said not to be as the profile says, and after
 how many seconds (median). moved: by how much the mass that the profile takes for the empty arm's moves from first to
-last [g], median and largest over the arms. Rates have 95 % intervals (Wilson). Printed, and written to
-benchmarks/results/alarms.json and a table of docs/profiles.md.
+last [g], median and largest over the arms. Rates have 95 % intervals (Wilson). Cases that are
+named replace their own among the results. Printed, and written to benchmarks/results/alarms.json and a table of
+docs/profiles.md.
 """
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from life import OFFSET, empty_logs, motions_about, on_a_day
-from script import ROOT, markdown_table, options, say, write, write_table
+from script import RESULTS, ROOT, markdown_table, options, say, write, write_table
 
 from armload import Recording, arm
 from armload.inertia import InertialParameters
@@ -109,13 +111,14 @@ def followed(e: Episode, profile: Profile, log: Recording) -> tuple[Profile | No
 
 
 def main() -> None:
-    asked = options(__doc__, arms=4, streams=3, seed=3)
-    panda = arm("panda")
-    found: dict[str, dict[str, Any]] = {case: {"learned": [], "said": [], "moved": []} for case in CASES}
+    asked = options(__doc__, arms=4, streams=3, seed=3, cases="")
+    panda, file = arm("panda"), RESULTS / "alarms.json"
+    chosen = [case for case in CASES if not asked.cases or case in asked.cases.split(",")]
+    found: dict[str, dict[str, Any]] = {case: {"learned": [], "said": [], "moved": []} for case in chosen}
     for k, e in enumerate(draw_episodes(panda, "reference", asked.arms, asked.seed, motions=asked.arms)):
         profile = known(e, k)
         before = profile.mounted(panda)[0][0]
-        for case in CASES:
+        for case in chosen:
             now = profile
             for i in range(asked.streams):
                 learned, said = followed(e, now, stream_of(e, case, k, i))
@@ -123,8 +126,8 @@ def main() -> None:
                 found[case]["said"].append(said)
                 now = now if learned is None else learned
             found[case]["moved"].append(1e3 * float(now.mounted(panda)[0][0] - before))
-        say(f"arm {k + 1} of {asked.arms}: moved {[round(found[case]['moved'][-1], 1) for case in CASES]} g")
-    out, rows = {}, []
+        say(f"arm {k + 1} of {asked.arms}: moved {[round(found[case]['moved'][-1], 1) for case in chosen]} g")
+    out = json.loads(file.read_text(encoding="utf-8"))["cases"] if asked.cases and file.exists() else {}
     for case, one in found.items():
         count, said = len(one["said"]), np.array(one["said"])
         told = int(np.isfinite(said).sum())
@@ -135,10 +138,12 @@ def main() -> None:
             "said after [s]": float(np.median(said[np.isfinite(said)])) if told else None,
             "moved [g]": [float(np.median(np.abs(one["moved"]))), float(np.max(np.abs(one["moved"])))],
         }
-        share = ["{:.0f} % ({:.0f}–{:.0f})".format(*(100 * x for x in out[case][what])) for what in ("learned", "said")]
-        after = "" if not told else f"{out[case]['said after [s]']:.0f}"
-        rows.append([case, str(count), *share, after, "{:.0f} · {:.0f}".format(*out[case]["moved [g]"])])
-    hours = asked.arms * asked.streams * len(CASES) * SECONDS / 3600.0
+    out, rows = {case: out[case] for case in CASES if case in out}, []
+    for case, one in out.items():
+        share = ["{:.0f} % ({:.0f}–{:.0f})".format(*(100 * x for x in one[what])) for what in ("learned", "said")]
+        after = "" if one["said after [s]"] is None else f"{one['said after [s]']:.0f}"
+        rows.append([case, str(one["streams"]), *share, after, "{:.0f} · {:.0f}".format(*one["moved [g]"])])
+    hours = sum(one["streams"] for one in out.values()) * SECONDS / 3600.0
     columns = ["stream", "streams", "learned", "said not to be the arm's", "after [s]", "moved [g]"]
     say(markdown_table(columns, "lrrrrr", rows))
     if asked.arms > 2:

@@ -28,7 +28,7 @@ from armload.inertia import Z95, determined
 from armload.lab.training import Records
 from armload.payloads import solids
 from armload.posterior import HybridModel, shipped_model
-from armload.posterior.hybrid import std_under_weak_prior
+from armload.posterior.hybrid import holding, std_under_weak_prior
 from armload.regression import payload_prior_std
 
 MASS, SIDE, THICK = (0.3, 2.0), (0.2, 0.4), (0.002, 0.01)  # [kg, m]
@@ -71,7 +71,8 @@ def held(robot: Arm, model: HybridModel, records: Records) -> dict[str, NDArray[
     for k in range(len(records)):
         trusted, truth = model.calibration.trusted(records.evidence(k)), records.truth[k]
         found = prior.posterior(trusted.information, trusted.vector)
-        half = Z95 * np.sqrt(np.diag(model.calibration.widened(found, trusted)))
+        covariance = model.calibration.widened(found, trusted)
+        half = Z95 * np.sqrt(np.diag(holding(covariance, 0, found.mass_if_any - found.mean[0])))
         out["hybrid"][k] = np.abs(found.mean - truth) <= half
         P = np.linalg.inv(trusted.information + np.diag(weak**-2))
         alone = P @ trusted.vector

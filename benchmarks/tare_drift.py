@@ -1,6 +1,6 @@
 """Is an arm as it was at its tare? How often sound logs are doubted, how often changed arms are, and what is answered.
 
-    python benchmarks/tare_drift.py [--episodes 24] [--seed 5] [--cases sound,old]
+    python benchmarks/tare_drift.py [--episodes 24] [--seed 5] [--cases "sound;old"]
 
 Every case draws episodes of a population of the benchmark (`armload.lab.episodes`), with a tare, and changes the arm
 between tare and run:
@@ -10,19 +10,22 @@ a day        offsets and friction by what is expected of a day, 1 sigma (`Correc
 a third, old offsets by ±0.1 (wrist 0.03) N·m and friction by 10 %; by ±0.3 (wrist 0.1) N·m and 30 %
 other arm    the tare is of another arm of the same kind
 
-Each log is answered by the hybrid (or `map-gp`, where none is shipped) with and without the test of
-`armload.posterior.drift`; arms that measure motor current are not asked. doubted: share that are told to have changed.
-said or inside: share whose mass lies in its interval, or that are doubted. Printed, and written
-to benchmarks/results/tare_drift.json and a table of docs/hybrid.md; six minutes of one core.
+Each log is answered by the hybrid (or `map-gp`, where none is shipped) with and without the tests of
+`armload.posterior.drift` and `armload.posterior.another_arm`; arms that measure motor current are not asked. doubted:
+share that are told to have changed. another: share that are told to be of another arm, or of a repaired one. said or
+inside: share whose mass lies in its interval, or that are doubted. Cases that are named replace their own among the
+results. Printed, and written to benchmarks/results/tare_drift.json and a table of docs/hybrid.md; six minutes of one
+core.
 """
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from script import ROOT, markdown_table, options, say, write, write_table
+from script import RESULTS, ROOT, markdown_table, options, say, write, write_table
 
 from armload import Arm, arm
 from armload.arms import rated_effort
@@ -70,7 +73,7 @@ def before(episode: Episode, change: Any, k: int) -> Episode:
 
 def answered(known: Arm, episodes: list[Episode]) -> dict[str, Any]:
     """What is said of the episodes' logs with the test and without."""
-    errors, inside, doubted, statistics = {True: [], False: []}, {True: [], False: []}, [], []
+    errors, inside, doubted, statistics, others = {True: [], False: []}, {True: [], False: []}, [], [], []
     half: dict[bool, list[float]] = {True: [], False: []}
     for logs in simulate_episodes(episodes):
         for tested in (True, False):
@@ -82,10 +85,17 @@ def answered(known: Arm, episodes: list[Episode]) -> dict[str, Any]:
             inside[tested].append(error <= Z95 * estimate.std)
             half[tested].append(float(Z95 * estimate.std[0]))
             if tested:
-                doubted.append(identifier.stream.drift.changed)
-                statistics.append(identifier.stream.drift.statistic)
+                drift, another = identifier.stream.drift, identifier.stream.another
+                asked = drift is not None and another is not None  # not where torque seems to be motor current
+                doubted.append(asked and (drift.changed or another.found))
+                statistics.append(drift.statistic if asked else 0.0)
+                others.append((another.found, another.surprise, another.log_odds) if asked else (False, 0.0, -100.0))
     out: dict[str, Any] = {"episodes": len(doubted), "doubted": round(float(np.mean(doubted)), 3)}
     out["statistic, quantiles 0.5 0.9 1"] = np.quantile(statistics, [0.5, 0.9, 1.0]).round(1).tolist()
+    found, surprise, odds = np.array(others, dtype=float).T
+    out["another"] = round(float(found.mean()), 3)
+    out["surprise, quantiles 0.5 0.9 1"] = np.quantile(surprise, [0.5, 0.9, 1.0]).round(1).tolist()
+    out["log odds, quantiles 0.5 0.9 1"] = np.quantile(odds, [0.5, 0.9, 1.0]).round(1).tolist()
     for tested, name in ((True, "with the test"), (False, "without")):
         error, held = np.array(errors[tested]), np.array(inside[tested])
         said = held[:, 0] | np.array(doubted) if tested else held[:, 0]
@@ -108,28 +118,40 @@ def table(found: dict[str, Any]) -> str:
             [
                 name,
                 f"{100 * case['doubted']:.0f} %",
+                f"{100 * case['another']:.0f} %" if "another" in case else "",
                 *(f"{x['mass error [g]']:.1f} ± {x['half-width [g]']:.0f}" for x in (tested, silent)),
                 *(f"{x['first moments [g·m]']:.2f}" for x in (tested, silent)),
                 *(f"{100 * x['inside'][0]:.0f} %" for x in (tested, silent)),
                 f"{100 * tested['said or inside']:.0f} %",
             ]
         )
-    columns = ["tare", "doubted", "mass [g]", "without", "first moments [g·m]", "without", "inside", "without"]
-    return markdown_table([*columns, "said or inside"], "lrrrrrrrr", rows)
+    columns = [
+        "tare",
+        "doubted",
+        "another",
+        "mass [g]",
+        "without",
+        "first moments [g·m]",
+        "without",
+        "inside",
+        "without",
+    ]
+    return markdown_table([*columns, "said or inside"], "lrrrrrrrrr", rows)
 
 
 def main() -> None:
     asked = options(__doc__, episodes=24, seed=5, cases="")
     chosen = [name for name in CASES if not asked.cases or name in asked.cases.split(";")]
-    found = {}
+    file = RESULTS / "tare_drift.json"
+    found = json.loads(file.read_text(encoding="utf-8"))["cases"] if asked.cases and file.exists() else {}
     for name in chosen:
         robot, population, change = CASES[name]
         known = arm(robot)
         drawn = draw_episodes(known, population, asked.episodes, asked.seed, motions=max(6, asked.episodes // 4))
         found[name] = answered(known, [before(episode, change, k) for k, episode in enumerate(drawn)])
         say(f"{name}: {found[name]}")
-    if not asked.cases:
-        write("tare_drift", {"episodes": asked.episodes, "seed": asked.seed, "cases": found})
+        found = {name: found[name] for name in CASES if name in found}
+        write("tare_drift", {"seed": asked.seed, "cases": found})
         write_table(ROOT / "docs" / "hybrid.md", "tare drift", table(found))
 
 

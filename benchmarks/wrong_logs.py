@@ -14,7 +14,7 @@ covered or said   share of the true values that lie inside, or whose answer is n
 no word       share of the answers that are not called calibrated, and have no note that says why
 
 Cases that are named replace their own among the results. Written to benchmarks/results/wrong_logs.json and a table of
-docs/hybrid.md; half an hour of one core.
+docs/hybrid.md, after every case; half an hour of one core.
 """
 
 from __future__ import annotations
@@ -84,9 +84,9 @@ def main() -> None:
         count = asked.logs * (2 if name.startswith("nothing") else 1)
         found[name] = answered(CASES[name](count, asked.seed))
         say(f"{name}: {found[name]}")
-    found = {name: found[name] for name in CASES if name in found}
-    write("wrong_logs", {"seed": asked.seed, "cases": found})
-    write_table(ROOT / "docs" / "hybrid.md", "wrong logs", table(found))
+        found = {name: found[name] for name in CASES if name in found}
+        write("wrong_logs", {"seed": asked.seed, "cases": found})
+        write_table(ROOT / "docs" / "hybrid.md", "wrong logs", table(found))
 
 
 if __name__ == "__main__":

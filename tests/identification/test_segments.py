@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from armload import Recording, arm, write_recording
 from armload.app.cli import main
 from armload.devices import Simulator
 from armload.errors import IdentificationError
 from armload.identification import identify
+from armload.identification.segments import _OF_MASS, changes_of_payload, of_mass
 from armload.identification.tare_age import DAY, SESSION, drift_after, drift_since, in_words
+from armload.identification.thresholds import PAYLOAD_MAY_CHANGE
 from armload.inertia import InertialParameters
+from armload.lab.episodes import draw_episodes, simulate_episodes
 from armload.motion import taie2024
 from armload.payloads import draw_payload, franka_hand
 from armload.posterior.drift import ALLOWED
@@ -76,6 +81,33 @@ def test_a_log_whose_payload_stays_is_one_part(panda, payload, held):
     assert len(found.segments) == 1
     assert (found.segments[0].start, found.segments[0].stop) == (0.0, pytest.approx(log.duration))
     assert not any("changes within" in note for note in found.notes)
+
+
+def test_a_light_thing_taken_up_is_doubted_by_its_mass_and_a_sound_log_is_not(panda):
+    light, how = draw_payload("boxes", 0, 0.2), {"sensors": Sensors.panda(panda), "rate": 200.0}
+    assert light.parameters.mass < 0.07
+    (episode,) = draw_episodes(panda, "reference", 1, seed=300, motions=6)
+    (sound,) = simulate_episodes([replace(episode, payload=light)])
+    source = Simulator(
+        panda, episode.motion, [(0.0, None), (3.0, light)], speed=None, duration=6.0, seed=1, world=episode.world, **how
+    )
+    log = Recording(*map(np.array, zip(*source, strict=True)))  # type: ignore[arg-type]
+    found = changes_of_payload(log, panda, sound.tare, kappa=1.5)
+    assert found.times or max(found.statistic, found.of_mass) > PAYLOAD_MAY_CHANGE
+    whole = changes_of_payload(sound.run, panda, sound.tare, kappa=1.5)
+    assert not whole.times
+    assert max(whole.statistic, whole.of_mass) < PAYLOAD_MAY_CHANGE
+
+
+def test_the_mass_of_what_was_added_is_chi_squared_of_one_where_nothing_was():
+    """Oracle: draws of the evidence of logs of one payload, whose quantiles are those of SciPy's distribution."""
+    rng = np.random.default_rng(0)
+    root = rng.normal(size=(10, 10)) * np.r_[10.0, [100.0] * 3, [1e3] * 6][:, None]
+    Λ = root @ root.T
+    draws = [of_mass(Λ, root @ rng.normal(size=10)) for _ in range(4000)]
+    for share in (0.5, 0.9, 0.99):
+        assert np.quantile(draws, share) <= 1.15 * chi2.ppf(share, 1)
+    assert pytest.approx(chi2.isf(1e-3, 10) / chi2.isf(5e-4, 1)) == _OF_MASS
 
 
 def test_real_logs_are_one_part(real_data):

@@ -45,8 +45,8 @@ def test_two_hypotheses_are_weighed_by_bayes_rule():
     """Oracle: draws of both, in the shares of their probabilities."""
     rng = np.random.default_rng(0)
     mean, root = np.linspace(0.0, 1.0, 10), np.diag(np.linspace(0.5, 1.0, 10))
-    first = MixturePosterior(np.zeros(10), np.eye(10), np.ones(1), -3.0)
-    other = MixturePosterior(mean, root @ root, np.ones(1), -2.0)
+    first = MixturePosterior(np.zeros(10), np.eye(10), np.ones(1), -3.0, 0.0)
+    other = MixturePosterior(mean, root @ root, np.ones(1), -2.0, 0.0)
     found, share = first.or_else(other, odds=0.5)
     assert share == pytest.approx(0.5 * np.e / (1.0 + 0.5 * np.e))
     N = 200_000

@@ -91,7 +91,8 @@ class Identification:
     log, date: name of the log's file, and when it was answered (ISO 8601, UTC).
     why: what is special about the method, in a few words; not in the JSON.
     kappa: by how much the physics overrates this log's evidence, of a method that knows; not in the JSON.
-    moves: whether no rigid body explains the torques; not in the JSON.
+    moves: whether no rigid body explains the torques; not in the JSON. another: whether the arm is another one than at
+        its tare, or than the profile's; not in the JSON.
     health: the arm itself, as the log shows it, of a method that asks; not in the JSON.
     """
 
@@ -125,6 +126,7 @@ class Identification:
     why: str = field(default="", metadata={"json": False})
     kappa: float | None = field(default=None, metadata={"json": False})
     moves: bool = field(default=False, metadata={"json": False})
+    another: bool = field(default=False, metadata={"json": False})
     health: ArmHealth | None = field(default=None, metadata={"json": False})
 
     def __post_init__(self) -> None:

@@ -19,6 +19,7 @@ from armload.identification.thresholds import LARGEST_OFFSETS, MISFIT, MOVES
 from armload.inertia import distance_to_body, is_consistent
 from armload.posterior import HybridIdentifier, KnownMass, PosteriorLeastSquares, Profile
 from armload.posterior.drift import Drift
+from armload.posterior.scales import AnotherArm
 from armload.posterior.tilt import TURNED, TURNS, Tilt
 from armload.recording import Recording
 from armload.regression import payload_prior_std
@@ -49,6 +50,7 @@ class Found(NamedTuple):
     unknown_friction: whether the torques hold gear friction that nobody knew of; `friction_found`: that they did.
     known_arm_std: standard deviation (10,) of a method that says what it would be, were the arm known exactly.
     drift: by how much the arm differs from what it was at the tare, of a method that asks.
+    another: whether it is another one than at its tare, of a method that asks.
     tilt: by how much gravity is turned from that of the arm, of a method that asks. gravity: (3,) [m/s²] with which all
         this was found, where it is not what was given.
     restlessness: how restless the torques are, of what they were at the tare (`posterior.restless`).
@@ -71,6 +73,7 @@ class Found(NamedTuple):
     friction_found: bool = False
     known_arm_std: NDArray[np.float64] | None = None
     drift: Drift | None = None
+    another: AnotherArm | None = None
     tilt: Tilt | None = None
     gravity: tuple[float, float, float] | None = None
     restlessness: float = 0.0
@@ -153,6 +156,7 @@ def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Foun
         unknown_friction=unknown and mismatch is not None and mismatch.torque == "motor",
         known_arm_std=identifier.known_arm_std,
         drift=None if posterior is None else posterior.stream.drift,
+        another=None if posterior is None else posterior.stream.another,
         tilt=None if posterior is None else posterior.stream.tilt,
         restlessness=0.0 if posterior is None else posterior.stream.restlessness,
         exchanged=posterior is not None and posterior.exchanged,

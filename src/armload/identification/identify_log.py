@@ -80,7 +80,8 @@ def identify(
     mounted = read_payload(tool) if isinstance(tool, str | Path) else tool
     say("identifying")
     whole = _of_one_payload(recording, arm, tare, mounted, asked, notes)
-    times, statistic = changes_of_payload(recording, arm, tare, known, whole.kappa)
+    of_arm = (None, None) if whole.another else (tare, known)
+    times, statistic, of_mass = changes_of_payload(recording, arm, *of_arm, whole.kappa)
     edges, answers = [recording.t[0], *times, recording.t[-1]], [whole]
     if times:
         parts = [recording.between(a + SETTLED * (k > 0), b) for k, (a, b) in enumerate(pairwise(edges))]
@@ -90,7 +91,7 @@ def identify(
         answers.append(_of_one_payload(parts[-1], arm, tare, mounted, asked, notes))
         if whole.moves and 2 * sum(answer.moves for answer in answers) > len(answers):
             edges, answers = [edges[0], edges[-1]], [whole]  # there is no rigid body in the parts either: it swings
-    elif statistic > PAYLOAD_MAY_CHANGE:
+    elif max(statistic, of_mass) > PAYLOAD_MAY_CHANGE:
         answers = [replace(whole, interval="approximate", notes=(MAY_CHANGE, *whole.notes))]
     segments = tuple(
         Segment(float(a - recording.t[0]), float(b - recording.t[0]), answer)

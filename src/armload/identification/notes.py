@@ -10,6 +10,7 @@ from armload.identification.thresholds import KNOWN, NOMINAL
 from armload.inertia import NAMES, SHRINK, Z95
 from armload.posterior import KnownMass
 from armload.posterior.drift import Drift
+from armload.posterior.scales import AnotherArm
 from armload.recording import Recording
 
 RECORD = "record the arm as it is, without the payload, on any motion of 20 s, and name the log with --tare"
@@ -84,10 +85,22 @@ def leaning_on_prior(leaning: NDArray[np.bool_]) -> list[str]:
     ]
 
 
-def changed_since_tare(drift: Drift, what: str = "tare") -> str:
-    """That the arm is not as it was at its tare, or as its profile says, where that shows most, and what to do."""
-    j = drift.joint
+def arm_changed(drift: Drift | None, another: AnotherArm | None, what: str = "tare") -> str | None:
+    """That the arm is not as it was at its tare, or as its profile says, how it differs, and what to do; None: it is.
+
+    Args:
+        drift, another: what the two tests of it found; None: they were not made.
+    """
     then = "its profile says" if what == "profile" else "it was at its tare"
+    if another is not None and another.found:
+        say = "learn a profile of this arm" if what == "profile" else "record a tare of this arm as it is now"
+        return (
+            f"the arm is not as {then}: it is another one, or was repaired, as its links, gears or torque sensors "
+            f"differ; the intervals do without what was known of it; {say}"
+        )
+    if drift is None or not drift.changed:
+        return None
+    j = drift.joint
     return (
         f"the arm is not as {then}: at joint {j + 1} the torque's offset differs by {drift.offset[j]:+.2g} "
         f"N·m, the friction by {drift.coulomb[j]:+.2g} N·m; the intervals allow for it; record a tare of this arm as "

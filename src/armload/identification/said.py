@@ -13,7 +13,7 @@ from armload.identification.answer import Identification, body_of, is_removal
 from armload.identification.found import Found
 from armload.identification.intervals import about_com, intervals, phi_interval
 from armload.identification.notes import (
-    changed_since_tare,
+    arm_changed,
     gravity_turned,
     lacking,
     leaning_on_prior,
@@ -98,6 +98,7 @@ def answered(
         why=found.why,
         kappa=found.kappa,
         moves=found.restlessness > RESTLESS or not found.explained,
+        another=found.another is not None and found.another.found,
         health=found.health,
     )
 
@@ -128,8 +129,8 @@ def _doubt(found: Found, mass_determined: bool, relative_to: str) -> str | None:
         return EXCHANGED
     if not found.explained:
         return NO_BODY
-    if found.drift is not None and found.drift.changed:
-        return changed_since_tare(found.drift, relative_to)
+    if (changed := arm_changed(found.drift, found.another, relative_to)) is not None:
+        return changed
     if found.restlessness > RESTLESS:
         return not_rigid(found.restlessness)
     if found.mass is not None and found.mass_alone is not None:

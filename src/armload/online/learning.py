@@ -6,18 +6,19 @@ from collections.abc import Iterable
 
 from armload.arms import rated_effort
 from armload.estimators import Identifier
+from armload.identification.notes import arm_changed
 from armload.inertia import HELD
 from armload.online.thresholds import LEARN_FROM
 from armload.posterior import PosteriorLeastSquares, Profile
-from armload.posterior.drift import Drift
-from armload.posterior.profile_learning import with_session
+from armload.posterior.profile_learning import compared, with_session
 from armload.regression import Correction
 
 
-def drift_of_run(run: Identifier) -> Drift | None:
-    """By how much the arm differs from its tare or profile, where that is beyond what is expected; else None."""
-    drift = run.stream.drift if isinstance(run, PosteriorLeastSquares) else None
-    return drift if drift is not None and drift.changed else None
+def change_of_arm(run: Identifier, what: str = "profile") -> str | None:
+    """That a run's arm is not as at its tare or as its profile says; None: it is, as far as anybody can tell."""
+    if not isinstance(run, PosteriorLeastSquares):
+        return None
+    return arm_changed(run.stream.drift, run.stream.another, what)
 
 
 def learned_from(profile: Profile, runs: Iterable[PosteriorLeastSquares], name: str) -> Profile | None:
@@ -31,8 +32,12 @@ def learned_from(profile: Profile, runs: Iterable[PosteriorLeastSquares], name: 
     if best is None:
         return None
     data = best.stream.accumulated()
+    correction = Correction(best.arm, rated_effort(best.arm))
+    data.session = profile.session(correction)
+    if compared(profile, correction, data)[2]:  # the stream asks now and then only
+        return None
     data.less(best.stream.posterior.phi)
-    return with_session(profile, Correction(best.arm, rated_effort(best.arm)), data, name=name)
+    return with_session(profile, correction, data, name=name)
 
 
 def _is_empty(run: PosteriorLeastSquares) -> bool:
@@ -45,4 +50,4 @@ def _is_empty(run: PosteriorLeastSquares) -> bool:
     ):
         return False
     mass, std = float(run.last.phi[0]), float(run.last.std[0])
-    return abs(mass) <= HELD * std and drift_of_run(run) is None
+    return abs(mass) <= HELD * std and change_of_arm(run) is None

@@ -21,14 +21,14 @@ from armload.estimators import Estimate, Identifier
 from armload.identification.answer import body_of
 from armload.identification.choice import choose
 from armload.identification.intervals import Before
-from armload.identification.notes import changed_since_tare, gravity_turned, not_rigid
+from armload.identification.notes import gravity_turned, not_rigid
 from armload.identification.said import EXCHANGED, NO_BODY
 from armload.identification.thresholds import MISFIT
 from armload.inertia import determined, distance_to_body, held
 from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
 from armload.online.gate import Gate, Health, all_finite
-from armload.online.learning import drift_of_run, learned_from
+from armload.online.learning import change_of_arm, learned_from
 from armload.online.listening import Listening
 from armload.online.restoring import known_parts, origin, same_origin
 from armload.online.state import load_state, save_state
@@ -185,7 +185,7 @@ class OnlineIdentifier:
                 self._doubted = self._doubted or exchanged
                 if self._doubted:
                     self._notes = (*self._notes, EXCHANGED if exchanged else NO_BODY)
-                self._doubted = self._doubted or drift_of_run(run) is not None
+                self._doubted = self._doubted or change_of_arm(run) is not None
                 restlessness = run.stream.restlessness if isinstance(run, PosteriorLeastSquares) else 0.0
                 if restlessness > RESTLESS and not self._doubted:
                     self._doubted, self._notes = True, (*self._notes, not_rigid(restlessness))
@@ -273,7 +273,7 @@ class OnlineIdentifier:
             self._published = sample.t
             self._judge(estimate, run, stands)
         self._estimate, self._source, self._around = estimate, run, estimate.phi
-        self._doubted = drift_of_run(run) is not None
+        self._doubted = change_of_arm(run) is not None
 
     def _counted(self, sample: Sample, run: Identifier) -> bool:
         """Remember how old the answer is; whether what was seen lately told it nothing, as the arm stands."""
@@ -321,8 +321,8 @@ class OnlineIdentifier:
             notes.append("not moving: inertia undetermined" if not self._determined[4:].all() else "not moving")
         if stands and self._stream.trouble is None:
             notes.append(_STANDING)
-        if (changed := drift_of_run(run)) is not None:
-            notes.append(changed_since_tare(changed, self.relative_to))
+        if (changed := change_of_arm(run, self.relative_to)) is not None:
+            notes.append(changed)
         self._notes = tuple(notes)
 
     @property

@@ -250,6 +250,8 @@ class PosteriorLeastSquares(Identifier):
         speed, weak = float(np.sqrt(self._squares / self._values)), self._weak
         difference = stream.difference is not None
         tare_time = self._tare_time + earlier
+        if stream.without_tare:
+            tare_time = sum(run.blocks.duration for run in stream.tares[1:])
         log = (said.information, said.vector, stream.posterior, now, tare_time, speed, weak, difference)
         return Evidence.of(*log, self._traits_frame)
 

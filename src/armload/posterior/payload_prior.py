@@ -27,16 +27,21 @@ from armload.kernels import kernel
 _COMPONENTS = 12  # per family: a container's loadings, a box's sizes and places; trained models hold them
 # families that a difference is made of: less nothing, or a screw, a payload is what it was
 _BODIES = ("boxes", "shapes", "tools", "container")
+_LITTLE = ("nothing", "light")  # families of an empty hand, or nearly
 _FLOOR = np.array([2e-3] + [2e-4] * 3 + [2e-5] * 6)  # [kg, kg·m, kg·m²] no component is narrower than this
 
 
 class MixturePosterior(NamedTuple):
-    """phi given evidence: mean (10,), covariance (10, 10), the components' weights (K,), and ln p(evidence) + const."""
+    """phi given evidence: mean (10,), covariance (10, 10), the components' weights (K,), and ln p(evidence) + const.
+
+    mass_if_any: mean of the mass [kg], if there is something that is not light.
+    """
 
     mean: NDArray[np.float64]
     covariance: NDArray[np.float64]
     weights: NDArray[np.float64]
     log_evidence: float
+    mass_if_any: float
 
     def or_else(self, other: MixturePosterior, odds: float) -> tuple[MixturePosterior, float]:
         """This one, or another of the same evidence under another prior, moments matched; and the other's probability.
@@ -49,7 +54,8 @@ class MixturePosterior(NamedTuple):
         covariance = (1.0 - share) * self.covariance + share * other.covariance
         covariance = covariance + share * (1.0 - share) * np.outer(away, away)
         log = float(np.logaddexp(self.log_evidence, np.log(odds) + other.log_evidence) - np.log1p(odds))
-        return MixturePosterior(self.mean + share * away, covariance, self.weights, log), share
+        mass = self.mass_if_any + share * (other.mass_if_any - self.mass_if_any)
+        return MixturePosterior(self.mean + share * away, covariance, self.weights, log, mass), share
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,6 +162,12 @@ class MixturePrior:
         return np.sqrt(self.weights @ second - self.mean**2)
 
     @cached_property
+    def _something(self) -> NDArray[np.bool_]:
+        """Which components (K,) are of something that is not light; all, where all are."""
+        some = ~np.isin(self.families, _LITTLE)
+        return some if some.any() else ~some
+
+    @cached_property
     def _scale(self) -> NDArray[np.float64]:
         return np.sqrt(np.abs(np.einsum("kii->ki", self.covariances))).max(
             axis=0
@@ -183,8 +195,8 @@ class MixturePrior:
 
     def posteriors(self, information: NDArray, vectors: NDArray) -> list[MixturePosterior]:
         """phi given Λ (10, 10) and each of several h (V, 10): one factorisation serves them all."""
-        found = _posteriors(*self._tables, self._scale, information, vectors)
-        return [MixturePosterior(m, P, w, float(total)) for m, P, w, total in zip(*found, strict=True)]
+        found = _posteriors(*self._tables, self._scale, self._something, information, vectors)
+        return [MixturePosterior(m, P, w, float(total), float(x)) for m, P, w, total, x in zip(*found, strict=True)]
 
 
 # Several components are computed at once: they lie beside each other, each innermost loop runs over them, and the order
@@ -259,8 +271,8 @@ def _components(precisions, pulls, constants, information, vectors):  # pragma: 
 
 
 @kernel(fastmath={"contract", "reassoc", "nsz"})
-def _posteriors(precisions, pulls, constants, scale, information, vectors):  # pragma: no cover - compiled
-    """Means (V, 10), covariances (V, 10, 10), weights (V, K) and ln p(evidence) + const (V,)."""
+def _posteriors(precisions, pulls, constants, scale, some, information, vectors):  # pragma: no cover - compiled
+    """Means (V, 10), covariances (V, 10, 10), weights (V, K), ln p(evidence) + const (V,), the mass of `some` (V,)."""
     (V, d), K = vectors.shape, len(constants)
     Λ, h = np.empty((d, d)), np.empty((V, d))
     for i in range(d):
@@ -269,7 +281,7 @@ def _posteriors(precisions, pulls, constants, scale, information, vectors):  # p
         for v in range(V):
             h[v, i] = scale[i] * vectors[v, i]
     P, m, weights = _components(precisions, pulls, constants, Λ, h)
-    mean, covariance, totals = np.empty((V, d)), np.empty((V, d, d)), np.empty(V)
+    mean, covariance, totals, masses = np.empty((V, d)), np.empty((V, d, d)), np.empty(V), np.empty(V)
     for v in range(V):
         w, largest, total = weights[v], weights[v, 0], 0.0
         for k in range(K):
@@ -280,6 +292,12 @@ def _posteriors(precisions, pulls, constants, scale, information, vectors):  # p
         totals[v] = largest + np.log(total)
         for k in range(K):
             w[k] /= total
+        share, total = 1e-300, 0.0
+        for k in range(K):
+            if some[k]:
+                share += w[k]
+                total += w[k] * m[v, 0, k]
+        masses[v] = scale[0] * total / share
         for i in range(d):
             away, total = m[v, i], 0.0
             for k in range(K):
@@ -293,4 +311,4 @@ def _posteriors(precisions, pulls, constants, scale, information, vectors):  # p
                 for k in range(K):
                     total += w[k] * (own[k] + one[k] * other[k])
                 covariance[v, i, j] = covariance[v, j, i] = total * scale[i] * scale[j]
-    return mean, covariance, weights, totals
+    return mean, covariance, weights, totals, masses

@@ -37,6 +37,12 @@ _POSE, _VELOCITY, _FEATURE_COUNT = 3e-3, 2e-3, 20.0
 _DIRECT = 20  # half the rows of a matrix that is inverted whole; changes no answer
 
 
+def of_mounted(prior: NDArray[np.float64], mass: float, variance: float) -> NDArray[np.float64]:
+    """Prior variance (10,) of what was mounted at a tare, its mass being known to a variance: its moments follow."""
+    heaviest = max(abs(mass) + 2.0 * np.sqrt(max(variance, 0.0)), _LIGHTEST)
+    return np.r_[prior[:1], np.minimum(prior[1:], (heaviest * _REACH) ** 2)]
+
+
 def _inverse(A: NDArray[np.float64]) -> NDArray[np.float64]:
     """A⁻¹ of a positive definite A = [[P, Q], [Qᵀ, S]], by the Schur complement C = S − Qᵀ·P⁻¹·Q.
 
@@ -254,8 +260,7 @@ class Problem:
         """A light body has small moments: what was mounted at a tare seldom weighs much, and its moments follow."""
         now = self.payload_variance.copy()
         if self.last.start > 0:
-            heaviest = max(abs(z[0]) + 2.0 * np.sqrt(max(variance[0], 0.0)), _LIGHTEST)
-            now[1:10] = np.minimum(now[1:10], (heaviest * _REACH) ** 2)
+            now[:10] = of_mounted(now[:10], z[0], variance[0])
         return now
 
     def answer(self, scales: Scales, found: _Gaussian) -> Posterior:

@@ -25,10 +25,11 @@ from numpy.typing import NDArray
 from armload.arms import Arm, rated_effort
 from armload.errors import IdentificationError
 from armload.inertia import HELD, Z95
-from armload.posterior.drift import SESSION, drift_of
+from armload.posterior.another_arm import another_arm
+from armload.posterior.drift import SESSION, Drift, drift_of
 from armload.posterior.problem import Problem
 from armload.posterior.profile import Profile, SessionRecord, attached_mass, fingerprint
-from armload.posterior.scales import Scales
+from armload.posterior.scales import Posterior, Scales
 from armload.posterior.solve import solve, threads
 from armload.recording import Recording
 from armload.regression import Correction, FilteredRegression, JointFeatures, payload_prior_std
@@ -322,25 +323,34 @@ def _poses(log: Recording) -> NDArray[np.float64]:
     return log.q[np.linspace(0, len(log) - 1, _POSES).astype(int)]
 
 
+def compared(known: Profile, correction: Correction, data: RegressionData) -> tuple[Posterior, Drift, bool]:
+    """What a session's rows say beside a profile: the solution, the drift, and whether they are of another arm."""
+    arm = correction.arm
+    runs = [known.data(correction, GAIN, SMOOTH.block), data]
+    found = solve(runs, payload_prior_std(arm), None, SMOOTH, 3, known.scales)
+    sensed = found.torque == "link"  # friction of gears differs from run to run
+    another = sensed and another_arm(runs, payload_prior_std(arm), None, SMOOTH, found).found
+    return found, drift_of(found, correction, data.session), another
+
+
 def check_fits(known: Profile, arm: Arm, log: Recording, tool: NDArray[np.float64] | None = None) -> None:
     """See that a log is of the profile's arm, with the same mounted.
 
     Raises:
-        IdentificationError: it carries something, or its offsets or friction are beyond what the other sessions show.
+        IdentificationError: it carries something, its offsets or friction are beyond what the other sessions show, or
+            it is of another arm.
     """
     known.check(arm)
     correction = Correction(arm, rated_effort(arm))
     data = log_data(correction, log, known.features, known.session(correction), tool)
-    runs = [known.data(correction, GAIN, SMOOTH.block), data]
-    found = solve(runs, payload_prior_std(arm), None, SMOOTH, 3, known.scales)
-    drift = drift_of(found, correction, data.session)
+    found, drift, another = compared(known, correction, data)
     mass, std = float(found.phi[0]), float(np.sqrt(found.covariance[0, 0]))
     if abs(mass) > HELD * std:
         raise IdentificationError(
             f"{log.source} carries {mass:+.3g} ± {Z95 * std:.2g} kg beside what was mounted in the profile's logs: a "
             "profile learns from the arm without a payload; leave the log out, or name what was mounted with --tool"
         )
-    if drift.changed:
+    if drift.changed or another:
         raise IdentificationError(
             f"{log.source} does not fit the profile (T = {drift.statistic:.0f}, at joint {drift.joint + 1} most): it "
             "is of another arm, or of one that was repaired or moved; learn a new profile, and leave this one as it is"

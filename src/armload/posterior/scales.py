@@ -25,6 +25,21 @@ class Scales:
 
 
 @dataclass(frozen=True, eq=False)
+class AnotherArm:
+    """Whether a run is of another arm than its tare (`posterior.another_arm`).
+
+    log_odds: B, what the run's log evidence gains if the tare is taken for another arm's. expected, spread: mean and
+    standard deviation of B, were the arm the same. surprise: (B − expected) / spread. found: whether it is another.
+    """
+
+    log_odds: float
+    expected: float
+    spread: float
+    surprise: float
+    found: bool
+
+
+@dataclass(frozen=True, eq=False)
 class Posterior:
     """Mean and covariance of phi, and of what else was found along the way.
 

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
 from armload.posterior.problem import Problem
-from armload.posterior.scales import Posterior, Scales
+from armload.posterior.scales import AnotherArm, Posterior, Scales
 from armload.posterior.sequential import SequentialPosterior
 from armload.regression import GaussianPrior
 from armload.regression.information import RegressionData
@@ -39,10 +39,14 @@ def threads() -> ThreadpoolController:
 
 @dataclass(eq=False)
 class Solution:
-    """The posterior of the accumulated rows, and the same as a state that takes further rows of the last run."""
+    """The posterior of the accumulated rows, and the same as a state that takes further rows of the last run.
+
+    another: whether the last run is of another arm than the first; None: nobody asked.
+    """
 
     posterior: Posterior
     state: SequentialPosterior
+    another: AnotherArm | None = None
 
 
 def solve(

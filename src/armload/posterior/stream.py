@@ -21,11 +21,12 @@ from numpy.typing import NDArray
 
 from armload.inertia.cholesky import factor, invert
 from armload.kernels import kernel
+from armload.posterior.another_arm import FROM, another_arm, apart
 from armload.posterior.drift import ALLOWED, TESTED, Drift, drift_of, drift_since_tare
 from armload.posterior.handover import Handover, Result
 from armload.posterior.restless import restlessness
 from armload.posterior.same_motion import Difference, SameMotion
-from armload.posterior.scales import Posterior, Scales
+from armload.posterior.scales import AnotherArm, Posterior, Scales
 from armload.posterior.sequential import SequentialPosterior
 from armload.posterior.solve import Solution, solve_to_go_on
 from armload.posterior.tilt import Tilt, tilt_of_base
@@ -53,13 +54,15 @@ class StreamingPosterior:
         gain: λ of the lag [1/s]. iterations: of expectation–maximisation in the last solution.
         same_motion: asks whether the tare shows the run's motion; None: nobody asks.
         session: of the run; the tares' is session 0 unless they are of this one.
-        test_tare: whether `conclude` asks if the arm is as it was at the tare, and allows for it if not; and if gravity
-            is as it was given.
+        test_tare: whether `conclude` asks if the arm is as it was at the tare, or another one, and allows for it if
+            not; and if gravity is as it was given.
 
     Attributes:
         posterior: the last full solution; its scales, ratios and torque side hold until the next.
         difference: what the torque difference with a tare along the same motion says, where it is the better evidence.
         drift: by how much the arm differs from what it was at the tare; None: not asked yet.
+        another: whether the arm is another one than at its tare; None: not asked yet.
+        without_tare: whether the last solution does without what the tare says of the arm.
         tilt: by how much gravity is turned from what was given; None: not asked yet.
         solutions: full solutions so far. rows: how many. row: the last one; seconds: what all rows stand for [s].
     """
@@ -107,6 +110,8 @@ class StreamingPosterior:
         self.row: Row | None = None
         self.difference: Difference | None = None
         self.drift: Drift | None = None
+        self.another: AnotherArm | None = None
+        self.without_tare = False
         self.tilt: Tilt | None = None
         self._posterior: Posterior | None = None
 
@@ -172,7 +177,7 @@ class StreamingPosterior:
     @property
     def restlessness(self) -> float:
         """How restless the torques are in the run, of what they were at the tare; 0 where nobody can tell."""
-        if not self.tares or self.posterior.torque != "link":
+        if len(self.posterior.power) < 2 or self.posterior.torque != "link":
             return 0.0
         return restlessness(self.posterior.power, self.noise.residual * self.correction.effort)
 
@@ -224,18 +229,23 @@ class StreamingPosterior:
         self._handover.abandon()
         self._accumulate_waiting()
         runs = [*self.tares, self._run]
-        self.drift = None
+        self.drift = self.another = None
+        about = (self.prior_std, self.prior, self.noise)
         self._adopt(self._solved(runs, self.start, self.iterations - 1))
         if self.tares and self._test_tare and self.posterior.torque == "link":
-            self.drift = drift_since_tare(runs, self.prior_std, self.prior, self.noise, self.posterior)
+            self.drift = drift_since_tare(runs, *about, self.posterior)
             if self.drift.changed:
                 self._run.session = replace(self.session, number=1, drift=max(ALLOWED, self.session.drift))
                 self._adopt(self._solved(runs, self.start, self.iterations - 1))
+            self.another = another_arm(runs, *about, self.posterior)
+            if self.another.found:
+                self._adopt(apart(runs, *about, self.iterations, self.posterior))
+                self.without_tare, runs = True, runs[1:]
         if self._test_tare:
-            self.tilt = tilt_of_base(runs, self.prior_std, self.prior, self.noise, self.posterior)
+            self.tilt = tilt_of_base(runs, *about, self.posterior)
         self._run.session = self.session
         changed = self.drift is not None and self.drift.changed  # then the difference is of two arms, too
-        self.difference = None if changed else self._better(self.posterior.covariance)
+        self.difference = None if changed or self.without_tare else self._better(self.posterior.covariance)
 
     def _solved(self, runs: list[RegressionData], start: Scales | None, steps: int) -> Solution:
         return solve_to_go_on(runs, self.prior_std, self.prior, self.noise, steps + 1, start)
@@ -288,14 +298,28 @@ class StreamingPosterior:
 
     def _step(self, run: RegressionData) -> Solution:
         """One step of expectation–maximisation from the last solution's scales."""
-        return self._solved([*self.tares, run], self.posterior.scales if self.solutions else self.start, 1)
+        runs = [*self.tares, run]
+        solution = self._solved(runs, self.posterior.scales if self.solutions else self.start, 1)
+        if self._asked(solution, run.blocks.duration):
+            solution.another = another_arm(runs, self.prior_std, self.prior, self.noise, solution.posterior)
+        return solution
+
+    def _asked(self, solution: Solution, seconds: float) -> bool:
+        """Whether a live solution tells if the arm is as at its tare: it does where it has allowed for a drift.
+
+        Not before `FROM`: what pushes or pulls for a few seconds is no other arm.
+        """
+        torque, drifts = solution.posterior.torque, solution.posterior.drift.size > 0
+        asked = self._test_tare and self.session.drift >= TESTED and seconds >= FROM
+        return asked and torque == "link" and drifts
 
     def _adopt(self, solution: Solution) -> None:
-        self._early = None
+        self._early, self.without_tare = None, False
         if np.isfinite(solution.state.information.sum() + solution.state.vector.sum()):  # else the last one goes on
             self._posterior, self._state = solution.posterior, solution.state
             self.solutions += 1
-            if self._test_tare and self.session.drift >= TESTED and self.posterior.torque == "link":
+            self.another = solution.another or self.another
+            if self._asked(solution, self.seconds):
                 self.drift = drift_of(solution.posterior, self.correction, self.session)
         elif self._state is None:
             self.prepare()
