@@ -238,6 +238,7 @@ def judge(folder: Path) -> dict[str, Any]:
             "moves": f.moves,
             "retare": f.retare,
             "loose": f.loose,
+            "shift": None if f.shift is None else f.shift.z,
         }
         | {"since day": None if not isinstance(f.since, float) else round((f.since - BEGAN) / DAY, 2), "joint": f.joint}
         for f in arm_findings(rows)
@@ -337,6 +338,7 @@ def tables(found: dict[str, Any]) -> dict[str, str]:
             f["arm"],
             f["role"],
             share(f["changed"]),
+            "" if f["shift"] is None else f"{f['shift']:.1f}",
             "yes" if f["retare"] else "",
             share(f["moves"]),
             "yes" if f["loose"] else "",
@@ -344,8 +346,17 @@ def tables(found: dict[str, Any]) -> dict[str, str]:
         ]
         for f in found["arms"]
     ]
-    heads = ["arm", "truth", "changed, last logs", "to re-tare", "moves, last logs", "to look at", "since day"]
-    return {"payloads": payloads, "arms": markdown_table(heads, "llrrrrr", rows)}
+    heads = [
+        "arm",
+        "truth",
+        "changed, last logs",
+        "shift z",
+        "to re-tare",
+        "moves, last logs",
+        "to look at",
+        "since day",
+    ]
+    return {"payloads": payloads, "arms": markdown_table(heads, "llrrrrrr", rows)}
 
 
 def share(value: float | None) -> str:

@@ -14,6 +14,7 @@ from armload.lab.report.shown import Table
 from armload.lab.report.style import COLOURS, look, new_figure
 from armload.survey.findings import LAST, ArmFinding, arm_findings, by_log, doubtful
 from armload.survey.rows import ANSWERED, SEPARATOR, UNUSABLE
+from armload.survey.shift import SHIFTED
 from armload.survey.table_file import read_rows
 
 if TYPE_CHECKING:
@@ -64,7 +65,17 @@ def _what_to_do(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) 
         if asked
         else "Without a tare or a profile nobody can say whether an arm is as it was: see `--tare` and `--profile`.",
     ]
-    columns = ("arm", "logs", "not answered", "payloads", "median mass [kg]", "changed", "payload moves", "since")
+    columns = (
+        "arm",
+        "logs",
+        "not answered",
+        "payloads",
+        "median mass [kg]",
+        "changed",
+        "shift",
+        "payload moves",
+        "since",
+    )
     cells = tuple(
         (
             f.arm,
@@ -72,14 +83,16 @@ def _what_to_do(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) 
             str(f.unusable),
             str(f.payloads),
             "" if f.mass is None else f"{f.mass:.3f}",
-            _share(f.changed, f.retare),
+            _share(f.changed, f.changed is not None and f.retare),
+            "" if f.shift is None else f"{f.shift.z:.1f}{' !' if f.shift.found else ''}",
             _share(f.moves, f.loose),
             _since(f),
         )
         for f in findings
     )
     note = (
-        f"changed and payload moves: share of an arm's last {LAST} logs that say so; ! asks for something to be done."
+        f"changed and payload moves: share of an arm's last {LAST} logs that say so; shift: z of its offsets and "
+        f"friction over the days, beyond {SHIFTED:g} it is another arm. ! asks for something to be done."
     )
     return Section("What to do", "\n\n".join(x for x in text if x), (Table("Arms", columns, cells, note),))
 
