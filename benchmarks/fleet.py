@@ -5,7 +5,7 @@
 
 make    logs by inverse dynamics (`simulate_inverse`) of arms that differ from their model as real ones do, with offsets
         and friction that differ from day to day by half of what `life.py` assumes. Each arm works four motions of its
-        own, 12 s at 100 Hz, and takes up and puts down payloads of 0.3 to 2.5 kg, all at once; the first log of a day
+        own, 12 s at 100 Hz, and takes up and puts down boxes of up to 2.5 kg, all at once; the first log of a day
         is empty, 24 s. From the middle day on, one arm is another one (exchanged), one holds 30 % of what it holds by
         a spring (loose), and the offset of one arm's second joint walks by 0.3 N·m a day. 3 % of the logs are broken,
         in eight ways. Of each arm there is a tare of 24 s of the day before the first.
@@ -238,6 +238,7 @@ def judge(folder: Path) -> dict[str, Any]:
             "moves": f.moves,
             "retare": f.retare,
             "loose": f.loose,
+            "shift": None if f.shift is None else f.shift.z,
         }
         | {"since day": None if not isinstance(f.since, float) else round((f.since - BEGAN) / DAY, 2), "joint": f.joint}
         for f in arm_findings(rows)
@@ -337,6 +338,7 @@ def tables(found: dict[str, Any]) -> dict[str, str]:
             f["arm"],
             f["role"],
             share(f["changed"]),
+            "" if f["shift"] is None else f"{f['shift']:.1f}",
             "yes" if f["retare"] else "",
             share(f["moves"]),
             "yes" if f["loose"] else "",
@@ -344,8 +346,17 @@ def tables(found: dict[str, Any]) -> dict[str, str]:
         ]
         for f in found["arms"]
     ]
-    heads = ["arm", "truth", "changed, last logs", "to re-tare", "moves, last logs", "to look at", "since day"]
-    return {"payloads": payloads, "arms": markdown_table(heads, "llrrrrr", rows)}
+    heads = [
+        "arm",
+        "truth",
+        "changed, last logs",
+        "shift z",
+        "to re-tare",
+        "moves, last logs",
+        "to look at",
+        "since day",
+    ]
+    return {"payloads": payloads, "arms": markdown_table(heads, "llrrrrrr", rows)}
 
 
 def share(value: float | None) -> str:

@@ -12,6 +12,7 @@ from armload.survey import write_rows
 from armload.survey.findings import arm_findings, doubtful
 from armload.survey.learning import empty_stretches
 from armload.survey.rows import columns
+from armload.survey.shift import shifts
 
 DAY = 86400.0
 
@@ -48,6 +49,24 @@ def test_an_arm_that_changed_is_told_with_its_day_and_joint_and_sound_ones_are_l
     assert found["sound"].unusable == 1
     assert found["sound"].logs == 21
     assert [bool(f.advice) for f in found.values()] == [f.retare or f.loose for f in found.values()]
+
+
+def test_a_lasting_shift_of_friction_is_found_with_its_day_and_joint(rows):
+    rng = np.random.default_rng(3)
+    rows = [one for one in rows if one["arm"] in ("sound", "mended") and one["status"] == "answered"]
+    for one in rows:
+        day = round((one["date"] - 1.79e9) / DAY)
+        one |= {f"{name}_{j}": float(0.05 * rng.normal()) for name in ("offset", "coulomb") for j in range(1, 8)}
+        one["coulomb_4"] += 0.4 * (one["arm"] == "mended" and day >= 7)
+    found = shifts(rows, 7)
+    assert [arm for arm, shift in found.items() if shift.found] == ["mended"]
+    assert (found["mended"].joint, found["mended"].what) == (4, "friction")
+    assert found["mended"].since == 1.79e9 + DAY * 7
+    assert found["mended"].size == pytest.approx(0.4, abs=0.1)
+    advised = {f.arm: f for f in arm_findings(rows)}
+    assert advised["mended"].retare
+    assert not advised["sound"].retare
+    assert shifts([one | {"date": None} for one in rows], 7) == {}
 
 
 def test_nothing_is_said_of_arms_that_could_not_be_asked(rows):

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from armload.survey.rows import ANSWERED, UNUSABLE
+from armload.survey.shift import Shift, shifts
 
 # [logs] that decide about an arm as it is now: some hours of a cell that works. A stated choice
 LAST = 10
@@ -36,6 +37,7 @@ class ArmFinding:
     retare, loose: whether that is enough to act. since: date of the first log of the run that led to it [s since 1970],
         or the log's name where logs have no date; of a sound arm None.
     joint: that tells most of the change, from 1; 0: none does.
+    shift: the most likely day since when the arm is another one, and how likely; None: it was seen on too few days.
     """
 
     arm: str
@@ -49,6 +51,7 @@ class ArmFinding:
     loose: bool
     since: float | str | None = None
     joint: int = 0
+    shift: Shift | None = None
 
     @property
     def advice(self) -> str:
@@ -66,7 +69,10 @@ class ArmFinding:
 
 def arm_findings(rows: Sequence[dict[str, Any]]) -> list[ArmFinding]:
     """What the rows say of each arm, by name."""
-    return [_of_arm(arm, [row for row in rows if row["arm"] == arm]) for arm in sorted({row["arm"] for row in rows})]
+    n = max((sum(name.startswith("offset_") for name in row) for row in rows), default=0)
+    shifted = shifts([row for row in rows if row["status"] == ANSWERED], n)
+    arms = sorted({row["arm"] for row in rows})
+    return [_of_arm(arm, [row for row in rows if row["arm"] == arm], shifted.get(arm)) for arm in arms]
 
 
 def doubtful(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -83,7 +89,7 @@ def by_log(rows: Sequence[dict[str, Any]]) -> list[list[dict[str, Any]]]:
     return sorted(logs.values(), key=lambda of: (of[0]["date"] is None, of[0]["date"] or 0.0, of[0]["log"]))
 
 
-def _of_arm(arm: str, rows: Sequence[dict[str, Any]]) -> ArmFinding:
+def _of_arm(arm: str, rows: Sequence[dict[str, Any]], shift: Shift | None) -> ArmFinding:
     logs = by_log(rows)
     asked = [of for of in logs if any(row["misfit"] is not None for row in of)]
     holding = [of for of in logs if any(row["held"] for row in of)]
@@ -91,6 +97,9 @@ def _of_arm(arm: str, rows: Sequence[dict[str, Any]]) -> ArmFinding:
     moves, first = _lately([any(row["moves"] for row in of if row["held"]) for of in holding], holding, SHARE_MOVES)
     retare, loose = since is not None, first is not None
     joints = [row["misfit_joint"] for of in asked[-LAST:] for row in of if row["changed"]]
+    joint = int(np.bincount(joints).argmax()) if retare and joints else 0
+    if not retare and shift is not None and shift.found:
+        retare, since, joint = True, shift.since, shift.joint
     masses = [row["mass"] for row in rows if row["status"] == ANSWERED and row["held"]]
     return ArmFinding(
         arm,
@@ -103,7 +112,8 @@ def _of_arm(arm: str, rows: Sequence[dict[str, Any]]) -> ArmFinding:
         retare,
         loose,
         since if retare else first,
-        int(np.bincount(joints).argmax()) if retare and joints else 0,
+        joint,
+        shift,
     )
 
 

@@ -12,8 +12,9 @@ import numpy as np
 from armload.lab.report import Section, write_report
 from armload.lab.report.shown import Table
 from armload.lab.report.style import COLOURS, look, new_figure
-from armload.survey.findings import LAST, ArmFinding, arm_findings, by_log, doubtful
+from armload.survey.findings import LAST, SHARE_CHANGED, ArmFinding, arm_findings, by_log, doubtful
 from armload.survey.rows import ANSWERED, SEPARATOR, UNUSABLE
+from armload.survey.shift import SHIFTED
 from armload.survey.table_file import read_rows
 
 if TYPE_CHECKING:
@@ -64,7 +65,17 @@ def _what_to_do(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) 
         if asked
         else "Without a tare or a profile nobody can say whether an arm is as it was: see `--tare` and `--profile`.",
     ]
-    columns = ("arm", "logs", "not answered", "payloads", "median mass [kg]", "changed", "payload moves", "since")
+    columns = (
+        "arm",
+        "logs",
+        "not answered",
+        "payloads",
+        "median mass [kg]",
+        "changed",
+        "shift",
+        "payload moves",
+        "since",
+    )
     cells = tuple(
         (
             f.arm,
@@ -72,14 +83,16 @@ def _what_to_do(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) 
             str(f.unusable),
             str(f.payloads),
             "" if f.mass is None else f"{f.mass:.3f}",
-            _share(f.changed, f.retare),
+            _share(f.changed, (f.changed or 0.0) >= SHARE_CHANGED),
+            "" if f.shift is None else f"{f.shift.z:.1f}{' !' if f.shift.found else ''}",
             _share(f.moves, f.loose),
             _since(f),
         )
         for f in findings
     )
     note = (
-        f"changed and payload moves: share of an arm's last {LAST} logs that say so; ! asks for something to be done."
+        f"changed and payload moves: share of an arm's last {LAST} logs that say so; shift: z of its offsets and "
+        f"friction over the days, beyond {SHIFTED:g} it is another arm. ! asks for something to be done."
     )
     return Section("What to do", "\n\n".join(x for x in text if x), (Table("Arms", columns, cells, note),))
 
@@ -149,7 +162,8 @@ def _drift(rows: Sequence[dict[str, Any]], shown: Sequence[ArmFinding], n: int, 
             for j in range(n):
                 y = [float(np.mean([row[f"{name}_{j + 1}"] for row in of])) for of in logs]
                 ax.plot(x, y, ".", markersize=3, color=COLOURS[j % len(COLOURS)], label=f"joint {j + 1}")
-            _dated(ax, x, 4)
+            _dated(ax, x, 6)
+            ax.tick_params(labelsize=7)
             ax.set_title(finding.arm + (" !" if finding.advice else ""), loc="left", fontsize=8.5)
         for ax in panels[len(shown) :]:
             ax.set_visible(False)
@@ -200,7 +214,7 @@ def _dated(ax: Any, x: np.ndarray, most: int) -> None:
     if x.dtype.kind == "M":
         from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 
-        ax.xaxis.set_major_locator(locator := AutoDateLocator(minticks=2, maxticks=most))
+        ax.xaxis.set_major_locator(locator := AutoDateLocator(minticks=3, maxticks=most))
         ax.xaxis.set_major_formatter(ConciseDateFormatter(locator, show_offset=False))
 
 
