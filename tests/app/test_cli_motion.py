@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from armload.app.cli import main
-from armload.app.cli.motion_design import accuracy, joints
+from armload.app.cli.motion_arguments import accuracy, joints
 from armload.arms import arm
 from armload.motion import export_motion, load_motion
 from armload.motion.point_to_point import PointToPoint

@@ -144,6 +144,15 @@ def test_until_reaches_the_accuracy_and_half_its_time_does_not(panda, allowed):
     assert wanted.over(shorter.half_width) > 1.0
 
 
+def test_an_accuracy_that_any_motion_reaches_is_reached_by_one_that_can_be_run():
+    slow = arm("ur5e")
+    keep = Constraints(slow, [0.1, -1.2, 1.4, -1.5, -1.5, 0.2], share=0.7, payload=PayloadRange(2.0))
+    wanted = Accuracy(mass=5.0)
+    found = design_until(keep, Criterion(slow), wanted, starts=1, stages=((2, 100.0),))
+    assert problems(keep, found.motion) == []
+    assert found.motion.duration < 2.0
+
+
 def test_an_accuracy_out_of_reach_is_refused(panda, allowed):
     with pytest.raises(MotionError, match="out of reach"):
         design_until(

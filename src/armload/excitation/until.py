@@ -61,7 +61,15 @@ def design_until(
     seen: list[tuple[float, float]] = []  # log time, log of what is over
     time = _FIRST
     for _ in range(_DESIGNS):
-        found = design_motion(constraints, criterion, time, tare_time=tare_time, **settings)
+        try:
+            found = design_motion(constraints, criterion, time, tare_time=tare_time, **settings)
+        except MotionError:
+            if best is None:
+                raise
+            low, time = time, round(float(np.sqrt(time * high)), 2)  # too short for any motion
+            if high <= low * (1.0 + _CLOSE):
+                break
+            continue
         over = accuracy.over(found.half_width)
         seen.append((float(np.log(time)), float(np.log(over))))
         if over <= 1.0:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from armload.app.cli import motion_design, motion_enrich
+from armload.app.cli import motion_arguments, motion_design, motion_enrich
 from armload.app.cli.arguments import Parser, add_arm_arguments, add_column_arguments, at_least, file_name
 from armload.app.cli.named import arm_of, motion_of, payload_of
 from armload.app.cli.printing import console, print_json, print_note, table, working
@@ -47,7 +47,7 @@ def parser() -> Parser:
         "it, within a share of every limit with the worst payload there may be, clear of floor, boxes and the arm "
         "itself. It is checked 1000 times a second by other code before it is written.",
     )
-    motion_design.add_design_arguments(design)
+    motion_arguments.add_design_arguments(design)
 
     enrich = actions.add_parser(
         "enrich",

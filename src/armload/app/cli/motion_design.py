@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from armload.app.cli.arguments import add_arm_arguments, add_column_arguments, at_least, file_name
 from armload.app.cli.named import arm_of
 from armload.app.cli.printing import console, print_json, print_note, table, working
 from armload.errors import UsageError
@@ -17,147 +15,6 @@ if TYPE_CHECKING:
     from armload.excitation import Constraints, Criterion, Design, Obstacle, Surroundings
     from armload.motion import Motion
     from armload.recording import Recording
-
-_UNITS = {
-    "mass": {"g": 1e-3, "kg": 1.0, "": 1.0},
-    "moment": {"g.m": 1e-3, "kg.m": 1.0, "": 1.0},
-    "inertia": {"g.m2": 1e-3, "kg.m2": 1.0, "": 1.0},
-}
-
-
-def numbers(text: str) -> tuple[float, ...]:
-    """Numbers separated by commas.
-
-    >>> numbers("0,-0.5,1")
-    (0.0, -0.5, 1.0)
-    """
-    try:
-        return tuple(float(part) for part in text.split(","))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not possible: expected numbers separated by commas") from None
-
-
-def box(text: str) -> tuple[float, ...]:
-    """Six numbers: where a box is, and its edges."""
-    found = numbers(text)
-    if len(found) != 6:
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is not a box: expected its centre and its edges x,y,z,sx,sy,sz in m, in the base's frame"
-        )
-    return found
-
-
-def held(text: str) -> float | tuple[float, float, float]:
-    """The radius of a ball, or the edges of a box."""
-    found = numbers(text)
-    if len(found) not in (1, 3):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a body: expected a radius, or three edges sx,sy,sz, in m")
-    return found[0] if len(found) == 1 else (found[0], found[1], found[2])
-
-
-def floor(text: str) -> float | None:
-    """A height, or none."""
-    return None if text == "none" else at_least(-1e3, float, 1e3)(text)
-
-
-def joints(text: str) -> tuple[int, ...]:
-    """Joints by number, from 1.
-
-    >>> joints("1,5-7")
-    (1, 5, 6, 7)
-    """
-    out: list[int] = []
-    for part in text.split(","):
-        found = re.fullmatch(r"(\d+)(?:-(\d+))?", part.strip())
-        if found is None:
-            raise argparse.ArgumentTypeError(f"{text!r} names no joints: expected numbers from 1, such as 5-7 or 1,3")
-        out += range(int(found[1]), int(found[2] or found[1]) + 1)
-    return tuple(sorted(set(out)))
-
-
-def accuracy(text: str) -> dict[str, float]:
-    """95 % half-widths that are to be reached.
-
-    >>> accuracy("mass=10g,moment=1.5g.m,inertia=1e-3")
-    {'mass': 0.01, 'moment': 0.0015, 'inertia': 0.001}
-    """
-    out = {}
-    for part in text.replace("·", ".").replace("²", "2").split(","):
-        found = re.fullmatch(r"\s*(mass|moment|inertia)=([0-9.eE+-]+?)((?:k?g)?(?:\.m2?)?)\s*", part)
-        unit = None if found is None else _UNITS[found[1]].get(found[3])
-        try:
-            value = float(found[2]) if found is not None else 0.0
-        except ValueError:
-            value = 0.0
-        if found is None or unit is None or value <= 0.0:
-            raise argparse.ArgumentTypeError(
-                f"{text!r} is not an accuracy: expected 95 % half-widths such as mass=10g,moment=1.5g.m,inertia=1e-3"
-            )
-        out[found[1]] = value * unit
-    return out
-
-
-def add_constraint_arguments(parser: argparse.ArgumentParser) -> None:
-    """What a motion must keep to: `--share` to `--speed`."""
-    add = parser.add_argument_group("limits").add_argument
-    add("--share", type=at_least(0.01, float, 1.0), metavar="S", help="of every limit that may be used (default: 0.8)")
-    add("--travel", type=at_least(0.01, float), metavar="RAD", help="farthest of a joint from the start (default: 1)")
-    add("--speed", type=at_least(0.01, float), metavar="V", help="of the payload frame at most [m/s] (default: 1.5)")
-    add("--payload", type=at_least(0.0, float), metavar="KG", help="the heaviest there may be (default: as rated)")
-    add(
-        "--centre",
-        type=numbers,
-        metavar="X,Y,Z",
-        help="of payloads in the payload frame, to 5 cm along each axis [m] (default: 0,0,0.1)",
-    )
-    add("--floor", type=floor, metavar="Z", help="height of the floor in the base's frame [m], or none (default: 0)")
-    add("--box", type=box, action="append", default=[], metavar="X,Y,Z,SX,SY,SZ", help="an obstacle; repeat for more")
-    add(
-        "--held",
-        type=held,
-        metavar="R|SX,SY,SZ",
-        help="what is held: radius of a ball 0.1 m beyond the payload frame, or edges of a box that begins at it [m] "
-        "(default: 0.15)",
-    )
-
-
-def add_knowledge_arguments(parser: argparse.ArgumentParser) -> None:
-    """What is known besides the run: `--tare` and `--profile`."""
-    parser.add_argument(
-        "--tare",
-        metavar="LOG|MOTION|none",
-        help="an earlier run of the arm that is at hand, or none (default: the same motion is run empty before)",
-    )
-    parser.add_argument("--profile", type=file_name, metavar="P", help="what many logs said of this arm")
-    add_column_arguments(parser)
-
-
-def add_design_arguments(parser: argparse.ArgumentParser) -> None:
-    """All of `armload motion design`."""
-    add_arm_arguments(parser)
-    parser.add_argument(
-        "--from", dest="start", required=True, type=numbers, metavar="Q1,…,QN", help="start and end pose [rad]"
-    )
-    parser.add_argument("--time", type=at_least(0.2, float, 60.0), metavar="S", help="of the motion (default: 3)")
-    parser.add_argument(
-        "--until",
-        type=accuracy,
-        metavar="ACCURACY",
-        help="in place of --time: the shortest motion whose bound is within these 95 %% half-widths, such as "
-        "mass=10g,moment=1.5g.m,inertia=1e-3",
-    )
-    parser.add_argument("--joints", type=joints, metavar="5-7", help="that may move (default: all)")
-    add_knowledge_arguments(parser)
-    parser.add_argument(
-        "--tare-time",
-        type=at_least(0.2, float, 60.0),
-        metavar="S",
-        help="design an empty run of its own of so many seconds with it, written beside it as …-empty.json",
-    )
-    add_constraint_arguments(parser)
-    parser.add_argument("--seed", type=at_least(0), default=0, metavar="N", help="same seed, same motion (default: 0)")
-    parser.add_argument("--out", required=True, type=file_name, metavar="FILE", help="JSON file to write")
-    parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
 
 
 def constraints_of(options: argparse.Namespace, arm: Arm, start: Any, moving: tuple[int, ...] | None) -> Constraints:

@@ -9,13 +9,8 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from armload.app.cli.arguments import add_arm_arguments, at_least, file_name
-from armload.app.cli.motion_design import (
-    add_constraint_arguments,
-    add_knowledge_arguments,
-    constraints_of,
-    criterion_of,
-    print_widths,
-)
+from armload.app.cli.motion_arguments import add_constraint_arguments, add_knowledge_arguments
+from armload.app.cli.motion_design import constraints_of, criterion_of, print_widths
 from armload.app.cli.named import arm_of
 from armload.app.cli.printing import print_json, print_note, working
 from armload.errors import MotionError, UsageError

@@ -1,0 +1,31 @@
+"""What docs/motion.md says was measured."""
+
+import json
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = (ROOT / "docs" / "motion.md").read_text(encoding="utf-8")
+
+
+def result(name):
+    return json.loads((ROOT / "benchmarks" / "results" / f"{name}.json").read_text(encoding="utf-8"))
+
+
+def test_the_tables_of_designed_motions_are_those_of_the_committed_benchmark(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    from designed_motions import table
+
+    found = result("designed_motions")["arms"]
+    assert {"panda", "ur10e"} <= found.keys()
+    for rows in found.values():
+        assert table(rows) in PAGE
+
+
+def test_what_became_of_the_requests_is_what_was_counted_and_none_was_rejected(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    from motion_requests import sentence
+
+    found = result("motion_requests")
+    assert sentence(found) in PAGE
+    assert found["designed"] + found["refused"] == found["requests"]
+    assert found["rejected"] == []
