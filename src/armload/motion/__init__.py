@@ -8,6 +8,7 @@ from armload.lazy import on_first_use
 
 if TYPE_CHECKING:
     from armload.motion.check import MotionCheck, check_motion, rated_load
+    from armload.motion.course import Course
     from armload.motion.endless import EndlessMotion
     from armload.motion.export import export_motion
     from armload.motion.fingerprint import MotionFingerprint
@@ -15,13 +16,18 @@ if TYPE_CHECKING:
     from armload.motion.motion import Motion
     from armload.motion.motion_file import load_motion, save_motion, taie2024
     from armload.motion.random_fourier import excitation, random_motion
+    from armload.motion.sampled import SampledMotion
+    from armload.motion.straight import StraightMotion
 
 __all__ = [
+    "Course",
     "EndlessMotion",
     "FourierMotion",
     "Motion",
     "MotionCheck",
     "MotionFingerprint",
+    "SampledMotion",
+    "StraightMotion",
     "check_motion",
     "excitation",
     "export_motion",

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
-from armload.devices.ros2.commanded import CommandedMotion
 from armload.devices.ros2.connection import Ros2Connection
 from armload.devices.ros2.trajectory import TrajectoryMotion, read_trajectory
+from armload.devices.simulator.commanded import CommandedMotion
 from armload.devices.simulator.source import Simulator
 from armload.errors import ArmloadError
 from armload.inertia import InertialParameters

@@ -1,0 +1,57 @@
+"""Arms that can be moved, by name."""
+
+from __future__ import annotations
+
+from typing import Any
+from urllib.parse import urlsplit
+
+from numpy.typing import ArrayLike
+
+from armload.arms import Arm
+from armload.devices.mover import Mover
+from armload.devices.simulator.mover import SimulatedMover
+from armload.errors import SourceError
+from armload.simulation import Sensors, World
+
+SCHEMES = ("fr3", "panda", "ur", "ros2")
+
+
+def open_mover(
+    spec: str,
+    arm: Arm,
+    *,
+    at: ArrayLike | None = None,
+    payload: Any | None = None,
+    mounted: Any | None = None,
+    world: World | None = None,
+    speed: float | None = 1.0,
+    rate: float = 1000.0,
+    seed: int = 0,
+) -> Mover:
+    """Open a robot or the simulator to move it; opening moves nothing.
+
+    | spec | what |
+    |---|---|
+    | `sim` | the simulator |
+
+    Args:
+        spec: see the table.
+        arm: which it is.
+        at, payload, mounted, world, speed, rate, seed: of the simulator, with its arm's sensors (`SimulatedMover`).
+
+    Raises:
+        SourceError: no such arm, it cannot be reached, or its client is not installed.
+    """
+    if spec == "sim":
+        if at is None:
+            raise SourceError("the simulator stands nowhere: give at=…, a pose")
+        sensors = Sensors.of(arm)
+        return SimulatedMover(
+            arm, at, payload, mounted, world=world, sensors=sensors, rate=rate, speed=speed, seed=seed
+        )
+    parts = urlsplit(spec)
+    raise SourceError(
+        f"{spec} cannot be moved: expected sim, {', '.join(f'{s}://ADDRESS' for s in SCHEMES)}"
+        if parts.scheme not in SCHEMES
+        else f"{spec} cannot be moved yet"
+    )
