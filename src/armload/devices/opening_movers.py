@@ -9,6 +9,8 @@ from numpy.typing import ArrayLike
 
 from armload.arms import Arm
 from armload.devices.mover import Mover
+from armload.devices.opening import address_of
+from armload.devices.remote_mover import DetachedMover, RemoteMover
 from armload.devices.simulator.mover import SimulatedMover
 from armload.errors import SourceError
 from armload.simulation import Sensors, World
@@ -33,6 +35,9 @@ def open_mover(
     | spec | what |
     |---|---|
     | `sim` | the simulator |
+    | `ur://ADDRESS`, `ur://ADDRESS?torque_constants=12,12,10,11,11,11` | a UR arm |
+    | `fr3://ADDRESS`, `panda://ADDRESS` | a Franka robot |
+    | `ros2:///joint_states` | a ROS 2 controller, beside the topic of its joint states |
 
     Args:
         spec: see the table.
@@ -49,9 +54,19 @@ def open_mover(
         return SimulatedMover(
             arm, at, payload, mounted, world=world, sensors=sensors, rate=rate, speed=speed, seed=seed
         )
-    parts = urlsplit(spec)
-    raise SourceError(
-        f"{spec} cannot be moved: expected sim, {', '.join(f'{s}://ADDRESS' for s in SCHEMES)}"
-        if parts.scheme not in SCHEMES
-        else f"{spec} cannot be moved yet"
-    )
+    scheme = urlsplit(spec).scheme
+    if scheme not in SCHEMES:
+        raise SourceError(f"{spec} cannot be moved: expected sim, {', '.join(f'{s}://ADDRESS' for s in SCHEMES)}")
+    return DetachedMover(spec, arm)
+
+
+def moved_here(spec: str, arm: Arm) -> RemoteMover:
+    """A robot's mover in this process, as the reader's process has it."""
+    address = address_of(spec)
+    if address.scheme == "ur":
+        from armload.devices.ur.mover import URMover
+
+        return RemoteMover(URMover(address.host, arm, address.torque_constants))
+    from armload.devices.franka.mover import FrankaMover
+
+    return RemoteMover(FrankaMover(address.host, arm, address.scheme))

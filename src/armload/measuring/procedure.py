@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +29,9 @@ from armload.recording import Recording, Sample, read_recording
 
 ENOUGH = "the accuracy asked for is reached"
 _LOOK = 0.02  # [s] between two looks at the accuracy: a tenth of a braking time
+_STILL = 0.2  # [s] for which the arm must have stood before a movement: what was just put on has swung out
+_FRESH = 0.05  # [s] older samples waited somewhere, while somebody mounted the payload, say
+_TO_SETTLE = 5.0  # [s] of waiting for that
 _WARM_UP = 0.5  # [s] of the tare that the identifier is fed before the arm moves, so that all it compiles is compiled
 
 
@@ -166,11 +170,15 @@ class Procedure:
 
     def _standing(self) -> NDArray[np.float64]:
         """Where the arm is commanded to be; it must not move."""
+        begun: float | None = None  # of the newest stretch of rest, among samples that did not wait anywhere
+        asked = time.monotonic()
         for sample in self.mover:
-            if np.all(np.isfinite(sample.dq)):
-                if is_moving(sample.dq):
-                    raise SafetyError(f"{self.mover.name} moves: a measurement begins at rest; stop it first")
+            fresh = self.mover.lag() < _FRESH
+            begun = None if not fresh or is_moving(sample.dq) else sample.t if begun is None else begun
+            if begun is not None and sample.t - begun >= _STILL:
                 return self.mover.commanded()
+            if time.monotonic() - asked > _TO_SETTLE:
+                raise SafetyError(f"{self.mover.name} moves: a measurement begins at rest; stop it first")
         raise SourceError(f"{self.mover.name} ended before its first sample")
 
     def _warm(self, tare: Recording) -> OnlineIdentifier:

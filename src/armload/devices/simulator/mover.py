@@ -37,7 +37,7 @@ class SimulatedMover(StreamedMover):
         at: where it stands (n,) [rad].
         payload: what `mount` puts on; None: nothing.
         mounted: what is on from the start, unknown to the controller; None: nothing.
-        world, sensors, rate, speed, seed: see `Simulator`.
+        world, sensors, rate, speed, seed, ahead: see `Simulator`.
     """
 
     def __init__(
@@ -52,12 +52,13 @@ class SimulatedMover(StreamedMover):
         rate: float = 1000.0,
         speed: float | None = 1.0,
         seed: int = 0,
+        ahead: float = _AHEAD,
     ) -> None:
         super().__init__(arm)
         standing = StraightMotion(at, at, 1.0, "standing")
         held = [] if mounted is None else [(0.0, mounted)]
-        settings: Any = {"world": world, "sensors": sensors, "rate": rate, "speed": speed, "seed": seed}
-        self.simulator = Simulator(arm, standing, held, ahead=_AHEAD, **settings)
+        settings: Any = {"world": world, "sensors": sensors, "rate": rate, "speed": speed, "seed": seed, "ahead": ahead}
+        self.simulator = Simulator(arm, standing, held, **settings)
         self.simulator.motion = self._commanded = CommandedMotion(standing)
         self.name, self.rate, self.speed = self.simulator.name, rate, self.simulator.speed
         self._payload = payload
