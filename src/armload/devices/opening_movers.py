@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from typing import Any
-from urllib.parse import urlsplit
+from urllib.parse import parse_qs, urlsplit
 
 from numpy.typing import ArrayLike
 
@@ -11,6 +11,7 @@ from armload.arms import Arm
 from armload.devices.mover import Mover
 from armload.devices.opening import address_of
 from armload.devices.remote_mover import DetachedMover, RemoteMover
+from armload.devices.ros2.mover import CONTROLLER, Ros2Mover
 from armload.devices.simulator.mover import SimulatedMover
 from armload.errors import SourceError
 from armload.simulation import Sensors, World
@@ -37,7 +38,7 @@ def open_mover(
     | `sim` | the simulator |
     | `ur://ADDRESS`, `ur://ADDRESS?torque_constants=12,12,10,11,11,11` | a UR arm |
     | `fr3://ADDRESS`, `panda://ADDRESS` | a Franka robot |
-    | `ros2:///joint_states` | a ROS 2 controller, beside the topic of its joint states |
+    | `ros2:///joint_states?controller=/NAME` | a ROS 2 controller (default `/joint_trajectory_controller`) |
 
     Args:
         spec: see the table.
@@ -57,6 +58,10 @@ def open_mover(
     scheme = urlsplit(spec).scheme
     if scheme not in SCHEMES:
         raise SourceError(f"{spec} cannot be moved: expected sim, {', '.join(f'{s}://ADDRESS' for s in SCHEMES)}")
+    if scheme == "ros2":
+        parts = urlsplit(spec)
+        controller = parse_qs(parts.query).get("controller", [CONTROLLER])[-1]
+        return Ros2Mover(parts.netloc + parts.path, arm, controller)
     return DetachedMover(spec, arm)
 
 

@@ -156,7 +156,7 @@ class Procedure:
 
     def _again(self, consent: Callable[[Plan], bool]) -> Plan:
         """The plan of what is left, from where the arm is now; agreed to anew if that is not where it was left."""
-        at = self._standing()
+        at = self._standing(_TO_SETTLE)
         expected = self.plan.legs[-1].motion.position([0.0])[0]
         if self.tare is not None:
             first = self.plan.legs[0].motion
@@ -168,8 +168,8 @@ class Procedure:
         plan.check()
         return plan
 
-    def _standing(self) -> NDArray[np.float64]:
-        """Where the arm is commanded to be; it must not move."""
+    def _standing(self, patience: float = 0.0) -> NDArray[np.float64]:
+        """Where the arm is commanded to be; it must not move, or come to rest within `patience` [s]."""
         begun: float | None = None  # of the newest stretch of rest, among samples that did not wait anywhere
         asked = time.monotonic()
         for sample in self.mover:
@@ -177,7 +177,7 @@ class Procedure:
             begun = None if not fresh or is_moving(sample.dq) else sample.t if begun is None else begun
             if begun is not None and sample.t - begun >= _STILL:
                 return self.mover.commanded()
-            if time.monotonic() - asked > _TO_SETTLE:
+            if fresh and begun is None and time.monotonic() - asked > patience:
                 raise SafetyError(f"{self.mover.name} moves: a measurement begins at rest; stop it first")
         raise SourceError(f"{self.mover.name} ended before its first sample")
 

@@ -1,7 +1,8 @@
 """An arm for servers to move, one control cycle at a time: armload's plant in MuJoCo under its position controller.
 
-What is commanded is where the controller holds the arm; the payload is unknown to it. When nobody commands any more, the
-arm's own brake (`halt`) takes every joint to rest at a constant deceleration, as controllers do that lost their client.
+What is commanded is where the controller holds the arm; the payload is unknown to it. When nobody commands any more,
+the arm's own brake (`halt`) takes every joint to rest at a constant deceleration, as controllers do that lost their
+client.
 """
 
 import mujoco

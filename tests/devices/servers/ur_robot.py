@@ -1,14 +1,17 @@
 """A UR e-series arm that is not there and moves: what ur-rtde's control and receive interfaces want to find.
 
 RTDE (TCP 30004, both ways), the dashboard (29999) and the script port (30003). The control script that the client sends
-is not interpreted but answered as it would: commands come in integer register 0 (11 servoj, 16 stop of servoj, 34 stopj,
-35 watchdog, 65 set_target_payload, 255 end of the script, 0 none), and output register 0 says 1 for ready and 2 for
-done. A client that is gone, or silent for longer than the watchdog allows, ends the script, and the arm brakes by itself.
+is not interpreted but answered as it would: commands come in integer register 0 (11 servoj, 16 stop of servoj, 34
+stopj, 35 watchdog, 65 set_target_payload, 255 end of the script, 0 none), and output register 0 says 1 for ready and 2
+for done. A client that is gone, or silent for longer than the watchdog allows, ends the script, and the arm brakes by
+itself.
 
-It prints one JSON line per event: ready, script, servo, stopped, payload, lost, rest. A line on standard input: mount.
+It prints one JSON line per event: ready, script, moving, stopped, ended, mounted, payload, lost, rest. A line on
+standard input says mount.
 """
 
 import argparse
+import contextlib
 import json
 import os
 import socket
@@ -99,7 +102,7 @@ class Robot:
         self.ready = 1 if number in (NONE, SERVOJ) else 2
         if number == SERVOJ and self.running:
             if self.target is None:
-                say("servo")
+                say("moving")
             self.target = np.array(numbers[:6])
         elif number in (SERVO_STOP, STOPJ):
             self.target = None
@@ -190,11 +193,8 @@ def serve(address, port, how, robot):
             threading.Thread(target=quietly, args=(connection,), daemon=True).start()
 
     def quietly(connection):
-        with connection:
-            try:
-                how(connection, robot)
-            except OSError:
-                pass
+        with connection, contextlib.suppress(OSError):
+            how(connection, robot)
 
     threading.Thread(target=accept, daemon=True).start()
 

@@ -76,8 +76,8 @@ class URMover(StreamedMover):
             self._movement = None
             self._release()
             raise SafetyError(
-                f"{self.name} does not take movements ({one_line(error)}): switch it on, release its brakes, and set it "
-                "to remote control"
+                f"{self.name} does not take movements ({one_line(error)}): switch it on, release its brakes, and set "
+                "it to remote control"
             ) from None
 
     def write(self, load: Load, *, allow_undetermined_inertia: bool = False) -> Any:

@@ -1,0 +1,127 @@
+"""A Franka robot that is moved: joint positions, one a millisecond, to its own joint impedance controller.
+
+An FR3 through pylibfranka's `start_joint_position_control`. The robot ends a motion by itself, with its brake ramp, when
+commands stay away for 20 ms, jump, or pass a limit; a movement of armload's keeps the limits of acceleration and jerk
+(`Course`), but a busy machine may be late: use a real-time kernel. The Panda's Python client has no such control that
+gives way to another thread, so a Panda is moved through ROS 2.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm
+from armload.devices.franka import writer
+from armload.devices.franka.source import FrankaSource, load_client
+from armload.devices.load import Load
+from armload.devices.mover import StreamedMover
+from armload.devices.supervision import Thresholds
+from armload.errors import SafetyError, SourceError, one_line
+from armload.motion import Motion
+from armload.recording import Sample
+
+_CYCLE = 1e-3  # [s]
+
+
+class FrankaMover(StreamedMover):
+    """A Franka robot that follows motions.
+
+    Args:
+        address, arm, system: see `FrankaSource`.
+
+    Raises:
+        SourceError: the client is not installed, the robot cannot be reached, or is a Panda.
+    """
+
+    writes = True
+
+    def __init__(self, address: str, arm: Arm, system: str = "fr3") -> None:
+        super().__init__(arm)
+        if system != "fr3":
+            raise SourceError(
+                f"{system}://{address} cannot be moved: its Python client holds all else up while it does; use ROS 2"
+            )
+        self._client = load_client(system)
+        self._source = FrankaSource(address, arm, system)
+        self.name, self.rate = self._source.name, self._source.rate
+        self._control: Any = None
+        self._target: NDArray[np.float64] | None = None
+        self._arrived: float | None = None
+        self._closed = False
+
+    def __iter__(self) -> Iterator[Sample]:
+        while not self._closed:
+            state = self._state()
+            self._arrived, self._target = time.monotonic(), np.array(state.q_d)
+            sample = Sample(state.time.to_sec(), np.array(state.q), np.array(state.dq), np.array(state.tau_J))
+            movement = self._took(sample, partial(float, sample.t))
+            if self._control is not None:
+                if movement is None or movement.begun is None:
+                    self._write(self._goal, finished=True)
+                else:
+                    t = sample.t - movement.begun
+                    self._brakes(movement, t)
+                    self._write(movement.course.position([t + _CYCLE])[0])
+            yield sample
+
+    def commanded(self) -> NDArray[np.float64]:
+        """Where the controller holds the arm, q (n,) [rad]."""
+        if self._target is None:
+            self._target = np.array(self._source.state().q_d)
+        return self._target
+
+    def follow(self, motion: Motion, thresholds: Thresholds | None = None) -> None:
+        """Begin a movement with the next state."""
+        super().follow(motion, thresholds)
+        self._goal = motion.position([0.0])[0]
+        try:
+            mode = self._client.ControllerMode.JointImpedance
+            self._control = self._source.robot.start_joint_position_control(mode)
+        except Exception as error:
+            self._movement = None
+            raise SafetyError(
+                f"{self.name} does not take movements ({one_line(error)}): unlock its joints, activate FCI, and "
+                "acknowledge errors in Desk"
+            ) from None
+
+    def write(self, load: Load, *, allow_undetermined_inertia: bool = False) -> Any:
+        """Tell the controller the load, guarded (`writer.set_load`), and return the arguments."""
+        robot = self._source.robot
+        return writer.set_load(
+            robot, load, self.arm, write=True, allow_undetermined_inertia=allow_undetermined_inertia
+        )
+
+    def arrived(self) -> float | None:
+        """When the client had the state handed on last."""
+        return self._arrived
+
+    def close(self) -> None:
+        """Let go of the robot; one that moves still brakes by itself."""
+        self._closed = True
+        self._control = None
+        self._source.close()
+
+    def _state(self) -> Any:
+        if self._control is None:
+            return self._source.state()
+        try:
+            return self._control.readOnce()[0]
+        except Exception as error:
+            raise SourceError(f"{self.name} stopped by itself: {one_line(error)}") from None
+
+    def _write(self, q: NDArray[np.float64], finished: bool = False) -> None:
+        target = self._client.JointPositions(q.tolist())
+        target.motion_finished = finished
+        self._goal = q
+        try:
+            self._control.writeOnce(target)
+        except Exception as error:
+            raise SourceError(f"{self.name} stopped by itself: {one_line(error)}") from None
+        if finished:
+            self._control = None
