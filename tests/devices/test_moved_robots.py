@@ -180,11 +180,16 @@ def test_whatever_ends_it_the_arm_comes_to_rest_and_the_log_can_be_read(served):
 
 def test_the_answer_is_written_in_the_controller_s_order_after_both_runs(served):
     out = served.folder / "answer.json"
-    code, _, err = served.measure("--move", "--apply", "--mounted", "nothing", "--out", out)
+    if served.spec.startswith("ros2"):
+        assert "takes no payload" in served.measure("--move", "--apply")[2]
+        return
+    code, _, err = served.measure("--move", "--apply", "--mounted", "nothing", "--undetermined-inertia", "--out", out)
     assert code == 0, err
     answer = json.loads(out.read_text())
     truth = held_payload().parameters
-    assert answer["mass"] == pytest.approx(truth.mass, abs=0.15)
+    assert answer["mass"] == pytest.approx(
+        truth.mass, abs=0.025 * served.robot.rated_payload
+    )  # by a small, slow motion
     assert np.allclose(answer["com"], truth.com, atol=0.03)
     said = served.said()
     assert said.index("mounted") < said.index("payload")

@@ -16,6 +16,7 @@ from armload.motion import Motion, MotionCheck, StraightMotion, check_motion, ra
 APPROACH = (
     1.0  # [rad] a joint may be from where the motion begins, unless more is allowed: further should be seen first
 )
+_SHARES = (0.2, 0.1, 0.05)  # of the limits of velocity and acceleration that a straight way uses, fastest first
 _SAMPLES = 1000.0  # [Hz] at which a plan is checked, as fast as the fastest controller takes commands
 _CLEARANCES = 100.0  # [Hz] at which clearances are: at 2 m/s the tool goes 2 cm in between
 _TOO_MANY = 100_000  # samples of a check
@@ -150,9 +151,7 @@ def plan_of(
                     f"{approach:g} rad of --approach: move the arm nearer to {np.round(start, 2).tolist()}, or allow "
                     "more"
                 )
-            there = StraightMotion.slow(arm, here, start, name="a straight line in joint space")
-            between = TO_START if not legs else BACK
-            legs.append(Leg(between, there, _checked(arm, there, floor)))
+            legs.append(_way(arm, here, start, TO_START if not legs else BACK, floor))
         legs.append(Leg(purpose, way, _checked(arm, way, floor)))
         here = way.position([way.duration])[0]
 
@@ -164,6 +163,16 @@ def plan_of(
              for p, leg in zip(points, legs, strict=True)]  # fmt: skip
     every = np.concatenate(points)
     return Plan(arm, tuple(legs), np.stack([every.min(axis=0), every.max(axis=0)]), float(max(steps)))
+
+
+def _way(arm: Arm, here: NDArray[np.float64], there: NDArray[np.float64], purpose: str, floor: float | None) -> Leg:
+    """The straight way between two poses, slower where the arm is not strong enough for it with its rated payload."""
+    for share in _SHARES:
+        way = StraightMotion.slow(arm, here, there, share, "a straight line in joint space")
+        leg = Leg(purpose, way, _checked(arm, way, floor))
+        if not leg.check.problems:
+            break
+    return leg
 
 
 def _checked(arm: Arm, motion: Motion, floor: float | None) -> MotionCheck:

@@ -21,7 +21,7 @@ from armload.motion.random_fourier import filled_limits
 
 _QUINTIC = np.polynomial.Polynomial([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
 _FASTEST, _HARDEST = 15.0 / 8.0, 10.0 / np.sqrt(3.0)  # the largest |b'| and |b''|
-_SHORTEST = 0.5  # [s] also of a way of no length
+_SHORTEST = 1.0  # [s] also of a way of no length
 
 
 @dataclass(frozen=True, eq=False)

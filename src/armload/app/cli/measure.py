@@ -19,13 +19,12 @@ from armload.app.cli.arguments import (
 )
 from armload.app.cli.named import arm_of, motion_of, payload_of, read_logs, robot_of, world_of
 from armload.app.cli.printing import print_json, print_note, write_json
-from armload.errors import SafetyError, UsageError
+from armload.errors import SafetyError, SinkError, UsageError
 
 if TYPE_CHECKING:
     from armload.arms import Arm
     from armload.devices import Mover
-    from armload.identification import Identification
-    from armload.measuring import Plan
+    from armload.measuring import Measurement, Plan
     from armload.motion import Motion
 
 _EXAMPLES = """\
@@ -85,6 +84,11 @@ def parser() -> Parser:
     answer("--out", type=file_name, metavar="FILE", help="write the answer as JSON, whole or not at all")
     answer("--apply", action="store_true", help="write it to the controller, too (UR, Franka)")
     answer("--mounted", metavar="FILE", help="what was on at the empty run: JSON, franka-hand, or nothing; for --apply")
+    answer(
+        "--undetermined-inertia",
+        action="store_true",
+        help="--apply writes inertia that the runs did not determine, too",
+    )
     sim = parser.add_argument_group("the simulator (sim)").add_argument
     sim("--payload", default="test", metavar="FILE", help="what is mounted: JSON, franka-hand, or test (test)")
     sim(
@@ -139,9 +143,13 @@ def run(options: argparse.Namespace) -> int | None:
             print_json(procedure.plan.to_dict()) if options.json else print(procedure.plan)
             return None
         found = procedure.run(_consent(options), _mount(options, mover))
-        _print(found, options)
+        if options.out is not None:
+            write_json(options.out, found.to_dict())
+        for note in found.answer.notes:
+            print_note(note)
         if options.apply:
-            _apply(found.answer, mover, mounted, options)
+            _apply(found, mover, mounted, options)
+        _print(found, options)
     return None
 
 
@@ -190,13 +198,9 @@ def _mount(options: argparse.Namespace, mover: Mover) -> Callable[[], None]:
     return mount
 
 
-def _print(found: Any, options: argparse.Namespace) -> None:
+def _print(found: Measurement, options: argparse.Namespace) -> None:
     from armload.identification.text import summary
 
-    if options.out is not None:
-        write_json(options.out, found.to_dict())
-    for note in found.answer.notes:
-        print_note(note)
     logs = " and ".join(str(path) for path in (found.empty, found.loaded) if path is not None)
     print_note(f"{found.seconds:.2f} s with the payload; logs: {logs}")
     if found.reached is False:
@@ -207,18 +211,23 @@ def _print(found: Any, options: argparse.Namespace) -> None:
         print(summary(found.answer, False))
 
 
-def _apply(answer: Identification, mover: Mover, mounted: Any, options: argparse.Namespace) -> None:
+def _apply(found: Measurement, mover: Mover, mounted: Any, options: argparse.Namespace) -> None:
     from armload.devices import Load
     from armload.inertia import InertialParameters
 
-    load = Load.of(answer)
+    load = Load.of(found.answer)
     if mounted is not None:
         load = load + mounted
     elif options.mounted == "nothing":
-        load = load + InertialParameters.zero(answer.frame)
+        load = load + InertialParameters.zero(found.answer.frame)
     if not options.move and not _typed_yes("type yes to write it to the controller: "):
         raise SafetyError("nothing was written: there was no consent")
-    print_note(f"written to {mover.name}: {mover.write(load)}")
+    try:
+        sent = mover.write(load, allow_undetermined_inertia=options.undetermined_inertia)
+    except SinkError as error:
+        again = f"armload identify {found.loaded} --robot {options.robot} --tare {found.empty or options.tare}"
+        raise SinkError(f"nothing was written: {error}; `{again}` tells the answer") from None
+    print_note(f"written to {mover.name}: {sent}")
 
 
 def _simulated(options: argparse.Namespace, arm: Arm, motion: Motion, loaded: bool) -> dict[str, Any]:

@@ -1,8 +1,8 @@
 """A Franka robot that is moved: joint positions, one a millisecond, to its own joint impedance controller.
 
-An FR3 through pylibfranka's `start_joint_position_control`. The robot ends a motion by itself, with its brake ramp, when
-commands stay away for 20 ms, jump, or pass a limit; a movement of armload's keeps the limits of acceleration and jerk
-(`Course`), but a busy machine may be late: use a real-time kernel. The Panda's Python client has no such control that
+An FR3 through pylibfranka's `start_joint_position_control`. The robot ends a motion by itself, with its brake ramp,
+when commands stay away for 20 ms, jump, or pass a limit; a movement of armload's keeps the limits of acceleration and
+jerk (`Course`), but a busy machine may be late: use a real-time kernel. The Panda's Python client has no such control that
 gives way to another thread, so a Panda is moved through ROS 2.
 """
 
@@ -93,9 +93,7 @@ class FrankaMover(StreamedMover):
     def write(self, load: Load, *, allow_undetermined_inertia: bool = False) -> Any:
         """Tell the controller the load, guarded (`writer.set_load`), and return the arguments."""
         robot = self._source.robot
-        return writer.set_load(
-            robot, load, self.arm, write=True, allow_undetermined_inertia=allow_undetermined_inertia
-        )
+        return writer.set_load(robot, load, self.arm, write=True, allow_undetermined_inertia=allow_undetermined_inertia)
 
     def arrived(self) -> float | None:
         """When the client had the state handed on last."""
