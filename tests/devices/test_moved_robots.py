@@ -33,6 +33,7 @@ POSES = {
     "fr3": [0.0, -0.5, 0.1, -2.0, 0.1, 1.7, 0.5],
 }
 MAKES = {"ur": ("ur10e", "rtde_control", "ur_robot.py"), "fr3": ("fr3", "pylibfranka", "franka_robot.py")}
+MAKES["panda"] = ("panda", "panda_py", "franka_robot.py")
 MAKES["ros2"] = ("panda", None, "ros_robot.py")
 
 

@@ -166,11 +166,11 @@ def address_of(name: str) -> Address:
     stray = [key for key in asked if (parts.scheme, key) != ("ur", "torque_constants")]
     if stray:
         raise SourceError(f"{name}: unknown option {stray[0]!r}: expected the address, with ur:// ?torque_constants=…")
-    given = asked.get("torque_constants")
+    given = asked.get("torque_constants", [""])[-1]
     try:
-        constants = None if not given else [float(x) for x in given[-1].split(",")]
+        constants = [float(x) for x in given.split(",")] if "torque_constants" in asked else None
     except ValueError:
-        raise SourceError(f"{name}: torque_constants are {given[-1]!r}: expected six numbers in N·m/A") from None
+        raise SourceError(f"{name}: torque_constants are {given!r}: expected six numbers in N·m/A") from None
     return Address(parts.scheme, parts.hostname, constants)
 
 

@@ -51,8 +51,8 @@ class StraightMotion(Motion):
             value = np.array(getattr(self, name), dtype=float)
             value.setflags(write=False)
             object.__setattr__(self, name, value)
-        shape = np.shape(self.start)
-        if len(shape) != 1 or np.shape(self.stop) != shape or not np.all(np.isfinite([self.start, self.stop])):
+        start, stop = np.asarray(self.start), np.asarray(self.stop)
+        if start.ndim != 1 or stop.shape != start.shape or not np.all(np.isfinite(start + stop)):
             raise MotionError(f"the way {self.name!r} leads from {self.start} to {self.stop}: expected two poses (n,)")
         if not (np.isfinite(self.lasting) and self.lasting > 0):
             raise MotionError(f"the way {self.name!r} lasts {self.lasting} s: expected a positive time")

@@ -1,4 +1,4 @@
-"""An FR3 that is not there and moves: the Franka Control Interface, as far as joint positions need it.
+"""A Franka robot that is not there and moves: the Franka Control Interface, as far as joint positions need it.
 
 Beside what `franka_server` has: Move (TCP command 1) is answered with "motion started", from then on a packet with the
 joint positions is expected for every state, and Move is answered once more, with success, when one says that the motion
@@ -21,7 +21,8 @@ import numpy as np
 from franka_server import CONNECT, END, GET_MODEL, PORT, SET_LOAD, State, receive, say
 from simulated_arm import SimulatedArm
 
-CYCLE, VERSION = 1e-3, 10
+CYCLE = 1e-3
+VERSIONS = {"panda": 5, "fr3": 10}
 MOVE, STOP_MOVE = 1, 2
 STARTED, SUCCESS, ABORTED = 1, 0, 2
 PATIENCE = 20  # cycles without a command; libfranka's limit of lost packets
@@ -36,8 +37,9 @@ def urdf_of(robot):
     return re.sub(r"(<limit [^>]*/>)", limits, text)
 
 
-def serve(connection, client, address, body, urdf):
-    state, udp = State(VERSION), socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+def serve(connection, client, address, body, version):
+    urdf = urdf_of(body.robot)
+    state, udp = State(version), socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     udp.bind((address, 0))
     udp.setblocking(False)
     port, start, tick, move, silent, moved = None, None, 0, None, 0, False
@@ -56,8 +58,8 @@ def serve(connection, client, address, body, urdf):
                 command, number, size = struct.unpack("<3I", receive(connection, 12))
                 asked = receive(connection, size - 12)
                 if command == CONNECT:
-                    version, port = struct.unpack("<2H", asked)
-                    reply(command, number, struct.pack("<BH", 0 if version == VERSION else 1, VERSION))
+                    theirs, port = struct.unpack("<2H", asked)
+                    reply(command, number, struct.pack("<BH", 0 if theirs == version else 1, version))
                     start = time.monotonic() + 0.01
                 elif command == MOVE:
                     move, silent = number, 0
@@ -68,11 +70,11 @@ def serve(connection, client, address, body, urdf):
                     move = None
                     body.halt()
                     reply(command, number, b"\0")
-                elif command == SET_LOAD[VERSION]:
+                elif command == SET_LOAD[version]:
                     load = struct.unpack("<13d", asked)
                     say("payload", numbers=load)
                     reply(command, number, b"\0")
-                elif command == GET_MODEL:
+                elif command == GET_MODEL and version == 10:
                     reply(command, number, b"\0" + urdf.encode())
                 else:
                     reply(command, number, b"\0")
@@ -130,7 +132,7 @@ def main():
             connection, client = server.accept()
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             with connection, contextlib.suppress(OSError):
-                serve(connection, client, options.address, body, urdf_of(body.robot))
+                serve(connection, client, options.address, body, VERSIONS[options.robot])
 
 
 if __name__ == "__main__":

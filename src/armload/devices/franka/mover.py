@@ -1,13 +1,15 @@
 """A Franka robot that is moved: joint positions, one a millisecond, to its own joint impedance controller.
 
-An FR3 through pylibfranka's `start_joint_position_control`. The robot ends a motion by itself, with its brake ramp,
-when commands stay away for 20 ms, jump, or pass a limit; a movement of armload's keeps the limits of acceleration and
-jerk (`Course`), but a busy machine may be late: use a real-time kernel. The Panda's Python client has no such control that
-gives way to another thread, so a Panda is moved through ROS 2.
+An FR3 through pylibfranka's `start_joint_position_control`, a Panda through panda-python's `control_joint_position`,
+which calls back for each command and is turned inside out here (`_Called`). The robot ends a motion by itself, with its
+brake ramp, when commands stay away for 20 ms, jump, or pass a limit; a movement of armload's keeps the limits of
+acceleration and jerk (`Course`), but a busy machine may be late: use a real-time kernel.
 """
 
 from __future__ import annotations
 
+import queue
+import threading
 import time
 from collections.abc import Iterator
 from functools import partial
@@ -27,6 +29,9 @@ from armload.motion import Motion
 from armload.recording import Sample
 
 _CYCLE = 1e-3  # [s]
+_LATE = 0.01  # [s] a target may be late, half of what the robot bears
+_SILENCE = 1.0  # [s] without a state after which the robot counts as lost
+_UNFILTERED = 1000.0  # [Hz] cut-off frequency at which libfranka leaves commands as they are
 
 
 class FrankaMover(StreamedMover):
@@ -36,17 +41,13 @@ class FrankaMover(StreamedMover):
         address, arm, system: see `FrankaSource`.
 
     Raises:
-        SourceError: the client is not installed, the robot cannot be reached, or is a Panda.
+        SourceError: the client is not installed, or the robot cannot be reached.
     """
 
     writes = True
 
     def __init__(self, address: str, arm: Arm, system: str = "fr3") -> None:
         super().__init__(arm)
-        if system != "fr3":
-            raise SourceError(
-                f"{system}://{address} cannot be moved: its Python client holds all else up while it does; use ROS 2"
-            )
         self._client = load_client(system)
         self._source = FrankaSource(address, arm, system)
         self.name, self.rate = self._source.name, self._source.rate
@@ -81,8 +82,11 @@ class FrankaMover(StreamedMover):
         super().follow(motion, thresholds)
         self._goal = motion.position([0.0])[0]
         try:
-            mode = self._client.ControllerMode.JointImpedance
-            self._control = self._source.robot.start_joint_position_control(mode)
+            robot = self._source.robot
+            if hasattr(robot, "start_joint_position_control"):
+                self._control = robot.start_joint_position_control(self._client.ControllerMode.JointImpedance)
+            else:
+                self._control = _Called(robot, self._client)
         except Exception as error:
             self._movement = None
             raise SafetyError(
@@ -114,12 +118,57 @@ class FrankaMover(StreamedMover):
             raise SourceError(f"{self.name} stopped by itself: {one_line(error)}") from None
 
     def _write(self, q: NDArray[np.float64], finished: bool = False) -> None:
+        self._goal = q
         target = self._client.JointPositions(q.tolist())
         target.motion_finished = finished
-        self._goal = q
         try:
             self._control.writeOnce(target)
         except Exception as error:
             raise SourceError(f"{self.name} stopped by itself: {one_line(error)}") from None
         if finished:
             self._control = None
+
+
+class _Called:
+    """panda-python's control, which calls back for each command, as pylibfranka's, which is asked and told.
+
+    The call runs in a thread of its own; what is called waits for the next target, and holds the last one should none
+    come in time.
+    """
+
+    def __init__(self, robot: Any, client: Any) -> None:
+        self._robot, self._client = robot, client
+        self._states: queue.Queue[Any] = queue.Queue()
+        self._targets: queue.Queue[Any] = queue.Queue()
+        self._last: Any = None
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def readOnce(self) -> tuple[Any, None]:
+        """The newest state; what ended the control is raised."""
+        state = self._states.get(timeout=_SILENCE)
+        if isinstance(state, Exception):
+            raise state
+        return state, None
+
+    def writeOnce(self, target: Any) -> None:
+        """The command for that state; returns when the robot has taken the last one."""
+        self._targets.put(target)
+        if target.motion_finished:
+            self._thread.join(_SILENCE)
+
+    def _run(self) -> None:
+        try:
+            mode = self._client.ControllerMode.kJointImpedance
+            self._robot.control_joint_position(self._next, mode, False, _UNFILTERED)
+        except Exception as error:
+            self._states.put(error)
+
+    def _next(self, state: Any, _: Any) -> Any:
+        self._states.put(state)
+        try:
+            self._last = self._targets.get(timeout=_LATE)
+        except queue.Empty:
+            if self._last is None:
+                self._last = self._client.JointPositions(list(state.q_d))
+        return self._last
