@@ -155,10 +155,11 @@ def test_whatever_ends_it_the_arm_comes_to_rest_and_the_log_can_be_read(served):
         run = served.measure("--move", wait=False)
         log = served.logs / "empty.csv"
         until = time.monotonic() + 120.0
-        while not (log.exists() and log.stat().st_size > 100_000):
+        while not (log.exists() and served.said(since).count("moving") == 2):  # to the start, and then
             assert time.monotonic() < until, served.said(since)
             assert run.poll() is None, run.communicate()[1]
             time.sleep(0.02)
+        time.sleep(1.5)
         since = len(served.events)
         if how == "Ctrl-C":
             run.send_signal(signal.SIGINT)

@@ -102,6 +102,7 @@ class DetachedMover(Detached, Mover):
     def __init__(self, spec: str, arm: Arm, *, capacity: int = 8192, **options: Any) -> None:
         self.arm = arm
         self._begun = self._ended = 0
+        self._stopping = False  # once is enough: each order is answered through a pipe
         super().__init__(spec, arm, capacity=capacity, **options)
         self.writes = True  # those that are read in a process of their own have a controller that does
 
@@ -128,10 +129,12 @@ class DetachedMover(Detached, Mover):
             self._begun = self._call("begin", numbers | {"name": motion.name}, asdict(thresholds or Thresholds()))
         except SourceError as error:
             raise SafetyError(str(error)) from None
+        self._stopping = False
 
     def stop(self, why: str) -> None:
         """Let the arm come to rest."""
-        if self.moving:
+        if self.moving and not self._stopping:
+            self._stopping = True
             self._calls += 1
             self._send({"call": "stop", "number": self._calls, "arguments": [why]})
 

@@ -8,31 +8,38 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-from armload.devices.mover import Mover
-
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
+class Interruption:
+    """What was heard.
+
+    Attributes:
+        name: of the first signal; None: none came.
+    """
+
+    name: str | None = None
+
+    def heard(self, number: int, _: FrameType | None) -> None:
+        """Take note of a signal."""
+        self.name = self.name or signal.Signals(number).name
+
+
 @contextmanager
-def stopped_first(mover: Mover) -> Iterator[None]:
-    """Within, Ctrl-C (SIGINT), SIGTERM and SIGHUP only stop the arm; KeyboardInterrupt is raised at the end.
+def held_back() -> Iterator[Interruption]:
+    """Within, Ctrl-C (SIGINT), SIGTERM and SIGHUP are only noted; KeyboardInterrupt is raised at the end.
 
     In another thread than the main one, where signals do not come, nothing is changed.
     """
+    interruption = Interruption()
     if threading.current_thread() is not threading.main_thread():
-        yield
+        yield interruption
         return
-    heard: list[int] = []
-
-    def stop(number: int, _: FrameType | None) -> None:
-        heard.append(number)
-        mover.stop(f"interrupted by {signal.Signals(number).name}")
-
-    before = {number: signal.signal(number, stop) for number in _SIGNALS}
+    before = {number: signal.signal(number, interruption.heard) for number in _SIGNALS}
     try:
-        yield
+        yield interruption
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-        if heard:
+        if interruption.name is not None:
             raise KeyboardInterrupt

@@ -20,7 +20,7 @@ from armload.errors import RecordingError, SafetyError, SourceError
 from armload.identification import Identification, identify
 from armload.inertia import Z95
 from armload.measuring.accuracy import Accuracy
-from armload.measuring.interruption import stopped_first
+from armload.measuring.interruption import held_back
 from armload.measuring.plan import APPROACH, BACK, EMPTY, LOADED, TO_START, Plan, plan_of
 from armload.motion import Motion
 from armload.online import OnlineIdentifier
@@ -201,10 +201,12 @@ class Procedure:
         first, last, looked = np.inf, -np.inf, -np.inf
         recorder = None if log is None else Recorder(log, self.mover.n)
         try:
-            with stopped_first(self.mover):
+            with held_back() as interruption:
                 for sample in samples_of_movement(self.mover, leg.motion, self.thresholds):
                     if recorder is not None:
                         recorder.append(sample)
+                    if interruption.name is not None:
+                        self.mover.stop(f"interrupted by {interruption.name}")
                     first, last = min(first, sample.t), sample.t
                     if identifier is not None and self._enough(identifier, sample, sample.t - looked > _LOOK):
                         self.mover.stop(ENOUGH)

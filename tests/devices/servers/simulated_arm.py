@@ -46,6 +46,10 @@ class SimulatedArm:
         if not self.halting:
             self.speed = np.zeros(self.robot.n)
 
+    def coast(self):
+        """No new command: the target goes on as it did, as a Franka robot bears with a lost packet."""
+        self.target = self.target + self.speed * self.cycle
+
     def halt(self):
         """Come to rest by itself."""
         self.halting = True

@@ -4,7 +4,7 @@ Every `_EVERY` seconds the controller gets the next `_AHEAD` seconds of the moti
 along the path (`Course.brake`), on the topic `joint_trajectory` that ROS 2's joint trajectory controllers have, the
 scaled one of Universal Robots among them. The next one replaces it before it gets there. So the arm comes to rest on
 its path whatever becomes of this process or the network, and nothing has to notice. Each message has the stamp of the
-movement's start: clocks must agree to some milliseconds.
+movement's start on the clock of the joint states, which is the controller's.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from armload.motion import Course, Motion
 from armload.recording import Sample
 
 CONTROLLER = "/joint_trajectory_controller"
-_EVERY = 0.1  # [s] between two trajectories
-_AHEAD = 0.4  # [s] of motion in each: three may be lost
+_EVERY = 0.15  # [s] between two trajectories
+_AHEAD = 0.6  # [s] of motion in each: three may be lost
 _LEAD = 0.1  # [s] before a change reaches the arm: the message's way, and a controller's cycles
 _APART = 0.02  # [s] between points
 _SAME = 0.03  # [rad] a controller lets an arm hang below where it was sent
@@ -64,7 +64,8 @@ class Ros2Mover(StreamedMover):
                 self._seen = sample.q
             movement = self._took(sample, lambda at=sample.t: self._begins(at))
             if movement is not None:
-                t = 1e-9 * (self._connection.now() - self._start)
+                assert movement.begun is not None
+                t = sample.t - movement.begun + self._source.lag()
                 braked = movement.course.braked
                 self._brakes(movement, t + _LEAD)
                 if movement.course.braked != braked or t - self._sent >= _EVERY:
@@ -92,8 +93,9 @@ class Ros2Mover(StreamedMover):
 
     def _begins(self, t: float) -> float:
         """The start of a movement, on the samples' clock [s]."""
-        self._start, self._sent = self._connection.now() + round(1e9 * _LEAD), -np.inf
-        return t + 1e-9 * (self._start - self._source.stamp(t))
+        wait = self._source.lag() + _LEAD
+        self._start, self._sent = self._source.stamp(t) + round(1e9 * wait), -np.inf
+        return t + wait
 
     def _send(self, course: Course, t: float) -> None:
         """The piece of the motion that is ahead at t [s] on its clock."""
