@@ -50,7 +50,7 @@ class Served:
             self.env = os.environ | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_DOMAIN_ID": domain}
         else:
             self.env = dict(os.environ)
-        self.events, self.runs = [], 0
+        self.events, self.runs = [], []
         pose = np.array(POSES[self.name])
         sine = 0.12 * np.array([[1.0, 0.3, -1.6 / 3]] * len(pose)) * np.linspace(0.5, 1.0, len(pose))[:, None]
         cosine = 0.1 * np.array([[1.0, -1.0, 1.0 / 3]] * len(pose)) * np.linspace(1.0, 0.6, len(pose))[:, None]
@@ -78,9 +78,8 @@ class Served:
             time.sleep(0.02)
 
     def measure(self, *arguments, wait=True):
-        self.runs += 1
         told = f"sh -c {shlex.quote('echo mount > ' + str(self.folder / 'told'))}"
-        self.logs = self.folder / f"logs{self.runs}"
+        self.logs = self.folder / f"logs{len(self.runs)}"
         command = [self.python, "-m", "armload", "measure", self.spec, "--robot", self.name, "--method", "map"]
         command += ["--motion", self.folder / "small.json", "--dir", self.logs, "--grip", told]
         run = subprocess.Popen(
@@ -91,6 +90,7 @@ class Served:
             text=True,
             env=self.env,
         )
+        self.runs.append(run)
         threading.Thread(target=self._mount, args=(run,), daemon=True).start()
         if not wait:
             return run
@@ -106,6 +106,10 @@ class Served:
             time.sleep(0.02)
 
     def close(self):
+        for run in self.runs:  # what a failing test has left
+            run.kill()
+            if not run.stdout.closed:
+                run.communicate()
         self.process.kill()
         self.process.wait()
         self.listener.join()

@@ -30,6 +30,7 @@ from armload.motion import Course, Motion
 from armload.recording import Sample
 
 AT_START = 0.005  # [rad] between where the arm is commanded to be and where a motion begins: what rounding leaves
+_BLEND = 0.5  # [s] in which that is taken up
 SETTLE = 0.2  # [s] of samples after a movement's end, while the arm swings out
 
 
@@ -99,9 +100,9 @@ class StreamedMover(Mover):
 
     def follow(self, motion: Motion, thresholds: Thresholds | None = None) -> None:
         """Begin a movement with the next command."""
-        check_start(self, motion)
+        away = check_start(self, motion)
         self.why = self._stop_for = None
-        self._movement = _Movement(self.arm, motion, thresholds or Thresholds())
+        self._movement = _Movement(self.arm, motion, thresholds or Thresholds(), away)
 
     def stop(self, why: str) -> None:
         """Brake with the next command."""
@@ -120,6 +121,7 @@ class StreamedMover(Mover):
         t, course = sample.t - movement.begun, movement.course
         if course.braked is None:
             self._stop_for = self._stop_for or movement.supervision.problem(max(t, 0.0), sample, course)
+            self.why = self._stop_for
         if t > course.duration + SETTLE:
             self._movement = None
             return None
@@ -128,19 +130,25 @@ class StreamedMover(Mover):
     def _brakes(self, movement: _Movement, t: float) -> None:
         """Brake from t [s] on the movement's clock on, if that was asked for."""
         if self._stop_for is not None and movement.course.braked is None and t < movement.course.duration:
-            self.why = self._stop_for
             movement.course.brake(max(t, 0.0))
 
 
 class _Movement:
-    def __init__(self, arm: Arm, motion: Motion, thresholds: Thresholds) -> None:
+    def __init__(self, arm: Arm, motion: Motion, thresholds: Thresholds, away: NDArray[np.float64]) -> None:
         self.course = Course(motion, arm.limits)
         self.supervision = Supervision(arm, motion, thresholds)
         self.begun: float | None = None
+        self._away = away
+
+    def target(self, t: float) -> NDArray[np.float64]:
+        """The command q (n,) for t [s] on the movement's clock: without a jump from where the arm was held."""
+        x = min(max(t / _BLEND, 0.0), 1.0)
+        left = 1.0 - x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
+        return self.course.position([t])[0] + left * self._away
 
 
-def check_start(mover: Mover, motion: Motion) -> None:
-    """See that a movement may begin.
+def check_start(mover: Mover, motion: Motion) -> NDArray[np.float64]:
+    """See that a movement may begin; how far the arm is from its start (n,) [rad], which is at most `AT_START`.
 
     Raises:
         SafetyError: the arm moves already, or is not where the motion begins; the motion is of another arm, or does not
@@ -153,13 +161,14 @@ def check_start(mover: Mover, motion: Motion) -> None:
     q, dq, _ = motion([0.0, motion.duration])
     if np.abs(dq).max() > 1e-3:
         raise SafetyError(f"the motion {motion.name!r} does not begin and end at rest")
-    away = np.abs(q[0] - mover.commanded())
-    j = int(np.argmax(away))
-    if not away[j] <= AT_START:
+    away = mover.commanded() - q[0]
+    j = int(np.argmax(np.abs(away)))
+    if not abs(away[j]) <= AT_START:
         raise SafetyError(
-            f"{mover.arm.joint_names[j]} is {away[j]:.3f} rad from where the motion {motion.name!r} begins: move the "
-            "arm to its start first"
+            f"{mover.arm.joint_names[j]} is {abs(away[j]):.3f} rad from where the motion {motion.name!r} begins: move "
+            "the arm to its start first"
         )
+    return away
 
 
 def samples_of_movement(mover: Mover, motion: Motion, thresholds: Thresholds | None = None) -> Iterator[Sample]:

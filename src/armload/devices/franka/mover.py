@@ -68,7 +68,7 @@ class FrankaMover(StreamedMover):
                 else:
                     t = sample.t - movement.begun
                     self._brakes(movement, t)
-                    self._write(movement.course.position([t + _CYCLE])[0])
+                    self._write(movement.target(t + _CYCLE))
             yield sample
 
     def commanded(self) -> NDArray[np.float64]:
@@ -80,7 +80,7 @@ class FrankaMover(StreamedMover):
     def follow(self, motion: Motion, thresholds: Thresholds | None = None) -> None:
         """Begin a movement with the next state."""
         super().follow(motion, thresholds)
-        self._goal = motion.position([0.0])[0]
+        self._goal = self.commanded()
         try:
             robot = self._source.robot
             if hasattr(robot, "start_joint_position_control"):

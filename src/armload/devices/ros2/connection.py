@@ -90,6 +90,10 @@ class Ros2Connection:
         """
         return self._named(topic, lambda: self._node.create_publisher(kind, topic, _COMMAND_DEPTH)).publish
 
+    def listeners(self, topic: str) -> int:
+        """How many subscriptions to a topic were discovered so far."""
+        return int(self._node.count_subscribers(topic))
+
     def spin(self, timeout: float) -> None:
         """Wait up to `timeout` seconds for the next message and hand it to its callback."""
         self._executor.spin_once(timeout_sec=max(0.0, timeout))

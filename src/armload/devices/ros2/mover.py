@@ -9,6 +9,7 @@ movement's start on the clock of the joint states, which is the controller's.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from copy import copy
 from typing import Any
@@ -20,6 +21,7 @@ from armload.arms import Arm
 from armload.devices.mover import StreamedMover
 from armload.devices.ros2.source import Ros2Source
 from armload.devices.supervision import Thresholds
+from armload.errors import SafetyError
 from armload.motion import Course, Motion
 from armload.recording import Sample
 
@@ -28,6 +30,7 @@ _EVERY = 0.15  # [s] between two trajectories
 _AHEAD = 0.6  # [s] of motion in each: three may be lost
 _LEAD = 0.1  # [s] before a change reaches the arm: the message's way, and a controller's cycles
 _APART = 0.02  # [s] between points
+_TO_DISCOVER = 5.0  # [s] until a controller counts as absent
 _SAME = 0.03  # [rad] a controller lets an arm hang below where it was sent
 
 
@@ -49,8 +52,8 @@ class Ros2Mover(StreamedMover):
         self.name, self.rate = topic, self._source.rate
         self._connection = self._source.connection
         try:
-            commands = f"{controller.rstrip('/')}/joint_trajectory"
-            self._publish = self._connection.publisher(self._connection.JointTrajectory, commands)
+            self._commands = f"{controller.rstrip('/')}/joint_trajectory"
+            self._publish = self._connection.publisher(self._connection.JointTrajectory, self._commands)
         except BaseException:
             self._source.close()
             raise
@@ -80,6 +83,14 @@ class Ros2Mover(StreamedMover):
 
     def follow(self, motion: Motion, thresholds: Thresholds | None = None) -> None:
         """Begin a movement, a moment after the next sample."""
+        until = time.monotonic() + _TO_DISCOVER
+        while not self._connection.listeners(self._commands):
+            if time.monotonic() > until:
+                raise SafetyError(
+                    f"nobody listens on {self._commands}: expected a joint trajectory controller that is active; name "
+                    f"it with {self.name}?controller=/NAME"
+                )
+            self._connection.spin(_LEAD)
         super().follow(motion, thresholds)
         self._goal = motion.position([motion.duration])[0]
 

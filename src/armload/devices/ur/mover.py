@@ -57,7 +57,7 @@ class URMover(StreamedMover):
             if movement is not None and movement.begun is not None:
                 t = sample.t - movement.begun
                 self._brakes(movement, t)
-                self._servo(movement.course.position([t + _CYCLE])[0])
+                self._servo(movement.target(t + _CYCLE))
             elif self._control is not None:
                 self._release()
             yield sample
