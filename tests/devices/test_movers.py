@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from armload.arms import arm
-from armload.devices import SimulatedMover, Supervision, Thresholds
+from armload.devices import SimulatedMover, StreamedMover, Supervision, Thresholds
 from armload.errors import SafetyError, SinkError
 from armload.inertia import InertialParameters
 from armload.motion import Course, StraightMotion, random_motion, taie2024
@@ -15,6 +15,7 @@ from armload.simulation import Run, World, simulate_many
 MOTION = taie2024()
 START = MOTION.position([0.0])[0]
 RATE = 250.0
+CYCLE = 4e-3  # [s] of an arm that streams
 
 
 @pytest.fixture
@@ -165,6 +166,52 @@ def test_an_arm_of_which_nothing_is_heard_is_stopped(panda):
 def test_thresholds_are_positive(wrong):
     with pytest.raises(SafetyError, match="expected a positive number"):
         Thresholds(**wrong)
+
+
+class Obedient(StreamedMover):
+    """An arm that is where it was commanded to be a cycle ago."""
+
+    def __init__(self, robot, at):
+        super().__init__(robot)
+        self.name, self.rate, self.t, self.targets = "obedient", 1 / CYCLE, 0.0, [np.array(at)]
+
+    def __iter__(self):
+        while True:
+            self.t += CYCLE
+            sample = sample_of(self.arm, self.t, self.targets[-1])
+            movement = self._took(sample, lambda: self.t)
+            if movement is not None:
+                self._brakes(movement, self.t - movement.begun)
+                self.targets.append(movement.target(self.t - movement.begun + CYCLE))
+            yield sample
+
+    def commanded(self):
+        return self.targets[-1]
+
+    def close(self):
+        pass
+
+
+def test_what_is_left_to_the_start_is_taken_up_without_a_jump(panda):
+    left = np.array([4e-3, -4e-3, 0.0, 1e-3, 0.0, 0.0, -2e-3])
+    mover = Obedient(panda, START + left)
+    run(mover, MOTION)
+    q = np.array(mover.targets)
+    np.testing.assert_array_equal(q[0], START + left)
+    np.testing.assert_allclose(q[-1], MOTION.position([MOTION.duration])[0], atol=1e-9)
+    assert np.abs(np.diff(q, 3, axis=0)).max() < CYCLE**3 * panda.limits.jerk.min()  # within what a Panda takes
+    path = MOTION.position(np.linspace(0.0, MOTION.duration, 6001))
+    assert max(np.abs(path - pose).max(axis=1).min() for pose in q[::20]) < 5e-3
+
+
+def test_an_arm_that_does_not_follow_is_never_taken_for_one_that_arrived(panda):
+    mover = Obedient(panda, START)
+    mover.follow(StraightMotion(START, START + 0.2, 1.0))
+    for sample in mover:
+        mover.targets[-1] = START  # stuck
+        if sample.t > 1.4 or not mover.moving:
+            break
+    assert "off the path" in mover.why
 
 
 def test_the_simulator_takes_no_payload_from_us(mover):
