@@ -23,11 +23,13 @@ from simulated_arm import SimulatedArm
 
 CYCLE = 1e-3
 VERSIONS = {"panda": 5, "fr3": 10}
+FILTER = 0.01  # [s] by which it smooths commands: on a busy machine some are left out
 MOVE, STOP_MOVE = 1, 2
 STARTED, SUCCESS, ABORTED = 1, 0, 2
 PATIENCE = 300  # cycles without a command: a robot bears 20, the machines of tests are busier
-# number; q, dq, pose, twist, elbow; (of version 10) elbow valid; finished; torques, finished
-COMMANDS = {5: struct.Struct("<Q38d?7d?"), 10: struct.Struct("<Q38d2?7d?")}
+# number; q, dq, pose, twist, elbow; elbow valid, finished; torques, and of version 10 whether they are finished
+COMMANDS = {5: struct.Struct("<Q38d2?7d"), 10: struct.Struct("<Q38d2?7d?")}
+FINISHED = 40
 MOVING = struct.pack("<2B82?B", 1, 0, *[False] * 82, 2)  # joint positions, joint impedance, no errors, robot mode move
 
 
@@ -88,8 +90,8 @@ def serve(connection, client, address, body, version):
                     newest = COMMANDS[version].unpack(udp.recv(1 << 12))
             silent = 0 if newest is not None else silent + 1
             if move is not None and newest is not None:
-                body.command(newest[1:8])
-                if newest[-9]:  # finished
+                body.command(body.target + (np.array(newest[1:8]) - body.target) * CYCLE / FILTER)
+                if newest[FINISHED]:
                     reply(MOVE, move, bytes([SUCCESS]))
                     move = None
             elif move is not None and silent > PATIENCE and moved:

@@ -146,13 +146,14 @@ class _Called:
 
     def readOnce(self) -> tuple[Any, None]:
         """The newest state; what ended the control is raised."""
-        state = self._states.get(timeout=_SILENCE)
+        state = _newest(self._states, self._states.get(timeout=_SILENCE))
         if isinstance(state, Exception):
             raise state
         return state, None
 
     def writeOnce(self, target: Any) -> None:
         """The command for that state; returns when the robot has taken the last one."""
+        _newest(self._targets, None)  # what came too late for its state would delay all that follow
         self._targets.put(target)
         if target.motion_finished:
             self._thread.join(_SILENCE)
@@ -172,3 +173,12 @@ class _Called:
             if self._last is None:
                 self._last = self._client.JointPositions(list(state.q_d))
         return self._last
+
+
+def _newest(waiting: queue.Queue[Any], first: Any) -> Any:
+    """The last of what waits, which is empty then; `first` where nothing does."""
+    while True:
+        try:
+            first = waiting.get_nowait()
+        except queue.Empty:
+            return first
