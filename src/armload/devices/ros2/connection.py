@@ -48,6 +48,7 @@ class Ros2Connection:
             raise SourceError(f"ROS 2 is not there for this Python ({error}): {INSTALL}") from None
         self.JointState, self.InertiaStamped, self.JointTrajectory = JointState, InertiaStamped, JointTrajectory
         self.JointTrajectoryPoint = JointTrajectoryPoint
+        self._publishers: dict[Callable[[Any], None], Any] = {}
         self._context = rclpy.context.Context()
         try:
             rclpy.init(args=[], context=self._context, signal_handler_options=rclpy.signals.SignalHandlerOptions.NO)
@@ -88,11 +89,13 @@ class Ros2Connection:
         Raises:
             SourceError: the topic's name is not one.
         """
-        return self._named(topic, lambda: self._node.create_publisher(kind, topic, _COMMAND_DEPTH)).publish
+        made = self._named(topic, lambda: self._node.create_publisher(kind, topic, _COMMAND_DEPTH))
+        self._publishers[made.publish] = made
+        return made.publish
 
-    def listeners(self, topic: str) -> int:
-        """How many subscriptions to a topic were discovered so far."""
-        return int(self._node.count_subscribers(topic))
+    def listeners(self, publish: Callable[[Any], None]) -> int:
+        """How many subscriptions hear what `publisher` gave."""
+        return int(self._publishers[publish].get_subscription_count())
 
     def spin(self, timeout: float) -> None:
         """Wait up to `timeout` seconds for the next message and hand it to its callback."""

@@ -29,6 +29,7 @@ CONTROLLER = "/joint_trajectory_controller"
 _EVERY = 0.15  # [s] between two trajectories
 _AHEAD = 0.6  # [s] of motion in each: three may be lost
 _LEAD = 0.1  # [s] before a change reaches the arm: the message's way, and a controller's cycles
+_BEGIN = 0.5  # [s] before a movement begins, which is announced several times meanwhile
 _APART = 0.02  # [s] between points
 _TO_DISCOVER = 5.0  # [s] until a controller counts as absent
 _SAME = 0.03  # [rad] a controller lets an arm hang below where it was sent
@@ -84,7 +85,7 @@ class Ros2Mover(StreamedMover):
     def follow(self, motion: Motion, thresholds: Thresholds | None = None) -> None:
         """Begin a movement, a moment after the next sample."""
         until = time.monotonic() + _TO_DISCOVER
-        while not self._connection.listeners(self._commands):
+        while not self._connection.listeners(self._publish):
             if time.monotonic() > until:
                 raise SafetyError(
                     f"nobody listens on {self._commands}: expected a joint trajectory controller that is active; name "
@@ -104,7 +105,7 @@ class Ros2Mover(StreamedMover):
 
     def _begins(self, t: float) -> float:
         """The start of a movement, on the samples' clock [s]."""
-        wait = self._source.lag() + _LEAD
+        wait = self._source.lag() + _BEGIN
         self._start, self._sent = self._source.stamp(t) + round(1e9 * wait), -np.inf
         return t + wait
 
