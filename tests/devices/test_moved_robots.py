@@ -81,6 +81,7 @@ class Served:
         told = f"sh -c {shlex.quote('echo mount > ' + str(self.folder / 'told'))}"
         self.logs = self.folder / f"logs{len(self.runs)}"
         command = [self.python, "-m", "armload", "measure", self.spec, "--robot", self.name, "--method", "map"]
+        command += ["--off-path", "0.3"]  # a busy machine is late: what stops an arm off its path is in test_movers.py
         command += ["--motion", self.folder / "small.json", "--dir", self.logs, "--grip", told]
         run = subprocess.Popen(
             [*HEARS_CTRL_C, *map(str, command), *map(str, arguments)],
