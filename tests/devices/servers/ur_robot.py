@@ -28,7 +28,7 @@ from ur_server import kind as kind_of_output
 from armload.arms import ARMS
 
 CYCLE = 2e-3
-FILTER = 0.02  # [s] servoj follows its targets so much later
+FILTER = 0.08  # [s] servoj follows its targets so much later: it looks 0.1 s ahead
 ANSWERS = {
     "PolyscopeVersion": "URSoftware 5.12.0.1101534 (Nov 01 2023)",
     "get serial number": "20225500001",
