@@ -54,6 +54,10 @@ class SourceError(ArmloadError, ConnectionError):
     """A robot, topic or file that cannot be opened as a stream, or that was lost."""
 
 
+class SafetyError(ArmloadError, RuntimeError):
+    """A movement that must not begin, or that was stopped."""
+
+
 class SinkError(ArmloadError, ValueError):
     """A payload that cannot be exported, or must not be written to a robot."""
 

@@ -252,6 +252,22 @@ def test_a_trajectory_the_arm_cannot_run_is_refused(panda):
     assert "end at rest" in refusal(names, (1.0, start, np.ones(7), none))
 
 
+def test_times_of_a_trajectory_count_from_its_stamp_and_what_is_over_is_left_out(panda):
+    motion, start = taie2024(), 1_700_000_000 * SECOND
+    message = trajectory(panda.joint_names, sampled(motion, list(range(7)), lead=0.0))
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(start, SECOND)
+    late = 1.234
+    now = tuple(x[0] for x in motion([late]))
+    read = read_trajectory(message, panda, now, start + round(late * SECOND))
+    assert read.duration == pytest.approx(motion.duration - late)
+    t = np.linspace(0.0, read.duration, 301)
+    assert np.abs(read.position(t) - motion.position(late + t)).max() < 1e-5
+    with pytest.raises(MotionError, match=r"was over 1\.000 s before it could begin"):
+        read_trajectory(message, panda, now, start + 7 * SECOND)
+    message.header.stamp.sec = message.header.stamp.nanosec = 0  # without one it begins at once
+    assert read_trajectory(message, panda, at_rest(motion.position([0.0])[0]), start).duration == motion.duration
+
+
 def test_an_order_replaces_the_motion_without_a_jump_and_keeps_what_was_asked_for(panda):
     motion = taie2024()
     commanded = CommandedMotion(motion)

@@ -14,13 +14,17 @@ if TYPE_CHECKING:
     from armload.devices.franka.source import FrankaSource
     from armload.devices.guard import check_writable, flange_of, is_moving
     from armload.devices.load import Load, about, read_load
+    from armload.devices.mover import Mover, StreamedMover, samples_of_movement
     from armload.devices.opening import open_source
+    from armload.devices.opening_movers import open_mover
     from armload.devices.recorder import Recorded, Recorder
     from armload.devices.ring import Ring, RingReader
     from armload.devices.ros2.connection import Ros2Connection
     from armload.devices.ros2.source import Ros2Source
+    from armload.devices.simulator.mover import SimulatedMover
     from armload.devices.simulator.source import Simulator
     from armload.devices.source import Source
+    from armload.devices.supervision import Supervision, Thresholds
     from armload.devices.ur.form import URPayload, ur_payload
     from armload.devices.ur.source import URSource
 
@@ -32,6 +36,7 @@ __all__ = [
     "FrankaLoad",
     "FrankaSource",
     "Load",
+    "Mover",
     "Recorded",
     "Recorder",
     "Replay",
@@ -39,8 +44,12 @@ __all__ = [
     "RingReader",
     "Ros2Connection",
     "Ros2Source",
+    "SimulatedMover",
     "Simulator",
     "Source",
+    "StreamedMover",
+    "Supervision",
+    "Thresholds",
     "URPayload",
     "URSource",
     "about",
@@ -49,8 +58,10 @@ __all__ = [
     "flange_of",
     "franka_load",
     "is_moving",
+    "open_mover",
     "open_source",
     "read_load",
+    "samples_of_movement",
     "ur_payload",
 ]
 

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
 from armload.devices.franka.source import FrankaStatus
@@ -42,6 +42,7 @@ _TO_START = 60.0  # [s] to import what is needed, and to open what is no robot
 _TO_CONNECT = 10.0
 _TO_OBEY = 10.0  # [s]
 _TO_END = 3.0  # [s]
+TO_REST = 6.0  # [s] a moving arm may take to come to rest, which is longer than any braking time that is tried
 
 
 class Detached(Source):
@@ -65,6 +66,8 @@ class Detached(Source):
         SourceError: the source cannot be opened; the message is the reader's.
     """
 
+    _moves = False  # whether the process moves the arm, too
+
     def __init__(
         self,
         spec: str,
@@ -84,7 +87,8 @@ class Detached(Source):
         self._closed = False
         self._twin = twin
         self._waiting = threading.Lock()  # held while the ring and the pipes are in use
-        self._ring = Ring.create(2 + 3 * arm.n, capacity)  # the last column: when the sample arrived
+        # beside the sample: when it arrived, and of a mover how many movements have ended
+        self._ring = Ring.create(2 + 3 * arm.n + self._moves, capacity)
         self._reader = RingReader(self._ring)
         self._wake, wake = os.pipe()
         self._status, status = os.pipe()
@@ -112,7 +116,8 @@ class Detached(Source):
         if options.get("payloads"):
             options["payloads"] = payloads_to_json(options["payloads"])
         kept = None if record is None else str(record)
-        self._send({"spec": spec, "arm": arm_to_json(arm), "options": options, "record": kept})
+        order = {"spec": spec, "arm": arm_to_json(arm), "options": options, "record": kept, "moves": self._moves}
+        self._send(order)
         connecting = False
         try:
             event = self._event(_TO_START)
@@ -142,8 +147,12 @@ class Detached(Source):
                 if not len(rows) and not os.read(self._wake, 1 << 16) and self._reader.next >= self._ring.written:
                     return self._raise_error_of_end()
             for row in rows:
-                self._arrived = float(row[-1])
-                yield Sample(float(row[0]), row[1 : n + 1], row[n + 1 : 2 * n + 1], row[2 * n + 1 : -1])
+                self._note(row[3 * n + 1 :])
+                yield Sample(float(row[0]), row[1 : n + 1], row[n + 1 : 2 * n + 1], row[2 * n + 1 : 3 * n + 1])
+
+    def _note(self, beside: NDArray[np.float64]) -> None:
+        """Keep what comes beside a sample."""
+        self._arrived = float(beside[0])
 
     def arrived(self) -> float | None:
         """When the sample handed on last came to the reader; one clock runs for all processes of a machine."""
@@ -179,7 +188,7 @@ class Detached(Source):
         with contextlib.suppress(OSError):
             stdin.close()
         try:
-            self.process.wait(_TO_END)
+            self.process.wait(_TO_END + self._moves * TO_REST)
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()

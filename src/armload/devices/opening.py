@@ -6,7 +6,7 @@ import contextlib
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.parse import parse_qs, urlsplit
 
 from armload.arms import Arm, rated_mass
@@ -143,10 +143,21 @@ def prepare(spec: str) -> str | None:
     return None
 
 
-def _robot(name: str, arm: Arm, torque_constants: Sequence[float] | None) -> Source:
+class Address(NamedTuple):
+    """A robot's, from scheme://HOST?torque_constants=…; the constants (6,) in N·m/A, of a UR arm."""
+
+    scheme: str
+    host: str
+    torque_constants: list[float] | None
+
+
+def address_of(name: str) -> Address:
+    """What a robot's address says.
+
+    Raises:
+        SourceError: it names no robot, or has an option that there is not.
+    """
     parts = urlsplit(name)
-    if parts.scheme == "ros2":
-        return Ros2Source(parts.netloc + parts.path, arm)  # ros2://joint_states means the same
     if not parts.hostname:
         raise SourceError(
             f"{name} names no robot: expected {parts.scheme}://ADDRESS, such as {parts.scheme}://172.16.0.2"
@@ -155,17 +166,22 @@ def _robot(name: str, arm: Arm, torque_constants: Sequence[float] | None) -> Sou
     stray = [key for key in asked if (parts.scheme, key) != ("ur", "torque_constants")]
     if stray:
         raise SourceError(f"{name}: unknown option {stray[0]!r}: expected the address, with ur:// ?torque_constants=…")
-    if parts.scheme == "ur":
-        given = asked.get("torque_constants")
-        if given:
-            try:
-                torque_constants = [float(x) for x in given[-1].split(",")]
-            except ValueError:
-                raise SourceError(
-                    f"{name}: torque_constants are {given[-1]!r}: expected six numbers in N·m/A"
-                ) from None
-        return URSource(parts.hostname, arm, torque_constants)
-    return FrankaSource(parts.hostname, arm, parts.scheme)
+    given = asked.get("torque_constants", [""])[-1]
+    try:
+        constants = [float(x) for x in given.split(",")] if "torque_constants" in asked else None
+    except ValueError:
+        raise SourceError(f"{name}: torque_constants are {given!r}: expected six numbers in N·m/A") from None
+    return Address(parts.scheme, parts.hostname, constants)
+
+
+def _robot(name: str, arm: Arm, torque_constants: Sequence[float] | None) -> Source:
+    parts = urlsplit(name)
+    if parts.scheme == "ros2":
+        return Ros2Source(parts.netloc + parts.path, arm)  # ros2://joint_states means the same
+    address = address_of(name)
+    if address.scheme == "ur":
+        return URSource(address.host, arm, address.torque_constants or torque_constants)
+    return FrankaSource(address.host, arm, address.scheme)
 
 
 def _simulator(

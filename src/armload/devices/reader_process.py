@@ -25,19 +25,23 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from armload.devices.opening import open_source, prepare
+from armload.devices.opening_movers import moved_here
 from armload.devices.order import arm_from_json, payloads_from_json
 from armload.devices.recorder import Recorder
+from armload.devices.remote_mover import RemoteMover
 from armload.devices.ring import Ring
 from armload.devices.source import Source
 from armload.errors import ArmloadError, SourceError
 from armload.extras import missing
 
-_CALLS = ("read_once", "set_load")  # what may be asked of the source from outside
+_CALLS = ("read_once", "set_load")  # what may be asked of a source from outside
+_ORDERS = ("begin", "stop", "whereabouts", "put")  # and of a mover
 _PATIENCE = 1.0  # [s] a source may take to end before the process does
 _PR_SET_PDEATHSIG = 1  # of prctl(2): the signal this process gets when the thread that started it ends
 
@@ -68,7 +72,8 @@ class _Reader:
                 if silent is not None:
                     self.report(event="connecting", message=silent)
                 with contextlib.nullcontext() if silent is None else _ended_with_its_starter():
-                    source = open_source(order["spec"], arm, detached=False, **options)
+                    opens = moved_here if order["moves"] else partial(open_source, detached=False)
+                    source = opens(order["spec"], arm, **options)
                 stack.enter_context(source)
                 record = order["record"]
                 recorder = None if record is None else stack.enter_context(Recorder(record, source.n))
@@ -85,13 +90,16 @@ class _Reader:
 
     def pass_on(self, source: Source, recorder: Recorder | None) -> None:
         row = np.empty(self.ring.columns)
+        last = 2 + 3 * source.n
         for sample in source:
             arrived = source.arrived()
             arrived = time.monotonic() if arrived is None else arrived
             if recorder is not None:
                 recorder.append(sample)
-            row[0], row[-1] = sample.t, arrived
-            row[1:-1] = np.concatenate(sample[1:])
+            row[0], row[last - 1] = sample.t, arrived
+            row[1 : last - 1] = np.concatenate(sample[1:])
+            if isinstance(source, RemoteMover):
+                row[last] = source.ended
             self.ring.write(row)
             with contextlib.suppress(BlockingIOError, BrokenPipeError):  # nobody is waiting, or nobody is there
                 os.write(self.wake, b".")
@@ -101,7 +109,8 @@ class _Reader:
     def obey(self, source: Source, command: dict[str, Any]) -> None:
         method = command["call"]
         try:
-            if method not in _CALLS or not hasattr(source, method):
+            allowed = _ORDERS if isinstance(source, RemoteMover) else _CALLS
+            if method not in allowed or not hasattr(source, method):
                 raise SourceError(f"{source.name} has no {method}: only a Franka robot has")
             value = getattr(source, method)(*command["arguments"])
             self.report(event="answer", number=command["number"], value=value)
@@ -112,6 +121,8 @@ class _Reader:
         """Take commands until standard input ends; then end the source, and if it does not, the process."""
         for line in lines:
             self.commands.put(json.loads(line))
+        if isinstance(source, RemoteMover):  # whoever started it has ended: the arm comes to rest first
+            source.come_to_rest()
         watch = threading.Timer(_PATIENCE, os._exit, [0])  # the record needs no closing
         watch.daemon = True
         watch.start()
@@ -157,5 +168,6 @@ def _lines(descriptor: int) -> Iterator[bytes]:
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)  # a closed terminal ends the starter, which stops the arm
     _silence_clients()
     _Reader(*map(int, sys.argv[1:4])).run()

@@ -8,6 +8,7 @@ from armload.lazy import on_first_use
 
 if TYPE_CHECKING:
     from armload.motion.check import MotionCheck, check_motion, rated_load
+    from armload.motion.course import Course
     from armload.motion.endless import EndlessMotion
     from armload.motion.export import export_motion
     from armload.motion.fingerprint import MotionFingerprint
@@ -16,16 +17,21 @@ if TYPE_CHECKING:
     from armload.motion.motion_file import load_motion, save_motion, taie2024
     from armload.motion.path import PathMotion
     from armload.motion.random_fourier import excitation, random_motion
+    from armload.motion.sampled import SampledMotion
     from armload.motion.spline import SplineMotion
+    from armload.motion.straight import StraightMotion
 
 __all__ = [
+    "Course",
     "EndlessMotion",
     "FourierMotion",
     "Motion",
     "MotionCheck",
     "MotionFingerprint",
     "PathMotion",
+    "SampledMotion",
     "SplineMotion",
+    "StraightMotion",
     "check_motion",
     "excitation",
     "export_motion",

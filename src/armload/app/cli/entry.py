@@ -38,6 +38,7 @@ COMMANDS = {
     "identify": "tell from a log what the robot holds: mass, centre of mass, inertia, with 95 % intervals",
     "profile": "learn an arm from its logs, of many days: a tare that outlives the day; or show what is known of it",
     "survey": "tell of thousands of logs, of many arms, what was held, when, how heavy, and which arm drifts",
+    "measure": "move the robot, without and with the payload, and identify it: the whole procedure in one command",
     "live": "identify while the robot runs, or a simulated one, or a log: a page in the browser, or lines of JSON",
     "export": "write what was identified in a controller's or simulator's form: Franka, UR, URDF, MJCF, SDF, ROS 2",
     "methods": "list the methods of identification: when to use each, its source, and what is left out",

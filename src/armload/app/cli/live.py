@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from typing import TYPE_CHECKING
-from urllib.parse import urlsplit
 
 from armload.app.cli.arguments import (
     Parser,
@@ -15,7 +14,7 @@ from armload.app.cli.arguments import (
     at_least,
     file_name,
 )
-from armload.app.cli.named import arm_of, columns_of, payload_of, read_logs
+from armload.app.cli.named import arm_of, columns_of, payload_of, read_logs, robot_of
 from armload.app.cli.printing import print_note
 from armload.errors import ArmloadError, UsageError
 
@@ -36,7 +35,6 @@ examples:
 The page is for this machine only (http://127.0.0.1:8080) unless --host says otherwise: whoever can open it can read
 everything on it, switch the method and tare. Nothing is written to the robot.
 """
-_SIMULATED = "panda"
 
 
 def _speed(text: str) -> float | None:
@@ -105,7 +103,7 @@ def run(options: argparse.Namespace) -> int | None:
     from armload.posterior import load_profile
     from armload.recording import ColumnSpec, check_own_measurements, has_topics
 
-    options.robot = options.robot or _robot_of(options.source)
+    options.robot = options.robot or robot_of(options.source)
     arm = _arm_of(options)
     if options.learn and options.profile is None:
         raise UsageError("--learn adds to a profile, but there is no --profile; make one with `armload profile`")
@@ -192,16 +190,3 @@ def _serve(session, options: argparse.Namespace) -> int | None:
         return 0 if session.error is None else 2  # reported when it happened
     finally:
         page.close()
-
-
-def _robot_of(source: str) -> str:
-    """The robot where --robot does not name one."""
-    from armload.arms import ARMS
-
-    if source == "sim":
-        return _SIMULATED
-    scheme = urlsplit(source).scheme if "://" in source else None
-    known = [name for name, facts in ARMS.items() if scheme is not None and facts.scheme == scheme]
-    if len(known) != 1:
-        raise UsageError(f"{source}: name the robot with --robot, such as --robot {_SIMULATED}")
-    return known[0]

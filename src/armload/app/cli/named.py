@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
 
 from armload.app.cli.arguments import AS_NAMED
 from armload.app.cli.printing import print_note
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from armload.payloads import Payload
     from armload.recording import ColumnSpec, Recording
     from armload.simulation import World
+
+_SIMULATED = "panda"
 
 
 def columns_of(options: argparse.Namespace, of_tare: bool = False) -> ColumnSpec:
@@ -132,6 +135,19 @@ def payload_of(name: str, arm: Arm | None = None) -> InertialParameters:
     if not payload.inertia_known:
         print_note(f"{name}: {INERTIA_ASSUMED}")
     return payload.parameters
+
+
+def robot_of(source: str) -> str:
+    """The robot of a source where --robot does not name one."""
+    from armload.arms import ARMS
+
+    if source == "sim":
+        return _SIMULATED
+    scheme = urlsplit(source).scheme if "://" in source else None
+    known = [name for name, facts in ARMS.items() if scheme is not None and facts.scheme == scheme]
+    if len(known) != 1:
+        raise UsageError(f"{source}: name the robot with --robot, such as --robot {_SIMULATED}")
+    return known[0]
 
 
 def motion_of(name: str, arm: Arm) -> Motion:

@@ -79,7 +79,7 @@ class FrankaSource(Source):
 
     def __iter__(self) -> Iterator[Sample]:
         while not self._closed:
-            state = self._state()
+            state = self.state()
             self._arrived = time.monotonic()  # the client drops all but the newest state
             yield Sample(state.time.to_sec(), np.array(state.q), np.array(state.dq), np.array(state.tau_J))
 
@@ -94,7 +94,7 @@ class FrankaSource(Source):
 
     def read_once(self) -> FrankaStatus:
         """The robot's present velocity and the masses it counts with."""
-        state = self._state()
+        state = self.state()
         return FrankaStatus([float(x) for x in state.dq], float(state.m_ee), float(state.m_load))
 
     def set_load(self, mass: float, com: ArrayLike, inertia: ArrayLike) -> None:
@@ -119,7 +119,8 @@ class FrankaSource(Source):
             raise SourceError(f"{self.name} is closed: open it again")
         return robot
 
-    def _state(self) -> Any:
+    def state(self) -> Any:
+        """The newest state, in the client's own form."""
         robot = self._robot()
         try:
             return robot.read_once()

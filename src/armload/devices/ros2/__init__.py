@@ -8,13 +8,13 @@ from armload.lazy import on_first_use
 
 if TYPE_CHECKING:
     from armload.devices.ros2.announcement import announced
-    from armload.devices.ros2.commanded import CommandedMotion
     from armload.devices.ros2.connection import Ros2Connection
     from armload.devices.ros2.messages import message_of, parameters_of
     from armload.devices.ros2.payload_node import PayloadNode
     from armload.devices.ros2.robot_node import RobotNode
     from armload.devices.ros2.source import Ros2Source
     from armload.devices.ros2.trajectory import TrajectoryMotion, read_trajectory
+    from armload.devices.simulator.commanded import CommandedMotion
 
 __all__ = [
     "CommandedMotion",

@@ -29,7 +29,7 @@ class Ros2Connection:
         name: of the node: letters, digits and underscores.
 
     Attributes:
-        JointState, InertiaStamped, JointTrajectory: the message types.
+        JointState, InertiaStamped, JointTrajectory, JointTrajectoryPoint: the message types.
 
     Raises:
         SourceError: ROS 2 is not installed for this Python, or does not start.
@@ -43,10 +43,12 @@ class Ros2Connection:
             import rclpy.signals  # type: ignore[import-not-found]
             from geometry_msgs.msg import InertiaStamped  # type: ignore[import-not-found]
             from sensor_msgs.msg import JointState  # type: ignore[import-not-found]
-            from trajectory_msgs.msg import JointTrajectory  # type: ignore[import-not-found]
+            from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # type: ignore[import-not-found]
         except ImportError as error:
             raise SourceError(f"ROS 2 is not there for this Python ({error}): {INSTALL}") from None
         self.JointState, self.InertiaStamped, self.JointTrajectory = JointState, InertiaStamped, JointTrajectory
+        self.JointTrajectoryPoint = JointTrajectoryPoint
+        self._publishers: dict[Callable[[Any], None], Any] = {}
         self._context = rclpy.context.Context()
         try:
             rclpy.init(args=[], context=self._context, signal_handler_options=rclpy.signals.SignalHandlerOptions.NO)
@@ -87,7 +89,13 @@ class Ros2Connection:
         Raises:
             SourceError: the topic's name is not one.
         """
-        return self._named(topic, lambda: self._node.create_publisher(kind, topic, _COMMAND_DEPTH)).publish
+        made = self._named(topic, lambda: self._node.create_publisher(kind, topic, _COMMAND_DEPTH))
+        self._publishers[made.publish] = made
+        return made.publish
+
+    def listeners(self, publish: Callable[[Any], None]) -> int:
+        """How many subscriptions hear what `publisher` gave."""
+        return int(self._publishers[publish].get_subscription_count())
 
     def spin(self, timeout: float) -> None:
         """Wait up to `timeout` seconds for the next message and hand it to its callback."""

@@ -1,8 +1,8 @@
 """The simulated robot as a ROS 2 node: joint states out, joint trajectories in.
 
 What Gazebo and ROS do in the paper (Taie et al., RA-L 2024, Section IV). The physics is `devices.Simulator`: computed a
-quarter of a second ahead, published in real time. A trajectory counts from the end of what is computed already, and
-replaces the one before it, as ROS 2's joint trajectory controller has it.
+moment ahead, published in real time. A trajectory begins at the end of what is computed already, and replaces the one
+before it, as ROS 2's joint trajectory controller has it.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
-from armload.devices.ros2.commanded import CommandedMotion
 from armload.devices.ros2.connection import Ros2Connection
 from armload.devices.ros2.trajectory import TrajectoryMotion, read_trajectory
+from armload.devices.simulator.commanded import CommandedMotion
 from armload.devices.simulator.source import Simulator
 from armload.errors import ArmloadError
 from armload.inertia import InertialParameters
@@ -24,6 +24,7 @@ from armload.motion import EndlessMotion, Motion
 from armload.recording import Sample
 from armload.simulation import Sensors, World
 
+_AHEAD = 0.04  # [s] computed at once
 _LOOK = 0.1  # [s] at most between two looks at whether somebody interrupts
 
 
@@ -70,10 +71,10 @@ class RobotNode:
             motion = TrajectoryMotion([0.0, 1.0], np.array([first, first]), name="standing")
         self._commanded = CommandedMotion(EndlessMotion(motion))
         self._simulator = Simulator(
-            arm, motion, [(0.0, payload)], world=world, sensors=sensors, rate=rate, speed=None, seed=seed
+            arm, motion, [(0.0, payload)], world=world, sensors=sensors, rate=rate, speed=None, seed=seed, ahead=_AHEAD
         )
         self._simulator.motion = self._commanded
-        self._stopped = False
+        self._stopped, self._began = False, 0
         self._publish = connection.publisher(connection.JointState, states)
         connection.subscribe(connection.JointTrajectory, commands, self._take)
 
@@ -82,12 +83,16 @@ class RobotNode:
         start = None
         for sample in self._simulator:
             if start is None:  # by now what the simulation needs is loaded
-                start = self._connection.now()
+                start = self._began = self._connection.now()
             stamp = start + round(sample.t * 1e9)
             self._wait_until(stamp)
             if self._stopped:
                 break
             self._publish(self._message(sample, stamp))
+
+    def hold(self, payload: InertialParameters | None) -> None:
+        """Another payload from now on; None: nothing is held."""
+        self._simulator.hold(payload)
 
     def stop(self) -> None:
         """Let `run` end; from any thread."""
@@ -104,7 +109,8 @@ class RobotNode:
     def _take(self, message: Any, _: int) -> None:
         """A trajectory has come."""
         try:
-            motion = read_trajectory(message, self._arm, self._commanded.state)
+            now = self._began + round(1e9 * self._commanded.asked)
+            motion = read_trajectory(message, self._arm, self._commanded.state, now)
         except ArmloadError as error:
             self._say(f"a trajectory was refused: {error}")
             return

@@ -95,11 +95,15 @@ class TrajectoryMotion(Motion):
 
 
 def read_trajectory(
-    message: Any, arm: Arm, start: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+    message: Any,
+    arm: Arm,
+    start: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    now: int | None = None,
 ) -> TrajectoryMotion:
     """The motion that a JointTrajectory asks of an arm commanded to be at `start`: q, dq and ddq, each (n,).
 
-    It begins at once, whatever the header's stamp, and blends into the points from the state the arm is in.
+    It blends into the points from the state the arm is in. Its times count from the header's stamp, and points that are
+    over by `now`, when the motion begins [ns since 1970], are left out; without a stamp, or a `now`, it begins at once.
 
     Raises:
         MotionError: joints that are not the arm's, all of them once; no points; points that lack positions, go back in
@@ -115,6 +119,13 @@ def read_trajectory(
     if not points:
         raise MotionError("the trajectory has no points: expected at least one")
     times = np.array([p.time_from_start.sec + 1e-9 * p.time_from_start.nanosec for p in points])
+    stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
+    if now is not None and stamp:
+        times = times - 1e-9 * (now - stamp)
+        ahead = times > _LOOK
+        if not ahead.any():
+            raise MotionError(f"the trajectory was over {-times[-1]:.3f} s before it could begin")
+        times, points = times[ahead], [point for point, kept in zip(points, ahead, strict=True) if kept]
     positions, *rest = [_column(points, kind, order) for kind in ("positions", "velocities", "accelerations")]
     velocities, accelerations = rest if rest[0] is not None else (None, None)
     if positions is None:

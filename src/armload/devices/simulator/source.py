@@ -48,6 +48,7 @@ class Simulator(Source):
         speed: 1: real time; 2: twice as fast; None: as fast as possible.
         duration: [s]; None: for ever.
         seed: of the sensors' noise and of a random motion.
+        ahead: how much is computed at once [s].
 
     Raises:
         PayloadError: times out of order, or a payload that is none.
@@ -67,6 +68,7 @@ class Simulator(Source):
         speed: float | None = 1.0,
         duration: float | None = None,
         seed: int = 0,
+        ahead: float = _PIECE,
     ) -> None:
         if motion is None:
             motion = excitation(arm, seed)
@@ -79,6 +81,8 @@ class Simulator(Source):
         self._world, self._sensors, self._seed = world, sensors, seed
         self._end = None if duration is None else round(duration * rate)
         self._pace = Pace(speed)
+        self._piece = max(2, round(ahead * rate))
+        self._row = 0  # the first that is not computed yet
         self.speed = speed or 1.0
 
     def __iter__(self) -> Iterator[Sample]:
@@ -96,29 +100,42 @@ class Simulator(Source):
         """When the sample handed on last was due; None without a clock."""
         return self._pace.due
 
+    def hold(self, payload: Any | None) -> None:
+        """Another payload from the next sample on that is not computed yet; None: nothing is held.
+
+        Raises:
+            PayloadError: it is none.
+        """
+        times, held = _schedule([(self._row / self.rate, payload)], self.arm)
+        before = self._times < times[1]
+        self._payloads = [*(p for p, kept in zip(self._payloads, before, strict=True) if kept), held[1]]
+        self._times = np.append(self._times[before], times[1])
+
     def truth(self, t: float) -> InertialParameters:
         """What the arm holds at time t; ten zeros where it holds nothing."""
         return self._payloads[int(np.searchsorted(self._times, t, side="right")) - 1]
 
     def _pieces(self) -> Iterator[tuple[NDArray, NDArray, NDArray, NDArray]]:
         """The run, as the sensors show it, in pieces that end where the payload changes."""
-        changes = np.ceil(np.maximum(self._times, 0.0) * self.rate - 1e-9).astype(
-            int
-        )  # rows; what changes in one, the last wins
-        start = int(np.searchsorted(changes, 0, side="right")) - 1
+        start = int(np.searchsorted(self._changes(), 0, side="right")) - 1
         run = ContinuedRun(
             self.arm, self.motion, self._payloads[start], world=self._world, rate=self.rate, seed=self._seed
         )
-        row, piece, before = 0, max(2, round(_PIECE * self.rate)), None
-        while self._end is None or row < self._end:
+        before = None
+        while self._end is None or self._row < self._end:
+            row, changes = self._row, self._changes()
             k = int(np.searchsorted(changes, row, side="right"))
             if row and changes[k - 1] == row:
                 run.hold(self._payloads[k - 1])
-            stops = [row + piece, *changes[k : k + 1].tolist(), *([] if self._end is None else [self._end])]
-            exact = run.advance(min(stops) - row)
+            stops = [row + self._piece, *changes[k : k + 1].tolist(), *([] if self._end is None else [self._end])]
+            self._row = min(stops)
+            exact = run.advance(self._row - row)
             seen, before = (exact, None) if self._sensors is None else self._observed(exact, before, row)
             yield seen
-            row = min(stops)
+
+    def _changes(self) -> NDArray:
+        """Rows from which on another payload is held; of what changes in one, the last wins."""
+        return np.ceil(np.maximum(self._times, 0.0) * self.rate - 1e-9).astype(int)
 
     def _observed(self, exact: tuple, before: tuple | None, row: int) -> tuple[tuple, tuple]:
         """What the sensors make of a piece that follows another, and what the next one has to see of both."""

@@ -40,12 +40,18 @@ class URSource(Source):
         address: host name or IP address of the robot.
         arm: an arm of 6 joints.
         torque_constants: joint torque per motor current (6,) [N·m/A]; None: those known for this arm.
+        fields: what else `client` is to receive.
+
+    Attributes:
+        client: the maker's.
 
     Raises:
         SourceError: ur-rtde is not installed, the constants are not known, or the robot cannot be reached.
     """
 
-    def __init__(self, address: str, arm: Arm, torque_constants: Sequence[float] | None = None) -> None:
+    def __init__(
+        self, address: str, arm: Arm, torque_constants: Sequence[float] | None = None, fields: Sequence[str] = ()
+    ) -> None:
         self.name, self.n = f"ur://{address}", arm.n
         if arm.n != 6:
             raise SourceError(f"{arm.name} has {arm.n} joints: a UR arm has 6; name the arm that is there")
@@ -64,13 +70,13 @@ class URSource(Source):
         self._stop = threading.Event()
         client = load_client()
         try:
-            self._client = client(address, -1.0, _FIELDS)  # −1: the fastest the controller has
+            self.client = client(address, -1.0, [*_FIELDS, *fields])  # −1: the fastest the controller has
         except Exception as error:
             raise SourceError(unreachable(address, one_line(error))) from None
         self.rate = 500.0
 
     def __iter__(self) -> Iterator[Sample]:
-        client, last, heard = self._client, None, time.monotonic()
+        client, last, heard = self.client, None, time.monotonic()
         while not self._stop.is_set():
             t = client.getTimestamp()
             if t == last:
@@ -95,7 +101,7 @@ class URSource(Source):
         """Let go of the robot."""
         if not self._stop.is_set():
             self._stop.set()
-            self._client.disconnect()
+            self.client.disconnect()
 
 
 def load_client() -> Any:
@@ -111,6 +117,21 @@ def load_client() -> Any:
             f"a UR arm is read through ur-rtde, which cannot be imported ({error}): {install('rtde_receive')}"
         ) from None
     return RTDEReceiveInterface
+
+
+def load_control() -> Any:
+    """The commanding side of ur-rtde.
+
+    Raises:
+        SourceError: it is not installed.
+    """
+    try:
+        from rtde_control import RTDEControlInterface  # type: ignore[import-not-found]
+    except ImportError as error:
+        raise SourceError(
+            f"a UR arm is moved through ur-rtde, which cannot be imported ({error}): {install('rtde_control')}"
+        ) from None
+    return RTDEControlInterface
 
 
 def unreachable(address: str, why: str) -> str:

@@ -21,13 +21,16 @@ class CommandedMotion(Motion):
 
     Args:
         motion: the first order, from t = 0 on; after its end the robot stands.
+
+    Attributes:
+        asked: up to when the simulator has asked for it [s].
     """
 
     name = "commanded"
 
     def __init__(self, motion: Motion) -> None:
         self._orders: list[tuple[float, Motion]] = [(0.0, motion)]
-        self._asked = 0.0
+        self.asked = 0.0
 
     @property
     def n(self) -> int:
@@ -42,18 +45,18 @@ class CommandedMotion(Motion):
     @property
     def state(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Position, velocity and acceleration (n,) where a new order would begin [rad, rad/s, rad/s²]."""
-        q, dq, ddq = self([self._asked])
+        q, dq, ddq = self([self.asked])
         return q[0], dq[0], ddq[0]
 
     def order(self, motion: Motion) -> float:
         """Do this from now on; returns when that is [s]. It should begin as `state` says."""
-        begun = [each for each in self._orders if each[0] < self._asked]  # what never began is forgotten
-        self._orders = [*begun[-1:], (self._asked, motion)]
-        return self._asked
+        begun = [each for each in self._orders if each[0] < self.asked]  # what never began is forgotten
+        self._orders = [*begun[-1:], (self.asked, motion)]
+        return self.asked
 
     def derivative(self, t: NDArray[np.float64], order: int) -> NDArray[np.float64]:
         """The derivative of q of the given order (0 to 3) at times t (N,); (N, n)."""
-        self._asked = max(self._asked, float(np.max(t)))
+        self.asked = max(self.asked, float(np.max(t)))
         out = np.empty((len(t), self.n))
         for k, (begin, motion) in enumerate(self._orders):
             rows = t >= begin if k else np.full(len(t), True)

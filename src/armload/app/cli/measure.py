@@ -1,0 +1,262 @@
+"""`armload measure`: the arm is moved, without and with the payload, and the answer is given, in one command."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import subprocess
+import sys
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from armload.app.cli.arguments import (
+    Parser,
+    add_arm_arguments,
+    add_column_arguments,
+    add_tare_and_mass_arguments,
+    at_least,
+    file_name,
+)
+from armload.app.cli.named import arm_of, motion_of, payload_of, read_logs, robot_of, world_of
+from armload.app.cli.printing import print_json, print_note, write_json
+from armload.errors import SafetyError, SinkError, UsageError
+
+if TYPE_CHECKING:
+    from armload.arms import Arm
+    from armload.devices import Mover
+    from armload.measuring import Measurement, Plan
+    from armload.motion import Motion
+
+_EXAMPLES = """\
+examples:
+  armload measure sim --motion taie2024 --dry-run
+  armload measure sim --motion taie2024 --move --speed max
+  armload measure fr3://172.16.0.2 --motion excite.json --until mass=10g,moment=1.5g.m
+  armload measure ur://192.168.0.10 --robot ur10e --motion random:1 --mass 1.200±0.002 --out payload.json
+  armload measure ros2:///joint_states --robot ur5e --motion excite.json --tare empty.csv
+
+What will move, how far and how fast is said first, and nothing moves until you type yes (or give --move). Ctrl-C stops
+the arm on its path. Keep the emergency stop at hand: nothing here knows what stands around the arm but the floor.
+"""
+
+
+def parser() -> Parser:
+    """The arguments of `armload measure`."""
+    parser = Parser(
+        prog="armload measure",
+        description="Move the arm without and with the payload, and identify it: the whole procedure in one command.",
+        epilog=_EXAMPLES,
+    )
+    add = parser.add_argument
+    add(
+        "source",
+        type=file_name,
+        metavar="SOURCE",
+        help="sim, fr3://ADDRESS, panda://ADDRESS, ur://ADDRESS or ros2:///TOPIC",
+    )
+    add_arm_arguments(parser, required=False)
+    add("--motion", metavar="MOTION", help="taie2024, a JSON or CSV file, or random:SEED")
+    add("--dry-run", action="store_true", help="connect, say what would move and check it; move nothing")
+    add("--move", action="store_true", help="move without asking: for who has seen the dry run")
+    add("--until", metavar="WIDTHS", help="stop when 95%% half-widths are mass=10g,moment=1.5g.m,inertia=1e-3")
+    add("--dir", type=file_name, metavar="DIR", help="folder of the logs (default: measurement-DATE-TIME)")
+    add(
+        "--tare", type=file_name, metavar="LOG0", help="a log of the empty arm: no empty run, the payload is on already"
+    )
+    add_tare_and_mass_arguments(parser)
+    add("--method", type=file_name, metavar="M", help="a name `armload methods` lists, or a trained model's path")
+    add("--grip", metavar="COMMAND", help="a command that mounts the payload; else you are asked to")
+    add_column_arguments(parser)
+    safety = parser.add_argument_group("what is allowed").add_argument
+    safety(
+        "--floor", type=_floor, default=0.0, metavar="Z|none", help="height of the floor in the base's frame [m] (0)"
+    )
+    safety("--approach", type=at_least(0.0, float), metavar="RAD", help="how far a joint may be from the start (1)")
+    safety("--off-path", type=at_least(1e-3, float), default=0.05, metavar="RAD", help="more stops the arm (0.05)")
+    safety(
+        "--push",
+        type=at_least(0.01, float),
+        metavar="SHARE",
+        help="of a joint's rated torque, beside a rated payload's; more stops the arm (0.15; motor currents: 0.5)",
+    )
+    answer = parser.add_argument_group("the answer").add_argument
+    answer("--json", action="store_true", help="print one JSON object and nothing else")
+    answer("--out", type=file_name, metavar="FILE", help="write the answer as JSON, whole or not at all")
+    answer("--apply", action="store_true", help="write it to the controller, too (UR, Franka)")
+    answer("--mounted", metavar="FILE", help="what was on at the empty run: JSON, franka-hand, or nothing; for --apply")
+    answer(
+        "--undetermined-inertia",
+        action="store_true",
+        help="--apply writes inertia that the runs did not determine, too",
+    )
+    sim = parser.add_argument_group("the simulator (sim)").add_argument
+    sim("--payload", default="test", metavar="FILE", help="what is mounted: JSON, franka-hand, or test (test)")
+    sim(
+        "--world", default="real-like:0", metavar="W", help="the arm as it is: nominal, or real-like:SEED (real-like:0)"
+    )
+    sim("--at", type=_pose, metavar="Q1,…", help="where it stands [rad] (default: where the motion begins)")
+    sim("--speed", type=_speed, default=1.0, metavar="X|max", help="1: real time")
+    sim("--seed", type=at_least(0), default=0, metavar="N", help="of the sensors' noise (0)")
+    return parser
+
+
+def run(options: argparse.Namespace) -> int | None:
+    """Measure; 2 after an error, 130 after Ctrl-C, and the arm is at rest in any case."""
+    from datetime import datetime
+
+    from armload.devices import Thresholds, open_mover
+    from armload.measuring import Accuracy, Procedure
+    from armload.measuring.plan import APPROACH
+    from armload.posterior import KnownMass
+
+    options.robot = options.robot or robot_of(options.source)
+    arm = arm_of(options)
+    motion = _motion(options, arm)
+    accuracy = None if options.until is None else Accuracy.read(options.until)
+    mass = None if options.mass is None else KnownMass(*options.mass)
+    mounted = None if options.mounted in (None, "nothing") else payload_of(options.mounted, arm)
+    if options.tare_age is not None and options.tare is None:
+        raise UsageError("--tare-age says how old a tare is, but there is no --tare")
+    _, tare = read_logs(options, arm, None, options.tare)
+    folder = options.dir or f"measurement-{datetime.now():%Y%m%d-%H%M%S}"
+    simulated = {} if options.source != "sim" else _simulated(options, arm, motion, loaded=tare is not None)
+    with open_mover(options.source, arm, **simulated) as mover:
+        if options.apply and not mover.writes:
+            raise UsageError(f"{mover.name} takes no payload: leave out --apply, and export the answer")
+        procedure = Procedure(
+            mover,
+            arm,
+            motion,
+            folder,
+            tare=tare,
+            tare_age=options.tare_age,
+            mass=mass,
+            method=options.method,
+            accuracy=accuracy,
+            floor=options.floor,
+            approach=APPROACH if options.approach is None else options.approach,
+            thresholds=Thresholds(options.off_path, options.push),
+            say=print_note,
+        )
+        if options.dry_run:
+            procedure.plan.check()
+            print_json(procedure.plan.to_dict()) if options.json else print(procedure.plan)
+            return None
+        found = procedure.run(_consent(options), _mount(options, mover))
+        if options.out is not None:
+            write_json(options.out, found.to_dict())
+        for note in found.answer.notes:
+            print_note(note)
+        if options.apply:
+            _apply(found, mover, mounted, options)
+        _print(found, options)
+    return None
+
+
+def _motion(options: argparse.Namespace, arm: Arm) -> Motion:
+    """The motion that is run; the one place for a default."""
+    from armload.motion import SampledMotion
+
+    if options.motion is None:
+        raise UsageError("there is no --motion: expected taie2024, a JSON or CSV file, or random:SEED")
+    if options.motion.lower().endswith(".csv"):
+        return SampledMotion.read(options.motion)
+    return motion_of(options.motion, arm)
+
+
+def _consent(options: argparse.Namespace) -> Callable[[Plan], bool]:
+    def ask(plan: Plan) -> bool:
+        print(plan, file=sys.stderr, flush=True)
+        return options.move or _typed_yes("type yes to let the arm move: ")
+
+    return ask
+
+
+def _typed_yes(question: str) -> bool:
+    if not sys.stdin.isatty():
+        raise SafetyError("nothing was moved: nobody is at a terminal to agree; look at --dry-run, then give --move")
+    print(question, end="", file=sys.stderr, flush=True)
+    return sys.stdin.readline().strip() == "yes"
+
+
+def _mount(options: argparse.Namespace, mover: Mover) -> Callable[[], None]:
+    def mount() -> None:
+        if options.grip is not None:
+            print_note(f"mounting: {options.grip}")
+            code = subprocess.run(shlex.split(options.grip), stdout=sys.stderr, check=False).returncode
+            if code:
+                raise SafetyError(f"{options.grip} ended with exit code {code}: the payload may not be on")
+        elif not mover.mount():
+            print("mount the payload, step back, and press Enter: the arm then moves: ", end="", file=sys.stderr)
+            sys.stderr.flush()
+            if not sys.stdin.readline():
+                raise SafetyError(
+                    "nobody says that the payload is on: give --grip COMMAND, or its log with --tare; the empty run is "
+                    "recorded"
+                )
+
+    return mount
+
+
+def _print(found: Measurement, options: argparse.Namespace) -> None:
+    from armload.identification.text import summary
+
+    logs = " and ".join(str(path) for path in (found.empty, found.loaded) if path is not None)
+    print_note(f"{found.seconds:.2f} s with the payload; logs: {logs}")
+    if found.reached is False:
+        print_note("the accuracy asked for was not reached: run a longer motion, or one that moves more joints")
+    if options.json:
+        print_json(found.to_dict())
+    else:
+        print(summary(found.answer, False))
+
+
+def _apply(found: Measurement, mover: Mover, mounted: Any, options: argparse.Namespace) -> None:
+    from armload.devices import Load
+    from armload.inertia import InertialParameters
+
+    load = Load.of(found.answer)
+    if mounted is not None:
+        load = load + mounted
+    elif options.mounted == "nothing":
+        load = load + InertialParameters.zero(found.answer.frame)
+    if not options.move and not _typed_yes("type yes to write it to the controller: "):
+        raise SafetyError("nothing was written: there was no consent")
+    try:
+        sent = mover.write(load, allow_undetermined_inertia=options.undetermined_inertia)
+    except SinkError as error:
+        again = f"armload identify {found.loaded} --robot {options.robot} --tare {found.empty or options.tare}"
+        raise SinkError(f"nothing was written: {error}; `{again}` tells the answer") from None
+    print_note(f"written to {mover.name}: {sent}")
+
+
+def _simulated(options: argparse.Namespace, arm: Arm, motion: Motion, loaded: bool) -> dict[str, Any]:
+    payload = payload_of(options.payload, arm)
+    return {
+        "at": motion.position([0.0])[0] if options.at is None else options.at,
+        "payload": payload,
+        "mounted": payload if loaded else None,
+        "world": world_of(options.world, arm),
+        "speed": options.speed,
+        "seed": options.seed,
+    }
+
+
+def _floor(text: str) -> float | None:
+    if text == "none":
+        return None
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a height: expected metres, or none") from None
+
+
+def _pose(text: str) -> list[float]:
+    try:
+        return [float(x) for x in text.split(",")]
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a pose: expected radians, separated by commas") from None
+
+
+def _speed(text: str) -> float | None:
+    return None if text == "max" else at_least(0.01, float)(text)

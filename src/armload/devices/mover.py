@@ -1,0 +1,185 @@
+"""An arm that is read and moved: a source of samples that also follows motions.
+
+    with open_mover("sim", arm) as mover:
+        mover.follow(motion)
+        for sample in mover:
+            ...
+            if not mover.moving:
+                break
+
+A movement begins only where the arm is commanded to be, goes along the motion's path and nowhere else, and ends at
+rest: at its end, or, braked along the path (`Course`), when `stop` is asked for, by whoever holds the mover or by its
+`Supervision`. Samples come all the time, at rest too.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm
+from armload.devices.load import Load
+from armload.devices.source import Source
+from armload.devices.supervision import Supervision, Thresholds
+from armload.errors import SafetyError, SinkError
+from armload.motion import Course, Motion
+from armload.recording import Sample
+
+AT_START = 0.005  # [rad] between where the arm is commanded to be and where a motion begins: what rounding leaves
+_BLEND = 0.5  # [s] in which that is taken up
+SETTLE = 0.2  # [s] of samples after a movement's end, while the arm swings out
+
+
+class Mover(Source):
+    """A source that moves its arm.
+
+    Attributes:
+        arm: which it is.
+        why: why the last movement was stopped before its end; None: it was not.
+        writes: whether its controller takes a payload (`write`).
+    """
+
+    arm: Arm
+    why: str | None = None
+    writes: bool = False
+
+    @property
+    @abstractmethod
+    def moving(self) -> bool:
+        """Whether a movement is under way."""
+
+    @abstractmethod
+    def commanded(self) -> NDArray[np.float64]:
+        """Where the controller holds the arm, q (n,) [rad]; known from the first sample on."""
+
+    @abstractmethod
+    def follow(self, motion: Motion, thresholds: Thresholds | None = None) -> None:
+        """Begin a movement.
+
+        Raises:
+            SafetyError: the arm moves already, or is not where the motion begins.
+        """
+
+    @abstractmethod
+    def stop(self, why: str) -> None:
+        """Let the arm come to rest on its path, soon; from any thread. Nothing happens at rest."""
+
+    def mount(self) -> bool:
+        """Put on the payload, where the mover can (a simulator); False: somebody has to."""
+        return False
+
+    def write(self, load: Load, *, allow_undetermined_inertia: bool = False) -> Any:  # noqa: ARG002
+        """Tell the controller the load, guarded (`check_writable`), and return what was sent.
+
+        Raises:
+            SinkError: it must not be written, or there is no controller that takes one.
+        """
+        raise SinkError(f"{self.name} takes no payload: export it instead (armload export)")
+
+
+class StreamedMover(Mover):
+    """A mover that sends a command for each sample; makes derive from it.
+
+    Args:
+        arm: which it is.
+    """
+
+    def __init__(self, arm: Arm) -> None:
+        self.arm, self.n = arm, arm.n
+        self._movement: _Movement | None = None
+        self._stop_for: str | None = None
+
+    @property
+    def moving(self) -> bool:
+        """Whether a movement is under way."""
+        return self._movement is not None
+
+    def follow(self, motion: Motion, thresholds: Thresholds | None = None) -> None:
+        """Begin a movement with the next command."""
+        away = check_start(self, motion)
+        self.why = self._stop_for = None
+        self._movement = _Movement(self.arm, motion, thresholds or Thresholds(), away)
+
+    def stop(self, why: str) -> None:
+        """Brake with the next command."""
+        self._stop_for = self._stop_for or why
+
+    def _took(self, sample: Sample, begun: Callable[[], float]) -> _Movement | None:
+        """Look at a sample; the movement it belongs to, braked if it must be; None at rest.
+
+        begun: called when a movement begins: the time on the samples' clock at which its first command takes effect.
+        """
+        movement = self._movement
+        if movement is None:
+            return None
+        if movement.begun is None:
+            movement.begun = begun()
+        t, course = sample.t - movement.begun, movement.course
+        if course.braked is None:
+            self._stop_for = self._stop_for or movement.supervision.problem(max(t, 0.0), sample, course)
+            self.why = self._stop_for
+        if t > course.duration + SETTLE:
+            self._movement = None
+            return None
+        return movement
+
+    def _brakes(self, movement: _Movement, t: float) -> None:
+        """Brake from t [s] on the movement's clock on, if that was asked for."""
+        if self._stop_for is not None and movement.course.braked is None and t < movement.course.duration:
+            movement.course.brake(max(t, 0.0))
+
+
+class _Movement:
+    def __init__(self, arm: Arm, motion: Motion, thresholds: Thresholds, away: NDArray[np.float64]) -> None:
+        self.course = Course(motion, arm.limits)
+        self.supervision = Supervision(arm, motion, thresholds)
+        self.begun: float | None = None
+        self._away = away
+
+    def target(self, t: float) -> NDArray[np.float64]:
+        """The command q (n,) for t [s] on the movement's clock: without a jump from where the arm was held."""
+        x = min(max(t / _BLEND, 0.0), 1.0)
+        left = 1.0 - x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
+        return self.course.position([t])[0] + left * self._away
+
+
+def check_start(mover: Mover, motion: Motion) -> NDArray[np.float64]:
+    """See that a movement may begin; how far the arm is from its start (n,) [rad], which is at most `AT_START`.
+
+    Raises:
+        SafetyError: the arm moves already, or is not where the motion begins; the motion is of another arm, or does not
+            begin and end at rest.
+    """
+    if mover.moving:
+        raise SafetyError(f"{mover.name} moves already: wait until it is at rest")
+    if motion.n != mover.n:
+        raise SafetyError(f"the motion {motion.name!r} moves {motion.n} joints: {mover.name} has {mover.n}")
+    q, dq, _ = motion([0.0, motion.duration])
+    if np.abs(dq).max() > 1e-3:
+        raise SafetyError(f"the motion {motion.name!r} does not begin and end at rest")
+    away = mover.commanded() - q[0]
+    j = int(np.argmax(np.abs(away)))
+    if not abs(away[j]) <= AT_START:
+        raise SafetyError(
+            f"{mover.arm.joint_names[j]} is {abs(away[j]):.3f} rad from where the motion {motion.name!r} begins: move "
+            "the arm to its start first"
+        )
+    return away
+
+
+def samples_of_movement(mover: Mover, motion: Motion, thresholds: Thresholds | None = None) -> Iterator[Sample]:
+    """Let the arm follow a motion; its samples until it is at rest again.
+
+    Raises:
+        SafetyError: the movement must not begin.
+        SourceError: the connection was lost.
+    """
+    mover.follow(motion, thresholds)
+    for sample in mover:
+        yield sample
+        if not mover.moving:
+            return

@@ -1,0 +1,158 @@
+"""A mover in a process of its own: what goes to and fro between the two.
+
+The process that streams commands to the arm must not wait for one that identifies, prints or compiles; and the arm must
+come to rest when that one ends, however it does. So the mover runs in the reader's process (`devices.reader_process`),
+gets each movement as a whole, watches it (`Supervision`) and stops it there. `DetachedMover` is how it looks from
+outside.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm
+from armload.devices.detached import TO_REST, Detached
+from armload.devices.load import Load
+from armload.devices.mover import Mover, check_start
+from armload.devices.source import Source
+from armload.devices.supervision import Thresholds
+from armload.errors import SafetyError, SinkError, SourceError
+from armload.inertia import InertialParameters
+from armload.motion import Motion, SampledMotion
+from armload.recording import Sample
+
+_LOOK = 0.01  # [s] between two looks at whether the arm is at rest
+
+
+class RemoteMover(Source):
+    """A mover inside the process: its orders as JSON has them.
+
+    Args:
+        mover: closed with this one.
+
+    Attributes:
+        ended: how many movements have ended.
+    """
+
+    def __init__(self, mover: Mover) -> None:
+        self.mover, self.name, self.n, self.rate = mover, mover.name, mover.n, mover.rate
+        self.ended, self._begun = 0, 0
+
+    def __iter__(self) -> Iterator[Sample]:
+        for sample in self.mover:
+            self.ended = self._begun - self.mover.moving
+            yield sample
+
+    def begin(self, motion: dict[str, Any], thresholds: dict[str, Any]) -> int:
+        """`Mover.follow`; the movement's number."""
+        self.mover.follow(SampledMotion(**motion), Thresholds(**thresholds))
+        self._begun += 1
+        return self._begun
+
+    def stop(self, why: str) -> None:
+        """`Mover.stop`."""
+        self.mover.stop(why)
+
+    def whereabouts(self) -> dict[str, Any]:
+        """Where the arm is commanded to be, why it stopped last, and whether its controller takes a payload."""
+        mover = self.mover
+        return {"commanded": mover.commanded().tolist(), "why": mover.why, "writes": mover.writes}
+
+    def put(self, load: dict[str, Any], allow_undetermined_inertia: bool) -> Any:
+        """`Mover.write`."""
+        parameters = InertialParameters(np.array(load.pop("phi")), load.pop("frame"))
+        std = load.pop("std")
+        found = Load(parameters, std=None if std is None else np.array(std), **load)
+        return self.mover.write(found, allow_undetermined_inertia=allow_undetermined_inertia)
+
+    def come_to_rest(self) -> None:
+        """Stop, and wait until that is done."""
+        self.mover.stop("whoever moved the arm has ended")
+        until = time.monotonic() + TO_REST
+        while self.mover.moving and time.monotonic() < until:
+            time.sleep(_LOOK)
+
+    def arrived(self) -> float | None:
+        """The mover's."""
+        return self.mover.arrived()
+
+    def close(self) -> None:
+        """Close the mover."""
+        self.mover.close()
+
+
+class DetachedMover(Detached, Mover):
+    """Any mover of `open_mover`, in another process.
+
+    Args:
+        spec, arm, capacity, options: see `Detached`; no record is written there.
+
+    Raises:
+        SourceError: the arm cannot be reached; the message is the process's.
+    """
+
+    _moves = True
+
+    def __init__(self, spec: str, arm: Arm, *, capacity: int = 8192, **options: Any) -> None:
+        self.arm = arm
+        self._begun = self._ended = 0
+        self._stopping = False  # once is enough: each order is answered through a pipe
+        super().__init__(spec, arm, capacity=capacity, **options)
+        self.writes = True  # those that are read in a process of their own have a controller that does
+
+    @property
+    def moving(self) -> bool:
+        """Whether a movement is under way, as of the last sample."""
+        return self._ended < self._begun
+
+    @property
+    def why(self) -> str | None:  # type: ignore[override]
+        """Why the last movement was stopped before its end."""
+        return self._call("whereabouts")["why"]
+
+    def commanded(self) -> NDArray[np.float64]:
+        """Where the controller holds the arm, q (n,) [rad]."""
+        return np.array(self._call("whereabouts")["commanded"])
+
+    def follow(self, motion: Motion, thresholds: Thresholds | None = None) -> None:
+        """Begin a movement."""
+        check_start(self, motion)
+        table = SampledMotion.of(motion)
+        numbers = {key: np.asarray(getattr(table, key)).tolist() for key in ("times", "q", "dq", "ddq")}
+        try:
+            self._begun = self._call("begin", numbers | {"name": motion.name}, asdict(thresholds or Thresholds()))
+        except SourceError as error:
+            raise SafetyError(str(error)) from None
+        self._stopping = False
+
+    def stop(self, why: str) -> None:
+        """Let the arm come to rest."""
+        if self.moving and not self._stopping:
+            self._stopping = True
+            self._calls += 1
+            self._send({"call": "stop", "number": self._calls, "arguments": [why]})
+
+    def write(self, load: Load, *, allow_undetermined_inertia: bool = False) -> Any:
+        """Tell the controller the load, guarded, and return what was sent."""
+        said = {
+            "phi": load.parameters.phi.tolist(),
+            "frame": load.parameters.frame,
+            "determined": load.determined,
+            "robot": load.robot,
+            "relative_to": load.relative_to,
+            "std": None if load.std is None else load.std.tolist(),
+        }
+        try:
+            return self._call("put", said, allow_undetermined_inertia)
+        except SourceError as error:
+            raise SinkError(str(error)) from None
+
+    def _note(self, beside: NDArray[np.float64]) -> None:
+        super()._note(beside)
+        self._ended = int(beside[1])

@@ -1,0 +1,132 @@
+"""A ROS 2 arm that is moved: short trajectories to a joint trajectory controller, each of which ends at rest.
+
+Every `_EVERY` seconds the controller gets the next `_AHEAD` seconds of the motion and, behind them, the way to rest
+along the path (`Course.brake`), on the topic `joint_trajectory` that ROS 2's joint trajectory controllers have, the
+scaled one of Universal Robots among them. The next one replaces it before it gets there. So the arm comes to rest on
+its path whatever becomes of this process or the network, and nothing has to notice. Each message has the stamp of the
+movement's start on the clock of the joint states, which is the controller's.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from copy import copy
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm
+from armload.devices.mover import StreamedMover
+from armload.devices.ros2.source import Ros2Source
+from armload.devices.supervision import Thresholds
+from armload.errors import SafetyError
+from armload.motion import Course, Motion
+from armload.recording import Sample
+
+CONTROLLER = "/joint_trajectory_controller"
+_EVERY = 0.15  # [s] between two trajectories
+_AHEAD = 0.6  # [s] of motion in each: three may be lost
+_LEAD = 0.1  # [s] before a change reaches the arm: the message's way, and a controller's cycles
+_BEGIN = 0.5  # [s] before a movement begins, which is announced several times meanwhile
+_APART = 0.02  # [s] between points
+_TO_DISCOVER = 5.0  # [s] until a controller counts as absent
+_SAME = 0.03  # [rad] a controller lets an arm hang below where it was sent
+
+
+class Ros2Mover(StreamedMover):
+    """An arm behind a joint trajectory controller.
+
+    Args:
+        topic: of its sensor_msgs/JointState messages.
+        arm: whose joints.
+        controller: the controller's name, under which its topic is.
+
+    Raises:
+        SourceError: no ROS 2, no such topic name, nothing to hear in time, joints or efforts missing.
+    """
+
+    def __init__(self, topic: str, arm: Arm, controller: str = CONTROLLER) -> None:
+        super().__init__(arm)
+        self._source = Ros2Source(topic, arm)
+        self.name, self.rate = topic, self._source.rate
+        self._connection = self._source.connection
+        try:
+            self._commands = f"{controller.rstrip('/')}/joint_trajectory"
+            self._publish = self._connection.publisher(self._connection.JointTrajectory, self._commands)
+        except BaseException:
+            self._source.close()
+            raise
+        self._start, self._sent = 0, -np.inf  # of the movement [ns since 1970], and the last message, on its clock [s]
+        self._seen: NDArray[np.float64] | None = None
+        self._goal: NDArray[np.float64] | None = None
+
+    def __iter__(self) -> Iterator[Sample]:
+        for sample in self._source:
+            if np.all(np.isfinite(sample.q)):
+                self._seen = sample.q
+            movement = self._took(sample, lambda at=sample.t: self._begins(at))
+            if movement is not None:
+                assert movement.begun is not None
+                t = sample.t - movement.begun + self._source.lag()
+                braked = movement.course.braked
+                self._brakes(movement, t + _LEAD)
+                if movement.course.braked != braked or t - self._sent >= _EVERY:
+                    self._send(movement.course, t)
+            yield sample
+
+    def commanded(self) -> NDArray[np.float64]:
+        """Where it was sent last, q (n,) [rad]; where it is, if that is elsewhere or nobody sent it."""
+        assert self._seen is not None
+        near = self._goal is not None and np.abs(self._goal - self._seen).max() < _SAME
+        return np.array(self._goal if near else self._seen)
+
+    def follow(self, motion: Motion, thresholds: Thresholds | None = None) -> None:
+        """Begin a movement, a moment after the next sample."""
+        until = time.monotonic() + _TO_DISCOVER
+        while not self._connection.listeners(self._publish):
+            if time.monotonic() > until:
+                raise SafetyError(
+                    f"nobody listens on {self._commands}: expected a joint trajectory controller that is active; name "
+                    f"it with {self.name}?controller=/NAME"
+                )
+            self._connection.spin(_LEAD)
+        super().follow(motion, thresholds)
+        self._goal = motion.position([motion.duration])[0]
+
+    def arrived(self) -> float | None:
+        """When the middleware had taken in the message handed on last."""
+        return self._source.arrived()
+
+    def close(self) -> None:
+        """Leave the network; an arm on its way comes to rest."""
+        self._source.close()
+
+    def _begins(self, t: float) -> float:
+        """The start of a movement, on the samples' clock [s]."""
+        wait = self._source.lag() + _BEGIN
+        self._start, self._sent = self._source.stamp(t) + round(1e9 * wait), -np.inf
+        return t + wait
+
+    def _send(self, course: Course, t: float) -> None:
+        """The piece of the motion that is ahead at t [s] on its clock."""
+        self._sent = t
+        piece = copy(course)
+        if piece.braked is None:
+            piece.brake(max(t, 0.0) + _AHEAD)
+        self._goal = piece.position([piece.duration])[0]
+        first = max(t, 0.0) + 0.5 * _LEAD
+        times = np.append(np.arange(first, piece.duration, _APART), max(piece.duration, first) + _APART)
+        message = self._connection.JointTrajectory()
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(self._start, 1_000_000_000)
+        message.joint_names = list(self.arm.joint_names)
+        message.points = [self._point(*row) for row in zip(times.tolist(), *piece(times), strict=True)]
+        self._publish(message)
+
+    def _point(self, t: float, q: NDArray, dq: NDArray, ddq: NDArray) -> Any:
+        point = self._connection.JointTrajectoryPoint()
+        nanoseconds = round(t * 1e9)
+        point.time_from_start.sec, point.time_from_start.nanosec = divmod(nanoseconds, 1_000_000_000)
+        point.positions, point.velocities, point.accelerations = q.tolist(), dq.tolist(), ddq.tolist()
+        return point

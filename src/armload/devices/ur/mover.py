@@ -1,0 +1,118 @@
+"""A UR arm that is moved: `servoJ` of ur-rtde, one target per state, 500 times a second.
+
+Opening reads only. A movement uploads ur-rtde's control script, which replaces the program that runs, and needs remote
+control; the script ends with the movement, so that the arm is free for the pendant in between. `set_watchdog` makes the
+controller end the script, and so stop the arm, should no target come for `_WATCHDOG`: whatever ends this process or the
+network between.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm
+from armload.devices.load import Load
+from armload.devices.mover import StreamedMover
+from armload.devices.supervision import Thresholds
+from armload.devices.ur import writer
+from armload.devices.ur.source import URSource, load_control
+from armload.errors import SafetyError, SourceError, one_line
+from armload.motion import Motion
+from armload.recording import Sample
+
+_CYCLE = 2e-3  # [s] of an e-series controller
+_LOOKAHEAD, _GAIN = 0.1, 300.0  # [s, 1] of servoj: UR's defaults, as in the exported programs
+_WATCHDOG = 2.0  # [Hz] least frequency of targets: servoj stands at the last one, 0.5 s later its script ends
+_STOPJ = 4.0  # [rad/s²] deceleration of an arm that is at rest already
+
+
+class URMover(StreamedMover):
+    """A UR arm of the e-series that follows motions.
+
+    Args:
+        address, arm, torque_constants: see `URSource`.
+
+    Raises:
+        SourceError: ur-rtde is not installed, the constants are not known, or the robot cannot be reached.
+    """
+
+    writes = True
+
+    def __init__(self, address: str, arm: Arm, torque_constants: Sequence[float] | None = None) -> None:
+        super().__init__(arm)
+        self._address, self._control = address, None
+        load_control()  # what is missing is said before anything moves
+        self._source = URSource(address, arm, torque_constants, ("target_q",))
+        self.name, self.rate = self._source.name, self._source.rate
+        self._hold: NDArray[np.float64] | None = None
+
+    def __iter__(self) -> Iterator[Sample]:
+        for sample in self._source:
+            movement = self._took(sample, partial(float, sample.t))
+            if movement is not None and movement.begun is not None:
+                t = sample.t - movement.begun
+                self._brakes(movement, t)
+                self._servo(movement.target(t + _CYCLE))
+            elif self._control is not None:
+                self._release()
+            yield sample
+
+    def commanded(self) -> NDArray[np.float64]:
+        """Where the controller holds the arm, q (n,) [rad]."""
+        return np.array(self._source.client.getTargetQ())
+
+    def follow(self, motion: Motion, thresholds: Thresholds | None = None) -> None:
+        """Begin a movement with the next state."""
+        super().follow(motion, thresholds)
+        try:
+            self._control = load_control()(self._address, 1.0 / _CYCLE)
+            self._control.setWatchdog(_WATCHDOG)
+        except Exception as error:
+            self._movement = None
+            self._release()
+            raise SafetyError(
+                f"{self.name} does not take movements ({one_line(error)}): switch it on, release its brakes, and set "
+                "it to remote control"
+            ) from None
+
+    def write(self, load: Load, *, allow_undetermined_inertia: bool = False) -> Any:
+        """Tell the controller the load, guarded (`writer.set_load`), and return the arguments."""
+        control = load_control()(self._address)
+        try:
+            return writer.set_load(
+                control,
+                self._source.client,
+                load,
+                self.arm,
+                write=True,
+                allow_undetermined_inertia=allow_undetermined_inertia,
+            )
+        finally:
+            control.stopScript()
+            control.disconnect()
+
+    def arrived(self) -> float | None:
+        """When the client had the values handed on last."""
+        return self._source.arrived()
+
+    def close(self) -> None:
+        """Let go of the robot."""
+        self._release()
+        self._source.close()
+
+    def _servo(self, q: NDArray[np.float64]) -> None:
+        assert self._control is not None
+        if not self._control.servoJ(q.tolist(), 0.0, 0.0, _CYCLE, _LOOKAHEAD, _GAIN):
+            raise SourceError(f"{self.name} takes no more targets: its program has stopped; look at its pendant")
+
+    def _release(self) -> None:
+        control, self._control = self._control, None
+        if control is not None:
+            control.servoStop(_STOPJ)
+            control.stopScript()
+            control.disconnect()

@@ -1,0 +1,76 @@
+"""How well a payload is to be known before a measurement may end."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.errors import UsageError
+from armload.estimators import Estimate
+from armload.inertia import Z95
+from armload.posterior import KnownMass
+
+# what each word of `Accuracy.read` may be given in, in SI units
+_UNITS = {
+    "mass": {"kg": 1.0, "g": 1e-3},
+    "moment": {"kg.m": 1.0, "g.m": 1e-3},
+    "inertia": {"kg.m2": 1.0, "g.m2": 1e-3},
+}
+_PLACES = {"mass": slice(0, 1), "moment": slice(1, 4), "inertia": slice(4, 10)}
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """The largest 95 % half-widths wanted; infinite: any will do.
+
+    >>> Accuracy.read("mass=10g,moment=1.5g.m,inertia=1e-3")
+    Accuracy(mass=0.01, moment=0.0015, inertia=0.001)
+
+    Args:
+        mass: [kg]. moment: of each first moment m·c [kg·m]. inertia: of each second moment about the frame's origin
+            [kg·m²].
+    """
+
+    mass: float = np.inf
+    moment: float = np.inf
+    inertia: float = np.inf
+
+    @classmethod
+    def read(cls, text: str) -> Self:
+        """From words such as mass=10g,moment=1.5g.m,inertia=1e-3; without a unit kg, kg·m and kg·m² are meant.
+
+        Raises:
+            UsageError: it cannot be understood.
+        """
+        given: dict[str, float] = {}
+        for part in text.split(","):
+            name, _, value = (each.strip() for each in part.partition("="))
+            found = re.fullmatch(r"([0-9.]+(?:e[-+]?\d+)?)\s*([a-z][a-z.2²·]*)?", value)
+            unit = "" if found is None else (found[2] or "").replace("·", ".").replace("²", "2")
+            scale = 1.0 if not unit else _UNITS.get(name, {}).get(unit)
+            try:
+                number = float(found[1]) if found is not None else 0.0
+            except ValueError:
+                number = 0.0
+            if name not in _UNITS or name in given or scale is None or not number > 0:
+                raise UsageError(
+                    f"{part!r} is no accuracy: expected mass=…g, moment=…g.m or inertia=…kg.m2, each at most once, "
+                    "such as mass=10g,moment=1.5g.m,inertia=1e-3"
+                )
+            given[name] = number * scale
+        return cls(**given)
+
+    def reached(self, estimate: Estimate, known: KnownMass | None = None) -> bool:
+        """Whether an estimate is so good, together with a mass that was weighed."""
+        covariance = estimate.covariance
+        if known is not None:
+            covariance = known.given(estimate.phi, covariance)[1]
+        return self.holds(Z95 * np.sqrt(np.maximum(np.diag(covariance), 0.0)))
+
+    def holds(self, half_width: NDArray[np.float64]) -> bool:
+        """Whether half-widths (10,) are at most those wanted."""
+        return all(bool(np.all(half_width[place] <= getattr(self, name))) for name, place in _PLACES.items())

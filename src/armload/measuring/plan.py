@@ -1,0 +1,184 @@
+"""What will move, how far, how fast and for how long: said, and checked, before anything moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armload.arms import Arm
+from armload.devices.mover import AT_START
+from armload.errors import SafetyError
+from armload.motion import Motion, MotionCheck, StraightMotion, check_motion, rated_load
+
+APPROACH = (
+    1.0  # [rad] a joint may be from where the motion begins, unless more is allowed: further should be seen first
+)
+_SHARES = (0.2, 0.1, 0.05)  # of the limits of velocity and acceleration that a straight way uses, fastest first
+_SAMPLES = 1000.0  # [Hz] at which a plan is checked, as fast as the fastest controller takes commands
+_CLEARANCES = 100.0  # [Hz] at which clearances are: at 2 m/s the tool goes 2 cm in between
+_TOO_MANY = 100_000  # samples of a check
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """One movement: what it is for, the motion, and what the check of it found."""
+
+    purpose: str
+    motion: Motion
+    check: MotionCheck
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """All movements of a measurement, in their order.
+
+    arm: whose. legs: in order. tool: corners (2, 3) of the box, in the base's frame, in which the payload frame stays
+    [m]; speed: the fastest it moves [m/s].
+    """
+
+    arm: Arm
+    legs: tuple[Leg, ...]
+    tool: NDArray[np.float64]
+    speed: float
+
+    def leg(self, purpose: str) -> Leg | None:
+        """The movement for a purpose; None: it is not needed."""
+        return next((leg for leg in self.legs if leg.purpose == purpose), None)
+
+    @property
+    def duration(self) -> float:
+        """Of all movements [s]."""
+        return sum(leg.motion.duration for leg in self.legs)
+
+    def check(self) -> None:
+        """See that the arm may make all movements.
+
+        Raises:
+            SafetyError: a limit is passed, or something touches; the message says which.
+        """
+        for leg in self.legs:
+            if leg.check.problems:
+                raise SafetyError(
+                    f"nothing was moved, because of the way {leg.purpose}: {'; '.join(leg.check.problems)}; choose "
+                    "another motion, or move the arm to another place"
+                )
+
+    def __str__(self) -> str:
+        lines = [f"{self.arm.name} will move for {self.duration:.1f} s:"]
+        for k, leg in enumerate(self.legs, start=1):
+            q = leg.motion.position(_times(leg.motion, 100.0))
+            far = np.ptp(q, axis=0)
+            j = int(np.argmax(far))
+            lines.append(
+                f"{k}. {leg.purpose}: {leg.motion.name}, {leg.motion.duration:.1f} s, at most {far[j]:.2f} rad "
+                f"({self.arm.joint_names[j]})"
+            )
+        width = max(len("joint"), *map(len, self.arm.joint_names))
+        lines.append(f"{'joint':<{width}}{'from [rad]':>12}{'to [rad]':>12}{'fastest [rad/s]':>17}{'of its limit':>14}")
+        every = [leg.motion(_times(leg.motion, 200.0)) for leg in self.legs]
+        q, dq = (np.concatenate([each[k] for each in every]) for k in (0, 1))
+        fastest, limit = np.abs(dq).max(axis=0), self.arm.limits.velocity
+        for j, joint in enumerate(self.arm.joint_names):
+            share = f"{100 * fastest[j] / limit[j]:.0f} %" if np.isfinite(limit[j]) else "no limit"
+            low, high = q[:, j].min(), q[:, j].max()
+            lines.append(f"{joint:<{width}}{low:>12.2f}{high:>12.2f}{fastest[j]:>17.2f}{share:>14}")
+        low, high = self.tool
+        box = ", ".join(f"{a} from {x:.2f} to {y:.2f}" for a, x, y in zip("xyz", low, high, strict=True))
+        lines.append(f"{self.arm.frame} stays within {box} m of the base, at most {self.speed:.2f} m/s")
+        for what in ("floor", "self"):
+            distance = min(getattr(leg.check, f"{what}_clearance") for leg in self.legs)
+            if np.isfinite(distance):
+                lines.append(f"nearest to {'itself' if what == 'self' else 'the floor'}: {distance:.3f} m")
+        return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The same as JSON."""
+        return {
+            "robot": self.arm.name,
+            "duration": self.duration,
+            "movements": [
+                {"purpose": leg.purpose, "motion": leg.motion.name, "duration": leg.motion.duration}
+                for leg in self.legs
+            ],
+            "tool_box": self.tool.tolist(),
+            "tool_speed": self.speed,
+            "problems": [problem for leg in self.legs for problem in leg.check.problems],
+        }
+
+
+TO_START, EMPTY, BACK, LOADED = "to the start", "without the payload", "back to the start", "with the payload"
+
+
+def plan_of(
+    arm: Arm,
+    motion: Motion,
+    at: ArrayLike,
+    *,
+    empty_run: bool = True,
+    empty_motion: Motion | None = None,
+    floor: float | None = 0.0,
+    approach: float = APPROACH,
+) -> Plan:
+    """The movements of a measurement by an arm that stands.
+
+    Args:
+        arm: bare, or with what is mounted; each movement is checked with the rated payload.
+        motion: from rest to rest.
+        at: where the arm is commanded to be (n,) [rad].
+        empty_run: whether the motion is run without the payload first.
+        empty_motion: what is run then; None: the same motion.
+        floor: height of the floor in the base's frame [m]; None: there is none.
+        approach: how far a joint may be from the motion's start [rad].
+
+    Raises:
+        SafetyError: the arm is farther from the start than `approach`.
+        MotionError: the motion is of another arm.
+    """
+    here, legs = np.asarray(at, dtype=float), []
+
+    def add(purpose: str, way: Motion) -> None:
+        nonlocal here
+        start = way.position([0.0])[0]
+        away = np.abs(start - here)
+        if np.max(away) > AT_START:
+            j = int(np.argmax(away))
+            if away[j] > approach:
+                raise SafetyError(
+                    f"{arm.joint_names[j]} is {away[j]:.2f} rad from where {way.name} begins, more than the "
+                    f"{approach:g} rad of --approach: move the arm nearer to {np.round(start, 2).tolist()}, or allow "
+                    "more"
+                )
+            legs.append(_way(arm, here, start, TO_START if not legs else BACK, floor))
+        legs.append(Leg(purpose, way, _checked(arm, way, floor)))
+        here = way.position([way.duration])[0]
+
+    if empty_run:
+        add(EMPTY, empty_motion or motion)
+    add(LOADED, motion)
+    points = [arm.frame_pose(leg.motion.position(_times(leg.motion, 100.0)))[1] for leg in legs]
+    steps = [np.linalg.norm(np.diff(p, axis=0), axis=1).max() * (len(p) - 1) / leg.motion.duration
+             for p, leg in zip(points, legs, strict=True)]  # fmt: skip
+    every = np.concatenate(points)
+    return Plan(arm, tuple(legs), np.stack([every.min(axis=0), every.max(axis=0)]), float(max(steps)))
+
+
+def _way(arm: Arm, here: NDArray[np.float64], there: NDArray[np.float64], purpose: str, floor: float | None) -> Leg:
+    """The straight way between two poses, slower where the arm is not strong enough for it with its rated payload."""
+    for share in _SHARES:
+        way = StraightMotion.slow(arm, here, there, share, "a straight line in joint space")
+        leg = Leg(purpose, way, _checked(arm, way, floor))
+        if not leg.check.problems:
+            break
+    return leg
+
+
+def _checked(arm: Arm, motion: Motion, floor: float | None) -> MotionCheck:
+    rate = min(_SAMPLES, _TOO_MANY / motion.duration)
+    return check_motion(arm, motion, rated_load(arm), floor=floor, rate=rate, collision_rate=min(rate, _CLEARANCES))
+
+
+def _times(motion: Motion, rate: float) -> NDArray[np.float64]:
+    return np.linspace(0.0, motion.duration, max(2, round(motion.duration * rate) + 1))

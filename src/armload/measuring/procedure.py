@@ -1,0 +1,231 @@
+"""The procedure: plan, consent, a run without the payload, one with it that ends when enough is known, the answer."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm
+from armload.devices.guard import is_moving
+from armload.devices.mover import AT_START, Mover, samples_of_movement
+from armload.devices.recorder import Recorder
+from armload.devices.supervision import Thresholds
+from armload.errors import RecordingError, SafetyError, SourceError
+from armload.identification import Identification, identify
+from armload.inertia import Z95
+from armload.measuring.accuracy import Accuracy
+from armload.measuring.interruption import held_back
+from armload.measuring.plan import APPROACH, BACK, EMPTY, LOADED, TO_START, Plan, plan_of
+from armload.motion import Motion
+from armload.online import OnlineIdentifier
+from armload.posterior import KnownMass
+from armload.recording import Recording, Sample, read_recording
+
+ENOUGH = "the accuracy asked for is reached"
+_LOOK = 0.02  # [s] between two looks at the accuracy: a tenth of a braking time
+_STILL = 0.2  # [s] for which the arm must have stood before a movement: what was just put on has swung out
+_FRESH = 0.05  # [s] older samples waited somewhere, while somebody mounted the payload, say
+_TO_SETTLE = 5.0  # [s] of waiting for that
+_WARM_UP = 0.5  # [s] of the tare that the identifier is fed before the arm moves, so that all it compiles is compiled
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """What a measurement found.
+
+    answer: of the log of the loaded run. empty, loaded: the logs; empty is None where a tare was given.
+    seconds: of the loaded run. reached: whether the answer is as accurate as was asked for; None: nothing was asked.
+    """
+
+    answer: Identification
+    empty: Path | None
+    loaded: Path
+    seconds: float
+    reached: bool | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """The answer's fields and `measurement`, ready for JSON."""
+        empty = None if self.empty is None else str(self.empty)
+        own = {"empty": empty, "loaded": str(self.loaded), "seconds": self.seconds, "reached": self.reached}
+        return self.answer.to_dict() | {"measurement": own}
+
+
+class Procedure:
+    """A measurement on one arm; nothing moves before `run`, nor in `run` before `consent` says yes.
+
+    Args:
+        mover: the arm, at rest.
+        arm: which it is: bare, or with a tool that is known.
+        motion: what is run, from rest to rest; empty_motion: what is run without the payload (None: the same).
+        folder: for the logs `empty.csv` and `loaded.csv`, which must not exist.
+        tare: a log of the empty arm: there is no empty run, and the payload is on already.
+        tare_age: how old that is [s]; None: by the logs' clocks.
+        mass: of the payload, where it was weighed.
+        method: of the identification.
+        accuracy: the loaded run ends when it is reached; None: with the motion.
+        floor, approach: see `plan_of`.
+        thresholds: where a movement is stopped.
+        say: told what is being done.
+
+    Raises:
+        RecordingError: a log is there already, or the folder cannot be made.
+        SourceError: the arm does not say where it is.
+        SafetyError: the arm moves, or is too far from the motion's start.
+    """
+
+    def __init__(
+        self,
+        mover: Mover,
+        arm: Arm,
+        motion: Motion,
+        folder: str | Path,
+        *,
+        empty_motion: Motion | None = None,
+        tare: Recording | None = None,
+        tare_age: float | None = None,
+        mass: KnownMass | None = None,
+        method: str | Path | None = None,
+        accuracy: Accuracy | None = None,
+        floor: float | None = 0.0,
+        approach: float = APPROACH,
+        thresholds: Thresholds | None = None,
+        say: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        self.mover, self.arm, self.motion, self.empty_motion = mover, arm, motion, empty_motion
+        self.folder, self.tare, self.tare_age, self.mass, self.method = Path(folder), tare, tare_age, mass, method
+        self.accuracy, self.thresholds, self._say = accuracy, thresholds or Thresholds(), say
+        self._room = {"floor": floor, "approach": approach}
+        for path in (self.folder / "empty.csv", self.folder / "loaded.csv"):
+            if path.exists():
+                raise RecordingError(f"{path} exists: a log is never written over; name another folder")
+        at = self._standing()
+        self.plan = plan_of(arm, motion, at, empty_run=tare is None, empty_motion=empty_motion, **self._room)
+
+    def run(self, consent: Callable[[Plan], bool], mount: Callable[[], None]) -> Measurement:
+        """Make the measurement.
+
+        Args:
+            consent: asked with the plan before the first movement, and with a new one should the arm be elsewhere
+                when the payload is on; False: nothing moves.
+            mount: returns when the payload is on and the arm may move again.
+
+        Raises:
+            SafetyError: the plan passes a limit, there is no consent, or the arm had to be stopped. It is at rest then.
+            SourceError: the connection was lost.
+            KeyboardInterrupt: somebody interrupted. The arm is at rest.
+            ArmloadError: the answer cannot be found; the logs are kept.
+        """
+        self._allowed(self.plan, consent)
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise RecordingError(f"{self.folder} cannot be made: {error.strerror}") from None
+        empty, loaded = self.folder / "empty.csv", self.folder / "loaded.csv"
+        tare = self.tare
+        if tare is None:
+            self._move(self.plan, TO_START)
+            self._move(self.plan, EMPTY, empty)
+            self._move(self.plan, BACK)
+            mount()
+            tare = read_recording(empty, self.arm)
+        identifier = self._warm(tare)
+        try:
+            plan = self._again(consent)
+            self._move(plan, TO_START)
+            seconds = self._move(plan, LOADED, loaded, identifier)
+        finally:
+            identifier.close()
+        self._say("identifying")
+        answer = identify(loaded, self.arm, tare=tare, tare_age=self.tare_age, mass=self.mass, method=self.method)
+        reached = None
+        if self.accuracy is not None:
+            half_width = Z95 * np.sqrt(np.maximum(np.diag(answer.covariance), 0.0))
+            reached = self.accuracy.holds(half_width)
+        return Measurement(answer, empty if self.tare is None else None, loaded, seconds, reached)
+
+    def _allowed(self, plan: Plan, consent: Callable[[Plan], bool]) -> None:
+        plan.check()
+        if not consent(plan):
+            raise SafetyError("nothing was moved: there was no consent; type yes when asked, or give --move")
+
+    def _again(self, consent: Callable[[Plan], bool]) -> Plan:
+        """The plan of what is left, from where the arm is now; agreed to anew if that is not where it was left."""
+        at = self._standing(_TO_SETTLE)
+        expected = self.plan.legs[-1].motion.position([0.0])[0]
+        if self.tare is not None:
+            first = self.plan.legs[0].motion
+            expected = first.position([0.0])[0]
+        plan = plan_of(self.arm, self.motion, at, empty_run=False, **self._room)
+        if np.abs(at - expected).max() > AT_START:
+            self._say("the arm is not where it was left")
+            self._allowed(plan, consent)
+        plan.check()
+        return plan
+
+    def _standing(self, patience: float = 0.0) -> NDArray[np.float64]:
+        """Where the arm is commanded to be; it must not move, or come to rest within `patience` [s]."""
+        begun: float | None = None  # of the newest stretch of rest, among samples that did not wait anywhere
+        asked = time.monotonic()
+        for sample in self.mover:
+            fresh = self.mover.lag() < _FRESH
+            begun = None if not fresh or is_moving(sample.dq) else sample.t if begun is None else begun
+            if begun is not None and sample.t - begun >= _STILL:
+                return self.mover.commanded()
+            if fresh and begun is None and time.monotonic() - asked > patience:
+                raise SafetyError(f"{self.mover.name} moves: a measurement begins at rest; stop it first")
+        raise SourceError(f"{self.mover.name} ended before its first sample")
+
+    def _warm(self, tare: Recording) -> OnlineIdentifier:
+        """An identifier that has compiled and loaded what it needs, and has seen nothing."""
+        identifier = OnlineIdentifier(self.arm, tare, self.method)
+        short = tare.between(tare.t[0], tare.t[0] + _WARM_UP)
+        for row in zip(short.t, short.q, short.dq, short.tau, strict=True):
+            identifier.update(*row)
+        identifier.reset()
+        return identifier
+
+    def _move(
+        self, plan: Plan, purpose: str, log: Path | None = None, identifier: OnlineIdentifier | None = None
+    ) -> float:
+        """Make one movement of a plan, if it is needed; how long it took [s]."""
+        leg = plan.leg(purpose)
+        if leg is None:
+            return 0.0
+        self._say(f"moving {purpose}")
+        first, last, looked = np.inf, -np.inf, -np.inf
+        recorder = None if log is None else Recorder(log, self.mover.n)
+        try:
+            with held_back() as interruption:
+                for sample in samples_of_movement(self.mover, leg.motion, self.thresholds):
+                    if recorder is not None:
+                        recorder.append(sample)
+                    if interruption.name is not None:
+                        self.mover.stop(f"interrupted by {interruption.name}")
+                    first, last = min(first, sample.t), sample.t
+                    if identifier is not None and self._enough(identifier, sample, sample.t - looked > _LOOK):
+                        self.mover.stop(ENOUGH)
+                    looked = sample.t if sample.t - looked > _LOOK else looked
+        except SourceError as error:
+            raise SourceError(f"{error}; {_kept(log)}") from None
+        finally:
+            if recorder is not None:
+                recorder.close()
+        if self.mover.why not in (None, ENOUGH):
+            raise SafetyError(f"the arm was stopped on its way {purpose}: {self.mover.why}; {_kept(log)}")
+        return last - first
+
+    def _enough(self, identifier: OnlineIdentifier, sample: Sample, look: bool) -> bool:
+        estimate = identifier.update(*sample)
+        if not look or self.accuracy is None or estimate.settling or estimate.n_samples == 0:
+            return False
+        return self.accuracy.reached(estimate, self.mass)
+
+
+def _kept(log: Path | None) -> str:
+    return "nothing was being recorded" if log is None else f"what was recorded until then is in {log}"

@@ -1,0 +1,111 @@
+"""`armload measure` as a user has it: what is printed, exit codes, Ctrl-C and kill −9 in the middle."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from armload.app.cli import main
+from armload.arms import arm
+from armload.motion import FourierMotion, save_motion, taie2024
+from armload.payloads import test_payload as held_payload
+from armload.recording import read_recording
+
+QUICK = ("--robot", "panda", "--speed", "max", "--method", "map", "--world", "nominal")
+
+
+@pytest.fixture
+def motion(tmp_path):
+    """A quarter of taie2024 in two thirds of the time."""
+    whole = taie2024()
+    small = FourierMotion(whole.offset, 0.25 * whole.sine, 0.25 * whole.cosine, 4.0, "small")
+    save_motion(tmp_path / "small.json", small)
+    return str(tmp_path / "small.json")
+
+
+def test_a_dry_run_says_what_would_move_and_makes_nothing(motion, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["measure", "sim", *QUICK, "--motion", motion, "--dry-run"]) == 0
+    out = capsys.readouterr().out
+    assert "panda will move for 8.0 s" in out
+    assert "1. without the payload: small, 4.0 s" in out
+    assert "panda_joint7" in out
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["small.json"]
+    assert main(["measure", "sim", *QUICK, "--motion", motion, "--dry-run", "--json", "--at", "0,0,0,-2,0,2,0"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert [move["purpose"] for move in said["movements"]] == [
+        "to the start",
+        "without the payload",
+        "with the payload",
+    ]
+
+
+def test_the_whole_way_prints_and_writes_the_answer(motion, tmp_path, capsys):
+    out = tmp_path / "answer.json"
+    arguments = ["--motion", motion, "--move", "--dir", str(tmp_path / "logs"), "--out", str(out), "--json"]
+    assert main(["measure", "sim", *QUICK, *arguments, "--mass", "1.48±0.001"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said == json.loads(out.read_text())
+    assert said["mass"] == pytest.approx(1.48, abs=0.003)
+    assert np.allclose(said["com"], held_payload().parameters.com, atol=0.005)
+    assert said["relative_to"] == "tare"
+    assert [os.path.basename(said["measurement"][log]) for log in ("empty", "loaded")] == ["empty.csv", "loaded.csv"]
+    # the payload that is on already, with the log of the empty arm
+    arguments = ["--motion", motion, "--move", "--dir", str(tmp_path / "again"), "--json"]
+    assert main(["measure", "sim", *QUICK, *arguments, "--tare", said["measurement"]["empty"]]) == 0
+    again = json.loads(capsys.readouterr().out)
+    assert again["mass"] == pytest.approx(1.48, abs=0.05)
+    assert again["measurement"]["empty"] is None
+    assert not (tmp_path / "again" / "empty.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ([], "there is no --motion: expected taie2024"),
+        (["--motion", "MOTION"], "nothing was moved: nobody is at a terminal to agree"),
+        (["--motion", "MOTION", "--move", "--floor", "0.6"], "the arm hits the floor"),
+        (["--motion", "MOTION", "--move", "--until", "weight=10g"], "is no accuracy: expected"),
+        (["--motion", "MOTION", "--move", "--apply"], "takes no payload: leave out --apply"),
+        (["--motion", "MOTION", "--move", "--tare-age", "1d"], "there is no --tare"),
+        (["--motion", "MOTION", "--move", "--at", "0,0,0,-2,0,2,0", "--approach", "0.1"], "more than the 0.1 rad"),
+    ],
+)
+def test_what_cannot_be_is_one_sentence_and_nothing_is_made(arguments, said, motion, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    arguments = [motion if word == "MOTION" else word for word in arguments]
+    assert main(["measure", "sim", *QUICK, *arguments]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert said in err.splitlines()[-1]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["small.json"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_what_is_ended_in_the_middle_leaves_a_log_that_can_be_read(number, motion, tmp_path):
+    log = tmp_path / "logs" / "empty.csv"
+    command = [sys.executable, "-m", "armload", "measure", "sim", "--robot", "panda", "--motion", motion, "--move"]
+    process = subprocess.Popen(
+        ["env", "--default-signal=INT", *command, "--dir", str(log.parent)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    until = time.monotonic() + 60.0
+    while not (log.exists() and log.stat().st_size > 200_000) and time.monotonic() < until:
+        time.sleep(0.05)
+    process.send_signal(number)
+    out, err = process.communicate(timeout=30.0)
+    assert out == ""
+    recording = read_recording(log, arm("panda"))
+    assert 0.3 < recording.duration < 3.9
+    assert np.abs(recording.dq).max() > 0.02
+    if number == signal.SIGINT:
+        assert process.returncode == 130
+        assert err.splitlines()[-1] == "armload: interrupted"
+        assert np.abs(recording.dq[-20:].mean(axis=0)).max() < 0.01

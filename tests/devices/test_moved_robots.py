@@ -1,0 +1,211 @@
+"""`armload measure` on robots that are not there, through the makers' own clients.
+
+Each server (`servers`) moves armload's simulated arm by the maker's protocol, and prints what it was told, in order.
+"""
+
+import json
+import os
+import shlex
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armload.arms import arm
+from armload.inertia import to_order
+from armload.motion import FourierMotion, save_motion
+from armload.payloads import test_payload as held_payload
+from armload.recording import read_recording
+
+pytestmark = pytest.mark.full
+SERVERS = Path(__file__).resolve().parent / "servers"
+ROS_PYTHON = os.environ.get("ARMLOAD_ROS_PYTHON", str(SERVERS.parents[2] / ".venv-ros" / "bin" / "python"))
+# what was started in the background of a shell is deaf to Ctrl-C, and so are its children
+HEARS_CTRL_C = ("env", "--default-signal=INT")
+POSES = {
+    "ur10e": [0.3, -1.2, 1.4, -1.0, 1.3, 0.4],
+    "panda": [0.0, -0.5, 0.1, -2.0, 0.1, 1.7, 0.5],
+    "fr3": [0.0, -0.5, 0.1, -2.0, 0.1, 1.7, 0.5],
+}
+MAKES = {"ur": ("ur10e", "rtde_control", "ur_robot.py"), "fr3": ("fr3", "pylibfranka", "franka_robot.py")}
+MAKES["panda"] = ("panda", "panda_py", "franka_robot.py")
+MAKES["ros2"] = ("panda", None, "ros_robot.py")
+
+
+class Served:
+    """A server, what it said, and `armload measure` against it."""
+
+    def __init__(self, make, tmp_path, address):
+        self.name, _, program = MAKES[make]
+        self.robot, self.folder = arm(self.name), tmp_path
+        self.spec = "ros2:///joint_states" if make == "ros2" else f"{make}://{address}"
+        self.python = ROS_PYTHON if make == "ros2" else sys.executable
+        if make == "ros2":
+            domain = str(101 + os.getpid() % 100)
+            self.env = os.environ | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_DOMAIN_ID": domain}
+        else:
+            self.env = dict(os.environ)
+        self.events, self.runs = [], []
+        pose = np.array(POSES[self.name])
+        sine = 0.12 * np.array([[1.0, 0.3, -1.6 / 3]] * len(pose)) * np.linspace(0.5, 1.0, len(pose))[:, None]
+        cosine = 0.1 * np.array([[1.0, -1.0, 1.0 / 3]] * len(pose)) * np.linspace(1.0, 0.6, len(pose))[:, None]
+        self.motion = FourierMotion(pose, sine, cosine, 5.0, "small").smooth()
+        save_motion(tmp_path / "small.json", self.motion)
+        at = ",".join(f"{x:.6f}" for x in self.motion.position([0.0])[0] + 0.03)
+        command = [self.python, SERVERS / program, "--robot", self.name, "--address", address, "--", at]
+        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=self.env)
+        self.listener = threading.Thread(target=self._listen, daemon=True)
+        self.listener.start()
+        self.wait("ready")
+
+    def _listen(self):
+        for line in self.process.stdout:
+            self.events.append(json.loads(line))
+
+    def said(self, since=0):
+        return [event["event"] for event in self.events[since:]]
+
+    def wait(self, event, since=0, seconds=90.0, run=None):
+        until = time.monotonic() + seconds
+        while event not in self.said(since):
+            if time.monotonic() > until or (run is not None and run.poll() is not None):
+                pytest.fail(f"no {event} among {self.said(since)}" + ("" if run is None else run.communicate()[1]))
+            time.sleep(0.02)
+
+    def measure(self, *arguments, wait=True):
+        told = f"sh -c {shlex.quote('echo mount > ' + str(self.folder / 'told'))}"
+        self.logs = self.folder / f"logs{len(self.runs)}"
+        command = [self.python, "-m", "armload", "measure", self.spec, "--robot", self.name, "--method", "map"]
+        command += ["--off-path", "0.3"]  # a busy machine is late: what stops an arm off its path is in test_movers.py
+        command += ["--motion", self.folder / "small.json", "--dir", self.logs, "--grip", told]
+        run = subprocess.Popen(
+            [*HEARS_CTRL_C, *map(str, command), *map(str, arguments)],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=self.env,
+        )
+        self.runs.append(run)
+        threading.Thread(target=self._mount, args=(run,), daemon=True).start()
+        if not wait:
+            return run
+        out, err = run.communicate(timeout=240.0)
+        return run.returncode, out, err
+
+    def _mount(self, run):
+        while run.poll() is None:
+            if (self.folder / "told").exists():
+                (self.folder / "told").unlink()
+                self.process.stdin.write("mount\n")
+                self.process.stdin.flush()
+            time.sleep(0.02)
+
+    def close(self):
+        for run in self.runs:  # what a failing test has left
+            run.kill()
+            if not run.stdout.closed:
+                run.communicate()
+        self.process.kill()
+        self.process.wait()
+        self.listener.join()
+        for stream in (self.process.stdin, self.process.stdout):
+            stream.close()
+
+
+@pytest.fixture(params=MAKES)
+def served(request, tmp_path):
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+    if request.param == "ros2":
+        if not Path(ROS_PYTHON).exists():
+            pytest.skip("no ROS 2: make .venv-ros/.stamp, or ARMLOAD_ROS_PYTHON")
+    else:
+        pytest.importorskip(MAKES[request.param][1], reason="the maker's client has no wheel for this Python")
+    made = Served(request.param, tmp_path, f"127.0.7.{40 + worker}")
+    yield made
+    made.close()
+
+
+def child_of(process):
+    """The process that streams the commands."""
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+    return int(children[0])
+
+
+def test_nothing_moves_without_consent_nor_past_a_limit(served):
+    for arguments, said in (
+        ((), "nobody is at a terminal to agree"),
+        (("--move", "--floor", "0.9"), "the arm hits the floor"),
+        (("--move", "--approach", "0.02"), "more than the 0.02 rad of --approach"),
+    ):
+        code, out, err = served.measure(*arguments)
+        assert (code, out) == (2, "")
+        assert said in err.splitlines()[-1]
+    code, out, _ = served.measure("--dry-run")
+    assert code == 0
+    assert "with the payload: small, 5.0 s" in out
+    assert set(served.said()) == {"ready"}
+
+
+def test_whatever_ends_it_the_arm_comes_to_rest_and_the_log_can_be_read(served):
+    path = served.motion.position(np.linspace(0.0, served.motion.duration, 5001))
+    ways = ["Ctrl-C", "kill", "kill of the one that streams"]
+    for how in ways[:2] if served.spec.startswith("ros2") else ways:  # ROS 2's controller needs no stream
+        since = len(served.events)
+        run = served.measure("--move", wait=False)
+        log = served.logs / "empty.csv"
+        until = time.monotonic() + 120.0
+        while not (log.exists() and served.said(since).count("moving") == 2):  # to the start, and then
+            assert time.monotonic() < until, served.said(since)
+            assert run.poll() is None, run.communicate()[1]
+            time.sleep(0.02)
+        since = len(served.events)  # a busy machine may let the arm come to rest before it is told to
+        time.sleep(1.5)
+        if how == "Ctrl-C":
+            run.send_signal(signal.SIGINT)
+        elif how == "kill":
+            run.kill()
+        else:
+            os.kill(child_of(run), signal.SIGKILL)
+        served.wait("rest", since, 20.0)
+        _, err = run.communicate(timeout=60.0)
+        rest = np.array(next(event for event in served.events[since:] if event["event"] == "rest")["q"])
+        if how != "kill of the one that streams":  # then the robot's own brake leaves the path
+            assert np.abs(path - rest).max(axis=1).min() < 0.01
+        assert run.returncode == {"Ctrl-C": 130, "kill": -9}.get(how, 2)
+        if run.returncode == 2:
+            assert "what was recorded until then is in" in err
+        recording = read_recording(log, served.robot)
+        assert np.abs(recording.dq).max() > 0.02
+        assert recording.duration < 4.9
+
+
+def test_the_answer_is_written_in_the_controller_s_order_after_both_runs(served):
+    out = served.folder / "answer.json"
+    if served.spec.startswith("ros2"):
+        assert "takes no payload" in served.measure("--move", "--apply")[2]
+        return
+    code, _, err = served.measure("--move", "--apply", "--mounted", "nothing", "--undetermined-inertia", "--out", out)
+    assert code == 0, err
+    answer = json.loads(out.read_text())
+    truth = held_payload().parameters
+    assert answer["mass"] == pytest.approx(
+        truth.mass, abs=0.025 * served.robot.rated_payload
+    )  # by a small, slow motion
+    assert np.allclose(answer["com"], truth.com, atol=0.1 if served.robot.motor_torque else 0.03)
+    said = served.said()
+    assert said.index("mounted") < said.index("payload")
+    assert said.count("moving") == 3  # to the start, without and with the payload
+    numbers = next(event for event in served.events if event["event"] == "payload")["numbers"]
+    written = to_order(held_payload().parameters, "ur" if served.name == "ur10e" else "franka")
+    assert len(numbers) == len(written)
+    assert numbers[0] == pytest.approx(answer["mass"], rel=1e-6)
+    assert numbers[1:4] == pytest.approx(answer["com"], rel=1e-6)
+    matrix = np.array(answer["inertia_com"])
+    expected = matrix.ravel(order="F") if len(numbers) == 13 else matrix[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    assert numbers[4:] == pytest.approx(expected.tolist(), rel=1e-6)

@@ -1,0 +1,219 @@
+"""An arm that is moved: where a movement may begin, that it ends at rest, and what stops it."""
+
+import numpy as np
+import pytest
+
+from armload.arms import arm
+from armload.devices import SimulatedMover, StreamedMover, Supervision, Thresholds
+from armload.errors import SafetyError, SinkError
+from armload.inertia import InertialParameters
+from armload.motion import Course, StraightMotion, random_motion, taie2024
+from armload.payloads import test_payload as heavy_payload
+from armload.recording import Sample
+from armload.simulation import Run, World, simulate_many
+
+MOTION = taie2024()
+START = MOTION.position([0.0])[0]
+RATE = 250.0
+CYCLE = 4e-3  # [s] of an arm that streams
+
+
+@pytest.fixture
+def mover(panda):
+    with SimulatedMover(panda, START, speed=None, rate=RATE, ahead=0.05) as made:
+        yield made
+
+
+def run(mover, motion, at=None, do=lambda: None):
+    """Samples of a movement; `do` is called at the sample of that number."""
+    mover.follow(motion)
+    samples = []
+    for sample in mover:
+        samples.append(sample)
+        if len(samples) == at:
+            do()
+        if not mover.moving:
+            return samples
+    raise AssertionError("the mover ended")
+
+
+def test_a_movement_follows_its_motion_and_ends_at_rest(mover):
+    samples = run(mover, MOTION)
+    t = np.array([s.t for s in samples])
+    np.testing.assert_allclose(np.diff(t), 1 / RATE, atol=1e-9)
+    assert t[-1] - t[0] == pytest.approx(MOTION.duration, abs=0.3)
+    q = np.array([s.q for s in samples])
+    offsets = np.arange(-0.05, 0.05, 2e-3)
+    assert min(np.abs(q - MOTION.position(t - t[0] - d)).max() for d in offsets) < 0.01
+    assert np.abs(samples[-1].dq).max() < 1e-3
+    assert mover.why is None
+
+
+def test_an_arm_stands_until_it_is_moved(mover):
+    q = np.array([sample.q for sample, _ in zip(mover, range(100), strict=False)])
+    assert np.ptp(q, axis=0).max() < 1e-6
+    mover.stop("nothing moves: this is no order for later")
+    here = mover.commanded()
+    assert len(run(mover, StraightMotion(here, here + 0.05, 1.0))) > 250
+
+
+@pytest.mark.parametrize(
+    ("motion", "said"),
+    [
+        (StraightMotion(START + 0.02, START, 2.0), "0.020 rad from where the motion"),
+        (StraightMotion(START[:6], START[:6] + 0.1, 2.0), "moves 6 joints"),
+    ],
+)
+def test_a_movement_begins_where_the_arm_is_or_not_at_all(mover, motion, said):
+    with pytest.raises(SafetyError, match=said):
+        mover.follow(motion)
+    q = np.array([sample.q for sample, _ in zip(mover, range(100), strict=False)])
+    assert np.ptp(q, axis=0).max() < 1e-6
+
+
+def test_a_second_movement_waits_for_the_first(mover):
+    mover.follow(MOTION)
+    next(iter(mover))
+    with pytest.raises(SafetyError, match="moves already"):
+        mover.follow(MOTION)
+
+
+def test_a_stop_ends_at_rest_on_the_path_within_the_braking_time(mover, panda):
+    samples = run(mover, MOTION, 400, lambda: mover.stop("enough"))
+    assert mover.why == "enough"
+    path = MOTION.position(np.linspace(0.0, MOTION.duration, 6001))
+    assert max(np.abs(path - s.q).max(axis=1).min() for s in samples[::20]) < 0.01
+    assert np.abs(samples[-1].dq).max() < 0.01
+    longest = max(Course(MOTION, panda.limits).braking_time(t) for t in (1.6, 1.62, 1.64))
+    still = next(k for k in range(400, len(samples)) if all(np.abs(s.dq).max() < 0.02 for s in samples[k:]))
+    assert (still - 400) / RATE < longest + 0.05 + 0.15  # computed ahead, and swinging out
+    # it stands where it stopped, and goes on from there only by a motion that begins there
+    with pytest.raises(SafetyError, match="from where the motion"):
+        mover.follow(MOTION)
+    here = mover.commanded()
+    assert len(run(mover, StraightMotion(here, here + 0.05, 1.0))) > 200
+
+
+def test_what_pushes_stops_the_arm(mover):
+    mover._payload = InertialParameters(15.0 * heavy_payload().parameters.phi)
+    samples = run(mover, MOTION, 400, mover.mount)
+    assert "beside what a payload of 3 kg can cause" in mover.why
+    assert len(samples) < 600
+    assert np.abs(samples[-1].dq).max() < 0.1  # 22 kg swing on a Panda's springs
+
+
+def test_a_payload_the_arm_is_rated_for_does_not(panda):
+    rated = InertialParameters.from_com(3.0, (0.0, 0.0, 0.1), 0.004 * np.eye(3))
+    with SimulatedMover(panda, START, mounted=rated, speed=None, rate=RATE, ahead=0.1) as mover:
+        assert len(run(mover, MOTION)) > 1400
+        assert mover.why is None
+
+
+@pytest.mark.parametrize(("name", "most"), [("panda", 0.05), ("ur10e", 0.4)])
+def test_arms_like_the_measured_ones_are_not_stopped(name, most):
+    """The largest torque that no payload explains, of the rated one, over simulated worlds."""
+    robot = arm(name)
+    motion = MOTION if name == "panda" else random_motion(robot, 1)
+    watch = Supervision(robot, motion, Thresholds())
+    runs = [Run(motion, None, World.real_like(robot, seed)) for seed in range(4)]
+    found = -1.0
+    for log in simulate_many(robot, runs, rate=50.0, workers=1):
+        ddq = motion(log.t)[2]
+        for k, row in enumerate(zip(log.t, log.q, log.dq, log.tau, strict=True)):
+            found = max(found, float(np.max(watch.beyond(Sample(*row), ddq[k], row[0]) / watch._effort)))
+    assert found < most
+
+
+def sample_of(robot, t, q, dq=None, tau=None):
+    dq = np.zeros(robot.n) if dq is None else dq
+    return Sample(t, q, dq, robot.torque(q, dq) if tau is None else tau)
+
+
+def test_an_arm_may_be_late_but_not_off_its_path(panda):
+    watch, course = Supervision(panda, MOTION, Thresholds()), Course(MOTION, panda.limits)
+    for t in np.arange(0.0, 3.0, 0.1):
+        late = MOTION(np.array([t - 0.2]))
+        assert watch.problem(t, sample_of(panda, t, late[0][0], late[1][0]), course) is None
+    off = MOTION.position([3.0])[0] + np.eye(7)[3] * 0.06
+    said = watch.problem(3.0, sample_of(panda, 3.0, off), course)
+    assert said is not None
+    assert "panda_joint4 is 0.06" in said
+    far = sample_of(panda, 3.0, MOTION.position([2.4])[0])  # where it should have been long ago
+    assert "off the path" in watch.problem(3.0, far, course)
+
+
+def test_a_torque_counts_when_it_lasts(panda):
+    watch, course = Supervision(panda, MOTION, Thresholds()), Course(MOTION, panda.limits)
+    q = MOTION.position([0.0])[0]
+    hit = panda.torque(q) + np.array([0.0, 0, 0, 0, 0, 0, 11.0])
+    times = np.arange(0.0, 0.06, 0.005)
+    said = [watch.problem(t, sample_of(panda, t, q, tau=hit), course) is not None for t in times]
+    assert said == [t >= 0.02 - 1e-9 for t in times]
+    watch = Supervision(panda, MOTION, Thresholds())
+    for t, tau in ((0.0, hit), (0.005, panda.torque(q)), (0.02, hit), (0.035, hit)):
+        assert watch.problem(t, sample_of(panda, t, q, tau=tau), course) is None
+
+
+def test_an_arm_of_which_nothing_is_heard_is_stopped(panda):
+    watch, course = Supervision(panda, MOTION, Thresholds()), Course(MOTION, panda.limits)
+    q, silent = MOTION.position([0.0])[0], np.full(7, np.nan)
+    assert watch.problem(0.0, sample_of(panda, 0.0, q), course) is None
+    assert watch.problem(0.05, Sample(0.05, silent, silent, silent), course) is None
+    assert "no usable sample for 0.15 s" in watch.problem(0.15, Sample(0.15, silent, silent, silent), course)
+
+
+@pytest.mark.parametrize("wrong", [{"tracking": 0.0}, {"external": -1.0}, {"tracking": float("nan")}])
+def test_thresholds_are_positive(wrong):
+    with pytest.raises(SafetyError, match="expected a positive number"):
+        Thresholds(**wrong)
+
+
+class Obedient(StreamedMover):
+    """An arm that is where it was commanded to be a cycle ago."""
+
+    def __init__(self, robot, at):
+        super().__init__(robot)
+        self.name, self.rate, self.t, self.targets = "obedient", 1 / CYCLE, 0.0, [np.array(at)]
+
+    def __iter__(self):
+        while True:
+            self.t += CYCLE
+            sample = sample_of(self.arm, self.t, self.targets[-1])
+            movement = self._took(sample, lambda: self.t)
+            if movement is not None:
+                self._brakes(movement, self.t - movement.begun)
+                self.targets.append(movement.target(self.t - movement.begun + CYCLE))
+            yield sample
+
+    def commanded(self):
+        return self.targets[-1]
+
+    def close(self):
+        pass
+
+
+def test_what_is_left_to_the_start_is_taken_up_without_a_jump(panda):
+    left = np.array([4e-3, -4e-3, 0.0, 1e-3, 0.0, 0.0, -2e-3])
+    mover = Obedient(panda, START + left)
+    run(mover, MOTION)
+    q = np.array(mover.targets)
+    np.testing.assert_array_equal(q[0], START + left)
+    np.testing.assert_allclose(q[-1], MOTION.position([MOTION.duration])[0], atol=1e-9)
+    assert np.abs(np.diff(q, 3, axis=0)).max() < CYCLE**3 * panda.limits.jerk.min()  # within what a Panda takes
+    path = MOTION.position(np.linspace(0.0, MOTION.duration, 6001))
+    assert max(np.abs(path - pose).max(axis=1).min() for pose in q[::20]) < 5e-3
+
+
+def test_an_arm_that_does_not_follow_is_never_taken_for_one_that_arrived(panda):
+    mover = Obedient(panda, START)
+    mover.follow(StraightMotion(START, START + 0.2, 1.0))
+    for sample in mover:
+        mover.targets[-1] = START  # stuck
+        if sample.t > 1.4 or not mover.moving:
+            break
+    assert "off the path" in mover.why
+
+
+def test_the_simulator_takes_no_payload_from_us(mover):
+    with pytest.raises(SinkError, match="takes no payload"):
+        mover.write(None)
