@@ -67,7 +67,6 @@ def test_the_whole_way_prints_and_writes_the_answer(motion, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ([], "there is no --motion: expected taie2024"),
         (["--motion", "MOTION"], "nothing was moved: nobody is at a terminal to agree"),
         (["--motion", "MOTION", "--move", "--floor", "0.6"], "the arm hits the floor"),
         (["--motion", "MOTION", "--move", "--until", "weight=10g"], "is no accuracy: expected"),

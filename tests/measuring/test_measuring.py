@@ -9,10 +9,11 @@ import pytest
 from armload.devices import SimulatedMover, Thresholds
 from armload.errors import RecordingError, SafetyError, SourceError, UsageError
 from armload.estimators import Estimate
+from armload.excitation import Accuracy
 from armload.inertia import InertialParameters
-from armload.measuring import Accuracy, Procedure, plan_of
+from armload.measuring import Procedure, plan_of
 from armload.measuring.plan import BACK, EMPTY, LOADED, TO_START
-from armload.motion import SampledMotion, taie2024
+from armload.motion import PathMotion, taie2024
 from armload.motion.point_to_point import PointToPoint
 from armload.payloads import test_payload as held_payload
 from armload.posterior import KnownMass
@@ -23,7 +24,7 @@ WHOLE = taie2024()
 START = WHOLE.position([0.0])[0]
 _T = np.linspace(0.0, 3.0, 301)
 _Q, _DQ, _DDQ = WHOLE(2 * _T)
-MOTION = SampledMotion(_T, START + 0.25 * (_Q - START), 0.5 * _DQ, _DDQ)  # a quarter of the way in half the time
+MOTION = PathMotion(_T, START + 0.25 * (_Q - START), 0.5 * _DQ, _DDQ)  # a quarter of the way in half the time
 NEAR = START + np.array([0.1, 0, 0, -0.1, 0, 0, 0.1])
 RATE = 250.0
 

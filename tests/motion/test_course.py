@@ -5,7 +5,7 @@ import pytest
 
 from armload.arms import arm
 from armload.errors import MotionError
-from armload.motion import Course, SampledMotion, StraightMotion, export_motion, random_motion, taie2024
+from armload.motion import Course, PathMotion, StraightMotion, export_motion, random_motion, taie2024
 
 
 @pytest.fixture(scope="module", params=["panda", "ur10e"])
@@ -78,7 +78,7 @@ def test_a_table_of_a_motion_is_the_motion_and_comes_back_from_its_file(tmp_path
     motion = taie2024()
     export_motion(motion, tmp_path / "m.csv", rate=250.0)
     t = np.linspace(0.0, motion.duration, 777)
-    for table in (SampledMotion.of(motion), SampledMotion.read(tmp_path / "m.csv")):
+    for table in (PathMotion.of(motion, 250.0), PathMotion.read(tmp_path / "m.csv")):
         assert table.duration == motion.duration
         for order, off in enumerate((1e-8, 1e-6, 1e-3, 1.0)):  # the third is not continuous in a table
             np.testing.assert_allclose(table._at(t, order), motion._at(t, order), rtol=0, atol=off)
@@ -97,4 +97,4 @@ def test_a_file_that_is_no_motion_is_refused(text, said, tmp_path):
     path = tmp_path / "m.csv"
     path.write_text(text)
     with pytest.raises(MotionError, match=said):
-        SampledMotion.read(path)
+        PathMotion.read(path)

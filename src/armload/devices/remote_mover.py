@@ -24,9 +24,11 @@ from armload.devices.source import Source
 from armload.devices.supervision import Thresholds
 from armload.errors import SafetyError, SinkError, SourceError
 from armload.inertia import InertialParameters
-from armload.motion import Motion, SampledMotion
+from armload.motion import Motion, PathMotion
 from armload.recording import Sample
 
+_TABLE = 250.0  # [Hz] of the points that a movement is handed over with: quintics between them are off by 1e-9 rad
+_COLUMNS = ("times", "positions", "velocities", "accelerations")
 _LOOK = 0.01  # [s] between two looks at whether the arm is at rest
 
 
@@ -51,7 +53,7 @@ class RemoteMover(Source):
 
     def begin(self, motion: dict[str, Any], thresholds: dict[str, Any]) -> int:
         """`Mover.follow`; the movement's number."""
-        self.mover.follow(SampledMotion(**motion), Thresholds(**thresholds))
+        self.mover.follow(PathMotion(**motion), Thresholds(**thresholds))
         self._begun += 1
         return self._begun
 
@@ -123,8 +125,8 @@ class DetachedMover(Detached, Mover):
     def follow(self, motion: Motion, thresholds: Thresholds | None = None) -> None:
         """Begin a movement."""
         check_start(self, motion)
-        table = SampledMotion.of(motion)
-        numbers = {key: np.asarray(getattr(table, key)).tolist() for key in ("times", "q", "dq", "ddq")}
+        table = PathMotion.of(motion, _TABLE)
+        numbers = {key: np.asarray(getattr(table, key)).tolist() for key in _COLUMNS}
         try:
             self._begun = self._call("begin", numbers | {"name": motion.name}, asdict(thresholds or Thresholds()))
         except SourceError as error:

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 from armload.lazy import on_first_use
 
 if TYPE_CHECKING:
+    from armload.excitation.accuracy import Accuracy
     from armload.excitation.constraints import Constraints
     from armload.excitation.criterion import Criterion
     from armload.excitation.enrichment import Enriched, enrich
     from armload.excitation.optimisation import Design, design_motion
     from armload.excitation.payload_range import PayloadRange
     from armload.excitation.surroundings import Obstacle, Surroundings
-    from armload.excitation.until import Accuracy, design_until
+    from armload.excitation.until import design_until
     from armload.excitation.verification import problems, used
 
 __all__ = [

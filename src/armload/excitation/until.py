@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armload.errors import MotionError
+from armload.excitation.accuracy import Accuracy
 from armload.excitation.constraints import LONGEST, SHORTEST, Constraints
 from armload.excitation.criterion import Criterion
 from armload.excitation.optimisation import Design, design_motion
@@ -16,29 +15,6 @@ from armload.excitation.optimisation import Design, design_motion
 _FIRST = 2.0  # [s] looked at first
 _DESIGNS = 6  # at most
 _CLOSE = 0.05  # of the time: shorter is not looked for any more
-
-
-@dataclass(frozen=True)
-class Accuracy:
-    """95 % half-widths that are to be reached: of mass [kg], of each moment [kg·m], of each inertia [kg·m²].
-
-    Raises:
-        MotionError: nothing is to be reached, or a width that is not a positive number.
-    """
-
-    mass: float = np.inf
-    moment: float = np.inf
-    inertia: float = np.inf
-
-    def __post_init__(self) -> None:
-        each = np.array([self.mass, self.moment, self.inertia])
-        if not (each > 0).all() or np.isinf(each).all():
-            raise MotionError(f"the accuracy {each.tolist()} is not possible: expected positive half-widths")
-
-    def over(self, half_width: NDArray[np.float64]) -> float:
-        """The largest of the half-widths (10,) over the one wanted; 1 or less: all are reached."""
-        wanted = np.repeat([self.mass, self.moment, self.inertia], [1, 3, 6])
-        return float((half_width / wanted).max())
 
 
 def design_until(

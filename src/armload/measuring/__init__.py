@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 from armload.lazy import on_first_use
 
 if TYPE_CHECKING:
-    from armload.measuring.accuracy import Accuracy
     from armload.measuring.plan import Leg, Plan, plan_of
     from armload.measuring.procedure import Measurement, Procedure
 
-__all__ = ["Accuracy", "Leg", "Measurement", "Plan", "Procedure", "plan_of"]
+__all__ = ["Leg", "Measurement", "Plan", "Procedure", "plan_of"]
 
 __getattr__, __dir__ = on_first_use(__name__)

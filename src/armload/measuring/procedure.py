@@ -17,9 +17,9 @@ from armload.devices.mover import AT_START, Mover, samples_of_movement
 from armload.devices.recorder import Recorder
 from armload.devices.supervision import Thresholds
 from armload.errors import RecordingError, SafetyError, SourceError
+from armload.excitation import Accuracy
 from armload.identification import Identification, identify
 from armload.inertia import Z95
-from armload.measuring.accuracy import Accuracy
 from armload.measuring.interruption import held_back
 from armload.measuring.plan import APPROACH, BACK, EMPTY, LOADED, TO_START, Plan, plan_of
 from armload.motion import Motion

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from armload.motion.motion_file import load_motion, save_motion, taie2024
     from armload.motion.path import PathMotion
     from armload.motion.random_fourier import excitation, random_motion
-    from armload.motion.sampled import SampledMotion
     from armload.motion.spline import SplineMotion
     from armload.motion.straight import StraightMotion
 
@@ -29,7 +28,6 @@ __all__ = [
     "MotionCheck",
     "MotionFingerprint",
     "PathMotion",
-    "SampledMotion",
     "SplineMotion",
     "StraightMotion",
     "check_motion",

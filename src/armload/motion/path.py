@@ -6,8 +6,11 @@ ROS 2's joint trajectory controller does: q, dq and ddq are continuous.
 
 from __future__ import annotations
 
+import csv
 from dataclasses import dataclass
 from math import factorial
+from pathlib import Path
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,6 +79,30 @@ class PathMotion(Motion):
         t = np.linspace(0.0, motion.duration, max(2, round(motion.duration * rate) + 1))
         q, dq, ddq = (motion.derivative(t, order) for order in range(3))
         return cls(t, q, dq, ddq, motion.name if name is None else name, note)
+
+    @classmethod
+    def read(cls, path: str | Path) -> Self:
+        """The table that `export_motion` writes as CSV: a header, then t, q1 … qn, dq1 … dqn, ddq1 … ddqn.
+
+        Raises:
+            MotionError: the file is missing or is not such a table.
+        """
+        try:
+            with open(path, newline="", encoding="utf-8") as file:
+                header, *rows = list(csv.reader(file))
+            table = np.array(rows, dtype=float)
+        except OSError as error:
+            raise MotionError(f"motion file {path} cannot be read: {error.strerror}") from None
+        except ValueError:
+            raise MotionError(f"motion file {path} is not a table of numbers under a header") from None
+        n = (len(header) - 1) // 3
+        names = ["t", *(f"{kind}{joint + 1}" for kind in ("q", "dq", "ddq") for joint in range(n))]
+        if n < 1 or header != names or table.ndim != 2:
+            raise MotionError(
+                f"motion file {path} has the columns {', '.join(header)[:80]}: expected t, q1 …, dq1 …, ddq1 … as "
+                "`armload motion export --format csv` writes them"
+            )
+        return cls(table[:, 0], table[:, 1 : n + 1], table[:, n + 1 : 2 * n + 1], table[:, 2 * n + 1 :], str(path))
 
     def derivative(self, t: NDArray[np.float64], order: int) -> NDArray[np.float64]:
         """The derivative of q of any order ≥ 0 at times t (N,) within 0 … the last; (N, n)."""

@@ -18,10 +18,12 @@ from armload.app.cli.arguments import (
     file_name,
 )
 from armload.app.cli.named import arm_of, motion_of, payload_of, read_logs, robot_of, world_of
-from armload.app.cli.printing import print_json, print_note, write_json
+from armload.app.cli.printing import print_json, print_note, working, write_json
 from armload.errors import SafetyError, SinkError, UsageError
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from armload.arms import Arm
     from armload.devices import Mover
     from armload.measuring import Measurement, Plan
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
 
 _EXAMPLES = """\
 examples:
+  armload measure sim --dry-run
   armload measure sim --motion taie2024 --dry-run
   armload measure sim --motion taie2024 --move --speed max
   armload measure fr3://172.16.0.2 --motion excite.json --until mass=10g,moment=1.5g.m
@@ -55,7 +58,12 @@ def parser() -> Parser:
         help="sim, fr3://ADDRESS, panda://ADDRESS, ur://ADDRESS or ros2:///TOPIC",
     )
     add_arm_arguments(parser, required=False)
-    add("--motion", metavar="MOTION", help="taie2024, a JSON or CSV file, or random:SEED")
+    add(
+        "--motion",
+        metavar="MOTION",
+        help="taie2024, a JSON or CSV file, or random:SEED (default: designed about the present pose)",
+    )
+    add("--time", type=at_least(0.2, float, 60.0), default=2.0, metavar="S", help="of a motion that is designed (2)")
     add("--dry-run", action="store_true", help="connect, say what would move and check it; move nothing")
     add("--move", action="store_true", help="move without asking: for who has seen the dry run")
     add("--until", metavar="WIDTHS", help="stop when 95%% half-widths are mass=10g,moment=1.5g.m,inertia=1e-3")
@@ -105,13 +113,14 @@ def run(options: argparse.Namespace) -> int | None:
     from datetime import datetime
 
     from armload.devices import Thresholds, open_mover
-    from armload.measuring import Accuracy, Procedure
+    from armload.excitation import Accuracy
+    from armload.measuring import Procedure
     from armload.measuring.plan import APPROACH
     from armload.posterior import KnownMass
 
     options.robot = options.robot or robot_of(options.source)
     arm = arm_of(options)
-    motion = _motion(options, arm)
+    motion = None if options.motion is None else _motion(options.motion, arm)
     accuracy = None if options.until is None else Accuracy.read(options.until)
     mass = None if options.mass is None else KnownMass(*options.mass)
     mounted = None if options.mounted in (None, "nothing") else payload_of(options.mounted, arm)
@@ -121,6 +130,8 @@ def run(options: argparse.Namespace) -> int | None:
     folder = options.dir or f"measurement-{datetime.now():%Y%m%d-%H%M%S}"
     simulated = {} if options.source != "sim" else _simulated(options, arm, motion, loaded=tare is not None)
     with open_mover(options.source, arm, **simulated) as mover:
+        if motion is None:
+            motion = _designed(arm, mover.commanded(), options)
         if options.apply and not mover.writes:
             raise UsageError(f"{mover.name} takes no payload: leave out --apply, and export the answer")
         procedure = Procedure(
@@ -153,15 +164,20 @@ def run(options: argparse.Namespace) -> int | None:
     return None
 
 
-def _motion(options: argparse.Namespace, arm: Arm) -> Motion:
-    """The motion that is run; the one place for a default."""
-    from armload.motion import SampledMotion
+def _motion(name: str, arm: Arm) -> Motion:
+    from armload.motion import PathMotion
 
-    if options.motion is None:
-        raise UsageError("there is no --motion: expected taie2024, a JSON or CSV file, or random:SEED")
-    if options.motion.lower().endswith(".csv"):
-        return SampledMotion.read(options.motion)
-    return motion_of(options.motion, arm)
+    return PathMotion.read(name) if name.lower().endswith(".csv") else motion_of(name, arm)
+
+
+def _designed(arm: Arm, pose: NDArray, options: argparse.Namespace) -> Motion:
+    """The motion about the present pose that tells most, for who named none: after an empty run of it, or a tare."""
+    from armload.excitation import Constraints, Criterion, PayloadRange, Surroundings, design_motion
+
+    heaviest = None if options.mass is None else PayloadRange(options.mass[0] + 3.0 * options.mass[1])
+    limits = Constraints(arm, pose, payload=heaviest, surroundings=Surroundings(arm, options.floor))
+    with working("designing a motion about the present pose"):
+        return design_motion(limits, Criterion(arm, "same"), options.time, name="designed").motion
 
 
 def _consent(options: argparse.Namespace) -> Callable[[Plan], bool]:
@@ -230,10 +246,12 @@ def _apply(found: Measurement, mover: Mover, mounted: Any, options: argparse.Nam
     print_note(f"written to {mover.name}: {sent}")
 
 
-def _simulated(options: argparse.Namespace, arm: Arm, motion: Motion, loaded: bool) -> dict[str, Any]:
+def _simulated(options: argparse.Namespace, arm: Arm, motion: Motion | None, loaded: bool) -> dict[str, Any]:
+    from armload.motion import excitation
+
     payload = payload_of(options.payload, arm)
     return {
-        "at": motion.position([0.0])[0] if options.at is None else options.at,
+        "at": (motion or excitation(arm)).position([0.0])[0] if options.at is None else options.at,
         "payload": payload,
         "mounted": payload if loaded else None,
         "world": world_of(options.world, arm),

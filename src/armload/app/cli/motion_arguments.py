@@ -64,28 +64,6 @@ def joints(text: str) -> tuple[int, ...]:
     return tuple(sorted(set(out)))
 
 
-def accuracy(text: str) -> dict[str, float]:
-    """95 % half-widths that are to be reached.
-
-    >>> accuracy("mass=10g,moment=1.5g.m,inertia=1e-3")
-    {'mass': 0.01, 'moment': 0.0015, 'inertia': 0.001}
-    """
-    out = {}
-    for part in text.replace("·", ".").replace("²", "2").split(","):
-        found = re.fullmatch(r"\s*(mass|moment|inertia)=([0-9.eE+-]+?)((?:k?g)?(?:\.m2?)?)\s*", part)
-        unit = None if found is None else _UNITS[found[1]].get(found[3])
-        try:
-            value = float(found[2]) if found is not None else 0.0
-        except ValueError:
-            value = 0.0
-        if found is None or unit is None or value <= 0.0:
-            raise argparse.ArgumentTypeError(
-                f"{text!r} is not an accuracy: expected 95 % half-widths such as mass=10g,moment=1.5g.m,inertia=1e-3"
-            )
-        out[found[1]] = value * unit
-    return out
-
-
 def add_constraint_arguments(parser: argparse.ArgumentParser) -> None:
     """What a motion must keep to: `--share` to `--speed`."""
     add = parser.add_argument_group("limits").add_argument
@@ -130,7 +108,6 @@ def add_design_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--time", type=at_least(0.2, float, 60.0), metavar="S", help="of the motion (default: 3)")
     parser.add_argument(
         "--until",
-        type=accuracy,
         metavar="ACCURACY",
         help="in place of --time: the shortest motion whose bound is within these 95 %% half-widths, such as "
         "mass=10g,moment=1.5g.m,inertia=1e-3",

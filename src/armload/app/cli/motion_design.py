@@ -86,7 +86,7 @@ def run_design(options: argparse.Namespace) -> int:
         if options.until is None:
             found = design_motion(constraints, criterion, 3.0 if options.time is None else options.time, **settings)
         else:
-            found = design_until(constraints, criterion, Accuracy(**options.until), **settings)
+            found = design_until(constraints, criterion, Accuracy.read(options.until), **settings)
     save_motion(out, found.motion)
     written = [str(out)]
     if found.empty is not None:

@@ -1,4 +1,4 @@
-"""How well a payload is to be known before a measurement may end."""
+"""How well a payload is to be known: what a motion is designed for, and when a measurement may end."""
 
 from __future__ import annotations
 
@@ -20,7 +20,6 @@ _UNITS = {
     "moment": {"kg.m": 1.0, "g.m": 1e-3},
     "inertia": {"kg.m2": 1.0, "g.m2": 1e-3},
 }
-_PLACES = {"mass": slice(0, 1), "moment": slice(1, 4), "inertia": slice(4, 10)}
 
 
 @dataclass(frozen=True)
@@ -33,11 +32,19 @@ class Accuracy:
     Args:
         mass: [kg]. moment: of each first moment m·c [kg·m]. inertia: of each second moment about the frame's origin
             [kg·m²].
+
+    Raises:
+        UsageError: nothing is wanted, or a width that is not above 0.
     """
 
     mass: float = np.inf
     moment: float = np.inf
     inertia: float = np.inf
+
+    def __post_init__(self) -> None:
+        each = np.array([self.mass, self.moment, self.inertia])
+        if not (each > 0).all() or np.isinf(each).all():
+            raise UsageError(f"the accuracy {each.tolist()} is not possible: expected half-widths above 0")
 
     @classmethod
     def read(cls, text: str) -> Self:
@@ -73,4 +80,8 @@ class Accuracy:
 
     def holds(self, half_width: NDArray[np.float64]) -> bool:
         """Whether half-widths (10,) are at most those wanted."""
-        return all(bool(np.all(half_width[place] <= getattr(self, name))) for name, place in _PLACES.items())
+        return self.over(half_width) <= 1.0
+
+    def over(self, half_width: NDArray[np.float64]) -> float:
+        """The largest of the half-widths (10,) over the one wanted."""
+        return float((half_width / np.repeat([self.mass, self.moment, self.inertia], [1, 3, 6])).max())
