@@ -16,7 +16,7 @@ from typing import Any
 from armload.inertia import NAMES
 from armload.lab.study.multiverse import AXES, LEVEL, USUAL, Improvement, Multiverse, percent
 from armload.lab.study.numbers import LEAST, SEMI_REAL, Cells, Ensemble, at_end, benchmark, matched, on_many_arms
-from armload.lab.study.statements import RULES, Measured
+from armload.lab.study.statements import RULES
 
 CONFIRMED, DIRECTION, UNDETERMINED = "confirmed", "direction only", "undetermined"
 NOT_CONFIRMED, DEPENDS = "not confirmed", "depends on"
@@ -26,18 +26,18 @@ SPLITS = ("row", "payload")  # the paper's, and the one that keeps whole payload
 BAND = 10.0  # [percentage points] within which a number counts as the paper's
 CONSTANT = "Ixy"  # zero in every loading of our container
 
-RULE = f"""A percentage is **{CONFIRMED}** if the same method is better, the whole interval is on its side, and our number
-lies within {BAND:g} points of the paper's; **{DIRECTION}** if the number lies further off; **{UNDETERMINED}** if the
-interval spans zero; **{NOT_CONFIRMED}** if the other method is better, or neither by {LEAST:g} %. It **{DEPENDS}** a choice
-that the paper leaves open (the scaling, the stopping, the split, the stages, or the rival's rate, derivative, tuning or
-calibration) if this one change alone turns it, both intervals being clear of zero. On Ixy it is **{NOT_COMPARABLE}**: Ixy
-is zero in every loading of our container, so that a learner only has to learn a constant. A statement without a number
-is judged in the same way by a criterion of ours, under both splits.
+RULE = f"""A percentage is **{CONFIRMED}** if the same method is better, the whole interval is on its side, and our
+number lies within {BAND:g} points of the paper's; **{DIRECTION}** if the number lies further off; **{UNDETERMINED}**
+if the interval spans zero; **{NOT_CONFIRMED}** if the other method is better, or neither by {LEAST:g} %. It
+**{DEPENDS}** a choice that the paper leaves open (the scaling, the stopping, the split, the stages, or the rival's
+rate, derivative, tuning or calibration) if this one change alone turns it, both intervals being clear of zero. On Ixy
+it is **{NOT_COMPARABLE}**: Ixy is zero in every loading of our container, so that a learner only has to learn a
+constant. A statement without a number is judged in the same way by a criterion of ours, under both splits.
 
-All intervals are of one kind: {100 * LEVEL:.0f} % of a bootstrap, over held-out payloads (Fig. 4 and 5) or over real-like arms
-(Fig. 6 to 8), for one training (seed 0), widened by what the seeds 1 and 2 change where three were trained (networks of
-at most 60 epochs and trees, in SI units). They say what other payloads or arms would give, not what another container,
-motion or simulator would."""
+All intervals are of one kind: {100 * LEVEL:.0f} % of a bootstrap, over held-out payloads (Fig. 4 and 5) or over
+real-like arms (Fig. 6 to 8), for one training (seed 0), widened by what the seeds 1 and 2 change where three were
+trained (networks of at most 60 epochs and trees, in SI units). They say what other payloads or arms would give, not
+what another container, motion or simulator would."""
 
 
 @cache
@@ -87,8 +87,9 @@ def evaluate(cells: Cells) -> list[dict[str, Any]]:
         For each claim id, where, text, paper, ours (both in percent, or what `unit` says; None: not measured), low and
         high (its interval; None: a single unit), units, verdict, on (the choices it depends on); and parameter, unit,
         repeats (the claim it says again, or empty), held_out (ours with whole payloads held out), semi_real (ours on a
-        real log with the payload's torque added, another motion), bearing and readings (under how many of the readings
-        that the text allows it holds; None for statements), note.
+        real log with the payload's torque added, another motion), bearing, readings and reach (under how
+        many of the readings that the text allows it holds, and the least and largest of their numbers; None for
+        statements), note.
     """
     multiverse, many = Multiverse(cells), on_many_arms(cells)
     return [
@@ -98,7 +99,7 @@ def evaluate(cells: Cells) -> list[dict[str, Any]]:
 
 def _result(claim: dict[str, Any]) -> dict[str, Any]:
     kept = {key: claim[key] for key in ("id", "where", "text", "paper", "parameter", "repeats", "note")}
-    nothing = dict.fromkeys(("ours", "low", "high", "units", "held_out", "semi_real", "bearing", "readings"))
+    nothing = dict.fromkeys(("ours", "low", "high", "units", "held_out", "semi_real", "reach", "bearing", "readings"))
     unit = RULES[claim["rule"]].unit if "rule" in claim else "%"
     return {**kept, **nothing, "unit": unit, "verdict": NOT_MEASURED, "on": []}
 
@@ -120,6 +121,7 @@ def _percentage(claim: dict[str, Any], multiverse: Multiverse, cells: Cells) -> 
         "on": turning if claim["parameter"] != CONSTANT else [],
         "held_out": None if payload is None else round(payload.value, 2),
         "semi_real": _semi_real(claim, cells) if claim["on"] == "real" else None,
+        "reach": [round(percent(max(there)), 2), round(percent(min(there)), 2)],
         "bearing": sum(percent(ratio) >= LEAST for ratio in there),
         "readings": len(there),
         "note": (claim["note"] + _EXACT * (claim["parameter"] == CONSTANT)).strip(),

@@ -95,7 +95,7 @@ def held_out(group: Sequence[Cell]) -> NDArray[np.float64] | None:
 
 
 def held_out_payloads(group: Sequence[Cell]) -> NDArray[np.float64] | None:
-    """The same for each held-out payload (P, 10), averaged over the cells' seeds; None where a cell has no such rows."""
+    """The same for each held-out payload (P, 10), averaged over the cells' seeds; None: a cell has no such rows."""
     rows = [cell["protocols"].get("held_out", {}).get("payloads") for cell in group]
     if not rows or any(r is None for r in rows) or len({len(r) for r in rows}) > 1:
         return None
@@ -152,7 +152,7 @@ def both_stages(
 
 
 def _answers(cell: Cell, measured: Mapping[str, Any]) -> NDArray[np.float64]:
-    averaged = method(cell) in AVERAGED and "second_half" in measured
+    averaged = "second_half" in measured and (method(cell) in AVERAGED or cell["spec"]["kind"] == "rival")
     return np.array(measured["second_half" if averaged else "running"], dtype=float)
 
 

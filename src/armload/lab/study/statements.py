@@ -276,7 +276,8 @@ RULES = {
     "accurate": Rule(
         _accurate,
         "% of the inertia",
-        f"the error of the six moments of inertia on real-like arms, as a vector, is at most {ACCURATE:g} % of the true "
+        f"the error of the six moments of inertia on real-like arms, as a vector, is at most {ACCURATE:g} % of the "
+        f"true "
         "vector's length (mean over arms)",
     ),
     "close": Rule(
