@@ -30,9 +30,10 @@ RULE = f"""A percentage is **{CONFIRMED}** if the same method is better, the who
 number lies within {BAND:g} points of the paper's; **{DIRECTION}** if the number lies further off; **{UNDETERMINED}**
 if the interval spans zero; **{NOT_CONFIRMED}** if the other method is better, or neither by {LEAST:g} %. It
 **{DEPENDS}** a choice that the paper leaves open (the scaling, the stopping, the split, the stages, or the rival's
-rate, derivative, tuning or calibration) if this one change alone turns it, both intervals being clear of zero. On Ixy
-it is **{NOT_COMPARABLE}**: Ixy is zero in every loading of our container, so that a learner only has to learn a
-constant. A statement without a number is judged in the same way by a criterion of ours, under both splits.
+rate, derivative, tuning or calibration) if this one change alone turns it, both intervals being clear of zero (where
+a cell has no errors for single payloads: both numbers). On Ixy it is **{NOT_COMPARABLE}**: Ixy is zero in every
+loading of our container, so that a learner only has to learn a constant. A statement without a number is judged in
+the same way by a criterion of ours, under both splits.
 
 All intervals are of one kind: {100 * LEVEL:.0f} % of a bootstrap, over held-out payloads (Fig. 4 and 5) or over
 real-like arms (Fig. 6 to 8), for one training (seed 0), widened by what the seeds 1 and 2 change where three were
@@ -106,9 +107,9 @@ def _result(claim: dict[str, Any]) -> dict[str, Any]:
 
 def _percentage(claim: dict[str, Any], multiverse: Multiverse, cells: Cells) -> dict[str, Any]:
     out, ours = _result(claim), multiverse.improvement(claim)
-    if ours is None:
-        return out
     payload = multiverse.improvement(claim, USUAL._replace(split="payload"))
+    if ours is None or payload is None:
+        return out
     found = [multiverse.log_ratio(claim, reading) for reading in multiverse.readings(claim)]
     there = [ratio for ratio in found if ratio is not None]
     turning = [name for name in AXES if _turns(claim, name, multiverse, ours)]
@@ -119,7 +120,7 @@ def _percentage(claim: dict[str, Any], multiverse: Multiverse, cells: Cells) -> 
         "units": ours.units,
         "verdict": _verdict(claim, ours, turning),
         "on": turning if claim["parameter"] != CONSTANT else [],
-        "held_out": None if payload is None else round(payload.value, 2),
+        "held_out": round(payload.value, 2),
         "semi_real": _semi_real(claim, cells) if claim["on"] == "real" else None,
         "reach": [round(percent(max(there)), 2), round(percent(min(there)), 2)],
         "bearing": sum(percent(ratio) >= LEAST for ratio in there),

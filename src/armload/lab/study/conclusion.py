@@ -71,10 +71,9 @@ def _decides(claims: Claims, turns: Sequence[Turned], near: Sequence[Nearness]) 
     )
     if near:
         text += (
-            f" No reading comes near all numbers: in the nearest one our ratios of errors are still off by "
+            " No reading comes near all numbers: in the nearest one our ratios of errors are still off by "
             f"{near[0].factor:.1f} times (geometric mean), and {near[0].borne} of {near[0].measured} comparisons "
-            f"hold; in the "
-            f"farthest by {near[-1].factor:.0f} times, with {near[-1].borne}."
+            f"hold; in the farthest by {near[-1].factor:.0f} times, with {near[-1].borne}."
         )
     return text
 
@@ -108,11 +107,9 @@ def _instead(cells: Cells) -> str:
                 ratio.append(f"{payload[:, 0].mean() / row[:, 0].mean():.1f} times for {LEARNERS[kind]}")
     return (
         f"Use the physics. Error of the mass at the end of a run on real-like arms: {listing(shown)}. The ensembles "
-        f"know "
-        "one arm, one motion and one family of payloads; least squares need none of these, and a smoothed derivative "
-        "or "
-        "a run of the empty arm costs less than a training. Test a learner on payloads it has not seen: from rows to "
-        f"payloads held out the error of the mass grows {listing(ratio)} (below 1: falls). And say how the rival "
+        "know one arm, one motion and one family of payloads; least squares need none of these, and a smoothed "
+        "derivative or a run of the empty arm costs less than a training. Test a learner on payloads it has not seen: "
+        f"from rows to payloads held out the error of the mass grows {listing(ratio)} (below 1: falls). And say how the rival "
         "differentiates: that decides most comparisons with it."
     )
 

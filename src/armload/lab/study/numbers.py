@@ -172,15 +172,6 @@ def mean_ratio(a: ArrayLike, b: ArrayLike) -> float:
     return float(np.exp(np.mean(np.log(a[keep] / b[keep])))) if keep.any() else 1.0
 
 
-def improvement(better: float, worse: float) -> float:
-    """By how many percent `better` lowers the error `worse`: 100·(1 − better/worse); two exact answers are equal.
-
-    >>> improvement(1.0, 4.0), improvement(4.0, 1.0), improvement(0.0, 0.0)
-    (75.0, -300.0, 0.0)
-    """
-    return 100.0 * (1.0 - max(better, EXACT) / max(worse, EXACT))
-
-
 def on_many_arms(cells: Cells) -> dict[str, Cell]:
     """The study with the cells of the readings (many arms, a row for each payload) in place of those they repeat.
 
@@ -211,7 +202,8 @@ def on_many_arms(cells: Cells) -> dict[str, Cell]:
             out[name] = {**cells[name], "protocols": protocols}
     for name, cell in cells.items():
         if name.startswith("benchmark-training-mean") and REAL in cell["protocols"] and arms:
-            real = {k: cell["protocols"][REAL][k][:1] * arms for k in ("running", "first")}
+            alike = {k: cell["protocols"][REAL].get(k) for k in ("running", "first")}
+            real = {k: [np.mean(rows, axis=0).tolist()] * arms for k, rows in alike.items() if rows}
             out[name] = {**cell, "protocols": {**cell["protocols"], REAL: {**cell["protocols"][REAL], **real}}}
     return out
 

@@ -26,7 +26,7 @@ def reading_specs(size: Size) -> list[Spec]:
     """The trainings, the most telling first: trees, then networks by what they cost."""
     main = [Spec("tree"), Spec("network", max_epochs=DEFAULT_STOP), Spec("network")]
     order = [(main[0], "raw"), (main[0], "standard"), (main[2], "raw"), (main[1], "raw")]
-    order += [(main[1], "standard"), (main[2], "standard")]
+    order += [(main[1], "standard")]
     specs = [
         replace(spec, scale=scale, split=split, stages=stages, ablation=READING)
         for spec, scale in order
