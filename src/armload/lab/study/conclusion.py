@@ -109,8 +109,8 @@ def _instead(cells: Cells) -> str:
         f"Use the physics. Error of the mass at the end of a run on real-like arms: {listing(shown)}. The ensembles "
         "know one arm, one motion and one family of payloads; least squares need none of these, and a smoothed "
         "derivative or a run of the empty arm costs less than a training. Test a learner on payloads it has not seen: "
-        f"from rows to payloads held out the error of the mass grows {listing(ratio)} (below 1: falls). And say how the rival "
-        "differentiates: that decides most comparisons with it."
+        f"from rows to payloads held out the error of the mass changes {listing(ratio)}. And say how the rival "
+        "differentiates, and at which rate."
     )
 
 
