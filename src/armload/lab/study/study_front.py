@@ -184,15 +184,13 @@ def _nearest_table(near: Sequence[Nearness]) -> Table:
             "Readings by their distance to the paper", ("reading",), (), f"Not measured yet: `{COMMAND}` does."
         )
     by = {n.reading: n for n in near}
-    chosen = {
-        "nearest": near[0],
-        "most claims hold": max(near, key=lambda n: (n.borne, -n.factor)),
-        "usual": by[USUAL],
-        "usual, 14 epochs": by[SKLEARN],
-        "farthest": near[-1],
-    }
+    most = max(near, key=lambda n: (n.borne, -n.factor))
+    chosen = {"nearest": near[0], "most claims hold": most, "usual": by.get(USUAL), "farthest": near[-1]}
+    chosen["usual, stopped as scikit-learn does"] = by.get(SKLEARN)
     rows = tuple(
-        (name, shown(n.reading), f"{n.factor:.1f} times", f"{n.borne} of {n.measured}") for name, n in chosen.items()
+        (name, shown(n.reading), f"{n.factor:.1f} times", f"{n.borne} of {n.measured}")
+        for name, n in chosen.items()
+        if n is not None
     )
     note = f"Of {len(near)} readings of the whole paper."
     return Table("Readings by their distance to the paper", ("", "reading", "off by", "hold"), rows, note)
