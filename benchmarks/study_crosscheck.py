@@ -26,9 +26,10 @@ from armload.lab.study import FULL, Basis
 
 def parts(split: str, payload: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Training (70 %) and test rows (15 %), by row or by payload; trees do not use the rest."""
-    kind = ShuffleSplit if split == "row" else GroupShuffleSplit
-    rest, test = next(kind(1, test_size=0.15, random_state=0).split(payload, groups=payload))
-    train, _ = next(kind(1, train_size=0.7 / 0.85, random_state=1).split(payload[rest], groups=payload[rest]))
+    kind, by = (ShuffleSplit, None) if split == "row" else (GroupShuffleSplit, payload)
+    rest, test = next(kind(1, test_size=0.15, random_state=0).split(payload, groups=by))
+    by = None if by is None else by[rest]
+    train, _ = next(kind(1, train_size=0.7 / 0.85, random_state=1).split(rest, groups=by))
     return rest[train], test
 
 

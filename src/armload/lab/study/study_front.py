@@ -60,6 +60,10 @@ Fig. 6 to 8.
 reading: SI units, at most 1000 epochs, stopped when ten epochs lower the validation loss by less than a
 ten-thousandth.
 
+**Checks.** `python benchmarks/study_crosscheck.py` trains the trees with scikit-learn alone and puts its errors
+beside the cells'. A test computes every verdict again from the cells by other code. Filtered RLS agree with an
+implementation of [7] written anew from its formulas.
+
 **No real Panda with a payload was measured.** `Real-like` arms are simulated arms that differ from their model as
 real ones do. Read "real robot" in a claim as the paper's, "real-like" as ours."""
 
