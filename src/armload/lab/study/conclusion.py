@@ -94,8 +94,8 @@ def _instead(cells: Cells) -> str:
         if (errors := at_end([cells[cell]] if cell in cells else [], REAL)) is not None:
             shown.append(f"{mass_shown(errors)} for {name}")
     for name, method in {
-        "same-prior least squares": "same-prior",
-        "armload's default with a tare": "hybrid-tare",
+        "same-prior least squares (on five of the arms)": "same-prior",
+        "armload's default with a tare on another motion (on five of the arms)": "hybrid-tare",
     }.items():
         if (errors := at_end(benchmark(cells, method), REAL)) is not None:
             shown.append(f"{mass_shown(errors)} for {name}")
