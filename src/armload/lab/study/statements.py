@@ -6,13 +6,13 @@ reader finds the measured number beside the verdict.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.lab.study.multiverse import LEVEL
+from armload.lab.study.judged import Measured, judged
 from armload.lab.study.numbers import (
     LEAST,
     Answers,
@@ -36,21 +36,6 @@ FLAT = 5.0  # [% of the truth] that a flat line may move, ours
 CLOSE = 2.0  # ratio of errors that still counts as close, ours
 SETTLED = 100.0  # [% of the truth] the error of the answer 0: what has settled errs less, ours
 ACCURATE = 10.0  # [% of the truth] that "highly accurate" may err, ours
-STATEMENT_DRAWS = 400  # of the bootstrap
-
-
-class Measured(NamedTuple):
-    """A claim under one split: the number, its interval (None: a single unit), how many units, whether it holds.
-
-    holds: None where the interval holds values on both sides of the criterion. cap on epochs and seeds behind it.
-    """
-
-    value: float
-    bounds: tuple[float, float] | None
-    units: int
-    holds: bool | None
-    cap: int | None = None
-    seeds: tuple[int, ...] = ()
 
 
 class Rule(NamedTuple):
@@ -87,29 +72,7 @@ def _first_step(cells: Cells, learner: str | None, split: str) -> Measured | Non
 
 def _over_arms(own: Answers, improvement: Callable[[NDArray], float]) -> Measured:
     """An improvement [%] of an ensemble's errors over the arms, and whether it counts as one."""
-    return _judged(improvement, (own.errors,), lambda value: value >= LEAST, own.cap, own.seeds)
-
-
-def _judged(
-    statistic: Callable[..., float],
-    arrays: Sequence[NDArray],
-    criterion: Callable[[float], bool],
-    most: int | None = None,
-    seeds: tuple[int, ...] = (),
-) -> Measured:
-    """A statistic of errors (U, ...) with its bootstrap interval over the units, which are drawn for all arrays alike.
-
-    It holds if the criterion does at the value and at both bounds; it is open if at some of them.
-    """
-    value, units = statistic(*arrays), len(arrays[0])
-    if units < 2 or any(len(a) != units for a in arrays):
-        return Measured(value, None, units, criterion(value), most, seeds)
-    drawn = np.random.default_rng(units).integers(units, size=(STATEMENT_DRAWS, units))
-    found = [statistic(*(a[rows] for a in arrays)) for rows in drawn]
-    low, high = np.quantile(found, [(1.0 - LEVEL) / 2.0, (1.0 + LEVEL) / 2.0])
-    at = {criterion(value), criterion(float(low)), criterion(float(high))}
-    holds = None if len(at) > 1 else at.pop()
-    return Measured(value, (float(low), float(high)), units, holds, most, seeds)
+    return judged(improvement, (own.errors,), lambda value: value >= LEAST, own.cap, own.seeds)
 
 
 def _flat(cells: Cells, learner: str | None, split: str) -> Measured | None:
@@ -156,7 +119,7 @@ def _close(cells: Cells, learner: str | None, split: str) -> Measured | None:
     def ratio(errors: NDArray) -> float:
         return mean_ratio(errors.mean(axis=0), nominal)
 
-    return _judged(ratio, (real.errors,), lambda value: value <= CLOSE, real.cap, real.seeds)
+    return judged(ratio, (real.errors,), lambda value: value <= CLOSE, real.cap, real.seeds)
 
 
 def _accurate(cells: Cells, learner: str | None, split: str) -> Measured | None:
@@ -168,7 +131,7 @@ def _accurate(cells: Cells, learner: str | None, split: str) -> Measured | None:
     def share(errors: NDArray) -> float:
         return 100.0 * float(np.linalg.norm(errors[:, 4:], axis=1).mean() / truth)
 
-    return _judged(share, (real.errors,), lambda value: value <= ACCURATE, real.cap, real.seeds)
+    return judged(share, (real.errors,), lambda value: value <= ACCURATE, real.cap, real.seeds)
 
 
 def _better_on_real(cells: Cells, learner: str | None, split: str) -> Measured | None:
@@ -192,7 +155,7 @@ def _b_surpasses_a(cells: Cells, _learner: str | None, split: str) -> Measured |
     def less(a: NDArray, b: NDArray) -> float:
         return 100.0 * (1.0 - mean_ratio(a.mean(axis=0)[:4], b.mean(axis=0)[:4]))
 
-    return _judged(less, (tree.errors, network.errors), lambda value: value >= LEAST, network.cap, network.seeds)
+    return judged(less, (tree.errors, network.errors), lambda value: value >= LEAST, network.cap, network.seeds)
 
 
 def _no_filter(cells: Cells, learner: str | None, split: str) -> Measured | None:
@@ -202,7 +165,7 @@ def _no_filter(cells: Cells, learner: str | None, split: str) -> Measured | None
     if own is None or len(others) < len(methods):
         return None
     best = min(others, key=lambda e: mean_ratio(e.mean(axis=0), own.errors.mean(axis=0)))
-    return _judged(_percent_of_means, (own.errors, best), lambda value: value >= LEAST, own.cap, own.seeds)
+    return judged(_percent_of_means, (own.errors, best), lambda value: value >= LEAST, own.cap, own.seeds)
 
 
 def _trees_better(cells: Cells, _learner: str | None, split: str) -> Measured | None:
@@ -234,7 +197,7 @@ def _held_out_comparison(
         there = [e for e in errors if e is not None]
         if len(there) == len(wanted):
             pair = (ours(there), theirs(there))
-            return _judged(_percent_of_means, pair, lambda value: value >= LEAST, match.cap, match.seeds)
+            return judged(_percent_of_means, pair, lambda value: value >= LEAST, match.cap, match.seeds)
     return None
 
 
