@@ -138,13 +138,10 @@ def small(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def written(small):
-    """The files of that study, by whether they are said to be of a quick run."""
+    """The files of that study."""
     folder, _, cells, _ = small
-    names = {quick: folder / f"written-{quick}" for quick in (False, True)}
-    return {
-        quick: write_results(cells, at / "a" / "s.json", at / "p.md", at / "r.html", quick=quick)
-        for quick, at in names.items()
-    }
+    at = folder / "written"
+    return write_results(cells, at / "a" / "s.json", at / "p.md", at / "r.html")
 
 
 def test_a_study_that_was_stopped_goes_on_and_measures_nothing_twice(small):
@@ -209,7 +206,7 @@ def test_every_learned_cell_has_all_protocols_and_finite_errors(small):
 
 
 def test_page_summary_and_report_are_written_from_the_cells(written):
-    files = written[False]
+    files = written
     summary = json.loads(files["summary"].read_text(encoding="utf-8"))
     assert {"rows", "payloads", "seeds", "command", "versions", "wall_s", "methods", "claims"} <= set(summary)
     assert summary["payloads"] == len(range(0, 77, SMALL.every))
@@ -244,10 +241,11 @@ def test_the_command_stops_in_time_names_what_is_missing_and_writes_the_page(tmp
     assert "no real log at" in capsys.readouterr().err
 
 
-def test_a_quick_run_says_on_top_of_its_page_and_report_that_its_verdicts_mean_nothing(written):
+def test_a_quick_run_says_on_top_of_its_pages_and_report_that_its_verdicts_mean_nothing(tmp_path):
     said = "This was a quick run: its verdicts mean nothing."
-    for quick, files in written.items():
-        for name, heading in (("page", "## "), ("report", "<h2>")):
+    for quick in (False, True):
+        files = write_results({}, tmp_path / "s.json", tmp_path / "p.md", tmp_path / "r.html", quick=quick)
+        for name, heading in (("page", "## "), ("tables", "## "), ("report", "<h2>")):
             text = files[name].read_text(encoding="utf-8")
             first = text.split(heading)[1 if name == "report" else 0]  # before the first heading, or under it
             assert (said in first) == quick

@@ -9,7 +9,7 @@ from test_study_claims import UNIT, cell, rival, study
 
 from armload.errors import ReportError
 from armload.lab.evaluation import Table
-from armload.lab.report import markdown
+from armload.lab.report import markdown, write_markdown
 from armload.lab.study import FULL
 from armload.lab.study.ablations import ABLATIONS, ablation_table, single_or_mean_table
 from armload.lab.study.appendix import averaged_table
@@ -29,8 +29,9 @@ from armload.lab.study.summary import paragraphs
 
 def page_of(cells, folder):
     """The page and its appendix."""
-    paths = write_pages(cells, evaluate(cells), folder / "paper.md")
-    return "\n".join(path.read_text(encoding="utf-8") for path in paths.values())
+    claims = evaluate(cells)
+    whole = [*front(cells, claims), *sections(cells, claims)]  # without pictures, which take long to draw
+    return write_markdown(folder / "paper.md", whole, "The study").read_text(encoding="utf-8")
 
 
 def row(table, *labels):

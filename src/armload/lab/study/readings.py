@@ -34,7 +34,8 @@ def reading_specs(size: Size) -> list[Spec]:
         for stages in (1, 2)
     ]
     shrunk = [spec if size.max_epochs is None else _shrunk(spec, size) for spec in specs]
-    return list({spec.name: spec for spec in shrunk}.values())
+    once = list({spec.name: spec for spec in shrunk}.values())
+    return once if size.max_epochs is None else [spec for spec in once if spec.scale == "raw"]
 
 
 def _shrunk(spec: Spec, size: Size) -> Spec:

@@ -49,8 +49,9 @@ percentages, of how many times our ratio of two errors is larger or smaller than
 _RIVALS = """RLS need an acceleration. Its noise, and so the rate and the derivative, decides how large their error
 is: it is a choice of the experiment, not a property of the method. `usual`: remembers everything, and the settings a
 reader of [7] would take first. `tuned`: the setting that errs least on eight other arms with payloads of the training
-(see `rivals.py`). `calibrated` as in [7]: minus the answer of the empty arm on the same motion. The ensembles know as
-much: they were trained on these payloads and this motion. All on the same 30 real-like arms."""
+(see `rivals.py`). `calibrated` as in [7]: minus the answer of the empty arm on the same motion. In simulation the
+empty run repeats the arm's mismatch to the last detail, which is the best case for it. The ensembles know as much: they
+were trained on these payloads and this motion. All on the same 30 real-like arms."""
 _PROTOCOL = """**Data.** The test payload's and the loadings' runs follow the paper: the arm, eight sinusoids a joint
 over six seconds, 77 loadings, 249 788 rows, 70 / 15 / 15 %. Single samples of held-out rows measure Fig. 4 and 5;
 whole runs on real-like arms, with the running mean of an ensemble and the mean of RLS over the second half, measure
