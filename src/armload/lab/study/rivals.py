@@ -68,13 +68,13 @@ class Rival:
 
 
 def rivals(size: Size) -> list[Rival]:
-    """Every combination; of a reduced size those of the first rate and noise."""
+    """Every combination; of a reduced size those of the first rate and noise, and none tuned."""
     whole = size.max_epochs is None
     return [
         Rival(rate, sensors, derivative, calibrated, tuned)
         for rate, sensors in product(RATES[: None if whole else 1], SENSORS[: None if whole else 1])
         for derivative in (*DERIVATIVES, "filter")
-        for calibrated, tuned in product((False, True), (False, True))
+        for calibrated, tuned in product((False, True), (False, True)[: None if whole else 1])
     ]
 
 
@@ -102,7 +102,7 @@ def measured_rivals(
     """The cells of these names: error of the mean over the second half of each run (R, 10)."""
     basis = basis_of_process(*rests_on, None)
     runs = simulated(basis, rate, sensors)
-    others = tuning_runs(basis, rate, sensors)
+    others = tuning_runs(basis, rate, sensors) if any(r.tuned for r in rivals(basis.size)) else []
     for rival in (r for r in rivals(basis.size) if r.name in names):
         begun = time.perf_counter()
         chosen = tune(basis, rival, others) if rival.tuned else (USUAL[rival.derivative], 1.0)
