@@ -46,7 +46,7 @@ def load_claims() -> tuple[dict[str, Any], ...]:
     """Every claim: id, where, text, paper (percent or None), and what to compare.
 
     >>> len(load_claims()), sum(claim["printed"] for claim in load_claims() if claim["where"] != "Abstract")
-    (82, 62)
+    (86, 62)
     """
     data = json.loads(resources.files("armload.lab.study").joinpath("claims.json").read_text(encoding="utf-8"))
     claims = []
