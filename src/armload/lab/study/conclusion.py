@@ -87,7 +87,7 @@ def _instead(cells: Cells) -> str:
     rivals = {
         "RLS as benchmarked": "rival-difference-540-panda",
         "the same with a Savitzky–Golay derivative": "rival-savgol-540-panda",
-        "that calibrated on the empty arm": "rival-savgol-540-panda-calibrated",
+        "that calibrated along the same motion (in simulation the best case)": "rival-savgol-540-panda-calibrated",
         "filtered RLS calibrated as in [7]": "rival-filter-540-panda-calibrated",
     }
     for name, cell in rivals.items():
@@ -95,7 +95,7 @@ def _instead(cells: Cells) -> str:
             shown.append(f"{mass_shown(errors)} for {name}")
     for name, method in {
         "same-prior least squares (on five of the arms)": "same-prior",
-        "armload's default with a tare on another motion (on five of the arms)": "hybrid-tare",
+        "armload's default, without a tare (on five of the arms)": "hybrid",
     }.items():
         if (errors := at_end(benchmark(cells, method), REAL)) is not None:
             shown.append(f"{mass_shown(errors)} for {name}")
