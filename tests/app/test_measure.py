@@ -64,6 +64,16 @@ def test_the_whole_way_prints_and_writes_the_answer(motion, tmp_path, capsys):
     assert not (tmp_path / "again" / "empty.csv").exists()
 
 
+def test_without_a_motion_one_about_the_present_pose_is_designed(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    pose = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]
+    at = ["--at", ",".join(map(str, pose)), "--time", "1", "--mass", "1.48±0.01"]
+    assert main(["measure", "sim", *QUICK, "--dry-run", "--json", *at]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert [move["purpose"] for move in said["movements"]] == ["without the payload", "with the payload"]
+    assert [move["motion"] for move in said["movements"]] == ["designed", "designed"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

@@ -13,9 +13,11 @@ from armload.inertia import InertialParameters
 from armload.lab import load_cells, save_cell
 from armload.lab.evaluation import EvaluationRun
 from armload.lab.study import FULL, QUICK, Basis, Size, Spec, plan, run_study, write_results
-from armload.lab.study.claims import evaluate
+from armload.lab.study.claims import VERDICTS, evaluate
 from armload.lab.study.protocols import measure_learned, measure_stream
-from armload.lab.study.study_page import summary_json, write_page
+from armload.lab.study.readings import reading_specs
+from armload.lab.study.rivals import rivals
+from armload.lab.study.study_page import pages, summary_json, write_pages
 from armload.recording import Recording
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -136,20 +138,18 @@ def small(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def written(small):
-    """The files of that study, by whether they are said to be of a quick run."""
+    """The files of that study."""
     folder, _, cells, _ = small
-    names = {quick: folder / f"written-{quick}" for quick in (False, True)}
-    return {
-        quick: write_results(cells, at / "a" / "s.json", at / "p.md", at / "r.html", quick=quick)
-        for quick, at in names.items()
-    }
+    at = folder / "written"
+    return write_results(cells, at / "a" / "s.json", at / "p.md", at / "r.html")
 
 
 @pytest.mark.full  # some seconds
 def test_a_study_that_was_stopped_goes_on_and_measures_nothing_twice(small):
     folder, first, cells, messages = small
-    assert len(first) < len(cells) == len(plan(SMALL))
-    assert len([line for line in messages if line.startswith("cell")]) == len(cells)
+    assert len(first) < len(cells) == len(plan(SMALL)) + len(reading_specs(SMALL)) + len(rivals(SMALL))
+    tasks = len(plan(SMALL)) + len(reading_specs(SMALL)) + 1  # the rivals of one rate and noise are one
+    assert len([line for line in messages if line.startswith("cell")]) == tasks
     again = []
     assert run_study(Basis(folder, SMALL), folder / "cells", say=again.append) == cells
     assert again == []
@@ -191,6 +191,14 @@ def test_a_cell_of_another_size_is_measured_again(small):
 def test_every_learned_cell_has_all_protocols_and_finite_errors(small):
     _, _, cells, _ = small
     for name, cell in cells.items():
+        if name.startswith("reading"):
+            held_out = cell["protocols"]["held_out"]
+            payloads, averaged = np.array(held_out["payloads"]), np.array(held_out["averaged"])
+            assert np.all(averaged <= payloads * (1 + 1e-5) + 1e-12)  # triangle inequality
+            assert payloads.min() >= 0.0
+            assert len(cell["protocols"]["test_payload_real_like"]["running"]) == SMALL.worlds + 1
+        if name.startswith("rival"):
+            assert all(np.isfinite(p["second_half"]).all() for p in cell["protocols"].values())
         if name.startswith(("tree", "network", "mixed")):
             assert {"held_out", "test_payload_nominal", "test_payload_real_like", "off_family", "other_motion"} <= set(
                 cell["protocols"]
@@ -199,14 +207,15 @@ def test_every_learned_cell_has_all_protocols_and_finite_errors(small):
 
 
 def test_page_summary_and_report_are_written_from_the_cells(written):
-    files = written[False]
+    files = written
     summary = json.loads(files["summary"].read_text(encoding="utf-8"))
     assert {"rows", "payloads", "seeds", "command", "versions", "wall_s", "methods", "claims"} <= set(summary)
     assert summary["payloads"] == len(range(0, 77, SMALL.every))
     verdicts = {claim["verdict"] for claim in summary["claims"]}
-    assert verdicts <= {"confirmed", "not confirmed", "depends on the split", "not measured"}
+    assert verdicts <= set(VERDICTS)
     page = files["page"].read_text(encoding="utf-8")
-    assert all(claim["id"] in page or claim["text"] in page for claim in summary["claims"])
+    assert all(claim["id"] in page or claim["repeats"] for claim in summary["claims"])
+    page = files["tables"].read_text(encoding="utf-8")
     assert "training mean" in page
     assert "same-prior least squares" in page
 
@@ -217,8 +226,9 @@ def test_the_committed_page_and_summary_are_what_the_committed_cells_say(tmp_pat
     assert messages == []  # no cell is left to measure
     claims = evaluate(cells)
     assert json.loads((results / "taie2024.json").read_text(encoding="utf-8")) == summary_json(cells, claims)
-    page = write_page(cells, claims, tmp_path / "paper.md")
-    assert page.read_text(encoding="utf-8") == (ROOT / "docs" / "paper.md").read_text(encoding="utf-8")
+    committed = pages(ROOT / "docs" / "paper.md")
+    for name, path in write_pages(cells, claims, tmp_path / "paper.md").items():
+        assert path.read_text(encoding="utf-8") == committed[name].read_text(encoding="utf-8")
 
 
 def test_the_command_stops_in_time_names_what_is_missing_and_writes_the_page(tmp_path, capsys):
@@ -232,10 +242,11 @@ def test_the_command_stops_in_time_names_what_is_missing_and_writes_the_page(tmp
     assert "no real log at" in capsys.readouterr().err
 
 
-def test_a_quick_run_says_on_top_of_its_page_and_report_that_its_verdicts_mean_nothing(written):
+def test_a_quick_run_says_on_top_of_its_pages_and_report_that_its_verdicts_mean_nothing(tmp_path):
     said = "This was a quick run: its verdicts mean nothing."
-    for quick, files in written.items():
-        for name, heading in (("page", "## "), ("report", "<h2>")):
+    for quick in (False, True):
+        files = write_results({}, tmp_path / "s.json", tmp_path / "p.md", tmp_path / "r.html", quick=quick)
+        for name, heading in (("page", "## "), ("tables", "## "), ("report", "<h2>")):
             text = files[name].read_text(encoding="utf-8")
             first = text.split(heading)[1 if name == "report" else 0]  # before the first heading, or under it
             assert (said in first) == quick

@@ -64,6 +64,13 @@ def parser() -> Parser:
         help="taie2024, a JSON or CSV file, or random:SEED (default: designed about the present pose)",
     )
     add("--time", type=at_least(0.2, float, 60.0), default=2.0, metavar="S", help="of a motion that is designed (2)")
+    add(
+        "--tool-speed",
+        type=at_least(0.01, float),
+        default=0.5,
+        metavar="V",
+        help="of the payload frame in a motion that is designed, at most [m/s] (0.5)",
+    )
     add("--dry-run", action="store_true", help="connect, say what would move and check it; move nothing")
     add("--move", action="store_true", help="move without asking: for who has seen the dry run")
     add("--until", metavar="WIDTHS", help="stop when 95%% half-widths are mass=10g,moment=1.5g.m,inertia=1e-3")
@@ -102,7 +109,12 @@ def parser() -> Parser:
     sim(
         "--world", default="real-like:0", metavar="W", help="the arm as it is: nominal, or real-like:SEED (real-like:0)"
     )
-    sim("--at", type=_pose, metavar="Q1,…", help="where it stands [rad] (default: where the motion begins)")
+    sim(
+        "--at",
+        type=_pose,
+        metavar="Q1,…",
+        help="where it stands [rad] (default: where the motion begins, else the middle of the joints)",
+    )
     sim("--speed", type=_speed, default=1.0, metavar="X|max", help="1: real time")
     sim("--seed", type=at_least(0), default=0, metavar="N", help="of the sensors' noise (0)")
     return parser
@@ -175,7 +187,8 @@ def _designed(arm: Arm, pose: NDArray, options: argparse.Namespace) -> Motion:
     from armload.excitation import Constraints, Criterion, PayloadRange, Surroundings, design_motion
 
     heaviest = None if options.mass is None else PayloadRange(options.mass[0] + 3.0 * options.mass[1])
-    limits = Constraints(arm, pose, payload=heaviest, surroundings=Surroundings(arm, options.floor))
+    around = Surroundings(arm, options.floor)
+    limits = Constraints(arm, pose, payload=heaviest, surroundings=around, speed=options.tool_speed)
     with working("designing a motion about the present pose"):
         return design_motion(limits, Criterion(arm, "same"), options.time, name="designed").motion
 
@@ -247,11 +260,13 @@ def _apply(found: Measurement, mover: Mover, mounted: Any, options: argparse.Nam
 
 
 def _simulated(options: argparse.Namespace, arm: Arm, motion: Motion | None, loaded: bool) -> dict[str, Any]:
-    from armload.motion import excitation
+    import numpy as np
 
     payload = payload_of(options.payload, arm)
+    middle = 0.5 * (arm.limits.position_low + arm.limits.position_high)
+    stands = np.where(np.isfinite(middle), middle, 0.0) if motion is None else motion.position([0.0])[0]
     return {
-        "at": (motion or excitation(arm)).position([0.0])[0] if options.at is None else options.at,
+        "at": stands if options.at is None else options.at,
         "payload": payload,
         "mounted": payload if loaded else None,
         "world": world_of(options.world, arm),

@@ -20,7 +20,7 @@ examples:
   armload reproduce taie2024 --hours 3
 
 Each method, training and split is a cell with a file of its own in --results; finished cells are not measured again.
-The page, the summary and the report are written from the cells there are; what is missing is named.
+The page, its appendix, the summary and the report are written from the cells there are; what is missing is named.
 """
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -163,3 +163,9 @@ class Basis:
         tare = log.between(start, start + 10.0)
         windows = [(w, loaded.between(start + w, start + w + 6.0)) for w in (10.0, 12.0, 14.0)]
         return [EvaluationRun(window, self.truth, f"real log from {w:g} s", tare) for w, window in windows]
+
+
+@lru_cache(maxsize=1)
+def basis_of_process(folder: Path, size: Size, real_log: Path | None) -> Basis:
+    """One for all cells that a process measures, so that its runs are simulated once."""
+    return Basis(folder, size, real_log)

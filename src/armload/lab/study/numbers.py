@@ -21,6 +21,15 @@ EXACT = 1e-9  # [SI] errors below are rounding: a parameter that is the same in 
 AVERAGED = ("rls", "rls-filter", "rls-filter-calibrated", "rls-filter-calibrated-other")
 
 
+REAL, SEMI_REAL = "test_payload_real_like", "test_payload_semi_real"
+READING = "reading"  # the ablation of the cells of the readings
+RIVAL_OF = {  # the same method on the many arms of `rivals`
+    "rls": "rival-difference-540-panda",
+    "rls-filter": "rival-filter-540-panda",
+    "rls-filter-calibrated": "rival-filter-540-panda-calibrated",
+}
+
+
 class Ensemble(NamedTuple):
     """Which ensemble: kind "tree", "network" or "mixed"; scale "raw" or "standard"; sensors of its training data."""
 
@@ -85,6 +94,14 @@ def held_out(group: Sequence[Cell]) -> NDArray[np.float64] | None:
     return np.array([row["single"] for row in rows if row], dtype=float) if rows and all(rows) else None
 
 
+def held_out_payloads(group: Sequence[Cell]) -> NDArray[np.float64] | None:
+    """The same for each held-out payload (P, 10), averaged over the cells' seeds; None: a cell has no such rows."""
+    rows = [cell["protocols"].get("held_out", {}).get("payloads") for cell in group]
+    if not rows or any(r is None for r in rows) or len({len(r) for r in rows}) > 1:
+        return None
+    return np.mean(rows, axis=0)
+
+
 def at_end(group: Sequence[Cell], protocol: str) -> NDArray[np.float64] | None:
     """|error| of the answer to each run of a protocol, (R, 10), averaged over the cells' seeds.
 
@@ -135,7 +152,7 @@ def both_stages(
 
 
 def _answers(cell: Cell, measured: Mapping[str, Any]) -> NDArray[np.float64]:
-    averaged = method(cell) in AVERAGED and "second_half" in measured
+    averaged = "second_half" in measured and (method(cell) in AVERAGED or cell["spec"]["kind"] == "rival")
     return np.array(measured["second_half" if averaged else "running"], dtype=float)
 
 
@@ -155,24 +172,43 @@ def mean_ratio(a: ArrayLike, b: ArrayLike) -> float:
     return float(np.exp(np.mean(np.log(a[keep] / b[keep])))) if keep.any() else 1.0
 
 
-def improvement(better: float, worse: float) -> float:
-    """By how many percent `better` lowers the error `worse`: 100·(1 − better/worse); two exact answers are equal.
+def on_many_arms(cells: Cells) -> dict[str, Cell]:
+    """The study with the cells of the readings (many arms, a row for each payload) in place of those they repeat.
 
-    >>> improvement(1.0, 4.0), improvement(4.0, 1.0), improvement(0.0, 0.0)
-    (75.0, -300.0, 0.0)
+    Least squares are those of `rivals` at the study's rate; the training mean errs on every arm alike.
     """
-    return 100.0 * (1.0 - max(better, EXACT) / max(worse, EXACT))
+    stages: dict[tuple, list[Cell]] = {}
+    for cell in cells.values():
+        if cell["spec"].get("ablation") == READING:
+            stages.setdefault(_ensemble_of(cell), []).append(cell)
+    many = {key: group for key, group in stages.items() if len(group) == 2}
+    arms = max((len(cell["protocols"][REAL]["running"]) for group in many.values() for cell in group), default=0)
+    out = {
+        name: cell
+        for name, cell in cells.items()
+        if cell["spec"]["kind"] not in ("tree", "network")
+        or cell["spec"].get("ablation") not in (None, "scale", READING)
+        or cell["spec"]["sensors"] != "ideal"
+        or _ensemble_of(cell) not in many
+    }
+    for cell in (cell for group in many.values() for cell in group):
+        spec = dict(cell["spec"]) | {"ablation": "scale" if cell["spec"]["scale"] == "standard" else None}
+        name = cell["name"].removeprefix(f"{READING}-")
+        out[name] = {**cell, "name": name, "spec": spec}
+    for method, rival in RIVAL_OF.items():
+        name = f"benchmark-{method}-s0"
+        if name in cells and rival in cells:
+            protocols = {**cells[name]["protocols"], **cells[rival]["protocols"]}
+            out[name] = {**cells[name], "protocols": protocols}
+    for name, cell in cells.items():
+        if name.startswith("benchmark-training-mean") and REAL in cell["protocols"] and arms:
+            alike = {k: cell["protocols"][REAL].get(k) for k in ("running", "first")}
+            real = {k: [np.mean(rows, axis=0).tolist()] * arms for k, rows in alike.items() if rows}
+            out[name] = {**cell, "protocols": {**cell["protocols"], REAL: {**cell["protocols"][REAL], **real}}}
+    return out
 
 
-def spread(statistic: Callable[..., float], *arrays: NDArray[np.float64]) -> float | None:
-    """Standard deviation over units (axis 0) of a statistic of several arrays; None for a single unit.
-
-    A ratio of means has no value for one unit, so the jackknife's take its place: θ_i = n·θ − (n − 1)·θ_(without i).
-    For a mean they are the units' own values (Tukey 1958).
-    """
-    n = len(arrays[0])
-    if n < 2 or any(len(a) != n for a in arrays):
-        return None
-    whole = statistic(*arrays)
-    without = [statistic(*(np.delete(a, i, axis=0) for a in arrays)) for i in range(n)]
-    return float(np.std(n * whole - (n - 1) * np.array(without), ddof=1))
+def _ensemble_of(cell: Cell) -> tuple[Any, ...]:
+    """What the two stages of an ensemble share, and its seeds."""
+    spec = cell["spec"]
+    return spec["kind"], spec["scale"], spec["split"], cap(cell)

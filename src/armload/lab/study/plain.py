@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
-from typing import Any
-
 from numpy.typing import NDArray
 
 from armload.lab.evaluation import Table
 from armload.lab.report.shown import short
 from armload.lab.study.ablations import compared
-from armload.lab.study.claims import CONFIRMED, DEPENDS, NOT_CONFIRMED, NOT_MEASURED
 from armload.lab.study.numbers import (
     Cells,
     Ensemble,
@@ -47,10 +42,9 @@ _AGAINST = """In the table below, a number under 1 means that the ensemble is be
 `training mean` is the mean of these payloads; it uses no measurement."""
 
 
-def in_plain_words(cells: Cells, claims: Sequence[dict[str, Any]]) -> str:
+def in_plain_words(cells: Cells) -> str:
     """What the study found, half a page; a part without its cells says that it is not measured."""
     parts = {
-        "The paper's claims": _claims(claims),
         "Against least squares": _AGAINST,
         "What the ensembles have learned": _learned(cells),
         "The first sample": _first(cells),
@@ -74,19 +68,6 @@ def against_table(cells: Cells) -> Table:
         tuple(rows),
         "Test payload on real-like arms, rows split at random, end of the run; geometric mean over the ten parameters. "
         + NOT_YET,
-    )
-
-
-def _claims(claims: Sequence[dict[str, Any]]) -> str:
-    numbered = Counter(claim["verdict"] for claim in claims if claim["paper"] is not None)
-    stated = Counter(claim["verdict"] for claim in claims if claim["paper"] is None)
-    if numbered[NOT_MEASURED]:
-        return ""
-    return (
-        f"The paper gives {numbered.total()} percentages by which one method is better than another. "
-        f"{numbered[CONFIRMED]} are confirmed: the same method is better in our measurements, too. "
-        f"{numbered[NOT_CONFIRMED]} are not. {numbered[DEPENDS]} hold for only one of two ways to split the data into "
-        f"training and test. Of its {stated.total()} statements without a number, {stated[CONFIRMED]} are confirmed."
     )
 
 

@@ -18,6 +18,8 @@ BENCHMARKS = (
     "map",
     "map-tare",
     "same-prior",
+    "hybrid",
+    "hybrid-tare",
 )
 
 

@@ -36,7 +36,9 @@ def measure_learned(predict: Predict, runs: dict[str, list[EvaluationRun]]) -> d
     return _measured(measure, runs)
 
 
-def measure_stream(make: Callable[[EvaluationRun], Identifier], runs: dict[str, list[EvaluationRun]]) -> dict[str, Any]:
+def measure_stream(
+    make: Callable[[EvaluationRun], Identifier], runs: dict[str, list[EvaluationRun]], points: int = _STREAM_POINTS
+) -> dict[str, Any]:
     """What a stream identifier makes of every run.
 
     single: mean |error| over the estimates along the runs; first: |error| of the estimate after one sample; running:
@@ -45,10 +47,11 @@ def measure_stream(make: Callable[[EvaluationRun], Identifier], runs: dict[str, 
 
     Args:
         make: the identifier for a run, already calibrated or with the tare where it uses one.
+        points: estimates along a run, about.
     """
 
     def measure(run: EvaluationRun) -> tuple[dict[str, NDArray], dict[str, Any]]:
-        trace = make(run).trace(run.recording, max(1, len(run.recording) // _STREAM_POINTS))
+        trace = make(run).trace(run.recording, max(1, len(run.recording) // points))
         t, phi = np.array([e.t for e in trace]) - run.recording.t[0], np.array([e.phi for e in trace])
         error = phi - run.truth.phi
         half = error[len(error) // 2 :].mean(axis=0)

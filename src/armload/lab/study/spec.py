@@ -51,7 +51,7 @@ class Spec:
         parts += [f"depth{self.max_depth}"] if self.max_depth is not None else []
         parts += [f"m{self.members}"] if self.members != usual.members else []
         parts += [f"without-{signal}" for signal in self.drop]
-        return "-".join(parts)
+        return "-".join(["reading"] * (self.ablation == "reading") + parts)
 
     def key(self, basis: str) -> str:
         """SHA-256 of the specification and of what it is measured on (`Basis.fingerprint`).

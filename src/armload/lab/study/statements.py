@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from armload.lab.study.judged import Measured, judged
 from armload.lab.study.numbers import (
     LEAST,
     Answers,
@@ -23,26 +24,18 @@ from armload.lab.study.numbers import (
     benchmark,
     both_stages,
     held_out,
+    held_out_payloads,
     matched,
     mean_ratio,
-    spread,
 )
+from armload.payloads import test_payload
 
 REAL, NOMINAL = "test_payload_real_like", "test_payload_nominal"
 FLAT_AFTER, SECOND_HALF = 2.85, 3.0  # [s] the paper's
 FLAT = 5.0  # [% of the truth] that a flat line may move, ours
 CLOSE = 2.0  # ratio of errors that still counts as close, ours
-
-
-class Measured(NamedTuple):
-    """A claim under one split: the number, its spread, whether the claim holds; cap on epochs and seeds behind it."""
-
-    value: float
-    spread: float | None
-    holds: bool
-    cap: int | None = None
-    seeds: tuple[int, ...] = ()
-    exact: bool = False  # one of the two errors is rounding only
+SETTLED = 100.0  # [% of the truth] the error of the answer 0: what has settled errs less, ours
+ACCURATE = 10.0  # [% of the truth] that "highly accurate" may err, ours
 
 
 class Rule(NamedTuple):
@@ -78,9 +71,8 @@ def _first_step(cells: Cells, learner: str | None, split: str) -> Measured | Non
 
 
 def _over_arms(own: Answers, improvement: Callable[[NDArray], float]) -> Measured:
-    """An improvement [%] of an ensemble's errors, its spread over the runs, and whether it counts as one."""
-    value = improvement(own.errors)
-    return Measured(value, spread(improvement, own.errors), value >= LEAST, own.cap, own.seeds)
+    """An improvement [%] of an ensemble's errors over the arms, and whether it counts as one."""
+    return judged(improvement, (own.errors,), lambda value: value >= LEAST, own.cap, own.seeds)
 
 
 def _flat(cells: Cells, learner: str | None, split: str) -> Measured | None:
@@ -90,23 +82,32 @@ def _flat(cells: Cells, learner: str | None, split: str) -> Measured | None:
     moved = []
     for curve in own[0]:
         late = curve["running"][curve["t"] >= FLAT_AFTER]
-        moved.append([100.0 * float(np.max(np.abs(late - late[-1]), initial=0.0) / abs(curve["truth"]))])
-    values = np.array(moved)
-    return Measured(float(values.mean()), spread(_mean, values), float(values.mean()) <= FLAT, *own[1:])
+        moved.append(100.0 * float(np.max(np.abs(late - late[-1]), initial=0.0) / abs(curve["truth"])))
+    value = float(np.mean(moved))  # of one run: without an interval
+    return Measured(value, None, 1, value <= FLAT, *own[1:])
 
 
 def _overshoot(cells: Cells, _learner: str | None, _split: str) -> Measured | None:
+    shares = _rls_shares(cells)
+    if shares is None:
+        return None
+    early, late = shares
+    return Measured(early, None, 1, early > max(100.0, late))
+
+
+def _settles(cells: Cells, _learner: str | None, _split: str) -> Measured | None:
+    shares = _rls_shares(cells)
+    return None if shares is None else Measured(shares[1], None, 1, shares[1] <= SETTLED)
+
+
+def _rls_shares(cells: Cells) -> tuple[float, float] | None:
+    """The largest error of RLS on Izz in one run, in percent of the truth: in its first half and in its second."""
     curves = [c for c in map(izz, benchmark(cells, "rls")) if c is not None]
     if not curves:
         return None
-    early, late = [], []
-    for curve in curves:
-        share = 100.0 * np.abs(curve["running_error"]) / abs(float(curve["truth"]))
-        before = curve["t"] < SECOND_HALF
-        early.append([float(np.max(share[before], initial=0.0))])
-        late.append([float(np.max(share[~before], initial=0.0))])
-    peak = float(np.mean(early))
-    return Measured(peak, spread(_mean, np.array(early)), peak > max(100.0, float(np.mean(late))))
+    share = 100.0 * np.abs(curves[0]["running_error"]) / abs(float(curves[0]["truth"]))
+    before = curves[0]["t"] < SECOND_HALF
+    return float(np.max(share[before], initial=0.0)), float(np.max(share[~before], initial=0.0))
 
 
 def _close(cells: Cells, learner: str | None, split: str) -> Measured | None:
@@ -118,8 +119,19 @@ def _close(cells: Cells, learner: str | None, split: str) -> Measured | None:
     def ratio(errors: NDArray) -> float:
         return mean_ratio(errors.mean(axis=0), nominal)
 
-    value = ratio(real.errors)
-    return Measured(value, spread(ratio, real.errors), value <= CLOSE, real.cap, real.seeds)
+    return judged(ratio, (real.errors,), lambda value: value <= CLOSE, real.cap, real.seeds)
+
+
+def _accurate(cells: Cells, learner: str | None, split: str) -> Measured | None:
+    real = both_stages(cells, str(learner), split, REAL)
+    if real is None:
+        return None
+    truth = np.linalg.norm(test_payload().parameters.phi[4:])
+
+    def share(errors: NDArray) -> float:
+        return 100.0 * float(np.linalg.norm(errors[:, 4:], axis=1).mean() / truth)
+
+    return judged(share, (real.errors,), lambda value: value <= ACCURATE, real.cap, real.seeds)
 
 
 def _better_on_real(cells: Cells, learner: str | None, split: str) -> Measured | None:
@@ -135,6 +147,17 @@ def _real_and_nominal(cells: Cells, learner: str | None, split: str) -> tuple[An
     return None if real is None or nominal is None else (real, nominal.errors.mean(axis=0))
 
 
+def _b_surpasses_a(cells: Cells, _learner: str | None, split: str) -> Measured | None:
+    tree, network = (both_stages(cells, kind, split, REAL) for kind in ("tree", "network"))
+    if tree is None or network is None:
+        return None
+
+    def less(a: NDArray, b: NDArray) -> float:
+        return 100.0 * (1.0 - mean_ratio(a.mean(axis=0)[:4], b.mean(axis=0)[:4]))
+
+    return judged(less, (tree.errors, network.errors), lambda value: value >= LEAST, network.cap, network.seeds)
+
+
 def _no_filter(cells: Cells, learner: str | None, split: str) -> Measured | None:
     own = both_stages(cells, str(learner), split, REAL)
     methods = ("rls-filter", "rls-filter-calibrated")  # those of [7]
@@ -142,8 +165,7 @@ def _no_filter(cells: Cells, learner: str | None, split: str) -> Measured | None
     if own is None or len(others) < len(methods):
         return None
     best = min(others, key=lambda e: mean_ratio(e.mean(axis=0), own.errors.mean(axis=0)))
-    value = _percent_of_means(own.errors, best)
-    return Measured(value, spread(_percent_of_means, own.errors, best), value >= LEAST, own.cap, own.seeds)
+    return judged(_percent_of_means, (own.errors, best), lambda value: value >= LEAST, own.cap, own.seeds)
 
 
 def _trees_better(cells: Cells, _learner: str | None, split: str) -> Measured | None:
@@ -167,27 +189,20 @@ def _held_out_comparison(
     ours: Callable[[list[NDArray]], NDArray],
     theirs: Callable[[list[NDArray]], NDArray],
 ) -> Measured | None:
-    """Improvement over all parameters on held-out single samples; spread over seeds at the cap that has most."""
-    pairs = []
+    """Improvement over all parameters on held-out single samples, the payloads its units where all cells have them."""
     for match in matched(cells, *wanted):
-        errors = [held_out(group) for group in match.cells]
+        errors = [held_out_payloads(group) for group in match.cells]
+        if any(e is None for e in errors):
+            errors = [None if (e := held_out(group)) is None else e.mean(axis=0)[None] for group in match.cells]
         there = [e for e in errors if e is not None]
         if len(there) == len(wanted):
-            pairs.append((match, ours(there), theirs(there)))
-    if not pairs:
-        return None
-    match, a, b = pairs[0]
-    value = _percent_of_means(a, b)
-    many = max(pairs, key=lambda pair: len(pair[0].seeds))
-    return Measured(value, spread(_percent_of_means, *many[1:]), value >= LEAST, match.cap, match.seeds)
+            pair = (ours(there), theirs(there))
+            return judged(_percent_of_means, pair, lambda value: value >= LEAST, match.cap, match.seeds)
+    return None
 
 
 def _percent_of_means(a: NDArray, b: NDArray) -> float:
     return 100.0 * (1.0 - mean_ratio(a.mean(axis=0), b.mean(axis=0)))
-
-
-def _mean(values: NDArray) -> float:
-    return float(values.mean())
 
 
 RULES = {
@@ -209,6 +224,24 @@ RULES = {
         "% of the truth, peak error",
         f"in one run on a real-like arm the error of RLS on Izz peaks before {SECOND_HALF:g} s, above 100 % of the "
         "truth, the error of the answer 0",
+    ),
+    "b-surpasses-a": Rule(
+        _b_surpasses_a,
+        "% less error of trees than networks",
+        "on real-like arms trees err less than networks on mass and first moments (geometric mean over these four)",
+    ),
+    "settles": Rule(
+        _settles,
+        "% of the truth, largest error",
+        f"in one run on a real-like arm the error of RLS on Izz stays below {SETTLED:g} % of the truth from "
+        f"{SECOND_HALF:g} s on",
+    ),
+    "accurate": Rule(
+        _accurate,
+        "% of the inertia",
+        f"the error of the six moments of inertia on real-like arms, as a vector, is at most {ACCURATE:g} % of the "
+        f"true "
+        "vector's length (mean over arms)",
     ),
     "close": Rule(
         _close,

@@ -1,16 +1,18 @@
-"""The study's page: one list of sections, written as Markdown for the docs and as HTML with figures."""
+"""The study's pages: the first one and its appendix as Markdown for the docs, both as one HTML file with figures."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from armload.lab.report import Section, write_markdown, write_report
 from armload.lab.report.shown import Table
 from armload.lab.study import summary
 from armload.lab.study.ablations import ABLATIONS, ablation_table, single_or_mean_table
-from armload.lab.study.claims import RULE
+from armload.lab.study.appendix import further_tables
 from armload.lab.study.counterparts import (
     benchmark_rows,
     first_table,
@@ -20,22 +22,13 @@ from armload.lab.study.counterparts import (
     test_payload_table,
     training_rows,
 )
-from armload.lab.study.numbers import PAPER_EPOCHS, Cells, at_end, cap, held_out
+from armload.lab.study.numbers import PAPER_EPOCHS, Cell, Cells, at_end, cap, held_out
 from armload.lab.study.plain import against_table, in_plain_words
-from armload.lab.study.statements import RULES
-from armload.lab.study.study_tables import COMMAND, PROTOCOLS, claims_table, epochs_table, main_tables, parameter_table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from armload.lab.study.study_front import front
+from armload.lab.study.study_tables import COMMAND, PROTOCOLS, epochs_table, main_tables, parameter_table
 
 TITLE = "The study of Taie et al. 2024, measured again"
-_CAPTIONS = {
-    4: "Fig. 4 in our numbers: single-stage training, single samples of the held-out rows.",
-    5: "Fig. 5 in our numbers: two-stage training, single samples of the held-out rows.",
-    6: "Fig. 6 in our numbers: the test payload in simulation, on real-like arms and on a real log, end of the run.",
-    7: "Fig. 7 in our numbers: ensembles and least squares, the test payload on real-like arms; more in its table.",
-    8: "Fig. 8 in our numbers: Izz over time in one run on a real-like arm; what overshoots leaves the picture.",
-}
+APPENDIX = "The study of Taie et al. 2024: all tables"
 _PAPER_GIVES = """**What the paper gives.** The arm, the kind of motion (eight sinusoids a joint, six seconds), 77
 loadings of a slotted container and their masses, 249 788 rows of 32 columns, inputs t, q, dq, tau, five members, one
 hidden layer of 500 ReLU units for at most 1000 epochs, unrestricted trees, 70 / 15 / 15 % of the rows, both parts
@@ -65,40 +58,53 @@ size, with ensembles hardly trained: it shows that the study runs, not what is t
 without `--quick` for numbers."""
 
 
-def sections(cells: Cells, claims: Sequence[dict[str, Any]], figures: dict[int, Figure] | None = None) -> list[Section]:
-    """The study as sections for `write_report`; without figures for Markdown."""
-    drawn = figures or {}
-
-    def shown(*numbers: int) -> tuple[tuple[Figure, str], ...]:
-        return tuple((drawn[n], _CAPTIONS[n]) for n in numbers if n in drawn)
-
+def sections(cells: Cells, claims: Sequence[dict[str, Any]]) -> list[Section]:
+    """The appendix."""
     return [
-        Section("In plain words", in_plain_words(cells, claims), (against_table(cells),)),
-        Section("The findings in numbers", "\n\n".join(summary.paragraphs(cells, claims)), (ratio_table(cells),)),
+        Section("In plain words", in_plain_words(cells), (against_table(cells),)),
+        Section("The findings in numbers", "\n\n".join(summary.paragraphs(cells)), (ratio_table(cells),)),
         Section("What was run", _what_was_run(cells) + "\n\n" + _PAPER_GIVES, _run_tables(cells)),
         Section("Every method under every protocol", _PROTOCOLS, main_tables(cells)),
-        Section("Figures 4 to 8", _FIGURES, _figure_tables(cells), shown(4, 5, 6, 7, 8)),
+        Section("Figures 4 to 8 in numbers", _FIGURES, _figure_tables(cells)),
         Section("The first time step", _FIRST, (first_table(cells),)),
         Section("What drives the result", _ABLATIONS, (*_ablations(cells), single_or_mean_table(cells))),
-        Section("Claim by claim", _claims_text(), _claims_tables(claims)),
+        Section("What else the paper's numbers say", _FURTHER, further_tables(cells)),
         Section("Notes on single claims, contradictions of the paper among them", _notes(claims)),
     ]
 
 
-def write_page(cells: Cells, claims: Sequence[dict[str, Any]], path: str | Path, quick: bool = False) -> Path:
-    """Write the study as Markdown (docs/paper.md); the file appears whole or not at all.
+def pages(page: str | Path) -> dict[str, Path]:
+    """The page's own path and that of its appendix, by what they are; pictures are in a folder beside them.
+
+    >>> pages("docs/paper.md")["tables"].as_posix()
+    'docs/paper_tables.md'
+    """
+    page = Path(page)
+    return {"page": page, "tables": page.with_name(f"{page.stem}_tables{page.suffix}")}
+
+
+def write_pages(
+    cells: Cells, claims: Sequence[dict[str, Any]], page: str | Path, quick: bool = False
+) -> dict[str, Path]:
+    """Write the study as Markdown: the page (docs/paper.md) with its pictures, and its appendix; each appears whole.
 
     Args:
-        cells: finished cells by name. claims: `evaluate(cells)`. path: the file; its folder must exist.
+        cells: finished cells by name. claims: `evaluate(cells)`. page: the file; its folder must exist.
         quick: whether the cells are of reduced size.
 
     Raises:
-        ReportError: the file cannot be written.
+        ReportError: a file cannot be written.
     """
-    note = (
-        f"Written by `{COMMAND}{' --quick' if quick else ''}`; every measured number on this page comes from its cells."
-    )
-    return write_markdown(path, sections(cells, claims), TITLE, f"{_QUICK}\n\n{note}" if quick else note)
+    from armload.lab.study.paper_figures import figures
+
+    paths = pages(page)
+    command = f"{COMMAND}{' --quick' if quick else ''}"
+    note = f"Written by `{command}`; every measured number on this page comes from its cells."
+    note = f"{_QUICK}\n\n{note}" if quick else note
+    first = front(cells, claims, figures(cells, claims), paths["tables"].name)
+    write_markdown(paths["page"], first, TITLE, note, pictures=f"pictures/{paths['page'].stem}")
+    write_markdown(paths["tables"], sections(cells, claims), APPENDIX, note)
+    return paths
 
 
 def html_report(cells: Cells, claims: Sequence[dict[str, Any]], path: str | Path, quick: bool = False) -> Path:
@@ -106,7 +112,8 @@ def html_report(cells: Cells, claims: Sequence[dict[str, Any]], path: str | Path
     from armload.lab.study.paper_figures import figures
 
     first = [Section("A quick run", _QUICK)] if quick else []
-    return write_report(path, [*first, *sections(cells, claims, figures(cells))], TITLE)
+    whole = [*first, *front(cells, claims, figures(cells, claims)), *sections(cells, claims)]
+    return write_report(path, whole, TITLE)
 
 
 def summary_json(cells: Cells, claims: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -117,6 +124,9 @@ def summary_json(cells: Cells, claims: Sequence[dict[str, Any]]) -> dict[str, An
     """
     methods = {}
     for name, cell in sorted(cells.items()):
+        if cell["spec"]["kind"] == "rival":
+            methods[name] = {**cell["spec"], **cell["setting"], "mae": _rivals_mae(cell), "wall_s": cell["wall_s"]}
+            continue
         errors = {p: held_out([cell]) if p == "held_out" else at_end([cell], p) for p in PROTOCOLS}
         methods[name] = {
             "spec": dict(cell["spec"]),
@@ -127,15 +137,19 @@ def summary_json(cells: Cells, claims: Sequence[dict[str, Any]]) -> dict[str, An
             "spread": {p: _rounded(e.std(axis=0, ddof=1)) for p, e in errors.items() if e is not None and len(e) > 1},
         }
     return {
-        "rows": max((cell["rows"] for cell in cells.values()), default=0),
-        "payloads": max((cell["payloads"] for cell in cells.values()), default=0),
-        "seeds": sorted({cell["spec"]["seed"] for cell in cells.values()}),
+        "rows": max((cell.get("rows", 0) for cell in cells.values()), default=0),
+        "payloads": max((cell.get("payloads", 0) for cell in cells.values()), default=0),
+        "seeds": sorted({cell["spec"]["seed"] for cell in cells.values() if "seed" in cell["spec"]}),
         "command": COMMAND,
         "versions": _versions(cells),
         "wall_s": round(sum(cell["wall_s"] for cell in cells.values()), 1),
         "methods": methods,
         "claims": [dict(claim) for claim in claims],
     }
+
+
+def _rivals_mae(cell: Cell) -> dict[str, list[float]]:
+    return {p: _rounded(np.mean(part["second_half"], axis=0)) for p, part in cell["protocols"].items()}
 
 
 def _rounded(values: Any) -> list[float]:
@@ -172,6 +186,8 @@ on. Compare this answer with the training mean, which needs no sample, and with 
 least squares need more than one sample: their first estimate is what they start from, zero (an error of 100 %) or, for
 same-prior least squares, the mean of the training payloads. Filtered RLS takes gravity from the first sample, as
 these runs start at rest: it has the mass and a part of the first moments, but no inertia."""
+_FURTHER = """What the paper's percentages imply without its saying so, where its rivals stay ahead, what averaging
+over time brings on payloads that were held out, and every rival with the settings that were found."""
 _ABLATIONS = """Each table changes one thing. A row stands below the one it is compared with, which has the same split
 and the same cap on epochs. In SI units the mass is a hundred times larger than the moments of inertia and dominates
 both the loss of a network and the splits of a tree."""
@@ -224,28 +240,6 @@ def _what_was_run(cells: Cells) -> str:
 
 def _grouped(number: int) -> str:
     return f"{number:,}".replace(",", " ")
-
-
-def _claims_text() -> str:
-    criteria = "\n\n".join(f"`{name}`: {rule.criterion}." for name, rule in RULES.items())
-    return (
-        "Sections V and VI print 62 percentages, repeats included; one of them (99.5 %) stands for four parameters, "
-        "which makes 65 rows. The abstract adds 4, the ends of its two ranges. An improvement is 1 − MAE of the method "
-        "the paper calls better over MAE of the other: below zero it is the other way round, and -100 % is twice the "
-        "error. In the same way a negative `less error` of a statement is more error. "
-        f"Fig. 4 and 5 are measured on test rows, Fig. 7 and what repeats it on real-like arms.\n\n{RULE}\n\n"
-        f"Statements without a number need a criterion; these are ours:\n\n{criteria}"
-    )
-
-
-def _claims_tables(claims: Sequence[dict[str, Any]]) -> tuple[Table, ...]:
-    groups = {
-        "Training, Fig. 4 and 5": lambda c: c["paper"] is not None and c["where"].startswith("Section V,"),
-        "Against the benchmark, Fig. 7": lambda c: c["paper"] is not None and c["where"].startswith("Section V-A"),
-        "Conclusion and abstract": lambda c: c["paper"] is not None and c["where"] in ("Section VI", "Abstract"),
-        "Statements without a number": lambda c: c["paper"] is None,
-    }
-    return tuple(claims_table([c for c in claims if belongs(c)], title) for title, belongs in groups.items())
 
 
 def _notes(claims: Sequence[dict[str, Any]]) -> str:

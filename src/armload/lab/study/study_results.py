@@ -6,13 +6,13 @@ from pathlib import Path
 
 from armload.lab.experiment import Cells, write_json
 from armload.lab.study.claims import evaluate
-from armload.lab.study.study_page import html_report, summary_json, write_page
+from armload.lab.study.study_page import html_report, pages, summary_json, write_pages
 
 
 def write_results(
     cells: Cells, summary: str | Path, page: str | Path, report: str | Path, quick: bool = False
 ) -> dict[str, Path]:
-    """Write the summary (JSON), the page (Markdown) and the report (HTML); each appears whole or not at all.
+    """Write the summary (JSON), the page and its appendix (Markdown) and the report (HTML); each appears whole.
 
     Args:
         cells: finished cells by name (`run_study`, `load_cells`).
@@ -22,11 +22,11 @@ def write_results(
     Returns:
         what was written, by what it is.
     """
-    written = {"summary": Path(summary), "page": Path(page), "report": Path(report)}
+    written = {"summary": Path(summary), "report": Path(report), **pages(page)}
     for path in written.values():
         path.parent.mkdir(parents=True, exist_ok=True)
     claims = evaluate(cells)
     write_json(written["summary"], summary_json(cells, claims))
-    write_page(cells, claims, written["page"], quick)
+    write_pages(cells, claims, page, quick)
     html_report(cells, claims, written["report"], quick)
     return written

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +22,8 @@ LEAST_SQUARES = {
     "map": "MAP least squares",
     "map-tare": "MAP least squares with tare",
     "same-prior": "same-prior least squares",
+    "hybrid": "hybrid, armload's default",
+    "hybrid-tare": "hybrid with tare",
 }
 TRAINING_MEAN = "training mean"
 BASELINES = (TRAINING_MEAN, LEAST_SQUARES["same-prior"])
@@ -175,37 +176,3 @@ def parameter_table(title: str, rows: Iterable[Row], note: str) -> Table:
     return Table(
         title, ("method", *parameter_columns()), tuple(filled), f"{note} {SPREAD} {NOT_YET}", baselines_of(filled)
     )
-
-
-def claims_table(claims: Sequence[dict[str, Any]], title: str) -> Table:
-    """The claims of the paper and our measurements."""
-    rows = []
-    for claim in claims:
-        paper = MISSING if claim["paper"] is None else f"{claim['paper']:g} %"
-        unit = "" if claim["unit"] == "%" else f" {claim['unit']}"
-        ours = MISSING if claim["ours"] is None else _number(claim["ours"], claim["spread"]) + (unit or " %")
-        payload, semi = (
-            MISSING if claim[key] is None else _number(claim[key], None) for key in ("held_out", "semi_real")
-        )
-        epochs = MISSING if claim["cap"] is None else cap_shown(claim["cap"])
-        verdict = claim["verdict"] + ("*" if within_spread(claim) else "")
-        rows.append((claim["id"], claim["where"], claim["text"], paper, ours, payload, semi, epochs, verdict))
-    columns = ("claim", "where", "what the paper says", "paper", "ours, rows split at random")
-    columns += ("payloads held out", "real log", "epochs", "verdict")
-    note = (
-        "± is the standard deviation over seeds (test rows) or arms (real-like). Payloads held out, real log: the same "
-        "number, in the same unit, under these; the real log, which shows another motion than the training, does not "
-        f"enter the verdict. * the number is smaller than its spread. {NOT_YET}"
-    )
-    return Table(title, columns, tuple(rows), note)
-
-
-def within_spread(claim: dict[str, Any]) -> bool:
-    """Whether a percentage could have come out the other way on another seed or arm."""
-    ours, spread = claim["ours"], claim["spread"]
-    return claim["paper"] is not None and ours is not None and spread is not None and abs(ours) < spread
-
-
-def _number(number: float, spread: float | None) -> str:
-    digits = 0 if abs(number) >= 100 else 1
-    return f"{number:.{digits}f}" + ("" if spread is None else f" ± {spread:.{digits}f}")

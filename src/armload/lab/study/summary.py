@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +10,6 @@ from numpy.typing import NDArray
 from armload.inertia import NAMES
 from armload.lab.report.shown import GROUPS, short
 from armload.lab.study.ablations import compared
-from armload.lab.study.claims import CONFIRMED, DEPENDS, NOT_MEASURED, VERDICTS
 from armload.lab.study.counterparts import RIVALS, SHOWN_ENSEMBLES
 from armload.lab.study.numbers import (
     Answers,
@@ -41,20 +38,17 @@ from armload.lab.study.study_tables import (
     ensemble_shown,
     listing,
     mass_shown,
-    within_spread,
 )
 from armload.payloads import test_payload
 
 _NOT_YET = f"not measured yet; `{COMMAND}` measures it."
-_SIZE = 10.0  # percentage points within which a number agrees with the paper's, too
 _HIT = 0.02  # of the truth, within which the training mean is right by chance
 _KINDS = ("tree", "network")
 
 
-def paragraphs(cells: Cells, claims: Sequence[dict[str, Any]]) -> list[str]:
+def paragraphs(cells: Cells) -> list[str]:
     """What the study found; a paragraph without its cells says so."""
-    out = [_tally(claims)]
-    out += [f"**{_capital(LEARNERS[kind])} against least squares.** {_against(cells, kind)}" for kind in _KINDS]
+    out = [f"**{_capital(LEARNERS[kind])} against least squares.** {_against(cells, kind)}" for kind in _KINDS]
     out.append("**How much is memorising.** " + _memorising(cells))
     out.append("**Accurate from the first time step.** " + _first_step(cells))
     out.append("**Against the same-prior least squares.** " + _same_prior(cells))
@@ -62,26 +56,6 @@ def paragraphs(cells: Cells, claims: Sequence[dict[str, Any]]) -> list[str]:
     out.append("**One stage or two.** " + _stages(cells))
     out.append("**SI units or standardised.** " + _scales(cells))
     return out
-
-
-def _tally(claims: Sequence[dict[str, Any]]) -> str:
-    numbered = [claim for claim in claims if claim["paper"] is not None]
-    stated = [claim for claim in claims if claim["paper"] is None]
-    close = [c for c in numbered if c["verdict"] == CONFIRMED and abs(c["ours"] - c["paper"]) <= _SIZE]
-    vague = [c for c in numbered if within_spread(c)]
-    return (
-        f"**The claims.** The paper gives {len(numbered)} comparisons as a percentage, repeats included: "
-        f"{_counts(numbered)}. Of those confirmed, {len(close)} agree with the paper's number within {_SIZE:g} points. "
-        f"Of all measured, {len(vague)} are smaller than their own spread over seeds or arms: others might "
-        f"reverse them. It makes {len(stated)} statements without a number: {_counts(stated)}."
-    )
-
-
-def _counts(claims: Iterable[dict[str, Any]]) -> str:
-    count = Counter(claim["verdict"] for claim in claims)
-    words = {v: v for v in VERDICTS} | {NOT_MEASURED: "not measured yet"}
-    words[DEPENDS] = DEPENDS if count[DEPENDS] == 1 else DEPENDS.replace("depends", "depend")
-    return ", ".join(f"{count[v]} {words[v]}" for v in VERDICTS if count[v]) or "none"
 
 
 def _against(cells: Cells, kind: str) -> str:
