@@ -357,3 +357,12 @@ def test_an_answer_near_what_the_log_says_spares_the_search_for_the_nearest_body
         verdicts.append(found.explained)
         assert found.explained == (distance_to_body(mean, covariance) <= MISFIT)
     assert len(set(verdicts)) == 2
+
+
+def test_a_real_log_of_another_model_is_not_called_calibrated_and_a_sound_one_is(real_data, panda):
+    kuka = arm("iiwa14")
+    wrong = identify(read_recording(real_data / "kuka_lwr_100hz.csv", kuka), kuka)
+    assert wrong.interval == "approximate"
+    assert any("differ from those of iiwa14" in note for note in wrong.notes)
+    sound = identify(read_recording(real_data / "panda_unloaded_1khz.csv", panda), panda)
+    assert not any("differ from those of" in note for note in sound.notes)

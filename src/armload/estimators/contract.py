@@ -66,10 +66,12 @@ class ArmMismatch(NamedTuple):
 
     torque: "link" or "motor", the side the torque seems to be measured on.
     offset_ratios: squared torque offsets (n,) over their expected variance.
+    links: by how much the links differ from the model's: squared errors over their expected variance, summed.
     """
 
     torque: str
     offset_ratios: NDArray[np.float64]
+    links: float = 0.0
 
 
 class Identifier(ABC):

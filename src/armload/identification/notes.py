@@ -75,6 +75,14 @@ def lacking(
     return said
 
 
+def another_model(name: str, links: float) -> str:
+    """That the links seem to be those of another model."""
+    return (
+        f"the links differ from those of {name} more than an arm's do from its description (T = {links:.0f}): was the "
+        "log made by this arm? If so, record a tare"
+    )
+
+
 def leaning_on_prior(leaning: NDArray[np.bool_]) -> list[str]:
     """That the intervals of some parameters (10,) rest on a learned prior."""
     if not leaning.any():

@@ -13,6 +13,7 @@ from armload.identification.answer import Identification, body_of, is_removal
 from armload.identification.found import Found
 from armload.identification.intervals import about_com, intervals, phi_interval
 from armload.identification.notes import (
+    another_model,
     arm_changed,
     gravity_turned,
     lacking,
@@ -110,10 +111,10 @@ def _doubts(found: Found, arm: Arm, mass_determined: bool, relative_to: str) -> 
         leans = gravity_turned(arm.gravity, found.gravity, True)
     elif found.tilt is not None and found.tilt.found:
         leans = gravity_turned(arm.gravity, arm.leaning(found.tilt.angles).gravity, False)
-    return [doubt for doubt in (leans, _doubt(found, mass_determined, relative_to)) if doubt is not None]
+    return [doubt for doubt in (leans, _doubt(found, arm, mass_determined, relative_to)) if doubt is not None]
 
 
-def _doubt(found: Found, mass_determined: bool, relative_to: str) -> str | None:
+def _doubt(found: Found, arm: Arm, mass_determined: bool, relative_to: str) -> str | None:
     """What the answer itself shows, most telling first."""
     if is_removal(found.estimate, mass_determined):
         if relative_to in ("tare", "profile"):
@@ -137,6 +138,8 @@ def _doubt(found: Found, mass_determined: bool, relative_to: str) -> str | None:
         mean, std = found.mass_alone
         if abs(found.mass.mass - mean) > HELD * np.hypot(found.mass.std, std):
             return other_than_weighed(found.mass, mean, std)
+    if found.strange_links and relative_to in ("arm", "tool"):  # a tare tells what the links are
+        return another_model(arm.name, found.strange_links)
     if found.offset_ratio:
         return f"the torques are {found.offset_ratio:.0f} times as far off as those of an arm should be: {_CHECK}"
     return None

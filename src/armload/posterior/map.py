@@ -239,8 +239,12 @@ class PosteriorLeastSquares(Identifier):
 
     @property
     def mismatch(self) -> ArmMismatch | None:
-        """The side the torque seems to be measured on, and the arm's offsets, by the last solution."""
-        return ArmMismatch(self.posterior.torque, self.posterior.ratios["offset"]) if self._count else None
+        """The side the torque seems to be measured on, the arm's offsets and its links, by the last solution."""
+        if not self._count:
+            return None
+        found, std = self.posterior, self._correction.prior_std[-10 * self.arm.n :]
+        links = float(np.sum((found.eta[-len(std) :][std > 0.0] / std[std > 0.0]) ** 2))
+        return ArmMismatch(found.torque, found.ratios["offset"], links)
 
     def evidence(self, elapsed: float | None = None) -> Evidence:
         """What the logs say as the stream stands, without a prior on the payload, `elapsed` [s] after the run began."""
