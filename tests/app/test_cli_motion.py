@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from armload.app.cli import main
-from armload.app.cli.motion_arguments import accuracy, joints
+from armload.app.cli.motion_arguments import joints
 from armload.arms import arm
 from armload.motion import export_motion, load_motion
 from armload.motion.point_to_point import PointToPoint
@@ -78,7 +78,7 @@ def test_the_json_says_what_is_told_and_what_is_used(designed):
         (f"--from {READY} --box 0,0,1", "is not a box"),
         (f"--from {READY} --joints 9", "joints 1 to 7"),
         (f"--from {READY} --joints a", "names no joints"),
-        (f"--from {READY} --until mass=3apples", "is not an accuracy"),
+        (f"--from {READY} --until mass=3apples", "is no accuracy"),
         (f"--from {READY} --until mass=10g --time 2", "exclude each other"),
         (f"--from {READY} --tare none --tare-time 2", "leave --tare out"),
         (f"--from {READY} --held 1,2", "is not a body"),
@@ -136,6 +136,4 @@ def test_a_file_that_is_no_path_is_refused(name, text, words, tmp_path, capsys):
 
 
 def test_accuracies_and_joints_are_read_with_their_units():
-    assert accuracy("mass=10g,moment=1.5g·m") == {"mass": 0.01, "moment": 0.0015}
-    assert accuracy("mass=0.01kg,inertia=1e-3kg.m2") == {"mass": 0.01, "inertia": 1e-3}
     assert joints("7,1-2") == (1, 2, 7)

@@ -171,6 +171,7 @@ def test_each_extra_and_each_package_of_it_is_known_and_named_as_in_pyproject():
     assert {(p, e) for e, packages in of.items() for p in packages} - stated == {
         ("trimesh", "live"),
         ("pyarrow", "lab"),
+        ("joblib", "cluster"),
     }
     assert all(package in of[extra] for package, extra in stated)
 

@@ -160,6 +160,8 @@ def of_mass(information: np.ndarray, vector: np.ndarray) -> float:
     """h_m²/Λ_m, chi-squared of one where nothing was added; Λ_m, h_m are of the mass, something light's moments out."""
     rest = np.linalg.solve(information[1:, 1:] + np.diag(_LIGHT**-2.0), np.c_[information[1:, 0], vector[1:]])
     own = information[0, 0] - information[0, 1:] @ rest[:, 0]
+    if own <= 0.0:  # neither part moves: they tell nothing
+        return 0.0
     return float((vector[0] - information[0, 1:] @ rest[:, 1]) ** 2 / own)
 
 

@@ -155,7 +155,7 @@ def _drawn(before: Problem, scales: Scales, same: Problem, S: NDArray, rng: np.r
         for j in range(n):
             A = run.A[j] / s[j]
             x = np.concatenate([selection @ whole, weights[j]])
-            jitter = _ROUNDING * np.abs(np.diag(A)).max()
+            jitter = _ROUNDING * np.abs(np.diag(A)).max() + np.finfo(float).tiny  # of a run without rows A is 0
             b[j] = A @ x + np.linalg.cholesky(A + jitter * np.eye(len(A))) @ rng.normal(size=x.shape)
         out.append(b)
     return out

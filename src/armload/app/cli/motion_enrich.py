@@ -168,7 +168,8 @@ def _trajectory(content: dict[str, Any], name: str, arm: Arm) -> Motion:
             whole, rest = divmod(round((seconds(point) - first) * 1e9), 10**9)
             columns = {key: list(point.get(key) or []) for key in ("positions", "velocities", "accelerations")}
             made.append(SimpleNamespace(time_from_start=SimpleNamespace(sec=whole, nanosec=rest), **columns))
-        message = SimpleNamespace(joint_names=list(content["joint_names"]), points=made)
+        header = SimpleNamespace(stamp=SimpleNamespace(sec=0, nanosec=0))  # a file begins when it is run
+        message = SimpleNamespace(header=header, joint_names=list(content["joint_names"]), points=made)
         order = [message.joint_names.index(joint) for joint in arm.joint_names]
         start = np.array(made[0].positions, dtype=float)[order]
     except (KeyError, IndexError, TypeError, AttributeError, ValueError):

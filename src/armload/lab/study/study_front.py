@@ -232,12 +232,10 @@ def rivals_table(cells: Cells) -> Table:
 
 
 def _rival(cells: Cells, derivative: str, rate: int, calibrated: bool, tuned: bool) -> np.ndarray | None:
+    wanted = {"derivative": derivative, "rate": rate, "sensors": "panda", "calibrated": calibrated, "tuned": tuned}
     for cell in cells.values():
         spec = cell["spec"]
-        if spec["kind"] == "rival" and (
-            (spec["derivative"], spec["rate"], spec["sensors"], spec["calibrated"], spec["tuned"])
-            == (derivative, rate, "panda", calibrated, tuned)
-        ):
+        if spec["kind"] == "rival" and wanted.items() <= spec.items():
             return np.array(cell["protocols"][REAL]["second_half"], dtype=float)
     return None
 
