@@ -42,6 +42,7 @@ from armload.recording import Recording, Sample
 from armload.regression import payload_prior_std
 
 _STANDING = "standing: a change of payload is noticed only when the arm moves"
+_CHANGING = "the payload is changing"
 _DOUBT = "samples that do not fit are left out: something pulls at the arm, or the payload is changing"
 
 
@@ -258,9 +259,9 @@ class OnlineIdentifier:
             estimate = self._watch.update(sample, self._held)
             if self._watch.event is not known:
                 self._noticed(sample.t)
-            if estimate is None or self._watch.settling:
-                if self._watch.doubting and sample.t - self._published > PUBLISH and _DOUBT not in self._notes:
-                    self._notes = (*self._notes, _DOUBT)
+            if estimate is None:
+                if sample.t - self._published > PUBLISH:
+                    self._track(sample)
                 return
             run = self._watch.answered
             fresh = run.fresh
@@ -274,6 +275,17 @@ class OnlineIdentifier:
             self._judge(estimate, run, stands)
         self._estimate, self._source, self._around = estimate, run, estimate.phi
         self._doubted = drift_of_run(run) is not None
+
+    def _track(self, sample: Sample) -> None:
+        """While samples are left out: what all that may have happened makes of the payload."""
+        assert self._watch is not None
+        self._published = sample.t
+        run = self._watch.run
+        phi, covariance = self._watch.tracked
+        self._estimate = replace(run.last, t=sample.t, phi=phi, covariance=covariance)
+        self._around, self._source = phi, None
+        self._judge(self._estimate, run, False)
+        self._notes = (*self._notes, _CHANGING if self._watch.settling else _DOUBT)
 
     def _counted(self, sample: Sample, run: Identifier) -> bool:
         """Remember how old the answer is; whether what was seen lately told it nothing, as the arm stands."""
@@ -301,10 +313,8 @@ class OnlineIdentifier:
         self._event = replace(event, t=event.t + shift, began=event.began + shift, mass=mass)
         if self._watch.settling:
             self._since = self._stream.clock
-            self._estimate, self._source, self._told = self._nothing(), None, -np.inf
-            self._around, self._doubted = self._estimate.phi, False
             self._stream.forget_pauses()
-            self._determined, self._held, self._notes = np.zeros(10, dtype=bool), False, ("the payload has changed",)
+            self._published = -np.inf
 
     def _nothing(self) -> Estimate:
         """What is known beforehand."""
@@ -345,7 +355,7 @@ class OnlineIdentifier:
                 "held": self._held,
                 "around": self._around,
                 "before": self._before,
-                "calibrated": engine.calibrated and not self._doubted,
+                "calibrated": engine.calibrated and not self._doubted and (watch is None or watch.sure),
                 "moving": self._moving,
                 "settling": watch is not None and watch.settling,
                 "event": self._event,

@@ -73,7 +73,7 @@ KIND_STD = 0.033
 # [payloads] the same to tell one payload from an earlier one: 15 g of a Panda
 RETURN_STD = 0.01
 # [s] of rows that do not fit, within which a change of payload shows: two and a half long windows
-DECIDED = 0.6
+DECIDED = 4.0
 # [s] of such rows shortly after a change, after which it may be over, as a push is: one lag of the regression
 # (test_a_push_that_ends_gives_the_estimate_back)
 BACK_AFTER = 1.0 / GAIN
@@ -85,7 +85,7 @@ BACK = 6.0
 LEARNT = 10.0
 # [s] that such a run leaves out at most (any other: `DECIDED`), longer than a push. Then what does not fit is believed
 # (test_a_pose_first_seen_shortly_after_a_change_is_not_another_change)
-PATIENCE = 4.0
+PATIENCE = 10.0
 
 # ---------------------------------------------------------------------- which run is which, `runs.py` and `step.py`
 
@@ -119,3 +119,25 @@ PAUSES_IN_A_ROW = 5
 
 # [s] of a run of the empty arm, at least, that a profile learns from: as long as a tare is asked for
 LEARN_FROM = 20.0
+
+# ---------------------------------------------------------------------- modes
+CONTACT_LASTS = 1.0
+CONTACT_VARIES = 0.5
+HANDED_OVER = 0.5
+LEVEL_BLOCK = 0.24
+RARE = 100.0
+SAME_ERROR = 0.1
+STARTS = np.array([0.05, 0.1, 0.2, 0.4, 0.8, 1.6])
+SURE = 0.99
+UNSURE = 0.5
+LIGHT = 0.05
+LAG = 0.1
+SETTLED = 0.9
+LONGEST_HANDOVER = 10.0
+STEADY = 0.9
+DRIFT_SIZE = 0.005
+DRIFT_VARIES = 5.0
+LASTING = 0.3
+AFTER_CONTACT = 0.3
+LONG_ENOUGH = 1.0
+HANDING_VARIES = np.array([5.0, 1.5, 0.5])

@@ -25,15 +25,14 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armload.estimators import Estimate
-from armload.online.changes import ChangeDetector, Weighed
+from armload.online.modes import Modes
 from armload.online.event import Event
 from armload.online.runs import Gaussian, Runs
 from armload.online.schedule import Deferred
 from armload.online.thresholds import (
-    BACK,
-    BACK_AFTER,
     DECIDED,
     FIRST_TARED,
     FIRST_UNTARED,
@@ -41,14 +40,23 @@ from armload.online.thresholds import (
     KIND_LATEST,
     KIND_STD,
     LEARNT,
+    AFTER_CONTACT,
+    LAG,
+    LONG_ENOUGH,
+    LIGHT,
+    LONGEST_HANDOVER,
     LONGEST,
     PASSING,
     PATIENCE,
     RETURN_STD,
     RETURN_UNTIL,
-    TRANSIENT,
+    SETTLED,
+    STEADY,
+    SURE,
+    UNSURE,
 )
 from armload.posterior import PosteriorLeastSquares
+from armload.posterior.sequential import SequentialPosterior
 from armload.posterior.worker import Worker
 from armload.recording import Sample
 from armload.regression import payload_prior_std
@@ -61,11 +69,14 @@ SETTLING: Phase = "settling"
 
 @dataclass
 class _Change:
-    """A change that is settling: until when [s], whether the run before it was a passing one, the run after it."""
+    """A change that is settling: when [s], whether the run before it was a passing one, the run after it."""
 
-    until: float
+    t: float
+    began: float
     passing: bool
+    state: SequentialPosterior
     following: Future[PosteriorLeastSquares] | PosteriorLeastSquares
+    fed: float = -np.inf
 
 
 class PayloadWatch:
@@ -95,13 +106,15 @@ class PayloadWatch:
         self.phase: Phase = FOLLOWING
         self.answered = self.run
         self.event: Event | None = None
-        self._detector: ChangeDetector | None = None
+        self._modes: Modes | None = None
+        self._row_t = self._steady_t = -np.inf
+        self._touched = False
         self._gaussian: tuple[PosteriorLeastSquares, Gaussian] | None = None  # before the row, and of which run
         self._doubted_at = np.inf
         self._gave_up = False  # doubting: what does not fit is believed until it fits again
         self._change: _Change | None = None
         self._judging = False  # whether the run is new, and may give way to the earlier one
-        self._held_before = False
+        self._held_before = self._held_before_doubt = False
 
     @property
     def run(self) -> PosteriorLeastSquares:
@@ -123,13 +136,16 @@ class PayloadWatch:
         """Whether samples are left out because they do not fit: a push, or a change not yet sure."""
         return self.phase == DOUBTING
 
+    @property
+    def sure(self) -> bool:
+        """Whether nothing but the arm and the same payload explains the last rows."""
+        return self.phase == FOLLOWING and (self._modes is None or self._modes.steady > STEADY)
+
     def update(self, sample: Sample, held: bool) -> Estimate | None:
         """Take one sample; None while it does not count. `held`: whether anything was, by the last estimate."""
         if self.phase == SETTLING:
-            assert self._change is not None
-            if sample.t < self._change.until:
-                return None
-            self._take_up_the_next()
+            self._settle(sample)
+            return None
         if self.phase == DOUBTING:
             self._look_on(sample, held)
             return None
@@ -163,20 +179,52 @@ class PayloadWatch:
         self._look.clear()
         stream = self.run.stream
         state, row = stream.state, stream.row
-        if state is None or row is None or row.h <= 0.0:
+        if state is None or row is None:
             return
-        if self._detector is None:
-            self._detector = ChangeDetector(self._unit, stream.correction.effort)
+        if self._modes is None:
+            self._modes = Modes(self._unit, stream.correction.effort)
             state.predict(row)  # loaded now, not in the middle of a change
-        found = self._detector.take(row.h, state.seen, row.X, state.scale, *self._before_row)
-        self._gaussian = (self.run, stream.answer())
-        if stream.seconds <= (FIRST_TARED if stream.tares else FIRST_UNTARED):
+        known = stream.seconds > (FIRST_TARED if stream.tares else FIRST_UNTARED)
+        h, self._row_t = row.t - self._row_t, row.t
+        if row.h > 0.0:
+            if known:
+                self._modes.take(row.h, state.seen, row.X, state.scale, *self._before_row, False)
+            self._gaussian = (self.run, stream.answer())
+        elif known and 0.0 < h < 0.1 and stream.posterior.torque == "link":
+            seen, scale = state.predict(row._replace(h=h))
+            self._modes.take(h, seen, row.X, scale, *self._before_row, True)
+        if known:
+            self._decide(sample, held)
+
+    def _decide(self, sample: Sample, held: bool) -> None:
+        """What becomes of the run, by what the last rows are."""
+        modes = self._modes
+        assert modes is not None
+        doubtful = modes.steady < UNSURE
+        if modes.steady > SURE:
+            self._steady_t, self._touched = sample.t, False
+        self._touched = self._touched or modes.contact > UNSURE
+        changed = modes.other + (0.0 if self._touched else modes.handing)
+        if changed > SURE and (not self._touched or modes.since > AFTER_CONTACT) and self._possible():
+            self._begin_change(sample, self._held_before_doubt if self.phase == DOUBTING else held)
             return
-        self._gave_up = self._gave_up and self._detector.suspicious
-        if found is not None:
-            self._begin_change(sample, found, held)
-        elif self._detector.suspicious and not self._gave_up:
-            self.phase, self._doubted_at = DOUBTING, sample.t
+        if not doubtful:
+            self.phase, self._gave_up = FOLLOWING, False
+        elif self.phase == FOLLOWING and not self._gave_up:
+            self.phase, self._doubted_at, self._held_before_doubt = DOUBTING, sample.t, held
+        elif self.phase == DOUBTING:
+            stream = self.run.stream
+            knows_its_arm = bool(stream.tares) or stream.seconds > LEARNT
+            if sample.t - self._doubted_at > (PATIENCE if knows_its_arm else DECIDED):
+                self.phase, self._gave_up = FOLLOWING, True
+
+    def _possible(self) -> bool:
+        """Whether what would be held now has a mass that can be."""
+        assert self._modes is not None
+        mean, covariance = self._before_row
+        shift, spread = self._modes.shift
+        std = float(np.sqrt(covariance[0, 0] + spread[0, 0]))
+        return float(mean[0] + shift[0]) > -LIGHT * self._unit - 2.0 * std
 
     @property
     def _before_row(self) -> Gaussian:
@@ -189,41 +237,105 @@ class PayloadWatch:
 
     def _look_on(self, sample: Sample, held: bool) -> None:
         """Look at a sample that the run is not told: something may be pulling at the arm, or the payload changing."""
-        stream, detector = self.run.stream, self._detector
-        assert stream.state is not None
-        assert detector is not None
-        row = stream.look(*sample)
-        if row is None or row.h <= 0.0:
-            return
-        seen, scale = stream.state.predict(row)
-        found = detector.take(row.h, seen, row.X, scale, *self._before_row)
-        since = sample.t - self._doubted_at
-        if found is not None and since < DECIDED:
-            self._begin_change(sample, found, held)
-        elif self._judging and since > BACK_AFTER and self._earlier_explains():
-            self._begin_change(sample, detector.last, held)
-        knows_its_arm = bool(stream.tares) or stream.seconds > LEARNT
-        self._gave_up = since > (PATIENCE if knows_its_arm else DECIDED)
-        if self.phase == DOUBTING and (self._gave_up or not detector.suspicious):
-            self.phase = FOLLOWING
+        if self._looked(sample, self.run.stream.state):
+            self._decide(sample, held)
 
-    def _earlier_explains(self) -> bool:
-        """Whether what was held before the last change explains the last rows better than what is held now."""
-        before = self._runs.payload_of(self._runs.previous)
-        assert self._detector is not None
-        return before is not None and self._detector.ratio(before[0] - self._before_row[0]) > BACK
+    def _looked(self, sample: Sample, state: SequentialPosterior | None) -> bool:
+        """Whether a sample that the run is not told completed a row, which is weighed."""
+        assert state is not None
+        assert self._modes is not None
+        row = self.run.stream.look(*sample)
+        if row is None:
+            return False
+        h, self._row_t = row.t - self._row_t, row.t
+        if not 0.0 < h < 0.1:
+            return False
+        seen, scale = state.predict(row._replace(h=h))
+        self._modes.take(h, seen, row.X, scale, *self._before_row, True)
+        return True
+
+    def _settle(self, sample: Sample) -> None:
+        """A sample while the payload may go on changing; the next run begins, or the run before goes on."""
+        change, modes = self._change, self._modes
+        assert change is not None
+        assert modes is not None
+        if not self._looked(sample, change.state):
+            if change.fed > -np.inf:
+                assert isinstance(change.following, PosteriorLeastSquares)
+                change.following.update(sample)
+            return
+        if modes.steady + modes.contact > SURE:
+            self._call_off()
+            return
+        self._feed(sample)
+        if sample.t - change.t > LONGEST_HANDOVER or (modes.other > SETTLED and self._stays()):
+            self._take_up_the_next()
+
+    def _stays(self) -> bool:
+        """Whether the payload has been the same for so long that, had it gone on changing, that would show."""
+        modes, change = self._modes, self._change
+        assert modes is not None
+        assert change is not None
+        for_how_long = modes.since
+        if for_how_long < LAG:
+            return False
+        if for_how_long > LONG_ENOUGH:
+            return True
+        shift, spread = modes.shift
+        took = self._row_t - change.began
+        # a ramp of the mean rate since it began spreads by rate·T/√12 over T: three standard deviations of the mean
+        return for_how_long * abs(float(shift[0])) > 3.0 * 12.0**0.5 * took * float(np.sqrt(spread[0, 0]))
+
+    def _feed(self, sample: Sample) -> None:
+        """The next run takes samples as soon as the payload seems to be the same, and begins anew if it was not."""
+        modes, change = self._modes, self._change
+        assert modes is not None
+        assert change is not None
+        if modes.other > UNSURE and modes.since >= LAG:
+            if isinstance(change.following, Future):
+                change.following = change.following.result()
+            if change.fed < sample.t - modes.since:
+                change.following.reset()
+                change.fed = sample.t
+            change.following.update(sample)
+        else:
+            change.fed = -np.inf
+
+    def _call_off(self) -> None:
+        """It was no payload: the run before goes on."""
+        self.hold()
+        assert self._change is not None
+        assert self.event is not None
+        following, self._change = self._change.following, None
+        assert isinstance(following, PosteriorLeastSquares)
+        self._closing = self._beside(following.close)
+        self.event = replace(self.event, kind="return")
+        self._look.clear()
+        self.phase, self._doubted_at, self._gave_up = DOUBTING, self._row_t, False
+
+    @property
+    def tracked(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """phi (10,) and covariance while samples are looked at: of all that may have happened."""
+        modes = self._modes
+        assert modes is not None
+        (x, spread), p = modes.shift, modes.handing + modes.other
+        last = self.run.last
+        late = p * (x - modes.lately)
+        return last.phi + p * x, last.covariance + p * spread + p * (1.0 - p) * np.outer(x, x) + np.outer(late, late)
 
     # ------------------------------------------------------------------ a change, and the run after it
 
-    def _begin_change(self, sample: Sample, found: Weighed, held: bool) -> None:
+    def _begin_change(self, sample: Sample, held: bool) -> None:
         """A change: the next run is made beside the stream while the transient lasts."""
-        assert self._detector is not None
+        assert self._modes is not None
         run = self.run
         passing = self._judging and run.stream.seconds < PASSING
-        self.event = Event("change", sample.t, sample.t - self._detector.seconds(found.rows), float(found.delta[0]))
+        self.event = Event("change", sample.t, self._steady_t, float(self._modes.shift[0][0]))
         self._held_before, self._judging = held, False
+        state = run.stream.state
+        assert state is not None
         following = self._beside(self._made, run, self._runs.reference_for_next(held))
-        self._change, self.phase = _Change(sample.t + TRANSIENT, passing, following), SETTLING
+        self._change, self.phase = _Change(sample.t, self._steady_t, passing, state, following), SETTLING
 
     @staticmethod
     def _made(run: PosteriorLeastSquares, reference: PosteriorLeastSquares | None) -> PosteriorLeastSquares:
@@ -255,12 +367,12 @@ class PayloadWatch:
         elif self.event.kind == "change" and (std <= KIND_STD or seconds > KIND_LATEST):
             known = {(False, True): "grasp", (True, False): "release", (True, True): "swap"}
             kind = known.get((self._held_before, held))
-            self.event = replace(self.event, kind=kind or ("grasp" if self.event.mass > 0 else "release"))
+            self.event = replace(self.event, kind=kind or ("grasp" if self.event.mass > 0 else "change"))
 
     def _watch_anew(self, dropped: PosteriorLeastSquares | None) -> None:
         """Begin to watch the current run; one that is not wanted any more has its thread stopped."""
-        if self._detector is not None:
-            self._detector.reset()
+        if self._modes is not None:
+            self._modes.reset()
         self._look.clear()
         self.phase, self._gave_up = FOLLOWING, False
         if dropped is not None:
