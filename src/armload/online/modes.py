@@ -1,17 +1,19 @@
-"""What the last moments of a stream are: steady, a payload being handed over, another payload, or a contact.
+"""What the last moments of a stream are: steady, a contact, a payload being handed over, or another payload.
 
 Given all rows before, a row says e ~ N(w·phi, v) (`SequentialPosterior.seen`). With phi ~ N(m, P) from the stream its
-innovation is d = e − w·m, of variance v + wᵀ·P·w, and the noise is taken to be as large as it has lately been. With
-R·Rᵀ = E[phi·phiᵀ] of a body (`body_root`) the hypotheses are, each for several sizes s,
+innovation is d = e − w·m, of variance v + wᵀ·P·w; the noise is taken to be as large as it has lately been. With
+R·Rᵀ = E[phi·phiᵀ] of a body (`body_root`) the hypotheses are
 
     steady          d = noise
-    contact         d_j = b_j + noise,         b_j an Ornstein–Uhlenbeck process of size s·effort_j: any joint, varying
-    handing over    d = W·R·x + noise,         x (10,) an Ornstein–Uhlenbeck process of size s: a body that varies
-    another         d = W·R·x + noise,         x ~ N(0, s²) since one of several moments: a body that stays
+    drifting        d_j = b_j + noise,     b_j an Ornstein–Uhlenbeck process, small and slow: the arm itself
+    contact         the same, large and quick: a person's hand, any torque on any joint, varying
+    handing over    d = W·R·x + noise,     x (10,) an Ornstein–Uhlenbeck process: a body that varies
+    another         d = W·R·x + noise,     x ~ N(0, s²·1) since one of several moments: a body that stays
 
-Each is a Gaussian filter, so that the likelihood of a row is in closed form; their probabilities follow from rates of
-beginning and mean durations, as in a hidden Markov model. Rows that the run is not told of share the errors of what
-it foresees, and count for less.
+of several sizes and times each. Each is a Gaussian filter, so that the likelihood of a row is in closed form; of
+another body it is that of all rows since its moment, ½·cᵀ·(A + s⁻²)⁻¹·c − ½·ln|1 + s²·A| over steady's, with
+A = Σ Rᵀ·Wᵀ·W·R/v, c = Σ Rᵀ·Wᵀ·d/v. Probabilities follow from how often each begins and how long it lasts, as in a
+hidden Markov model. Rows that a run is not told of share the errors of what it foresees, and count for less.
 
 Sources: interacting multiple models, Blom & Bar-Shalom, IEEE T-AC 1988; change points, Adams & MacKay 2007.
 """
@@ -29,12 +31,12 @@ from armload.online.thresholds import (
     BODY_GYRATION,
     BODY_SIZES,
     CONTACT_LASTS,
-    CONTACT_VARIES,
+    CONTACT_TIME,
+    DRIFT_RARE,
     DRIFT_SIZE,
-    DRIFT_VARIES,
+    DRIFT_TIME,
     HANDED_OVER,
-    HANDING_VARIES,
-    LAG,
+    HANDING_TIMES,
     LEVEL,
     LEVEL_BLOCK,
     LEVEL_OUTLIER,
@@ -46,9 +48,9 @@ from armload.online.thresholds import (
     STARTS,
 )
 
-CONTACT = 2  # 0: steady; 1: the arm drifting
-HANDING = CONTACT + len(PUSH_SIZES)
-OTHER = HANDING + len(BODY_SIZES)
+_DRIFT, _CONTACT = 1, 2  # where each kind begins among the probabilities; 0: steady
+_HANDING = _CONTACT + len(PUSH_SIZES)
+_OTHER = _HANDING + len(BODY_SIZES)
 
 
 def body_root() -> NDArray[np.float64]:
@@ -62,74 +64,66 @@ def body_root() -> NDArray[np.float64]:
 
 
 class Modes:
-    """The probabilities of the hypotheses, row by row.
+    """The probabilities of what the last rows are.
 
     Args:
         mass: of a payload as the arm usually holds [kg]. effort: torque scale of each joint (n,) [N·m].
-
-    Attributes:
-        steady, contact, handing, other: probabilities.
     """
 
     def __init__(self, mass: float, effort: NDArray[np.float64]) -> None:
-        n, bodies, pushes, starts = len(effort), len(BODY_SIZES), len(PUSH_SIZES), len(STARTS)
+        n, bodies, starts = len(effort), len(BODY_SIZES), len(STARTS)
         self.root, self.effort = mass * body_root(), effort
-        self._U, self._d, self._v = np.zeros((n, 10)), np.zeros(n), np.zeros(n)
-        self._weights = np.zeros(OTHER + starts)
-        self._sizes = np.concatenate([[DRIFT_SIZE], PUSH_SIZES])
-        self._times = np.array([DRIFT_VARIES] + [CONTACT_VARIES] * pushes)
-        self._b = np.zeros((2, 1 + pushes, n))
+        self._sizes = np.array([DRIFT_SIZE, *PUSH_SIZES])
+        self._times = np.array([DRIFT_TIME, *(CONTACT_TIME for _ in PUSH_SIZES)])
+        self._weights = np.zeros(_OTHER + starts)
+        self._b = np.zeros((2, len(self._sizes), n))  # mean and variance of each joint's torque
         self._x, self._P = np.zeros((bodies, 10)), np.zeros((bodies, 10, 10))
-        self._A, self._c = np.zeros((starts, 10, 10)), np.zeros((starts, 10))
+        self._A, self._c = np.zeros((starts, 10, 10)), np.zeros((starts, 10))  # of A the lower triangle
         self._found, self._age = np.zeros(starts), np.zeros(starts)
-        self._loud = np.zeros((2, n))
-        self.level, self._block = LEVEL, 0.0
-        self._told = 0.0
+        self._loud, self._block, self.level = np.zeros((2, n)), 0.0, LEVEL
         self.reset()
 
     def reset(self) -> None:
-        """Everything is steady again; how large the noise has been is not forgotten."""
+        """All is steady; how large the noise has been is not forgotten."""
         self._weights[:] = 0.0
         self._weights[0] = 1.0
-        self._b[0], self._x[:], self._A[:], self._c[:] = 0.0, 0.0, 0.0, 0.0
-        self._b[1] = np.outer(self._sizes, self.effort) ** 2
-        self._P[:] = BODY_SIZES[:, None, None] ** 2 * np.eye(10)
-        self._found[:] = 0.0
-        self._age[:] = 0.0
-        self.lately = np.zeros(10)
+        for state in (self._b, self._x, self._P, self._A, self._c, self._found, self._age):
+            state[:] = 0.0
 
-    def take(self, h, seen, X, scale, mean, covariance, looking: bool) -> None:
-        """Take a row that stands for h [s].
+    def take(
+        self,
+        h: float,
+        seen: NDArray[np.float64],
+        X: NDArray[np.float64],
+        scale: NDArray[np.float64],
+        mean: NDArray[np.float64],
+        covariance: NDArray[np.float64],
+        told: bool,
+    ) -> None:
+        """Take a row.
 
         Args:
-            seen: (n, 12) as in `SequentialPosterior`. X: (n, ≥ 10) the row's regressor, payload first. scale: (n,) what
-                the row was multiplied by. mean, covariance: of phi before the row. looking: the run is not told.
+            h: what the row stands for [s]. seen: (n, 12) as in `SequentialPosterior`. X: (n, ≥ 10) the row's regressor,
+                payload first. scale: (n,) what the row was multiplied by. mean, covariance: of phi before the row.
+            told: whether the run was told of it, too.
         """
-        factor = 1.0 + 2.0 * SAME_ERROR / h if looking else 1.0
-        _innovation(seen, X, scale, self.root, mean, covariance, factor, self.level, self._U, self._d, self._v)
-        if not looking:
-            self._listen(h, scale)
-        _weigh(
-            h, self._U, self._d, self._v, scale, self.effort, self._weights, self._b, self._x, self._P,
-            self._A, self._c, self._found, self._age, BODY_SIZES, self._sizes, self._times, HANDING_VARIES, STARTS,
-            RARE, CONTACT_LASTS, HANDED_OVER, RARE,
-        )
-        self._told += h
-        if self.steady < 0.999 and self._told > 0.02:
-            self.lately += min(self._told / LAG, 1.0) * (self.shift[0] - self.lately)
-            self._told = 0.0
-        elif self.steady >= 0.999:
-            self.lately = np.zeros(10)
+        shared = 1.0 if told else 1.0 + 2.0 * SAME_ERROR / h
+        U, d, v = _innovation(seen, X, scale, self.root, mean, covariance, shared, self.level)
+        if told:
+            self._listen(h, scale * scale / v, scale * d / v)
+        row, state = (h, U, d, v, scale, self.effort), (self._b, self._x, self._P, self._A, self._c)
+        known = (self._sizes, self._times, BODY_SIZES, HANDING_TIMES, STARTS)
+        rates = (RARE, DRIFT_RARE, CONTACT_LASTS, HANDED_OVER)
+        _weigh(*row, self._weights, *state, self._found, self._age, *known, *rates)
 
-    def _listen(self, h: float, scale: NDArray[np.float64]) -> None:
-        """Follow how large the noise is, in units of what it is held to be."""
-        v = self._v / self.level
-        self._loud[0] += scale**2 / v
-        self._loud[1] += scale * self._d / v
+    def _listen(self, h: float, weight: NDArray[np.float64], pull: NDArray[np.float64]) -> None:
+        """Follow how large the noise is, in units of what it is held to be: the mean over the joints of (Σ B)²/Σ N."""
+        self._loud[0] += weight
+        self._loud[1] += pull
         self._block += h
         if self._block >= LEVEL_BLOCK:
-            if self.steady > 0.5:
-                ratio = float((self._loud[1] ** 2 / np.maximum(self._loud[0], 1e-12)).mean())
+            if self._weights[0] > 0.5:
+                ratio = self.level * float((self._loud[1] ** 2 / np.maximum(self._loud[0], 1e-12)).mean())
                 self.level += LEVEL_SHARE * (min(ratio, LEVEL_OUTLIER * self.level) - self.level)
                 self.level = max(self.level, LOWEST_LEVEL)
             self._loud[:] = 0.0
@@ -137,134 +131,120 @@ class Modes:
 
     @property
     def steady(self) -> float:
-        return float(self._weights[0] + self._weights[1])
-
-    @property
-    def contact(self) -> float:
-        return float(self._weights[CONTACT:HANDING].sum())
-
-    @property
-    def handing(self) -> float:
-        return float(self._weights[HANDING:OTHER].sum())
-
-    @property
-    def other(self) -> float:
-        return float(self._weights[OTHER:].sum())
-
-    @property
-    def since(self) -> float:
-        """For how long the likeliest other payload has been there [s]."""
-        return float(self._age[int(self._weights[OTHER:].argmax())])
+        """Probability that the arm holds what it held, and nothing else pulls at it; drifting or not."""
+        return float(self._weights[:_CONTACT].sum())
 
     @property
     def drift(self) -> float:
-        return float(self._weights[1])
+        """Probability that the arm itself changes, slowly."""
+        return float(self._weights[_DRIFT])
 
     @property
-    def shift(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """By how much phi (10,) has changed if it has, and its covariance: of the likeliest such hypothesis."""
-        k = int(self._weights[HANDING:].argmax())
+    def contact(self) -> float:
+        """Probability that something touches the arm."""
+        return float(self._weights[_CONTACT:_HANDING].sum())
+
+    @property
+    def handing(self) -> float:
+        """Probability that the payload is changing."""
+        return float(self._weights[_HANDING:_OTHER].sum())
+
+    @property
+    def other(self) -> float:
+        """Probability that the payload has changed, and stays."""
+        return float(self._weights[_OTHER:].sum())
+
+    @property
+    def stays(self) -> float:
+        """For how long the likeliest other payload has been there [s]."""
+        return float(self._age[self._weights[_OTHER:].argmax()])
+
+    def shift(self, going_on: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """By how much phi (10,) has changed if it has, and its covariance, by the likeliest such hypothesis.
+
+        going_on: of those alone by which it may still be changing.
+        """
+        k = int(self._weights[_HANDING : _OTHER if going_on else None].argmax())
         if k < len(BODY_SIZES):
             x, P = self._x[k], self._P[k]
         else:
             k -= len(BODY_SIZES)
-            A = np.tril(self._A[k]) + np.tril(self._A[k], -1).T
-            best, most = BODY_SIZES[0], -np.inf
-            for s in BODY_SIZES:
-                M = np.eye(10) + s * s * A
-                f = 0.5 * s * s * self._c[k] @ np.linalg.solve(M, self._c[k]) - 0.5 * np.linalg.slogdet(M)[1]
-                if f > most:
-                    best, most = s, f
-            P = np.linalg.inv(A + np.eye(10) / best**2)
-            x = P @ self._c[k]
+            A, c = self._A[k] + np.tril(self._A[k], -1).T, self._c[k]
+            found = [(s * s * c @ np.linalg.solve(M := np.eye(10) + s * s * A, c), M, s) for s in BODY_SIZES]
+            likely = [said - np.linalg.slogdet(M)[1] for said, M, _ in found]
+            P = np.linalg.inv(A + np.eye(10) / found[int(np.argmax(likely))][2] ** 2)
+            x = P @ c
         return self.root @ x, self.root @ P @ self.root.T
 
 
 @kernel
-def _innovation(seen, X, scale, root, mean, covariance, factor, level, U, d, v):  # pragma: no cover - compiled
-    """One row's innovations, their variance, and what they would see of a body."""
-    for j in range(seen.shape[0]):
-        e, s = seen[j, 10], seen[j, 11]
+def _innovation(seen, X, scale, root, mean, covariance, shared, level):  # pragma: no cover - compiled
+    """What one row would see of a body (n, 10), its innovations (n,), their variance (n,); all in units of its noise.
+
+    shared: by how much more than the noise the run's own uncertainty counts.
+    """
+    n = seen.shape[0]
+    U, d, v = np.zeros((n, 10)), np.empty(n), np.empty(n)
+    for j in range(n):
+        d[j], v[j] = seen[j, 10], seen[j, 11]
         for i in range(10):
-            e -= seen[j, i] * mean[i]
+            d[j] -= seen[j, i] * mean[i]
             for k in range(10):
-                s += seen[j, i] * covariance[i, k] * seen[j, k]
-        d[j], v[j] = e, level * (1.0 + factor * max(s - 1.0, 0.0))
-        for i in range(10):
-            U[j, i] = 0.0
+                v[j] += seen[j, i] * covariance[i, k] * seen[j, k]
             for k in range(i, 10):
                 U[j, i] += scale[j] * X[j, k] * root[k, i]
+        v[j] = level * (1.0 + shared * max(v[j] - 1.0, 0.0))
+    return U, d, v
 
 
 @kernel
 def _weigh(
-    h, U, d, v, scale, effort, weights, b, x, P, A, c, found, age, bodies, pushes, times, slow, starts, rare, lasts, handed, drifting
-):  # pragma: no cover - compiled
-    """One row: transitions, the likelihood of each hypothesis over steady, and its state."""
-    n, pn, bn, sn = len(d), len(pushes), len(bodies), len(starts)
-    D, C, H, O = 1, 2, 1 + pn, 1 + pn + bn
-    # transitions
-    contact = handing = other = 0.0
-    for k in range(pn - 1):
-        contact += weights[C + k]
-    for k in range(bn):
-        handing += weights[H + k]
-    for k in range(sn):
-        other += weights[O + k]
-    steady = weights[0] + weights[D]
-    out = h / rare
-    over = min(h / lasts, 0.5)
-    done = min(h / handed, 0.5)
-    lost = weights[0] * h / drifting
-    back = weights[D] * h / (0.1 * drifting)
-    weights[D] += lost - back - 3.0 * out * weights[D]
-    weights[0] += back - lost - 3.0 * out * weights[0] + over * contact + 0.2 * done * handing
-    for k in range(pn - 1):
-        weights[C + k] = weights[C + k] * (1.0 - over) + out * (steady + other) / (pn - 1)
-    for k in range(bn):
-        weights[H + k] = weights[H + k] * (1.0 - 0.2 * done) + out * (steady + contact + 10.0 * other) / bn
-    for k in range(sn):
-        weights[O + k] *= 1.0 - 11.0 * out
-    best = 0
-    for k in range(sn):
-        if weights[O + k] > weights[O + best]:
-            best = k
-    for k in range(sn):
+    h, U, d, v, scale, effort, p, b, x, P, A, c, found, age,
+    sizes, times, bodies, slow, starts, rare, drift_rare, lasts, handed
+):  # fmt: skip  # pragma: no cover - compiled
+    """One row: what may have begun and ended (p), how likely each hypothesis is beside steady, and its state."""
+    n, pushes, H, O = len(d), len(sizes) - 1, 1 + len(sizes), 1 + len(sizes) + len(bodies)
+    gains, y, L = np.zeros(len(p)), np.empty(10), np.empty((10, 10))
+    contact, handing, other = p[2:H].sum(), p[H:O].sum(), p[O:].sum()
+    steady, begins, over, done = p[0] + p[1], h / rare, min(h / lasts, 0.5), min(h / handed, 0.5)
+    drifts, back = p[0] * h / drift_rare, p[1] * h * 10.0 / drift_rare
+    p[0] += back - drifts - 3.0 * begins * p[0] + over * contact + 0.2 * done * handing
+    p[1] += drifts - back - 3.0 * begins * p[1]
+    for k in range(2, H):
+        p[k] += begins * (steady + other) / pushes - over * p[k]
+    for k in range(H, O):
+        p[k] += begins * (steady + contact + 10.0 * other) / len(bodies) - 0.2 * done * p[k]
+    best = O + p[O:].argmax()
+    for k in range(len(starts)):
+        p[O + k] *= 1.0 - 11.0 * begins
         age[k] += h
-        if age[k] >= starts[k] and not (k == best and weights[O + k] > 0.01):
-            weights[0] += weights[O + k]
-            span = age[k]
+        if age[k] >= starts[k] and (O + k != best or p[best] < 0.01):  # begin it anew
+            p[0] += p[O + k]
+            p[O + k] = age[k] * (steady / rare + 0.1 * contact / lasts + handing / handed) / len(starts)
+            p[O + k] = min(p[O + k], 0.1)
             age[k], found[k] = 0.0, 0.0
             for i in range(10):
                 c[k, i] = 0.0
                 for m in range(10):
                     A[k, i, m] = 0.0
-            share = span * (steady / rare + contact / (10.0 * lasts) + handing / handed) / sn
-            weights[O + k] = min(share, 0.1)
-            weights[0] -= 0.0
-    # likelihoods
-    gains = np.zeros(len(weights))
-    for k in range(pn):
+    for k in range(len(sizes)):
         keep = math.exp(-h / times[k])
         for j in range(n):
-            size = (pushes[k] * effort[j]) ** 2
+            size = sizes[k] * effort[j]
             b[0, k, j] *= keep
-            b[1, k, j] = keep * keep * b[1, k, j] + (1.0 - keep * keep) * size
-            a = scale[j]
-            e, s = d[j] - a * b[0, k, j], a * a * b[1, k, j] + v[j]
-            gains[D + k] += 0.5 * (d[j] * d[j] / v[j] - e * e / s - math.log(s / v[j]))
-            g = a * b[1, k, j] / s
-            b[0, k, j] += g * e
+            b[1, k, j] = keep * keep * b[1, k, j] + (1.0 - keep * keep) * size * size
+            g = scale[j] * b[1, k, j]
+            e, s = d[j] - scale[j] * b[0, k, j], scale[j] * g + v[j]
+            gains[1 + k] += 0.5 * (d[j] * d[j] / v[j] - e * e / s - math.log(s / v[j]))
+            b[0, k, j] += g * e / s
             b[1, k, j] *= v[j] / s
-    y = np.empty(10)
-    for k in range(bn):
+    for k in range(len(bodies)):
         keep = math.exp(-h / slow[k])
-        size = bodies[k] ** 2
         for i in range(10):
             x[k, i] *= keep
             for m in range(10):
                 P[k, i, m] *= keep * keep
-            P[k, i, i] += (1.0 - keep * keep) * size
+            P[k, i, i] += (1.0 - keep * keep) * bodies[k] ** 2
         for j in range(n):
             e, s = d[j], v[j]
             for i in range(10):
@@ -278,8 +258,7 @@ def _weigh(
                 x[k, i] += y[i] * e / s
                 for m in range(10):
                     P[k, i, m] -= y[i] * y[m] / s
-    L = np.empty((10, 10))
-    for k in range(sn):
+    for k in range(len(starts)):
         for j in range(n):
             for i in range(10):
                 z = U[j, i] / v[j]
@@ -287,14 +266,12 @@ def _weigh(
                 for m in range(i + 1):
                     A[k, i, m] += z * U[j, m]
         total = -np.inf
-        for size in bodies:
-            said = 0.0
+        for size in bodies:  # L·Lᵀ = 1 + s²·A, L·y = s·c
+            said = -math.log(len(bodies))
             for i in range(10):
                 y[i] = size * c[k, i]
                 for j in range(i + 1):
-                    z = size * size * A[k, i, j]
-                    if i == j:
-                        z += 1.0
+                    z = size * size * A[k, i, j] + (1.0 if i == j else 0.0)
                     for m in range(j):
                         z -= L[i, m] * L[j, m]
                     L[i, j] = math.sqrt(z) if i == j else z / L[j, j]
@@ -302,17 +279,8 @@ def _weigh(
                     y[i] -= L[i, m] * y[m]
                 y[i] /= L[i, i]
                 said += 0.5 * y[i] * y[i] - math.log(L[i, i])
-            said -= math.log(len(bodies))
-            top = max(total, said)
-            total = top + math.log(math.exp(total - top) + math.exp(said - top))
-        gains[O + k] = total - found[k]
-        found[k] = total
-    top = 0.0
-    for k in range(len(weights)):
-        top = max(top, gains[k])
-    total = 0.0
-    for k in range(len(weights)):
-        weights[k] = max(weights[k] * math.exp(gains[k] - top), 1e-30)
-        total += weights[k]
-    for k in range(len(weights)):
-        weights[k] /= total
+            total = np.logaddexp(total, said)
+        gains[O + k], found[k] = total - found[k], total
+    p *= np.exp(gains - gains.max())
+    p += 1e-30
+    p /= p.sum()

@@ -1,20 +1,20 @@
 """One run for each payload: a change begins a new run, its transient kept out, and an old one may be taken up again.
 
-    … run A (empty) ──change──▶ 0.2 s left out ──▶ run B (tare: A) ──change──▶ 0.2 s ──▶ run C, or A again if it fits
+    … run A (empty) ──change──▶ hand-over left out ──▶ run B (tare: A) ──change──▶ … ──▶ run C, or A again if it fits
 
-The watch is in one of three phases:
+The watch is in one of three phases, by what the last rows are (`modes.py`):
 
-    FOLLOWING   the run takes the sample, and its innovations are looked at;
-                they fit no more → DOUBTING, a change of payload explains them best → SETTLING
+    FOLLOWING   the run takes the sample;
+                it is probably not steady → DOUBTING, the payload has surely changed or is changing → SETTLING
     DOUBTING    the sample is looked at, and the run is not told;
-                samples fit again, or have not for too long → FOLLOWING, a change of payload → SETTLING
-    SETTLING    the sample is left out, while the next run is made beside;
-                the transient is over → FOLLOWING, with the next run
+                steady again, or not for too long → FOLLOWING, the payload has surely changed → SETTLING
+    SETTLING    the sample is looked at with what the run before knows, the next run is made beside and told of what
+                may be the new payload; that stays → FOLLOWING with the next run, it was none → DOUBTING with the old
 
 After a change the new run is *judged* while it is followed: it says what the change was, once its mass is known, and
-gives way to the earlier run if it holds what that one held (a push that has ended). The run of the empty arm is a tare
-of the runs after it, beside the one that was given, if one was. Of a run that ends the last rows are taken back: a
-change is there before it is noticed.
+gives way to the earlier run if it holds what that one held. The run of the empty arm is a tare of the runs after it,
+beside the one that was given, if one was. Of a run that ends the last rows are taken back: a change is there before it
+is noticed.
 """
 
 from __future__ import annotations
@@ -33,33 +33,31 @@ from armload.online.event import Event
 from armload.online.runs import Gaussian, Runs
 from armload.online.schedule import Deferred
 from armload.online.thresholds import (
-    DECIDED,
+    AFTER_CONTACT,
     FIRST_TARED,
     FIRST_UNTARED,
     KIND_FROM,
     KIND_LATEST,
     KIND_STD,
-    LEARNT,
-    AFTER_CONTACT,
     LAG,
-    LONG_ENOUGH,
+    LEARNT,
     LIGHT,
+    LIKELY,
+    LONG_ENOUGH,
+    LONG_PATIENCE,
     LONGEST_HANDOVER,
-    LONGEST,
     PASSING,
     PATIENCE,
     RETURN_STD,
     RETURN_UNTIL,
-    SETTLED,
-    STEADY,
     SURE,
-    UNSURE,
 )
 from armload.posterior import PosteriorLeastSquares
 from armload.posterior.sequential import SequentialPosterior
 from armload.posterior.worker import Worker
-from armload.recording import Sample
+from armload.recording import GAP, Sample
 from armload.regression import payload_prior_std
+from armload.regression.rows import Row
 
 Phase = Literal["following", "doubting", "settling"]
 FOLLOWING: Phase = "following"
@@ -69,14 +67,16 @@ SETTLING: Phase = "settling"
 
 @dataclass
 class _Change:
-    """A change that is settling: when [s], whether the run before it was a passing one, the run after it."""
+    """A change that is settling: noticed and begun when [s], whether the run before it was a passing one, the posterior
+    that looks on, and the run after it, told since when [s] if it is.
+    """
 
     t: float
     began: float
     passing: bool
     state: SequentialPosterior
     following: Future[PosteriorLeastSquares] | PosteriorLeastSquares
-    fed: float = -np.inf
+    told: float | None = None
 
 
 class PayloadWatch:
@@ -107,14 +107,14 @@ class PayloadWatch:
         self.answered = self.run
         self.event: Event | None = None
         self._modes: Modes | None = None
-        self._row_t = self._steady_t = -np.inf
-        self._touched = False
         self._gaussian: tuple[PosteriorLeastSquares, Gaussian] | None = None  # before the row, and of which run
-        self._doubted_at = np.inf
+        self._row_t = self._steady_t = self._doubted_at = -np.inf  # of the last row, the last steady one, the doubt
+        self._touched = False  # whether something has touched the arm since it was steady
         self._gave_up = False  # doubting: what does not fit is believed until it fits again
+        self._lately = 0.0, np.zeros(10)  # shift of phi, lagged, and when it was last followed
         self._change: _Change | None = None
-        self._judging = False  # whether the run is new, and may give way to the earlier one
-        self._held_before = self._held_before_doubt = False
+        self._judging = self._unnamed = False  # whether the run is new, and may give way; whether its kind is not told
+        self._held_before = False  # the change, or the doubt
 
     @property
     def run(self) -> PosteriorLeastSquares:
@@ -137,9 +137,29 @@ class PayloadWatch:
         return self.phase == DOUBTING
 
     @property
+    def likely(self) -> tuple[float, float, float]:
+        """Probabilities that the payload is not what the run holds, or changes; of a contact; of a drift of the arm."""
+        modes = self._modes
+        return (0.0, 0.0, 0.0) if modes is None else (modes.handing + modes.other, modes.contact, modes.drift)
+
+    @property
     def sure(self) -> bool:
-        """Whether nothing but the arm and the same payload explains the last rows."""
-        return self.phase == FOLLOWING and (self._modes is None or self._modes.steady > STEADY)
+        """Whether nothing but the arm as it was and the same payload explains the last rows."""
+        return self.phase == FOLLOWING and sum(self.likely) < 1.0 - LIKELY
+
+    @property
+    def tracked(self) -> Gaussian:
+        """phi (10,) and covariance by the last rows, which the run was not told of.
+
+        The mixture of both hypotheses, the same payload and another; it is the wider the faster phi moves.
+        """
+        assert self._modes is not None
+        (shift, spread), p, last = self._modes.shift(going_on=True), self.likely[0], self.run.last
+        since, lately = self._lately
+        lately = lately + min((self._row_t - since) / LAG, 1.0) * (shift - lately)
+        self._lately, late = (self._row_t, lately), p * (shift - lately)
+        spread = p * spread + p * (1.0 - p) * np.outer(shift, shift) + np.outer(late, late)
+        return last.phi + p * shift, last.covariance + spread
 
     def update(self, sample: Sample, held: bool) -> Estimate | None:
         """Take one sample; None while it does not count. `held`: whether anything was, by the last estimate."""
@@ -147,7 +167,8 @@ class PayloadWatch:
             self._settle(sample)
             return None
         if self.phase == DOUBTING:
-            self._look_on(sample, held)
+            if self._looked(sample, self.run.stream.state):
+                self._decide(sample, held)
             return None
         if self._look.due(sample.t):
             self._examine(sample, held)
@@ -188,43 +209,12 @@ class PayloadWatch:
         h, self._row_t = row.t - self._row_t, row.t
         if row.h > 0.0:
             if known:
-                self._modes.take(row.h, state.seen, row.X, state.scale, *self._before_row, False)
+                self._modes.take(row.h, state.seen, row.X, state.scale, *self._before_row, True)
             self._gaussian = (self.run, stream.answer())
-        elif known and 0.0 < h < 0.1 and stream.posterior.torque == "link":
-            seen, scale = state.predict(row._replace(h=h))
-            self._modes.take(h, seen, row.X, scale, *self._before_row, True)
+        elif known and 0.0 < h <= GAP and stream.posterior.torque == "link":  # at rest, where friction hides no load
+            self._weigh(row, h, state)
         if known:
             self._decide(sample, held)
-
-    def _decide(self, sample: Sample, held: bool) -> None:
-        """What becomes of the run, by what the last rows are."""
-        modes = self._modes
-        assert modes is not None
-        doubtful = modes.steady < UNSURE
-        if modes.steady > SURE:
-            self._steady_t, self._touched = sample.t, False
-        self._touched = self._touched or modes.contact > UNSURE
-        changed = modes.other + (0.0 if self._touched else modes.handing)
-        if changed > SURE and (not self._touched or modes.since > AFTER_CONTACT) and self._possible():
-            self._begin_change(sample, self._held_before_doubt if self.phase == DOUBTING else held)
-            return
-        if not doubtful:
-            self.phase, self._gave_up = FOLLOWING, False
-        elif self.phase == FOLLOWING and not self._gave_up:
-            self.phase, self._doubted_at, self._held_before_doubt = DOUBTING, sample.t, held
-        elif self.phase == DOUBTING:
-            stream = self.run.stream
-            knows_its_arm = bool(stream.tares) or stream.seconds > LEARNT
-            if sample.t - self._doubted_at > (PATIENCE if knows_its_arm else DECIDED):
-                self.phase, self._gave_up = FOLLOWING, True
-
-    def _possible(self) -> bool:
-        """Whether what would be held now has a mass that can be."""
-        assert self._modes is not None
-        mean, covariance = self._before_row
-        shift, spread = self._modes.shift
-        std = float(np.sqrt(covariance[0, 0] + spread[0, 0]))
-        return float(mean[0] + shift[0]) > -LIGHT * self._unit - 2.0 * std
 
     @property
     def _before_row(self) -> Gaussian:
@@ -235,122 +225,126 @@ class PayloadWatch:
 
     # ------------------------------------------------------------------ doubting
 
-    def _look_on(self, sample: Sample, held: bool) -> None:
-        """Look at a sample that the run is not told: something may be pulling at the arm, or the payload changing."""
-        if self._looked(sample, self.run.stream.state):
-            self._decide(sample, held)
-
     def _looked(self, sample: Sample, state: SequentialPosterior | None) -> bool:
-        """Whether a sample that the run is not told completed a row, which is weighed."""
+        """Look at a sample that the run is not told; whether it completed a row that says something."""
         assert state is not None
-        assert self._modes is not None
         row = self.run.stream.look(*sample)
         if row is None:
             return False
         h, self._row_t = row.t - self._row_t, row.t
-        if not 0.0 < h < 0.1:
+        if not 0.0 < h <= GAP:
             return False
-        seen, scale = state.predict(row._replace(h=h))
-        self._modes.take(h, seen, row.X, scale, *self._before_row, True)
+        self._weigh(row, h, state)
         return True
 
-    def _settle(self, sample: Sample) -> None:
-        """A sample while the payload may go on changing; the next run begins, or the run before goes on."""
-        change, modes = self._change, self._modes
-        assert change is not None
-        assert modes is not None
-        if not self._looked(sample, change.state):
-            if change.fed > -np.inf:
-                assert isinstance(change.following, PosteriorLeastSquares)
-                change.following.update(sample)
-            return
-        if modes.steady + modes.contact > SURE:
-            self._call_off()
-            return
-        self._feed(sample)
-        if sample.t - change.t > LONGEST_HANDOVER or (modes.other > SETTLED and self._stays()):
-            self._take_up_the_next()
+    def _weigh(self, row: Row, h: float, state: SequentialPosterior) -> None:
+        """Weigh a row that the run was not told of, for as long as it stands."""
+        assert self._modes is not None
+        seen, scale = state.predict(row._replace(h=h))
+        self._modes.take(h, seen, row.X, scale, *self._before_row, False)
 
-    def _stays(self) -> bool:
-        """Whether the payload has been the same for so long that, had it gone on changing, that would show."""
-        modes, change = self._modes, self._change
-        assert modes is not None
-        assert change is not None
-        for_how_long = modes.since
-        if for_how_long < LAG:
-            return False
-        if for_how_long > LONG_ENOUGH:
-            return True
-        shift, spread = modes.shift
-        took = self._row_t - change.began
-        # a ramp of the mean rate since it began spreads by rate·T/√12 over T: three standard deviations of the mean
-        return for_how_long * abs(float(shift[0])) > 3.0 * 12.0**0.5 * took * float(np.sqrt(spread[0, 0]))
-
-    def _feed(self, sample: Sample) -> None:
-        """The next run takes samples as soon as the payload seems to be the same, and begins anew if it was not."""
-        modes, change = self._modes, self._change
-        assert modes is not None
-        assert change is not None
-        if modes.other > UNSURE and modes.since >= LAG:
-            if isinstance(change.following, Future):
-                change.following = change.following.result()
-            if change.fed < sample.t - modes.since:
-                change.following.reset()
-                change.fed = sample.t
-            change.following.update(sample)
-        else:
-            change.fed = -np.inf
-
-    def _call_off(self) -> None:
-        """It was no payload: the run before goes on."""
-        self.hold()
-        assert self._change is not None
-        assert self.event is not None
-        following, self._change = self._change.following, None
-        assert isinstance(following, PosteriorLeastSquares)
-        self._closing = self._beside(following.close)
-        self.event = replace(self.event, kind="return")
-        self._look.clear()
-        self.phase, self._doubted_at, self._gave_up = DOUBTING, self._row_t, False
-
-    @property
-    def tracked(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """phi (10,) and covariance while samples are looked at: of all that may have happened."""
+    def _decide(self, sample: Sample, held: bool) -> None:
+        """What becomes of the run, by what the last rows are."""
         modes = self._modes
         assert modes is not None
-        (x, spread), p = modes.shift, modes.handing + modes.other
-        last = self.run.last
-        late = p * (x - modes.lately)
-        return last.phi + p * x, last.covariance + p * spread + p * (1.0 - p) * np.outer(x, x) + np.outer(late, late)
+        if modes.steady > SURE:
+            self._steady_t, self._touched = self._row_t, False
+        self._touched = self._touched or modes.contact > 0.5
+        changed = modes.other if self._touched else modes.other + modes.handing
+        if changed > SURE and (not self._touched or modes.stays >= AFTER_CONTACT) and self._possible():
+            self._begin_change(sample, held)
+        elif modes.steady > 0.5:
+            self.phase, self._gave_up = FOLLOWING, False
+        elif self.phase == DOUBTING:
+            stream = self.run.stream
+            knows_its_arm = bool(stream.tares) or stream.seconds > LEARNT
+            self._gave_up = sample.t - self._doubted_at > (LONG_PATIENCE if knows_its_arm else PATIENCE)
+            self.phase = FOLLOWING if self._gave_up else DOUBTING
+        elif not self._gave_up:
+            self.phase, self._doubted_at, self._held_before = DOUBTING, sample.t, held
+
+    def _possible(self) -> bool:
+        """Whether what would be held now has a mass that can be."""
+        assert self._modes is not None
+        (mean, covariance), (shift, spread) = self._before_row, self._modes.shift()
+        std = float(np.sqrt(covariance[0, 0] + spread[0, 0]))
+        return float(mean[0] + shift[0]) > -LIGHT * self._unit - 2.0 * std
 
     # ------------------------------------------------------------------ a change, and the run after it
 
     def _begin_change(self, sample: Sample, held: bool) -> None:
-        """A change: the next run is made beside the stream while the transient lasts."""
-        assert self._modes is not None
+        """A change: the next run is made beside the stream while it settles."""
         run = self.run
-        passing = self._judging and run.stream.seconds < PASSING
-        self.event = Event("change", sample.t, self._steady_t, float(self._modes.shift[0][0]))
-        self._held_before, self._judging = held, False
         state = run.stream.state
         assert state is not None
-        following = self._beside(self._made, run, self._runs.reference_for_next(held))
-        self._change, self.phase = _Change(sample.t, self._steady_t, passing, state, following), SETTLING
+        if self.phase == FOLLOWING:
+            self._held_before = held
+        passing = self._judging and run.stream.seconds < PASSING
+        began = max(self._steady_t, sample.t - PATIENCE)
+        self.event, self._judging, self._unnamed = Event("change", sample.t, began, None), False, True
+        following = self._beside(self._made, run, self._runs.reference_for_next(self._held_before), 2 * began - sample.t)
+        self._change, self.phase = _Change(sample.t, began, passing, state, following), SETTLING
 
     @staticmethod
-    def _made(run: PosteriorLeastSquares, reference: PosteriorLeastSquares | None) -> PosteriorLeastSquares:
-        run.stream.finish(taken_back=LONGEST)
+    def _made(run: PosteriorLeastSquares, reference: PosteriorLeastSquares | None, until: float) -> PosteriorLeastSquares:
+        run.stream.finish(until)
         following = run.another(reference)
         following.prepare()
         return following
 
+    def _settle(self, sample: Sample) -> None:
+        """A sample while the payload may go on changing; then the next run begins, or the run before goes on."""
+        change, modes = self._change, self._modes
+        assert change is not None
+        assert modes is not None
+        looked = self._looked(sample, change.state)
+        if looked and modes.steady + modes.contact > SURE:
+            self._call_off()
+            return
+        if looked and (modes.other < 0.5 or modes.stays < LAG):
+            change.told = None
+        elif looked and (change.told is None or change.told < self._row_t - modes.stays):
+            self._ready(change).reset()
+            change.told = sample.t
+        if change.told is not None:
+            self._ready(change).update(sample)
+        if sample.t - change.t > LONGEST_HANDOVER or (looked and modes.other > LIKELY and self._stays(change)):
+            self._take_up_the_next()
+
+    def _stays(self, change: _Change) -> bool:
+        """Whether the payload has been the same for so long that it would show, had it gone on changing.
+
+        At the mean rate since the change began its mass would spread by rate·T/√12 over T: three of its deviations.
+        """
+        assert self._modes is not None
+        (shift, spread), T = self._modes.shift(), self._modes.stays
+        seen = abs(float(shift[0])) * T / (self._row_t - change.began) > 3.0 * np.sqrt(12.0 * float(spread[0, 0]))
+        return T >= LAG and (seen or T > LONG_ENOUGH)
+
+    @staticmethod
+    def _ready(change: _Change) -> PosteriorLeastSquares:
+        """The run after a change, waited for."""
+        if isinstance(change.following, Future):
+            change.following = change.following.result()
+        return change.following
+
+    def _call_off(self) -> None:
+        """The payload is what it was: the run before goes on."""
+        assert self._change is not None
+        assert self.event is not None
+        change, self._change = self._change, None
+        self._closing = self._beside(self._ready(change).close)
+        self.event = replace(self.event, kind="return", mass=0.0)
+        self.phase, self._doubted_at, self._gave_up = DOUBTING, change.t, False
+
     def _take_up_the_next(self) -> None:
-        """The transient is over: the next run begins."""
+        """The payload stays: the next run begins."""
         self.hold()
         assert self._change is not None
         change, self._change = self._change, None
-        assert isinstance(change.following, PosteriorLeastSquares)
-        self._watch_anew(self._runs.follow(change.following, change.passing))
+        if change.told is None:
+            self._ready(change).reset()
+        self._watch_anew(self._runs.follow(self._ready(change), change.passing))
         self._judging = True
 
     def _judge(self, estimate: Estimate, held: bool) -> None:
@@ -364,10 +358,10 @@ class PayloadWatch:
             self._watch_anew(self._runs.go_back())
             self._judging = False
             self.event = replace(self.event, kind="return")
-        elif self.event.kind == "change" and (std <= KIND_STD or seconds > KIND_LATEST):
+        elif self._unnamed and (std <= KIND_STD or seconds > KIND_LATEST):
             known = {(False, True): "grasp", (True, False): "release", (True, True): "swap"}
-            kind = known.get((self._held_before, held))
-            self.event = replace(self.event, kind=kind or ("grasp" if self.event.mass > 0 else "change"))
+            self._unnamed = False
+            self.event = replace(self.event, kind=known.get((self._held_before, held), "change"))
 
     def _watch_anew(self, dropped: PosteriorLeastSquares | None) -> None:
         """Begin to watch the current run; one that is not wanted any more has its thread stopped."""
