@@ -203,25 +203,25 @@ def _weigh(
     sizes, times, bodies, slow, starts, rare, drift_rare, lasts, handed
 ):  # fmt: skip  # pragma: no cover - compiled
     """One row: what may have begun and ended (p), how likely each hypothesis is beside steady, and its state."""
-    n, pushes, H, O = len(d), len(sizes) - 1, 1 + len(sizes), 1 + len(sizes) + len(bodies)
+    n, pushes, handing_from, other_from = len(d), len(sizes) - 1, 1 + len(sizes), 1 + len(sizes) + len(bodies)
     gains, y, L = np.zeros(len(p)), np.empty(10), np.empty((10, 10))
-    contact, handing, other = p[2:H].sum(), p[H:O].sum(), p[O:].sum()
+    contact, handing, other = p[2:handing_from].sum(), p[handing_from:other_from].sum(), p[other_from:].sum()
     steady, begins, over, done = p[0] + p[1], h / rare, min(h / lasts, 0.5), min(h / handed, 0.5)
     drifts, back = p[0] * h / drift_rare, p[1] * h * 10.0 / drift_rare
     p[0] += back - drifts - 3.0 * begins * p[0] + over * contact + 0.2 * done * handing
     p[1] += drifts - back - 3.0 * begins * p[1]
-    for k in range(2, H):
+    for k in range(2, handing_from):
         p[k] += begins * (steady + other) / pushes - over * p[k]
-    for k in range(H, O):
+    for k in range(handing_from, other_from):
         p[k] += begins * (steady + contact + 10.0 * other) / len(bodies) - 0.2 * done * p[k]
-    best = O + p[O:].argmax()
+    best = other_from + p[other_from:].argmax()
     for k in range(len(starts)):
-        p[O + k] *= 1.0 - 11.0 * begins
+        p[other_from + k] *= 1.0 - 11.0 * begins
         age[k] += h
-        if age[k] >= starts[k] and (O + k != best or p[best] < 0.01):  # begin it anew
-            p[0] += p[O + k]
-            p[O + k] = age[k] * (steady / rare + 0.1 * contact / lasts + handing / handed) / len(starts)
-            p[O + k] = min(p[O + k], 0.1)
+        if age[k] >= starts[k] and (other_from + k != best or p[best] < 0.01):  # begin it anew
+            p[0] += p[other_from + k]
+            p[other_from + k] = age[k] * (steady / rare + 0.1 * contact / lasts + handing / handed) / len(starts)
+            p[other_from + k] = min(p[other_from + k], 0.1)
             age[k], found[k] = 0.0, 0.0
             for i in range(10):
                 c[k, i] = 0.0
@@ -253,7 +253,7 @@ def _weigh(
                 for m in range(10):
                     y[i] += P[k, i, m] * U[j, m]
                 s += U[j, i] * y[i]
-            gains[H + k] += 0.5 * (d[j] * d[j] / v[j] - e * e / s - math.log(s / v[j]))
+            gains[handing_from + k] += 0.5 * (d[j] * d[j] / v[j] - e * e / s - math.log(s / v[j]))
             for i in range(10):
                 x[k, i] += y[i] * e / s
                 for m in range(10):
@@ -280,7 +280,7 @@ def _weigh(
                 y[i] /= L[i, i]
                 said += 0.5 * y[i] * y[i] - math.log(L[i, i])
             total = np.logaddexp(total, said)
-        gains[O + k], found[k] = total - found[k], total
+        gains[other_from + k], found[k] = total - found[k], total
     p *= np.exp(gains - gains.max())
     p += 1e-30
     p /= p.sum()

@@ -41,7 +41,8 @@ from armload.posterior.restless import RESTLESS
 from armload.recording import Recording, Sample
 from armload.regression import payload_prior_std
 
-_STANDING = "standing: the inertia is known only when the arm moves"
+_STANDING = "standing: nothing new is told until the arm moves, or what it holds changes"
+_STANDING_MOTOR = "standing: a change of payload is noticed only when the arm moves"
 _CHANGING = "the payload is changing"
 _DOUBT = "samples that do not fit are left out: something pulls at the arm, or the payload is changing"
 
@@ -332,7 +333,8 @@ class OnlineIdentifier:
         if not self._moving:
             notes.append("not moving: inertia undetermined" if not self._determined[4:].all() else "not moving")
         if stands and self._stream.trouble is None:
-            notes.append(_STANDING)
+            motor = isinstance(run, PosteriorLeastSquares) and run.stream.posterior.torque == "motor"
+            notes.append(_STANDING_MOTOR if motor else _STANDING)
         if (changed := drift_of_run(run)) is not None:
             notes.append(changed_since_tare(changed, self.relative_to))
         self._notes = tuple(notes)

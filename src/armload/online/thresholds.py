@@ -60,29 +60,32 @@ LEVEL_OUTLIER = 8.0
 
 # ---------------------------------------------------------------------- the phases of a run, `watch.py`
 
-# probability of a payload that changes or has changed, from which it is an event: one in a hundred may be none
-SURE = 0.99
+# probability of a payload that changes or has changed, from which it is an event: one in a thousand may be none, and
+# friction of gears is not what the hypotheses know (test_a_real_arm_that_breaks_away_from_rest_is_no_change_of_payload)
+SURE = 0.999
 # probability of what is taken for so: of a steady arm whose intervals are the calibrated ones, of a payload that stays
 LIKELY = 0.9
 # [s] that another payload stays at least until its run begins: twice the lag of the regression
 LAG = 2.0 / GAIN
 # [s] that it stays at most until then, however slowly it may be changing: 50 g within two seconds would show
 LONG_ENOUGH = 2.0
-# [s] of a hand-over at most: then a run begins, whatever is held
-LONGEST_HANDOVER = 10.0
 # [s] that another payload stays before it is believed when something has touched the arm: what a hand leaves behind
 # it is over by then
 AFTER_CONTACT = 0.3
 # [payloads] below nothing that a mass may seem to be: a tool or a light thing, 75 g of a Panda, may have been held from
 # the start and be part of the empty arm
 LIGHT = 0.05
-# [s] of a run with a tare before which no change is looked for: the tare has told most of what the arm does wrong
-FIRST_TARED = 0.5
+# [s] of rows that do not fit that are left out at most, and of a hand-over: a hand that leads the arm. Then what does
+# not fit is believed: it may be the arm (test_a_pose_first_seen_shortly_after_a_change_is_not_another_change)
+PATIENCE = 10.0
+# [s] before a change that are taken back from the run that ends, at least as long as it took to notice it: what a
+# payload does before it shows (test_a_cycle_in_step_with_the_motion_stays_as_good_in_its_second_half_as_in_its_first)
+TAKEN_BACK = 0.2
+# [s] of a run with a tare before which no change is looked for: the tare has told most of what the arm does wrong, and
+# one pose of an arm that stands counts no longer than 0.25 s
+FIRST_TARED = 0.2
 # [s] the same without a tare: the arm's offsets and friction must have been seen before anything can be unlike them
 FIRST_UNTARED = 2.0
-# [s] of a run not judged yet, below which it may have been a push: the run before it may come back. Pushes last up to
-# 3 s (`benchmarks/events.py`)
-PASSING = 3.0
 # [s] of a new run from which its kind is told: before, the prior alone says whether something is held
 KIND_FROM = 0.25
 # [s] of a new run after which its kind is told, however little is known of the mass
@@ -94,14 +97,6 @@ RETURN_UNTIL = 6.0
 KIND_STD = 0.033
 # [payloads] the same to tell one payload from an earlier one: 15 g of a Panda
 RETURN_STD = 0.01
-# [s] of rows that do not fit that a run leaves out at most, longer than a push. Then what does not fit is believed: it
-# may be the arm (test_a_pose_first_seen_shortly_after_a_change_is_not_another_change)
-PATIENCE = 4.0
-# [s] of a run that knows its arm as if it had a tare: what does not fit is then not the arm for longer.
-# A stated guard: the scenes are shorter
-LEARNT = 10.0
-# [s] that such a run leaves out at most: a hand that leads the arm
-LONG_PATIENCE = 10.0
 
 # ---------------------------------------------------------------------- which run is which, `runs.py` and `step.py`
 

@@ -25,11 +25,10 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armload.estimators import Estimate
-from armload.online.modes import Modes
 from armload.online.event import Event
+from armload.online.modes import Modes
 from armload.online.runs import Gaussian, Runs
 from armload.online.schedule import Deferred
 from armload.online.thresholds import (
@@ -40,17 +39,14 @@ from armload.online.thresholds import (
     KIND_LATEST,
     KIND_STD,
     LAG,
-    LEARNT,
     LIGHT,
     LIKELY,
     LONG_ENOUGH,
-    LONG_PATIENCE,
-    LONGEST_HANDOVER,
-    PASSING,
     PATIENCE,
     RETURN_STD,
     RETURN_UNTIL,
     SURE,
+    TAKEN_BACK,
 )
 from armload.posterior import PosteriorLeastSquares
 from armload.posterior.sequential import SequentialPosterior
@@ -67,13 +63,12 @@ SETTLING: Phase = "settling"
 
 @dataclass
 class _Change:
-    """A change that is settling: noticed and begun when [s], whether the run before it was a passing one, the posterior
-    that looks on, and the run after it, told since when [s] if it is.
+    """A change that is settling: noticed and begun when [s], the posterior that looks on, and the run after it,
+    told since when [s] if it is.
     """
 
     t: float
     began: float
-    passing: bool
     state: SequentialPosterior
     following: Future[PosteriorLeastSquares] | PosteriorLeastSquares
     told: float | None = None
@@ -86,12 +81,12 @@ class PayloadWatch:
         first: the identifier of the first run.
 
     Attributes:
-        phase: what becomes of samples at present. answered: the run that the last estimate is of.
-        event: the last change noticed.
+        runs: those that are kept. phase: what becomes of samples at present. answered: the run that the last estimate
+            is of. event: the last change noticed.
     """
 
     def __init__(self, first: PosteriorLeastSquares) -> None:
-        self._runs = Runs(first)
+        self.runs = Runs(first)
         self._unit = float(payload_prior_std(first.arm)[0])
         self._look = Deferred()
         self._worker: Worker | None = None
@@ -101,12 +96,12 @@ class PayloadWatch:
     def reset(self) -> None:
         """Forget the stream; the next sample is the first."""
         self._wait_for_closing()
-        self._runs.reset()
+        self.runs.reset()
         self._look.reset()
         self.phase: Phase = FOLLOWING
         self.answered = self.run
         self.event: Event | None = None
-        self._modes: Modes | None = None
+        self._modes = Modes(self._unit, self.run.stream.correction.effort)
         self._gaussian: tuple[PosteriorLeastSquares, Gaussian] | None = None  # before the row, and of which run
         self._row_t = self._steady_t = self._doubted_at = -np.inf  # of the last row, the last steady one, the doubt
         self._touched = False  # whether something has touched the arm since it was steady
@@ -119,12 +114,7 @@ class PayloadWatch:
     @property
     def run(self) -> PosteriorLeastSquares:
         """The identifier of the current run."""
-        return self._runs.current
-
-    @property
-    def runs(self) -> Runs:
-        """The runs that are kept."""
-        return self._runs
+        return self.runs.current
 
     @property
     def settling(self) -> bool:
@@ -139,8 +129,7 @@ class PayloadWatch:
     @property
     def likely(self) -> tuple[float, float, float]:
         """Probabilities that the payload is not what the run holds, or changes; of a contact; of a drift of the arm."""
-        modes = self._modes
-        return (0.0, 0.0, 0.0) if modes is None else (modes.handing + modes.other, modes.contact, modes.drift)
+        return self._modes.handing + self._modes.other, self._modes.contact, self._modes.drift
 
     @property
     def sure(self) -> bool:
@@ -153,7 +142,6 @@ class PayloadWatch:
 
         The mixture of both hypotheses, the same payload and another; it is the wider the faster phi moves.
         """
-        assert self._modes is not None
         (shift, spread), p, last = self._modes.shift(going_on=True), self.likely[0], self.run.last
         since, lately = self._lately
         lately = lately + min((self._row_t - since) / LAG, 1.0) * (shift - lately)
@@ -202,9 +190,6 @@ class PayloadWatch:
         state, row = stream.state, stream.row
         if state is None or row is None:
             return
-        if self._modes is None:
-            self._modes = Modes(self._unit, stream.correction.effort)
-            state.predict(row)  # loaded now, not in the middle of a change
         known = stream.seconds > (FIRST_TARED if stream.tares else FIRST_UNTARED)
         h, self._row_t = row.t - self._row_t, row.t
         if row.h > 0.0:
@@ -239,15 +224,13 @@ class PayloadWatch:
 
     def _weigh(self, row: Row, h: float, state: SequentialPosterior) -> None:
         """Weigh a row that the run was not told of, for as long as it stands."""
-        assert self._modes is not None
         seen, scale = state.predict(row._replace(h=h))
         self._modes.take(h, seen, row.X, scale, *self._before_row, False)
 
     def _decide(self, sample: Sample, held: bool) -> None:
         """What becomes of the run, by what the last rows are."""
         modes = self._modes
-        assert modes is not None
-        if modes.steady > SURE:
+        if modes.steady > LIKELY:
             self._steady_t, self._touched = self._row_t, False
         self._touched = self._touched or modes.contact > 0.5
         changed = modes.other if self._touched else modes.other + modes.handing
@@ -256,16 +239,13 @@ class PayloadWatch:
         elif modes.steady > 0.5:
             self.phase, self._gave_up = FOLLOWING, False
         elif self.phase == DOUBTING:
-            stream = self.run.stream
-            knows_its_arm = bool(stream.tares) or stream.seconds > LEARNT
-            self._gave_up = sample.t - self._doubted_at > (LONG_PATIENCE if knows_its_arm else PATIENCE)
+            self._gave_up = sample.t - self._doubted_at > PATIENCE
             self.phase = FOLLOWING if self._gave_up else DOUBTING
         elif not self._gave_up:
             self.phase, self._doubted_at, self._held_before = DOUBTING, sample.t, held
 
     def _possible(self) -> bool:
         """Whether what would be held now has a mass that can be."""
-        assert self._modes is not None
         (mean, covariance), (shift, spread) = self._before_row, self._modes.shift()
         std = float(np.sqrt(covariance[0, 0] + spread[0, 0]))
         return float(mean[0] + shift[0]) > -LIGHT * self._unit - 2.0 * std
@@ -279,14 +259,16 @@ class PayloadWatch:
         assert state is not None
         if self.phase == FOLLOWING:
             self._held_before = held
-        passing = self._judging and run.stream.seconds < PASSING
         began = max(self._steady_t, sample.t - PATIENCE)
+        until = began - max(sample.t - began, TAKEN_BACK)
         self.event, self._judging, self._unnamed = Event("change", sample.t, began, None), False, True
-        following = self._beside(self._made, run, self._runs.reference_for_next(self._held_before), 2 * began - sample.t)
-        self._change, self.phase = _Change(sample.t, began, passing, state, following), SETTLING
+        following = self._beside(self._made, run, self.runs.reference_for_next(self._held_before), until)
+        self._change, self.phase = _Change(sample.t, began, state, following), SETTLING
 
     @staticmethod
-    def _made(run: PosteriorLeastSquares, reference: PosteriorLeastSquares | None, until: float) -> PosteriorLeastSquares:
+    def _made(
+        run: PosteriorLeastSquares, reference: PosteriorLeastSquares | None, until: float
+    ) -> PosteriorLeastSquares:
         run.stream.finish(until)
         following = run.another(reference)
         following.prepare()
@@ -296,7 +278,6 @@ class PayloadWatch:
         """A sample while the payload may go on changing; then the next run begins, or the run before goes on."""
         change, modes = self._change, self._modes
         assert change is not None
-        assert modes is not None
         looked = self._looked(sample, change.state)
         if looked and modes.steady + modes.contact > SURE:
             self._call_off()
@@ -308,7 +289,7 @@ class PayloadWatch:
             change.told = sample.t
         if change.told is not None:
             self._ready(change).update(sample)
-        if sample.t - change.t > LONGEST_HANDOVER or (looked and modes.other > LIKELY and self._stays(change)):
+        if sample.t - change.t > PATIENCE or (looked and modes.other > LIKELY and self._stays(change)):
             self._take_up_the_next()
 
     def _stays(self, change: _Change) -> bool:
@@ -316,7 +297,6 @@ class PayloadWatch:
 
         At the mean rate since the change began its mass would spread by rate·T/√12 over T: three of its deviations.
         """
-        assert self._modes is not None
         (shift, spread), T = self._modes.shift(), self._modes.stays
         seen = abs(float(shift[0])) * T / (self._row_t - change.began) > 3.0 * np.sqrt(12.0 * float(spread[0, 0]))
         return T >= LAG and (seen or T > LONG_ENOUGH)
@@ -344,7 +324,7 @@ class PayloadWatch:
         change, self._change = self._change, None
         if change.told is None:
             self._ready(change).reset()
-        self._watch_anew(self._runs.follow(self._ready(change), change.passing))
+        self._watch_anew(self.runs.follow(self._ready(change)))
         self._judging = True
 
     def _judge(self, estimate: Estimate, held: bool) -> None:
@@ -354,19 +334,18 @@ class PayloadWatch:
         if seconds < KIND_FROM:
             return
         self._judging = seconds <= RETURN_UNTIL
-        if std <= RETURN_STD and self._runs.is_earlier(estimate):
-            self._watch_anew(self._runs.go_back())
+        if std <= RETURN_STD and self.runs.is_earlier(estimate):
+            self._watch_anew(self.runs.go_back())
             self._judging = False
             self.event = replace(self.event, kind="return")
-        elif self._unnamed and (std <= KIND_STD or seconds > KIND_LATEST):
+        elif self._unnamed and (std <= KIND_STD or seconds > KIND_LATEST or self.run.stream.stands):
             known = {(False, True): "grasp", (True, False): "release", (True, True): "swap"}
             self._unnamed = False
             self.event = replace(self.event, kind=known.get((self._held_before, held), "change"))
 
     def _watch_anew(self, dropped: PosteriorLeastSquares | None) -> None:
         """Begin to watch the current run; one that is not wanted any more has its thread stopped."""
-        if self._modes is not None:
-            self._modes.reset()
+        self._modes.reset()
         self._look.clear()
         self.phase, self._gave_up = FOLLOWING, False
         if dropped is not None:
@@ -390,13 +369,13 @@ class PayloadWatch:
         self._wait_for_closing()
         if self._change is not None and isinstance(self._change.following, Future):
             self._change.following = self._change.following.result()
-        for run in (*self._runs, *self._next):
+        for run in (*self.runs, *self._next):
             run.stream.hold()
 
     def close(self) -> None:
         """Stop what runs beside."""
         self.hold()
-        for run in (*self._runs, *self._next):
+        for run in (*self.runs, *self._next):
             run.close()
         if self._worker is not None:
             self._worker.stop()

@@ -182,6 +182,11 @@ class StreamingPosterior:
         return None if self._early is not None else self._state
 
     @property
+    def stands(self) -> bool:
+        """Whether the last row stands for no time: more of an arm at rest tells nothing new."""
+        return self.row is not None and self.row.h <= 0.0
+
+    @property
     def information(self) -> NDArray[np.float64]:
         """Λ (10, 10): what the logs alone say, all else integrated out."""
         return self._current.information
