@@ -117,7 +117,7 @@ class Stopping(Motion):
     """A motion that comes to rest within a second from `stop` on [s], and stays: q(s(t))."""
 
     name = "stopping"
-    duration = property(lambda self: 60.0)  # type: ignore[assignment]
+    duration = property(lambda _: 60.0)  # type: ignore[assignment]
     n = property(lambda self: self.motion.n)  # type: ignore[assignment]
 
     def __init__(self, motion, stop):

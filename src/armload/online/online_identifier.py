@@ -284,7 +284,7 @@ class OnlineIdentifier:
         phi, covariance = self._watch.tracked
         self._estimate = replace(run.last, t=sample.t, phi=phi, covariance=covariance)
         self._around, self._source = phi, None
-        if self._watch.settling:
+        if self._watch.settling or self._watch.likely[0] > 0.5:  # then phi follows what the samples say
             self._told = sample.t
         self._judge(self._estimate, run, False)
         self._notes = (*self._notes, _CHANGING if self._watch.settling else _DOUBT)

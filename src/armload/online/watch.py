@@ -35,6 +35,7 @@ from armload.online.thresholds import (
     AFTER_CONTACT,
     FIRST_TARED,
     FIRST_UNTARED,
+    HOLDS,
     KIND_FROM,
     KIND_LATEST,
     KIND_STD,
@@ -104,6 +105,7 @@ class PayloadWatch:
         self._modes = Modes(self._unit, self.run.stream.correction.effort)
         self._gaussian: tuple[PosteriorLeastSquares, Gaussian] | None = None  # before the row, and of which run
         self._row_t = self._steady_t = self._doubted_at = -np.inf  # of the last row, the last steady one, the doubt
+        self._sure_t = np.inf  # since when the payload has surely changed
         self._touched = False  # whether something has touched the arm since it was steady
         self._gave_up = False  # doubting: what does not fit is believed until it fits again
         self._lately = 0.0, np.zeros(10)  # shift of phi, lagged, and when it was last followed
@@ -234,7 +236,11 @@ class PayloadWatch:
             self._steady_t, self._touched = self._row_t, False
         self._touched = self._touched or modes.contact > 0.5
         changed = modes.other if self._touched else modes.other + modes.handing
-        if changed > SURE and (not self._touched or modes.stays >= AFTER_CONTACT) and self._possible():
+        if not (changed > SURE and (not self._touched or modes.stays >= AFTER_CONTACT) and self._possible()):
+            self._sure_t = np.inf
+        else:
+            self._sure_t = min(self._sure_t, self._row_t)
+        if self._row_t - self._sure_t >= HOLDS:
             self._begin_change(sample, held)
         elif modes.steady > 0.5:
             self.phase, self._gave_up = FOLLOWING, False
@@ -248,7 +254,7 @@ class PayloadWatch:
         """Whether what would be held now has a mass that can be."""
         (mean, covariance), (shift, spread) = self._before_row, self._modes.shift()
         std = float(np.sqrt(covariance[0, 0] + spread[0, 0]))
-        return float(mean[0] + shift[0]) > -LIGHT * self._unit - 2.0 * std
+        return float(mean[0] + shift[0]) > -LIGHT * self._unit - std
 
     # ------------------------------------------------------------------ a change, and the run after it
 
@@ -346,6 +352,7 @@ class PayloadWatch:
     def _watch_anew(self, dropped: PosteriorLeastSquares | None) -> None:
         """Begin to watch the current run; one that is not wanted any more has its thread stopped."""
         self._modes.reset()
+        self._sure_t = np.inf
         self._look.clear()
         self.phase, self._gave_up = FOLLOWING, False
         if dropped is not None:
