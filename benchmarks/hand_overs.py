@@ -142,7 +142,7 @@ def streamed(scene: Scene) -> Stream:
         log = Recording(*map(np.array, zip(*source, strict=True)))  # type: ignore[arg-type]
         even = np.arange(log.t[0], log.t[-1], 0.005)
         dq = np.array([np.interp(even, log.t, column) for column in log.dq.T])
-        ddq = savgol_filter(dq, 21, 3, deriv=1, delta=0.005, axis=1)
+        ddq = np.asarray(savgol_filter(dq, 21, 3, deriv=1, delta=0.005, axis=1))
         ddq = np.array([np.interp(log.t, even, row) for row in ddq]).T
         times = [10.0 + rng.uniform(0.0, 2.0), 22.0 + rng.uniform(0.0, 2.0)]
     t, tau, share, pushed = log.t, log.tau.copy(), np.zeros(len(log.t)), []
@@ -151,7 +151,7 @@ def streamed(scene: Scene) -> Stream:
     if scene.part == "light":
         phi = phi * rng.uniform(0.05, 0.15) / phi[0]
     if scene.part == "pushes":
-        x = 9.0
+        x = 11.0
         while x < t[-1] - 6.0:
             length, force = rng.uniform(0.3, 3.0), rng.normal(size=3)
             pushed.append(Push(x, x + length, "panda_link8", force * rng.uniform(10.0, 60.0) / np.linalg.norm(force)))
