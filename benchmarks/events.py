@@ -22,7 +22,7 @@ event 1 to 3 s after a change not noticed before is a late one. The time in whic
 the first second after each change; 95 % bounds are Poisson's, one-sided above.
 
 Scenes are cells in out/events: what was measured once is not measured again while `online/watch.py`,
-`online/changes.py` and `online/thresholds.py` stay as they are. Written to benchmarks/results/events.json, where a part
+`online/modes.py` and `online/thresholds.py` stay as they are. Written to benchmarks/results/events.json, where a part
 that was not asked for keeps what was measured of it before. In full about 50 minutes of CPU time. Printed only:
 --quick, two short scenes of each part; --seed, added to all seeds, to set constants on others; --scenes, at most so
 many of each part.
@@ -505,7 +505,7 @@ def in_all(parts: dict[str, Any]) -> dict[str, Any]:
 
 def tasks(part: str, quick: bool, seed: int, most: int) -> list[Task]:
     """The cells of a part."""
-    decides = ("changes.py", "watch.py", "thresholds.py")
+    decides = ("modes.py", "watch.py", "thresholds.py")
     code = source_key(*(Path(armload.online.__path__[0]) / name for name in decides))
     if part == "real":
         return [Task.of_one(f"real-{method}", key_of(method, code), real, method) for method in ("map-gp", "hybrid")]

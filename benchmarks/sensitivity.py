@@ -1,11 +1,12 @@
 """What half and twice each tuned constant would do to streams with changes of payload, and to sound and wrong logs.
 
-    python benchmarks/sensitivity.py [--only ALARM,TRANSIENT] [--parts streams,logs,tares] [--far] [--page]
+    python benchmarks/sensitivity.py [--only SURE,HOLDS] [--parts streams,logs,tares] [--far] [--page]
 
 The constants are those of `online/thresholds.py` that decide about changes, of `identification/thresholds.py`, three of
-the posterior, and those of a tare's age. Each is set to half and to double, all others as they are; CALM, which is 0,
-to −3 and 3. What changes nothing either way is set to a thousandth and to a thousand times, too (CALM to −3000 and
-3000): a constant that changes nothing even then decides nothing in these scenes.
+the posterior, and those of a tare's age. Each is set to half and to double, all others as they are; of a probability,
+that of the
+contrary. What changes nothing either way is set to a thousandth and to a thousand times, too: a constant that changes
+nothing even then decides nothing in these scenes.
 
 streams    10 scenes of 7–12 s at 250 and 500 Hz with the hybrid: payloads grasped, released, swapped, taken up again,
            two of 0.2 kg, pushes at the flange, an arm that nothing happens to, a UR10e with motor torque. Real-like
@@ -58,7 +59,7 @@ RESULT, PAGE = HERE / "results" / "sensitivity.json", HERE.parent / "docs" / "co
 MARKS = "<!-- table: benchmarks/sensitivity.py -->", "<!-- end -->"
 SEED = 70_000
 GROUPS = {  # home → constants, None: all; what they are tried on
-    "online.thresholds": (r"(?s)# -+ the detector.*(?=# -+ notes)", ("streams",)),
+    "online.thresholds": (r"(?s)# -+ the hypotheses.*(?=# -+ notes)", ("streams",)),
     "identification.thresholds": (r"(?s).*", ("logs",)),
     "posterior.problem": (r"(?m)(^#.*\n)*^(_MOTOR_SIDE|GAIN_STD) = .*\n", ("streams", "logs")),
     "posterior.hybrid": (r"(?m)(^#.*\n)*^_REMOVED = .*\n", ("streams", "logs")),
@@ -66,11 +67,12 @@ GROUPS = {  # home → constants, None: all; what they are tried on
     "posterior.drift": (r"(?m)(^#.*\n)*^(TESTED|ALLOWED|CHANGED|SESSION) = .*\n", ("tares",)),
 }
 PARTS = ("streams", "logs", "tares")
+PROBABILITIES = ("SURE", "LIKELY")
 NEAR = {"half": 0.5, "double": 2.0}
 FAR = {"thousandth": 1e-3, "thousand times": 1e3}
-# the largest of WINDOWS; a word about a change that was noticed; words of advice and of a refusal; a bound on what does
+# a word about a change that was noticed; words of advice and of a refusal; a bound on what does
 # not exist where it holds
-NOT_VARIED = ("LONGEST", "STEP_STD", "NOMINAL", "KNOWN", "CURRENT_LOW", "CURRENT_HIGH", "FARTHEST")
+NOT_VARIED = ("STEP_STD", "NOMINAL", "KNOWN", "CURRENT_LOW", "CURRENT_HIGH", "FARTHEST")
 
 
 # ---------------------------------------------------------------------- the constants, and how to set them
@@ -91,7 +93,9 @@ class Constant:
         return getattr(importlib.import_module(f"armload.{self.home}"), self.name)
 
     def times(self, factor: float) -> Any:
-        """Its value times a factor; of 0, −3 or 3, times a thousand where the factor is far."""
+        """Its value times a factor; of a probability, one less a multiple of what is left to one."""
+        if self.name in PROBABILITIES:
+            return 1.0 - min((1.0 - self.value) / factor, 0.999)
         return _times(self.value, factor)
 
 
@@ -102,8 +106,6 @@ def _times(value: Any, factor: float) -> Any:
         return tuple(_times(x, factor) for x in value)
     if isinstance(value, int):
         return max(int(value * factor), 1)
-    if isinstance(value, float) and value == 0.0:
-        return (1.0 if factor > 1.0 else -1.0) * (3.0 if factor in NEAR.values() else 3e3)
     return value * factor
 
 
@@ -125,22 +127,18 @@ def constants() -> list[Constant]:
 def set_to(constant: Constant, value: Any) -> Iterator[None]:
     """Every module that took the constant from its home has another value of it for a while."""
     before = constant.value
-    change = {constant.name: (before, value)}
-    if constant.name == "WINDOWS":
-        change["LONGEST"] = (max(before), max(value))
     places = [
-        (module, name, old, new)
-        for name, (old, new) in change.items()
+        module
         for key, module in list(sys.modules.items())
-        if key.startswith("armload.") and vars(module).get(name) is old
+        if key.startswith("armload.") and vars(module).get(constant.name) is before
     ]
-    for module, name, _, new in places:
-        setattr(module, name, new)
+    for module in places:
+        setattr(module, constant.name, value)
     try:
         yield
     finally:
-        for module, name, old, _ in places:
-            setattr(module, name, old)
+        for module in places:
+            setattr(module, constant.name, before)
 
 
 # ---------------------------------------------------------------------- streams

@@ -404,12 +404,12 @@ def test_no_constant_of_the_thresholds_stands_without_its_reason(sensitivity):
 
 
 def test_a_constant_is_set_wherever_it_is_used_and_put_back(sensitivity):
-    from armload.online import changes, thresholds, watch
+    from armload.online import thresholds, watch
 
-    (windows,) = (constant for constant in sensitivity.constants() if constant.name == "WINDOWS")
-    with sensitivity.set_to(windows, windows.times(2.0)):
-        assert (thresholds.WINDOWS, changes.WINDOWS, watch.LONGEST) == ((32, 96), (32, 96), 96)
-    assert (thresholds.WINDOWS, changes.WINDOWS, watch.LONGEST) == ((16, 48), (16, 48), 48)
+    (sure,) = (constant for constant in sensitivity.constants() if constant.name == "SURE")
+    with sensitivity.set_to(sure, sure.times(2.0)):
+        assert thresholds.SURE == watch.SURE == pytest.approx(0.9995, rel=1e-12)
+    assert thresholds.SURE == watch.SURE == 0.999
 
 
 def test_the_page_of_the_install_is_that_of_the_committed_measurement(tmp_path, monkeypatch):

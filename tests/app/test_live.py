@@ -410,7 +410,8 @@ def test_a_change_has_its_line_at_once_and_lines_go_on_while_it_settles(panda):
     assert first["t"] == first["event"]["t"]
     assert len(settling) >= 4
     assert np.diff([line["t"] for line in records]).max() < 0.06
-    assert not any(line["held"] for line in settling)
+    assert all(line["p_change"] > 0.5 and line["interval"] == "approximate" for line in settling)
+    assert settling[0]["event"]["mass"] is None
 
 
 NOT_OF_THIS_ARM = {

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
         pseudo_inertia,
         pseudo_inertia_to_phi,
     )
-    from armload.inertia.determinacy import HELD, LIGHTEST_HELD, SHRINK, SMALL, Z95, determined, held
+    from armload.inertia.determinacy import HELD, LIGHTEST_HELD, SHRINK, SMALL, Z95, determined, held, held_probability
     from armload.inertia.orders import ORDERS, from_order, to_order
     from armload.inertia.parameters import (
         NAMES,
@@ -53,6 +53,7 @@ __all__ = [
     "from_log_cholesky",
     "from_order",
     "held",
+    "held_probability",
     "inertia_com_std",
     "inertia_matrix",
     "is_consistent",

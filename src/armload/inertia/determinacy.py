@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -41,3 +43,17 @@ def determined(
 def held(mass: float, std: float, determined: bool) -> bool:
     """Whether anything is there at all, by its mass [kg] and the standard deviation of it."""
     return bool(determined and mass > max(HELD * std, LIGHTEST_HELD))
+
+
+def held_probability(mass: float, std: float, payloads: float) -> float:
+    """Probability that anything is there, if that is as likely beforehand as that nothing is.
+
+    What is there has a mass of N(0, payloads²), so that with σ² = std² and s² = payloads² the odds are
+    N(mass; 0, σ² + s²) to N(mass; 0, σ²); a mass below zero is nothing.
+
+    Args:
+        mass: the estimate [kg]. std: its standard deviation [kg]. payloads: how heavy payloads are beforehand [kg].
+    """
+    noise, all_of_it = std * std, std * std + payloads * payloads
+    room = 0.5 * math.log(noise / all_of_it) + 0.5 * max(mass, 0.0) ** 2 * (1.0 / noise - 1.0 / all_of_it)
+    return 1.0 / (1.0 + math.exp(-min(max(room, -700.0), 700.0)))

@@ -32,8 +32,11 @@ class OnlineEstimate(Estimate):
     around: (10,) the posterior's mean, about which the intervals are; phi is the nearest body, on a concluded stream.
     before: what was known of the payload before the data.
     calibrated: whether ±1.96 std were checked to be 95 % intervals, and nothing speaks against it.
+    p_held: probability that anything is there, if that is as likely beforehand as that nothing is.
+    p_change: probability that the payload is not what it was since `since`, or is being handed over at present.
+    p_contact: that something else touches the arm. p_drift: that the arm itself changes, slowly. None: not looked for.
     moving: whether the arm was seen to move in the last half second: a standing arm cannot tell an inertia.
-    settling: whether the payload changed so shortly ago that phi is still what was known beforehand.
+    settling: whether the payload is changing, or has so shortly ago that its run has not begun: phi follows it.
     event: the last change of payload noticed, if any.
     health: counts of the stream; the same object as long as the stream lives.
     notes: what else there is to say, a few words each.
@@ -49,6 +52,10 @@ class OnlineEstimate(Estimate):
     around: NDArray[np.float64]
     before: Before
     calibrated: bool
+    p_held: float
+    p_change: float | None
+    p_contact: float | None
+    p_drift: float | None
     moving: bool
     settling: bool
     event: Event | None
@@ -118,6 +125,10 @@ class OnlineEstimate(Estimate):
             "inertia_com": inertia_com,
             "consistent": bool(is_consistent(self.phi)),
             "held": self.held,
+            "p_held": self.p_held,
+            "p_change": self.p_change,
+            "p_contact": self.p_contact,
+            "p_drift": self.p_drift,
             "moving": self.moving,
             "settling": self.settling,
             "event": None if self.event is None else self.event.to_dict(),

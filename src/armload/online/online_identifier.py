@@ -24,7 +24,7 @@ from armload.identification.intervals import Before
 from armload.identification.notes import gravity_turned, not_rigid
 from armload.identification.said import EXCHANGED, NO_BODY
 from armload.identification.thresholds import MISFIT
-from armload.inertia import determined, distance_to_body, held
+from armload.inertia import determined, distance_to_body, held, held_probability
 from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
 from armload.online.gate import Gate, Health, all_finite
@@ -32,7 +32,7 @@ from armload.online.learning import change_of_arm, learned_from
 from armload.online.listening import Listening
 from armload.online.restoring import known_parts, origin, same_origin
 from armload.online.state import load_state, save_state
-from armload.online.step import MassStep
+from armload.online.step import mass_step
 from armload.online.thresholds import MOVING, RECENT, STANDS
 from armload.online.watch import PayloadWatch
 from armload.posterior import PosteriorLeastSquares, Profile
@@ -41,7 +41,9 @@ from armload.posterior.restless import RESTLESS
 from armload.recording import Recording, Sample
 from armload.regression import payload_prior_std
 
-_STANDING = "standing: a change of payload is noticed only when the arm moves"
+_STANDING = "standing: nothing new is told until the arm moves, or what it holds changes"
+_STANDING_MOTOR = "standing: a change of payload is noticed only when the arm moves"
+_CHANGING = "the payload is changing"
 _DOUBT = "samples that do not fit are left out: something pulls at the arm, or the payload is changing"
 
 
@@ -81,7 +83,6 @@ class OnlineIdentifier:
         self._gate = Gate(arm)
         self._stream = Listening()
         self._weak = payload_prior_std(arm)
-        self._step = MassStep(float(self._weak[0]))
         known = first.payload_prior
         mean, std = (np.zeros(10), self._weak) if known is None else known
         self._before = Before(mean, std, choice.prior)
@@ -131,7 +132,8 @@ class OnlineIdentifier:
         self._stream.reset()
         self._internal = 0.0
         self._told = -np.inf  # time of the newest sample that counted in the answer, on our own clock
-        self._step.reset()
+        self._ended: PosteriorLeastSquares | None = None  # the run before the last change
+        self._p_held = 0.0
         self._moved = -np.inf
         self._since: float | None = None
         self._published = -np.inf
@@ -258,9 +260,9 @@ class OnlineIdentifier:
             estimate = self._watch.update(sample, self._held)
             if self._watch.event is not known:
                 self._noticed(sample.t)
-            if estimate is None or self._watch.settling:
-                if self._watch.doubting and sample.t - self._published > PUBLISH and _DOUBT not in self._notes:
-                    self._notes = (*self._notes, _DOUBT)
+            if estimate is None:
+                if sample.t - self._published > PUBLISH:
+                    self._track(sample)
                 return
             run = self._watch.answered
             fresh = run.fresh
@@ -274,6 +276,18 @@ class OnlineIdentifier:
             self._judge(estimate, run, stands)
         self._estimate, self._source, self._around = estimate, run, estimate.phi
         self._doubted = change_of_arm(run) is not None
+
+    def _track(self, sample: Sample) -> None:
+        """While samples are left out: what all that may have happened makes of the payload."""
+        assert self._watch is not None
+        self._published, run = sample.t, self._watch.run
+        phi, covariance = self._watch.tracked
+        self._estimate = replace(run.last, t=sample.t, phi=phi, covariance=covariance)
+        self._around, self._source = phi, None
+        if self._watch.settling or self._watch.likely[0] > 0.5:  # then phi follows what the samples say
+            self._told = sample.t
+        self._judge(self._estimate, run, False)
+        self._notes = (*self._notes, _CHANGING if self._watch.settling else _DOUBT)
 
     def _counted(self, sample: Sample, run: Identifier) -> bool:
         """Remember how old the answer is; whether what was seen lately told it nothing, as the arm stands."""
@@ -293,18 +307,16 @@ class OnlineIdentifier:
         return False
 
     def _noticed(self, now: float) -> None:
-        """A change: until its transient is over only what was known beforehand is."""
+        """A change of payload, or what it was."""
         assert self._watch is not None
         assert self._watch.event is not None
-        event, shift = self._watch.event, self._stream.clock - now
-        mass = self._step.of(event, self._source, self._watch.run)
-        self._event = replace(event, t=event.t + shift, began=event.began + shift, mass=mass)
+        event, shift, run = self._watch.event, self._stream.clock - now, self._watch.run
         if self._watch.settling:
-            self._since = self._stream.clock
-            self._estimate, self._source, self._told = self._nothing(), None, -np.inf
-            self._around, self._doubted = self._estimate.phi, False
+            self._ended, self._since, self._published = run, self._stream.clock, -np.inf
             self._stream.forget_pauses()
-            self._determined, self._held, self._notes = np.zeros(10, dtype=bool), False, ("the payload has changed",)
+        elif event.mass is None and self._ended is not None:
+            event = replace(event, mass=mass_step(self._ended, run, float(self._weak[0])))
+        self._event = replace(event, t=event.t + shift, began=event.began + shift)
 
     def _nothing(self) -> Estimate:
         """What is known beforehand."""
@@ -316,11 +328,13 @@ class OnlineIdentifier:
         std, before = estimate.std, self._before
         self._determined = determined(std, before.std if before.used else None, run.weak_std, self._weak)
         self._held = held(float(estimate.phi[0]), float(std[0]), bool(self._determined[0]))
+        self._p_held = held_probability(float(estimate.phi[0]), float(std[0]), float(self._weak[0]))
         notes = []
         if not self._moving:
             notes.append("not moving: inertia undetermined" if not self._determined[4:].all() else "not moving")
         if stands and self._stream.trouble is None:
-            notes.append(_STANDING)
+            motor = isinstance(run, PosteriorLeastSquares) and run.stream.posterior.torque == "motor"
+            notes.append(_STANDING_MOTOR if motor else _STANDING)
         if (changed := change_of_arm(run, self.relative_to)) is not None:
             notes.append(changed)
         self._notes = tuple(notes)
@@ -331,6 +345,7 @@ class OnlineIdentifier:
 
     def _said(self) -> OnlineEstimate:
         engine, watch, stream = self.engine, self._watch, self._stream
+        change, contact, drift = (None, None, None) if watch is None else watch.likely
         age = stream.unseen + stream.ahead + (self._internal - self._told if self._told > -np.inf else 0.0)
         return OnlineEstimate.of(
             {
@@ -345,7 +360,11 @@ class OnlineIdentifier:
                 "held": self._held,
                 "around": self._around,
                 "before": self._before,
-                "calibrated": engine.calibrated and not self._doubted,
+                "calibrated": engine.calibrated and not self._doubted and (watch is None or watch.sure),
+                "p_held": self._p_held,
+                "p_change": change,
+                "p_contact": contact,
+                "p_drift": drift,
                 "moving": self._moving,
                 "settling": watch is not None and watch.settling,
                 "event": self._event,

@@ -38,17 +38,9 @@ class Runs:
         self.current, self.previous, self.earlier = self._first, None, None
         self.current.reset()
 
-    def follow(self, run: PosteriorLeastSquares, passing: bool) -> PosteriorLeastSquares | None:
-        """Begin a new run after the current one; `passing`: that one was so short that it was no payload's.
-
-        Returns:
-            the run that is not kept any more, if it is none of the others.
-        """
-        if passing:
-            dropped, self.earlier = self.current, self.previous
-        else:
-            dropped, self.earlier, self.previous = self.earlier, self.previous, self.current
-        self.current = run
+    def follow(self, run: PosteriorLeastSquares) -> PosteriorLeastSquares | None:
+        """Begin a new run after the current one; returns one that is not kept any more, if it is none of the others."""
+        dropped, self.earlier, self.previous, self.current = self.earlier, self.previous, self.current, run
         return self._unless_kept(dropped)
 
     def go_back(self) -> PosteriorLeastSquares | None:
@@ -67,20 +59,16 @@ class Runs:
             return run
         return run.reference
 
-    def payload_of(self, earlier: PosteriorLeastSquares | None) -> Gaussian | None:
-        """phi (10,) and covariance of an earlier run, relative to what the current one is relative to, if it can be."""
-        if earlier is None:
-            return None
-        if self.current.reference is earlier:
-            return np.zeros(10), np.zeros((10, 10))
-        if self.current.reference is not earlier.reference:
-            return None
-        return earlier.last.phi, earlier.last.covariance
-
     def is_earlier(self, estimate: Estimate) -> bool:
         """Whether an estimate's mass and first moments are those of the earlier run."""
-        then = self.payload_of(self.earlier)
-        if then is None:
+        earlier, current = self.earlier, self.current
+        if earlier is None:
+            return False
+        if current.reference is earlier:
+            then = np.zeros(10), np.zeros((10, 10))
+        elif current.reference is earlier.reference:
+            then = earlier.last.phi, earlier.last.covariance
+        else:
             return False
         phi, covariance = (estimate.phi - then[0])[:4], (estimate.covariance + then[1])[:4, :4]
         return bool(phi @ np.linalg.solve(covariance, phi) < SAME_RUN)

@@ -13,28 +13,34 @@ from armload.estimators.recursive import AT_REST
 from armload.regression.lag import GAIN
 from armload.regression.noise import SMOOTH
 
-# ---------------------------------------------------------------------- the detector, `changes.py`
+# ---------------------------------------------------------------------- the hypotheses, `modes.py`
 
-# [rows] over which explanations are weighed, 0.08 and 0.24 s: a large change shows in the one, a light one in the other
-WINDOWS = (16, 48)
-# [rows] that are kept, and taken back from a run that ends: a change is there for so long before it is noticed
-LONGEST = max(WINDOWS)
-# [nat] of a payload's likelihood ratio over nothing, in either window: under noise as modelled it is reached with a
-# probability below exp(−12), once in half a day of windows that do not overlap
-ALARM = 12.0
-# [nat] of a payload's ratio over a push's, in the window that alarms: odds of 400 to 1, as nearly all pushes look a
-# little like a payload (test_a_push_that_ends_gives_the_estimate_back)
-OVER_PUSH = 6.0
-# [nat] the same in the short window: it has a third of the rows, and so about half of what the long one tells
-OVER_PUSH_LATELY = 3.0
-# [rows] in a row that alarm, 0.03 s: a push that begins looks like a payload for some rows; the median delay is 0.08 s
-ALARM_ROWS = 6
-# [nat] of either ratio in the short window: where nothing explains the rows best, they may be believed again
-CALM = 0.0
-# [payloads] sizes of a change, in half of what the arm is rated for, a factor of 2.6 apart: 0.3 to 2 kg of a Panda
+# [payloads] sizes of another body, in half of what the arm is rated for, a factor of 2.6 apart: 0.3 to 2 kg of a Panda
 BODY_SIZES = np.array([0.2, 0.53, 1.33])
-# [effort limits] sizes of a push, a factor of 3 apart: 2 to 17 N·m of a Panda's large joints
+# [s] correlation times of bodies of these sizes that are handed over: a light change may take seconds, a heavy one that
+# does is seen at once, whatever its pace
+HANDING_TIMES = np.array([5.0, 1.5, 0.5])
+# [effort limits] sizes of a contact, a factor of 3 apart: 2 to 17 N·m of a Panda's large joints
 PUSH_SIZES = np.array([0.02, 0.06, 0.2])
+# [s] correlation time of a contact's torque: of what a hand does, which changes within half a second
+CONTACT_TIME = 0.5
+# [s] mean duration of a contact: pushes last 0.3 to 3 s (`benchmarks/events.py`)
+CONTACT_LASTS = 1.0
+# [effort limits] size of a drift: 0.3 N·m of a Panda's large joints, as its offsets differ from day to day
+DRIFT_SIZE = 0.003
+# [s] correlation time of a drift: longer than all that a payload or a hand does
+DRIFT_TIME = 5.0
+# [s] mean time between drifts, ten times what they last: an arm that has warmed up seldom drifts
+DRIFT_RARE = 1000.0
+# [s] mean time between changes, and between contacts: between a cell that works and an arm that stands for hours
+RARE = 100.0
+# [s] mean duration of a hand-over: steps take one lag of the regression, slow ones seconds
+HANDED_OVER = 0.5
+# [s] how far apart the moments lie from which another body is weighed: a heavy one shows in a tenth of a second, one of
+# 50 g in two seconds
+STARTS = np.array([0.05, 0.1, 0.2, 0.4, 0.8, 1.6])
+# [s] for which what a run foresees is wrong by about the same, when it is not told: a pose does not stay longer
+SAME_ERROR = 0.1
 # [m] standard deviation of a body's centre of mass along each axis: √3 times that is the weak prior's reach, twice that
 # of the simulated families (0.075 m rms)
 BODY_COM = 0.085
@@ -44,23 +50,44 @@ BODY_GYRATION = 0.06
 LEVEL = 2.0
 # [of the expected noise] the least level: the posterior expects no more than it has reason to
 LOWEST_LEVEL = 1.0
-# share of a new window in the mean level: it follows within twenty windows, 5 s
+# [s] of rows that say once how large the noise is: noise that is correlated for less shows in full
+LEVEL_BLOCK = 0.24
+# share of a new block in the mean level: it follows within twenty blocks, 5 s
 LEVEL_SHARE = 0.05
-# [levels] that one window counts at most: a light change must not raise the level and hide itself. A stated guard for
+# [levels] that one block counts at most: a light change must not raise the level and hide itself. A stated guard for
 # streams of minutes, no scene or test depends on it
 LEVEL_OUTLIER = 8.0
 
 # ---------------------------------------------------------------------- the phases of a run, `watch.py`
 
-# [s] of a run with a tare before which no change is looked for: the tare has told most of what the arm does wrong
-FIRST_TARED = 0.5
+# probability of a payload that changes or has changed, from which it is an event: one in a thousand may be none, and
+# friction of gears is not what the hypotheses know (test_a_real_arm_that_breaks_away_from_rest_is_no_change_of_payload)
+SURE = 0.999
+# [s] for which it has to be so sure: one lag of the regression, as gears that break away look like a payload for less
+HOLDS = 1.0 / GAIN
+# probability of what is taken for so: of a steady arm whose intervals are the calibrated ones, of a payload that stays
+LIKELY = 0.9
+# [s] that another payload stays at least until its run begins: twice the lag of the regression
+LAG = 2.0 / GAIN
+# [s] that it stays at most until then, however slowly it may be changing: 50 g within two seconds would show
+LONG_ENOUGH = 2.0
+# [s] that another payload stays before it is believed when something has touched the arm: what a hand leaves behind
+# it is over by then
+AFTER_CONTACT = 0.3
+# [payloads] below nothing that a mass may seem to be: a tool or a light thing, 75 g of a Panda, may have been held from
+# the start and be part of the empty arm
+LIGHT = 0.05
+# [s] of rows that do not fit that are left out at most, and of a hand-over: a hand that leads the arm. Then what does
+# not fit is believed: it may be the arm (test_a_pose_first_seen_shortly_after_a_change_is_not_another_change)
+PATIENCE = 10.0
+# [s] before a change that are taken back from the run that ends, at least as long as it took to notice it: what a
+# payload does before it shows (test_a_cycle_in_step_with_the_motion_stays_as_good_in_its_second_half_as_in_its_first)
+TAKEN_BACK = 0.2
+# [s] of a run with a tare before which no change is looked for: the tare has told most of what the arm does wrong, and
+# one pose of an arm that stands counts no longer than 0.25 s
+FIRST_TARED = 0.2
 # [s] the same without a tare: the arm's offsets and friction must have been seen before anything can be unlike them
 FIRST_UNTARED = 2.0
-# [s] left out after a change: four times the lag of the regression, 2 % of the old torque is left
-TRANSIENT = 4.0 / GAIN
-# [s] of a run not judged yet, below which it may have been a push: the run before it may come back. Pushes last up to
-# 3 s (`benchmarks/events.py`)
-PASSING = 3.0
 # [s] of a new run from which its kind is told: before, the prior alone says whether something is held
 KIND_FROM = 0.25
 # [s] of a new run after which its kind is told, however little is known of the mass
@@ -72,20 +99,6 @@ RETURN_UNTIL = 6.0
 KIND_STD = 0.033
 # [payloads] the same to tell one payload from an earlier one: 15 g of a Panda
 RETURN_STD = 0.01
-# [s] of rows that do not fit, within which a change of payload shows: two and a half long windows
-DECIDED = 0.6
-# [s] of such rows shortly after a change, after which it may be over, as a push is: one lag of the regression
-# (test_a_push_that_ends_gives_the_estimate_back)
-BACK_AFTER = 1.0 / GAIN
-# [nat] of what was held before over what is held now: as sure as a payload has to be over a push
-# (test_a_push_that_ends_gives_the_estimate_back)
-BACK = 6.0
-# [s] of a run that knows its arm as if it had a tare: what does not fit is then not the arm for longer.
-# A stated guard: the scenes are shorter
-LEARNT = 10.0
-# [s] that such a run leaves out at most (any other: `DECIDED`), longer than a push. Then what does not fit is believed
-# (test_a_pose_first_seen_shortly_after_a_change_is_not_another_change)
-PATIENCE = 4.0
 
 # ---------------------------------------------------------------------- which run is which, `runs.py` and `step.py`
 
@@ -94,7 +107,7 @@ PATIENCE = 4.0
 SAME_RUN = 7.779440339734858  # the 90 % quantile of a chi-square distribution of four degrees of freedom
 # [s] an empty run must have lasted to be a tare: with less it knows the arm no better than the prior
 TARE_FROM = 3.0
-# [payloads] standard deviation of the change of mass, below which the first guess is replaced: 150 g of a Panda
+# [payloads] standard deviation of the change of mass, below which it is told: 150 g of a Panda
 # (test_the_mass_of_a_change_is_what_the_runs_tell_once_its_kind_is_known)
 STEP_STD = 0.1
 

@@ -41,7 +41,7 @@ from armload.regression.rows import REGRESSOR_RATE, FilteredRegression, Row, Row
 _REFITS = (20, 60, 100, 150, 200, 300, 400, 600, 800, 1200, 1600, 2400)
 _REFIT_EVERY = 2000
 _CHUNK = 50  # [rows] handed over at once in between: one matrix product of 0.25 s
-_LATE = 50  # [rows] that can be taken back, 0.25 s: those that `online.thresholds.LONGEST` asks for, and two more
+_LATE = 100  # [rows] that can be taken back, 0.5 s: a slow hand-over begins so long before it is noticed
 
 
 class StreamingPosterior:
@@ -187,6 +187,11 @@ class StreamingPosterior:
         return None if self._early is not None else self._state
 
     @property
+    def stands(self) -> bool:
+        """Whether the last row stands for no time: more of an arm at rest tells nothing new."""
+        return self.row is not None and self.row.h <= 0.0
+
+    @property
     def information(self) -> NDArray[np.float64]:
         """Λ (10, 10): what the logs alone say, all else integrated out."""
         return self._current.information
@@ -330,19 +335,19 @@ class StreamingPosterior:
         """Wait for what is done beside; nothing is from then on, until the next rows. What is adopted when stays."""
         self._handover.hold()
 
-    def finish(self, taken_back: int = 0) -> RegressionData:
+    def finish(self, until: float = np.inf) -> RegressionData:
         """All rows so far, accumulated, for another run to take as its tare; this one may go on later.
 
         Args:
-            taken_back: so many of the last rows, as far as they are still to be had, never were.
+            until: rows from this time on [s], as far as they are still to be had, never were.
         """
         self._handover.abandon()
         rows, self._waiting = self._waiting, []
-        kept = max(len(rows) - taken_back, 0)
-        self._accumulate(rows[:kept])
-        if kept < len(rows):
-            self.rows -= len(rows) - kept
-            self.seconds -= sum(row.h for row in rows[kept:])
+        kept = [row for row in rows if row.t < until]
+        self._accumulate(kept)
+        if len(kept) < len(rows):
+            self.rows -= len(rows) - len(kept)
+            self.seconds -= sum(row.h for row in rows[len(kept) :])
             self._adopt(self._step(self._run))
         return self._run
 
