@@ -15,7 +15,7 @@ from armload.motion import random_motion
 from armload.posterior import HybridIdentifier
 from armload.posterior.another_arm import SURPRISING, another_arm, apart
 from armload.posterior.problem import Problem
-from armload.posterior.profile_learning import log_data
+from armload.posterior.profile_session import log_data
 from armload.posterior.solve import solve
 from armload.regression import Correction, FilteredRegression, JointFeatures, solution_prior_std
 from armload.regression.information import SAME, Session

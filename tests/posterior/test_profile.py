@@ -16,7 +16,8 @@ from armload.lab.episodes.motion_kinds import MotionSource
 from armload.online import OnlineIdentifier
 from armload.posterior import HybridIdentifier, learn_profile, load_profile, save_profile
 from armload.posterior.problem import Problem
-from armload.posterior.profile_learning import by_clock, log_data, without_drift
+from armload.posterior.profile_learning import by_clock
+from armload.posterior.profile_session import log_data, without_drift
 from armload.recording import Recording
 from armload.regression import Correction, JointFeatures, payload_prior_std
 from armload.regression.information import RegressionData, Session

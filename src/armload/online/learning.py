@@ -10,7 +10,7 @@ from armload.identification.notes import arm_changed
 from armload.inertia import HELD
 from armload.online.thresholds import LEARN_FROM
 from armload.posterior import PosteriorLeastSquares, Profile
-from armload.posterior.profile_learning import compared, with_session
+from armload.posterior.profile_session import compared, with_session
 from armload.regression import Correction
 
 

@@ -21,10 +21,8 @@ from armload.estimators import Estimate, Identifier
 from armload.identification.answer import body_of
 from armload.identification.choice import choose
 from armload.identification.intervals import Before
-from armload.identification.notes import gravity_turned, not_rigid
-from armload.identification.said import EXCHANGED, NO_BODY
-from armload.identification.thresholds import MISFIT
-from armload.inertia import determined, distance_to_body, held, held_probability
+from armload.inertia import determined, held, held_probability
+from armload.online.concluding import doubts_of
 from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
 from armload.online.gate import Gate, Health, all_finite
@@ -37,7 +35,6 @@ from armload.online.thresholds import MOVING, RECENT, STANDS
 from armload.online.watch import PayloadWatch
 from armload.posterior import PosteriorLeastSquares, Profile
 from armload.posterior.map import PUBLISH
-from armload.posterior.restless import RESTLESS
 from armload.recording import Recording, Sample
 from armload.regression import payload_prior_std
 
@@ -182,19 +179,8 @@ class OnlineIdentifier:
                 exchanged = isinstance(run, PosteriorLeastSquares) and run.exchanged
                 self._estimate = replace(estimate, phi=body_of(estimate, bool(self._determined[0]), exchanged))
                 self._source, self._around = run, estimate.phi
-                said, covariance = run.unprojected or (estimate.phi, estimate.covariance)
-                self._doubted = distance_to_body(said, covariance) > MISFIT
-                self._doubted = self._doubted or exchanged
-                if self._doubted:
-                    self._notes = (*self._notes, EXCHANGED if exchanged else NO_BODY)
-                self._doubted = self._doubted or change_of_arm(run) is not None
-                restlessness = run.stream.restlessness if isinstance(run, PosteriorLeastSquares) else 0.0
-                if restlessness > RESTLESS and not self._doubted:
-                    self._doubted, self._notes = True, (*self._notes, not_rigid(restlessness))
-                tilt = run.stream.tilt if isinstance(run, PosteriorLeastSquares) else None
-                if tilt is not None and tilt.found:
-                    note = gravity_turned(self.arm.gravity, self.arm.leaning(tilt.angles).gravity, False)
-                    self._doubted, self._notes = True, (*self._notes, note)
+                self._doubted, notes = doubts_of(run, estimate, self.arm)
+                self._notes = (*self._notes, *notes)
         return self._said()
 
     def learned(self, name: str = "stream") -> Profile | None:

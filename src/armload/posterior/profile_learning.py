@@ -24,32 +24,28 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm, rated_effort
 from armload.errors import IdentificationError
-from armload.inertia import HELD, Z95
-from armload.posterior.another_arm import another_arm
-from armload.posterior.drift import SESSION, Drift, drift_of
+from armload.posterior.drift import SESSION
 from armload.posterior.problem import Problem
 from armload.posterior.profile import Profile, SessionRecord, attached_mass, fingerprint
-from armload.posterior.scales import Posterior, Scales
-from armload.posterior.solve import solve, threads
+from armload.posterior.profile_session import STATED, log_data, poses, record, with_session, without_drift
+from armload.posterior.scales import Scales
+from armload.posterior.solve import threads
 from armload.recording import Recording
-from armload.regression import Correction, FilteredRegression, JointFeatures, payload_prior_std
+from armload.regression import Correction, JointFeatures, payload_prior_std
 from armload.regression.information import RegressionData, Session
 from armload.regression.lag import GAIN
-from armload.regression.noise import SMOOTH, whole_noise
+from armload.regression.noise import SMOOTH
 
 # features of the pose that a profile may have; the first is that of a single tare. A stream's row takes a third of a
 # millisecond at the last
 CAPACITIES = (128, 256, 384)
 # by which factor the noise of a log may count for more, by steps that a density can tell apart
 REPEATED = tuple(2.0**k for k in range(7))
-_RATE = 50.0  # [Hz] of a profile's rows: what passes the lag is below 4 Hz, and a profile's logs are long
 _FEWEST = 4  # logs below which none is left out: then capacity and noise are those of a tare
 _FOLDS = 5  # into which the logs are parted
 _STEPS = 5  # of expectation–maximisation, as for a tare
-_STATED = 3.0  # [sessions] that the stated size of the drift counts for: of so few a variance is known to 60 %
 _PREDICTED = 1.0  # [s] of a block that is predicted: residuals stay correlated for about as long
 _MOST_BLOCKS = 64  # of a log: their covariance is a matrix
-_POSES = 20  # of each log that are kept, to show where the arm was seen
 
 
 def learn_profile(
@@ -111,35 +107,6 @@ def by_clock(logs: Sequence[Recording]) -> list[int]:
     return numbers
 
 
-def log_data(
-    correction: Correction, log: Recording, features: JointFeatures, session: Session, tool: NDArray | None = None
-) -> RegressionData:
-    """The rows of a log, less a known tool (10,)."""
-    data = RegressionData(correction, GAIN, features, SMOOTH.block, session)
-    rows = FilteredRegression(correction.arm, GAIN, correction, features, _RATE, SMOOTH.block)
-    data.take(rows.rows(log.t, log.q, log.dq, log.tau))
-    if tool is not None:
-        data.less(tool)
-    return data
-
-
-def without_drift(
-    A: NDArray[np.float64], b: NDArray[np.float64], drift: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """A (n, S, S) and b (n, S) of a session in units of its noise, its own offsets and friction integrated out.
-
-    With u the rows of a joint's drift, A − A_u·(A_uu + D⁻¹)⁻¹·A_uᵀ: they occur in the joint's own rows only.
-    """
-    A, b, n = A.copy(), b.copy(), len(A)
-    for j in range(n):
-        own = 10 + j + n * np.arange(len(drift) // n)
-        gain = A[j][:, own] @ np.linalg.inv(A[j][np.ix_(own, own)] + np.diag(1.0 / drift[j::n]))
-        b[j] -= gain @ b[j, own]
-        A[j] -= gain @ A[j][own]
-        A[j] = 0.5 * (A[j] + A[j].T)
-    return A, b
-
-
 @dataclass(frozen=True, eq=False)
 class _Fit:
     """Logs solved together with as many features: scales, size of the drift, the sessions' own and its variance."""
@@ -179,7 +146,7 @@ def _learned(correction: Correction, parts: list[RegressionData], logs: Sequence
         fit.drift,
         repeated,
         tuple(_records(correction, fit, data, logs)),
-        np.concatenate([_poses(log) for log in logs]),
+        np.concatenate([poses(log) for log in logs]),
     )
 
 
@@ -194,7 +161,7 @@ def _fitted(correction: Correction, data: list[RegressionData]) -> _Fit:
         means = found.mean[problem.eta.stop :].reshape(count, -1)
         variances = np.diag(found.covariance)[problem.eta.stop :].reshape(count, -1)
         if step < _STEPS:
-            drift = (_STATED * stated + (means**2 + variances).sum(axis=0)) / (_STATED + count)
+            drift = (STATED * stated + (means**2 + variances).sum(axis=0)) / (STATED + count)
             scales = replace(problem.improved(scales, found), drifts=np.tile(drift, (count, 1)))
     numbers = [session.number for session in problem.sessions]
     in_order = sorted(range(count), key=lambda i: numbers[i])
@@ -256,35 +223,6 @@ def _blocks(data: RegressionData) -> tuple[NDArray[np.float64], NDArray[np.float
     return sums / total[:, None, None], total
 
 
-def with_session(
-    known: Profile, correction: Correction, data: RegressionData, logs: Sequence[Recording] = (), name: str = ""
-) -> Profile:
-    """A profile and one more session, whose rows have the profile's features; the scales stay, the drift's size learns.
-
-    Args:
-        data: of the session. logs: it came from, for their names and poses. name: of a session that is no log.
-    """
-    data.session = known.session(correction, len(known.sessions) + 1)
-    runs = [known.data(correction, GAIN, SMOOTH.block), data]
-    problem = Problem(runs, payload_prior_std(correction.arm), None, replace(SMOOTH, novelty=np.inf), same=True)
-    scales = problem.scales(known.scales)
-    for _ in range(2):
-        scales = replace(scales, noise=problem.improved(scales, problem.posterior(scales)).noise)
-    found = problem.posterior(scales)
-    means, P = found.mean[problem.eta.stop :], found.covariance[problem.eta.stop :, problem.eta.stop :]
-    S, seen = scales.noise[-1], len(known.sessions) + _STATED
-    A, b = without_drift(data.A / S[:, None, None], data.b / S[:, None], known.drift)
-    about = (data.blocks.duration, logs, name)
-    return replace(
-        known,
-        A=known.A + A / known.repeated,
-        b=known.b + b / known.repeated,
-        drift=(seen * known.drift + means**2 + np.diag(P)) / (seen + 1.0),
-        sessions=(*known.sessions, _record(correction, means, P + np.diag(known.drift), S, *about)),
-        poses=np.concatenate([known.poses, *(_poses(log) for log in logs)]),
-    )
-
-
 def _records(
     correction: Correction, fit: _Fit, data: list[RegressionData], logs: Sequence[Recording]
 ) -> list[SessionRecord]:
@@ -294,64 +232,5 @@ def _records(
         C = np.diag(fit.variances[number] + fit.drift)
         S = np.mean([fit.scales.noise[k] for k in of], axis=0)
         lasts = sum(data[k].blocks.duration for k in of)
-        out.append(_record(correction, mean, C, S, lasts, [logs[k] for k in of], ""))
+        out.append(record(correction, mean, C, S, lasts, [logs[k] for k in of], ""))
     return out
-
-
-def _record(
-    correction: Correction,
-    drift: NDArray[np.float64],
-    covariance: NDArray[np.float64],
-    S: NDArray[np.float64],
-    duration: float,
-    logs: Sequence[Recording],
-    name: str,
-) -> SessionRecord:
-    dates = [log.date for log in logs if log.date is not None]
-    return SessionRecord(
-        name or ", ".join(log.source for log in logs),
-        float(duration),
-        min(dates) if dates else None,
-        tuple(correction.offset(drift).tolist()),
-        tuple(correction.coulomb(drift).tolist()),
-        float(drift @ np.linalg.solve(covariance, drift)),
-        tuple(np.sqrt(S / whole_noise(correction, SMOOTH)).tolist()),
-    )
-
-
-def _poses(log: Recording) -> NDArray[np.float64]:
-    return log.q[np.linspace(0, len(log) - 1, _POSES).astype(int)]
-
-
-def compared(known: Profile, correction: Correction, data: RegressionData) -> tuple[Posterior, Drift, bool]:
-    """What a session's rows say beside a profile: the solution, the drift, and whether they are of another arm."""
-    arm = correction.arm
-    runs = [known.data(correction, GAIN, SMOOTH.block), data]
-    found = solve(runs, payload_prior_std(arm), None, SMOOTH, 3, known.scales)
-    sensed = found.torque == "link"  # friction of gears differs from run to run
-    another = sensed and another_arm(runs, payload_prior_std(arm), None, SMOOTH, found).found
-    return found, drift_of(found, correction, data.session), another
-
-
-def check_fits(known: Profile, arm: Arm, log: Recording, tool: NDArray[np.float64] | None = None) -> None:
-    """See that a log is of the profile's arm, with the same mounted.
-
-    Raises:
-        IdentificationError: it carries something, its offsets or friction are beyond what the other sessions show, or
-            it is of another arm.
-    """
-    known.check(arm)
-    correction = Correction(arm, rated_effort(arm))
-    data = log_data(correction, log, known.features, known.session(correction), tool)
-    found, drift, another = compared(known, correction, data)
-    mass, std = float(found.phi[0]), float(np.sqrt(found.covariance[0, 0]))
-    if abs(mass) > HELD * std:
-        raise IdentificationError(
-            f"{log.source} carries {mass:+.3g} ± {Z95 * std:.2g} kg beside what was mounted in the profile's logs: a "
-            "profile learns from the arm without a payload; leave the log out, or name what was mounted with --tool"
-        )
-    if drift.changed or another:
-        raise IdentificationError(
-            f"{log.source} does not fit the profile (T = {drift.statistic:.0f}, at joint {drift.joint + 1} most): it "
-            "is of another arm, or of one that was repaired or moved; learn a new profile, and leave this one as it is"
-        )

@@ -19,8 +19,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.inertia.cholesky import factor, invert
-from armload.kernels import kernel
 from armload.posterior.another_arm import FROM, another_arm, apart
 from armload.posterior.drift import ALLOWED, TESTED, Drift, drift_of, drift_since_tare
 from armload.posterior.handover import Handover, Result
@@ -30,6 +28,7 @@ from armload.posterior.scales import AnotherArm, Posterior, Scales
 from armload.posterior.sequential import SequentialPosterior
 from armload.posterior.solve import Solution, solve_to_go_on
 from armload.posterior.tilt import Tilt, tilt_of_base
+from armload.posterior.under_prior import under_prior
 from armload.regression import Correction, GaussianPrior, JointFeatures
 from armload.regression.information import SAME, RegressionData, Session
 from armload.regression.lag import GAIN
@@ -209,7 +208,7 @@ class StreamingPosterior:
     def answer(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """phi (10,) and its covariance (10, 10) under the Gaussian prior, as `solve` gives them."""
         state, gain = self._current, self.posterior.gain_std**2
-        return _answer(state.information, state.vector, *self._gaussian, self.noise.overrated, gain)
+        return under_prior(state.information, state.vector, *self._gaussian, self.noise.overrated, gain)
 
     @property
     def _current(self) -> SequentialPosterior:
@@ -362,45 +361,3 @@ class StreamingPosterior:
         """Stop the second thread."""
         self._handover.abandon()
         self._handover.close()
-
-
-@kernel
-def _answer(information, vector, mean, root, turned, overrated, gain):  # pragma: no cover - compiled
-    """The Gaussian posterior under N(mean, root·rootᵀ), its covariance widened as stated."""
-    n, total = 10, 0.0
-    phi, out, left = np.empty(n), np.empty((n, n)), np.empty(n)
-    work, K, L = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
-    for i in range(n):
-        phi[i], left[i] = mean[i], vector[i]
-        total += vector[i]
-        for j in range(n):
-            total += information[i, j]
-            left[i] -= information[i, j] * mean[j]
-    if not np.isfinite(total):
-        _product(root, turned, out)
-        return phi, out
-    _product(information, root, work)
-    _product(turned, work, K)
-    for i in range(n):
-        K[i, i] += 1.0
-    factor(K, L, 1.0)  # a pivot below 1 is rounding
-    invert(L, work, K)
-    _product(root, K, work)
-    _product(work, turned, K)  # the covariance
-    for i in range(n):
-        for j in range(n):
-            phi[i] += K[i, j] * left[j]
-    for i in range(n):
-        for j in range(n):
-            out[i, j] = 0.5 * overrated * (K[i, j] + K[j, i]) + gain * phi[i] * phi[j]
-    return phi, out
-
-
-@kernel
-def _product(A, B, out):  # pragma: no cover - compiled
-    for i in range(A.shape[0]):
-        for j in range(B.shape[1]):
-            total = 0.0
-            for k in range(A.shape[1]):
-                total += A[i, k] * B[k, j]
-            out[i, j] = total

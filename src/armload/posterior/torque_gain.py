@@ -23,7 +23,7 @@ from armload.errors import IdentificationError
 from armload.inertia import HELD, Z95
 from armload.posterior.problem import GAIN_STD, Problem
 from armload.posterior.profile import Profile
-from armload.posterior.profile_learning import log_data
+from armload.posterior.profile_session import log_data
 from armload.posterior.scales import Scales
 from armload.posterior.solve import solve, threads
 from armload.recording import Recording

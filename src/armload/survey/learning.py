@@ -18,7 +18,8 @@ from armload.inertia import NAMES
 from armload.lab.cells import key_of
 from armload.online.thresholds import LEARN_FROM
 from armload.posterior import Profile, learn_profile, save_profile
-from armload.posterior.profile_learning import by_clock, check_fits
+from armload.posterior.profile_learning import by_clock
+from armload.posterior.profile_session import check_fits
 from armload.recording import Recording
 from armload.survey.logs import Log
 from armload.survey.rows import ANSWERED, SEPARATOR

@@ -70,7 +70,7 @@ def run(options: argparse.Namespace) -> None:
         raise UsageError("a profile needs --robot, whose arm it is, and --out, its file; or: armload profile show P")
     from armload.identification import check_usable
     from armload.posterior import learn_profile, load_profile, save_profile, with_known_weight
-    from armload.posterior.profile_learning import check_fits
+    from armload.posterior.profile_session import check_fits
 
     with working("reading") as say:
         arm = arm_of(options)
