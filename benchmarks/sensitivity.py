@@ -519,8 +519,11 @@ def idle(row: dict[str, Any]) -> bool:
     return not any(found["changed"] for word in NEAR for found in row[word].values())
 
 
-def with_what_was_measured_before(result: dict[str, Any], before: dict[str, Any]) -> dict[str, Any]:
-    """Parts and constants that were not asked for, as they were, each beside what was measured as all stood then."""
+def with_what_was_measured_before(result: dict[str, Any], before: dict[str, Any], alone: bool) -> dict[str, Any]:
+    """Parts and constants that were not asked for, as they were, each beside what was measured as all stood then.
+
+    alone: some constants were asked for, not whole parts.
+    """
     merged = {}
     for constant in constants():
         now, then = (one["constants"].get(constant.name, {}) for one in (result, before))
@@ -533,7 +536,8 @@ def with_what_was_measured_before(result: dict[str, Any], before: dict[str, Any]
             both = then.get(word, {}) | now.get(word, {})
             if word in NEAR or (idle(row) and both.keys() >= set(constant.on)):
                 row[word] = {on: both[on] for on in constant.on}
-    kept = {"cpu_s": before["cpu_s"] | result["cpu_s"], "as they are": result["as they are"] | before["as they are"]}
+    new, old = result["as they are"], before["as they are"]
+    kept = {"cpu_s": before["cpu_s"] | result["cpu_s"], "as they are": new | old if alone else old | new}
     return result | kept | {"constants": merged}
 
 
@@ -553,7 +557,7 @@ def main() -> None:
             known = before["as they are"] if asked.far else None
             result = measured(only, asked.parts.split(","), FAR if asked.far else NEAR, known)
         if asked.only or asked.far or asked.parts != parser.get_default("parts"):
-            result = with_what_was_measured_before(result, before)
+            result = with_what_was_measured_before(result, before, bool(only))
         RESULT.write_text(json.dumps(result, indent=1) + "\n")
     write_page(json.loads(RESULT.read_text()))
 
