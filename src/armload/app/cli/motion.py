@@ -190,7 +190,7 @@ def _check(options: argparse.Namespace) -> int:
         motion_check.print_passed(run, arm, problems)
     else:
         print(f"{result}\ntorque with {carried}")
-    for found in (without_tare, tared):
+    for found in (tared, without_tare) if options.tare else (without_tare, tared):
         print()
         motion_check.print_bound(found)
     motion_check.print_advice(tared if options.tare else without_tare, advice)

@@ -97,7 +97,10 @@ def print_advice(found: Bound, advice: Advice | None) -> None:
     """What the figures rest on; one line on what the run does not determine, and what would change that."""
     from armload.inertia import NAMES
 
-    print("at best: an arm and a noise as expected (a milder arm is known better), a torque whose scale is right")
+    print(
+        "at best: an arm and a noise as expected (a milder arm is known better), a torque whose scale is right (a per "
+        "cent that it is off adds a per cent of the mass)"
+    )
     missing = [name for name, known in zip(NAMES, found.determined[-1], strict=True) if not known]
     if not missing:
         return
