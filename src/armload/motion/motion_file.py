@@ -7,6 +7,7 @@ of a `SplineMotion`, one of the kind "path" the points of a `PathMotion`.
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -40,7 +41,7 @@ def taie2024() -> FourierMotion:
 def shipped_motion(name: str) -> FourierMotion:
     """A motion that comes with armload, by name."""
     text = resources.files("armload.motion").joinpath(f"motions/{name}.json").read_text(encoding="utf-8")
-    return _fourier(_content(text, f"{name}.json"), f"{name}.json")
+    return _fourier(_content(text, f"{name}.json"))
 
 
 def load_motion(path: str | Path) -> FourierMotion | SplineMotion | PathMotion:
@@ -57,9 +58,7 @@ def load_motion(path: str | Path) -> FourierMotion | SplineMotion | PathMotion:
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
         raise MotionError(f"motion file {path} cannot be read: {reason}") from None
-    content = _content(text, str(path))
-    kinds = {_SPLINE: _spline, _PATH: _path}
-    return kinds.get(str(content.get("kind")), _fourier)(content, str(path))
+    return _made(_content(text, str(path)), str(path))
 
 
 def save_motion(path: str | Path, motion: Motion) -> None:
@@ -120,73 +119,50 @@ def _content(text: str, where: str) -> dict[str, Any]:
         raise MotionError(f"{where} is not a motion: it is not JSON ({error})") from None
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise MotionError(f'{where} is not a motion: expected a JSON object with "format": "{FORMAT}"')
-    if content.get("kind", _SPLINE) not in (_SPLINE, _PATH):
+    if "kind" in content and content["kind"] not in (_SPLINE, _PATH):
         raise MotionError(
             f'{where} is a motion of the kind {content["kind"]!r}: expected "{_SPLINE}", "{_PATH}", or no kind'
         )
     return content
 
 
-def _fourier(content: dict[str, Any], where: str) -> FourierMotion:
-    try:
-        return FourierMotion(
-            content["offset"],
-            content["sine"],
-            content["cosine"],
-            float(content["period"]),
-            str(content["name"]),
-            str(content.get("note", "")),
-        )
-    except KeyError as error:
-        raise MotionError(f"{where} is not a complete motion: the key {error} is missing") from None
-    except MotionError as error:
-        raise MotionError(f"{where}: {error}") from None
-    except (TypeError, ValueError):
-        raise MotionError(
-            f"{where} is not a motion: period must be a number of seconds, offset n numbers, sine and cosine n rows of "
-            "K numbers each"
-        ) from None
+def _fourier(content: dict[str, Any]) -> FourierMotion:
+    period = float(content["period"])
+    return FourierMotion(content["offset"], content["sine"], content["cosine"], period, *_called(content))
 
 
-def _spline(content: dict[str, Any], where: str) -> SplineMotion:
+def _spline(content: dict[str, Any]) -> SplineMotion:
     from armload.motion.spline import SplineMotion
 
-    try:
-        return SplineMotion(
-            content["start"],
-            content["control"],
-            float(content["duration"]),
-            str(content["name"]),
-            str(content.get("note", "")),
-        )
-    except KeyError as error:
-        raise MotionError(f"{where} is not a complete motion: the key {error} is missing") from None
-    except MotionError as error:
-        raise MotionError(f"{where}: {error}") from None
-    except (TypeError, ValueError):
-        raise MotionError(
-            f"{where} is not a motion: duration must be a number of seconds, start n numbers, control n rows of K "
-            "numbers each"
-        ) from None
+    return SplineMotion(content["start"], content["control"], float(content["duration"]), *_called(content))
 
 
-def _path(content: dict[str, Any], where: str) -> PathMotion:
+def _path(content: dict[str, Any]) -> PathMotion:
     from armload.motion.path import PathMotion
 
+    times, q, dq, ddq = (content[key] for key in ("times", "positions", "velocities", "accelerations"))
+    return PathMotion(times, q, dq, ddq, *_called(content))
+
+
+def _called(content: dict[str, Any]) -> tuple[str, str]:
+    return str(content["name"]), str(content.get("note", ""))
+
+
+# of each kind of motion: what makes it of a file's content, and what that has to be
+_KINDS: dict[str | None, tuple[Callable[[dict[str, Any]], Any], str]] = {
+    None: (_fourier, "period must be a number of seconds, offset n numbers, sine and cosine n rows of K numbers each"),
+    _SPLINE: (_spline, "duration must be a number of seconds, start n numbers, control n rows of K numbers each"),
+    _PATH: (_path, "times must be K numbers, positions, velocities and accelerations K rows of n"),
+}
+
+
+def _made(content: dict[str, Any], where: str) -> FourierMotion | SplineMotion | PathMotion:
+    make, expected = _KINDS[content.get("kind")]
     try:
-        return PathMotion(
-            content["times"],
-            content["positions"],
-            content["velocities"],
-            content["accelerations"],
-            str(content["name"]),
-            str(content.get("note", "")),
-        )
+        return make(content)
     except KeyError as error:
         raise MotionError(f"{where} is not a complete motion: the key {error} is missing") from None
     except MotionError as error:
         raise MotionError(f"{where}: {error}") from None
     except (TypeError, ValueError):
-        raise MotionError(
-            f"{where} is not a motion: times must be K numbers, positions, velocities and accelerations K rows of n"
-        ) from None
+        raise MotionError(f"{where} is not a motion: {expected}") from None
