@@ -182,7 +182,6 @@ def test_whatever_ends_it_the_arm_comes_to_rest_and_the_log_can_be_read(served):
             assert "what was recorded until then is in" in err
         recording = read_recording(log, served.robot)
         assert np.abs(recording.dq).max() > 0.02
-        assert recording.duration < 4.9
 
 
 def test_the_answer_is_written_in_the_controller_s_order_after_both_runs(served):

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from armload.posterior.another_arm import FROM, another_arm, apart
 from armload.posterior.drift import ALLOWED, TESTED, Drift, drift_of, drift_since_tare
 from armload.posterior.handover import Handover, Result
-from armload.posterior.restless import restlessness
+from armload.posterior.restless import RESTLESS, restlessness
 from armload.posterior.same_motion import Difference, SameMotion
 from armload.posterior.scales import AnotherArm, Posterior, Scales
 from armload.posterior.sequential import SequentialPosterior
@@ -178,6 +178,9 @@ class StreamingPosterior:
         """How restless the torques are in the run, of what they were at the tare; 0 where nobody can tell."""
         if len(self.posterior.power) < 2 or self.posterior.torque != "link":
             return 0.0
+        return self._restlessness()
+
+    def _restlessness(self) -> float:
         return restlessness(self.posterior.power, self.noise.residual * self.correction.effort)
 
     @property
@@ -244,7 +247,12 @@ class StreamingPosterior:
             self.another = another_arm(runs, *about, self.posterior)
             if self.another.found:
                 self._adopt(apart(runs, *about, self.iterations, self.posterior))
-                self.without_tare, runs = True, runs[1:]
+                self.without_tare = self._restlessness() <= RESTLESS
+                if self.without_tare:
+                    runs = runs[1:]
+                else:  # no arm explains it: what is held moves on its own
+                    self.another = None
+                    self._adopt(self._solved(runs, self.start, self.iterations - 1))
         if self._test_tare:
             self.tilt = tilt_of_base(runs, *about, self.posterior)
         self._run.session = self.session
