@@ -428,6 +428,7 @@ print("done")
             last = rows[-1, 0] if len(rows) else last
             got += len(rows)
             assert len(rows) or process.poll() in (None, 0)
+        process.communicate()  # or its last word would meet a closed pipe
     assert process.returncode == 0
     assert got + reader.lost == 60000
     assert got > 64

@@ -166,13 +166,14 @@ def test_memory_does_not_grow(make, log):
         return len(pickle.dumps({k: v for k, v in vars(identifier).items() if k not in ("arm", "model")}))
 
     identifier, sizes, part = make(), [], log.select(slice(70))
-    for k in range(3):
+    for k in range(8):
         for sample in part:
             identifier.update(sample._replace(t=sample.t + k * (part.t[-1] + 0.02)))
         if hasattr(identifier, "close"):
             identifier.close()  # threads are not its memory
         sizes.append(size(identifier))
-    assert sizes[-1] <= sizes[0] + 1024  # a few samples may wait to be taken together; there were 140 more
+    # up to 50 rows of 3 kB wait for the second thread, sooner or later; 280 samples more would be 840 kB
+    assert max(sizes[4:]) <= max(sizes[:4]) + 200_000
 
 
 def test_a_recording_of_another_arm_is_refused(make):

@@ -199,7 +199,7 @@ def test_the_answer_fulfils_the_conditions_of_the_optimum(numbers, decades, seed
         1e-15 * max(scale, np.abs(x).max()) * np.abs(np.linalg.solve(TO_SVEC.T, R.T @ R)).max()
     )  # of Z, by that of x
     J = scaled_J(x * UNITS) - MARGIN * np.eye(4)
-    assert abs(np.sum(Z * J)) <= 1e-9 * cost + 30 * rounding * np.abs(J).max() + 1e-13 * np.abs(Z).max() * scale
+    assert abs(np.sum(Z * J)) <= 1e-9 * cost + 100 * rounding * np.abs(J).max() + 1e-13 * np.abs(Z).max() * scale
     # the cost can fall along v·vᵀ by (vᵀ·Z·v)² / 2|R·x(v·vᵀ)|², where vᵀ·Z·v < 0
     value, v = (part[..., 0] for part in np.linalg.eigh(Z))
     along = R @ np.linalg.solve(TO_SVEC, svec(np.outer(v, v)))
