@@ -267,7 +267,7 @@ class OnlineIdentifier:
         """While samples are left out: what all that may have happened makes of the payload."""
         assert self._watch is not None
         self._published, run = sample.t, self._watch.run
-        phi, covariance = self._watch.tracked
+        phi, covariance = self._watch.track()
         self._estimate = replace(run.last, t=sample.t, phi=phi, covariance=covariance)
         self._around, self._source = phi, None
         if self._watch.settling or self._watch.likely[0] > 0.5:  # then phi follows what the samples say

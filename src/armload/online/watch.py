@@ -138,11 +138,11 @@ class PayloadWatch:
         """Whether nothing but the arm as it was and the same payload explains the last rows."""
         return self.phase == FOLLOWING and sum(self.likely) < 1.0 - LIKELY
 
-    @property
-    def tracked(self) -> Gaussian:
-        """phi (10,) and covariance by the last rows, which the run was not told of.
+    def track(self) -> Gaussian:
+        """Follow phi (10,) and its covariance to the last rows, which the run was not told of.
 
-        The mixture of both hypotheses, the same payload and another; it is the wider the faster phi moves.
+        The mixture of both hypotheses, the same payload and another; it is the wider the faster phi has moved since
+        the last call.
         """
         (shift, spread), p, last = self._modes.shift(going_on=True), self.likely[0], self.run.last
         since, lately = self._lately
@@ -374,8 +374,8 @@ class PayloadWatch:
     def hold(self) -> None:
         """Wait for what is done beside."""
         self._wait_for_closing()
-        if self._change is not None and isinstance(self._change.following, Future):
-            self._change.following = self._change.following.result()
+        if self._change is not None:
+            self._ready(self._change)
         for run in (*self.runs, *self._next):
             run.stream.hold()
 
