@@ -20,7 +20,6 @@ from armload.survey.table_file import read_rows
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_DAY = 86400.0  # [s]
 _MOST_ROWS = 60  # of the table of doubtful logs: the survey itself has them all
 _MOST_ARMS = 24  # that are drawn each in a panel, those with something to do first
 _MOST_DRAWN = 500  # points that are drawn as lines, each: a page of thousands would be slow
