@@ -72,7 +72,16 @@ NEAR = {"half": 0.5, "double": 2.0}
 FAR = {"thousandth": 1e-3, "thousand times": 1e3}
 # a word about a change that was noticed; words of advice and of a refusal; a bound on what does
 # not exist where it holds
-NOT_VARIED = ("STEP_STD", "NOMINAL", "KNOWN", "CURRENT_LOW", "CURRENT_HIGH", "FARTHEST")
+NOT_VARIED = (
+    "STEP_STD",
+    "NOMINAL",
+    "KNOWN",
+    "CURRENT_LOW",
+    "CURRENT_HIGH",
+    "FARTHEST",
+    "SWAPPED_MISFIT",
+    "SWAPPED_SHARE",
+)
 
 
 # ---------------------------------------------------------------------- the constants, and how to set them

@@ -9,6 +9,7 @@ import pytest
 from armload.arms import arm, rated_effort
 from armload.errors import RecordingError
 from armload.identification import check_plausible
+from armload.identification.exchanged import check_for_exchanged_torques
 from armload.identification.torque_scale import torque_scale
 from armload.inertia import InertialParameters
 from armload.motion import random_motion, taie2024
@@ -241,6 +242,27 @@ def test_a_torque_that_never_changes_while_its_joint_moves_is_refused_by_joint(r
     tau[:, joint] = 0.0
     with pytest.raises(RecordingError, match=rf"tau{joint + 1} is 0 in all rows although q{joint + 1} moves"):
         check_plausible(replace(log, tau=tau), robot)
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e", "ur10e loaded", "ur10"])
+@pytest.mark.parametrize("pair", [(4, 5), (3, 4), (1, 2)])
+def test_exchanged_torque_columns_of_a_real_log_are_named(real, name, pair):
+    robot, log = real[name]
+    check_plausible(log, robot)
+    order = np.arange(log.n)
+    order[[pair[0] - 1, pair[1] - 1]] = pair[1] - 1, pair[0] - 1
+    with pytest.raises(RecordingError, match=rf"tau{pair[0]} and tau{pair[1]} seem to be exchanged .*exchange them"):
+        check_plausible(replace(log, tau=log.tau[:, order]), robot)
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e"])
+@pytest.mark.parametrize("tilt", [(1.7, 0.0, -9.66), (9.81, 0.0, 0.0)])
+def test_a_base_that_leans_is_not_taken_for_exchanged_columns(sound, name, tilt):
+    """Whatever else is said of a base that leans by ten or ninety degrees, no columns are named."""
+    robot, logs = sound[name]
+    leaning = replace(robot, gravity=np.array(tilt))
+    for log in logs:
+        check_for_exchanged_torques(log, leaning, torque_scale(log, leaning))
 
 
 def test_positions_outside_the_limits_are_refused_by_joint_and_row(sound, panda):

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from armload.arms import ARMS, Arm
 from armload.errors import RecordingError
+from armload.identification.exchanged import check_for_exchanged_torques
 from armload.identification.thresholds import (
     ANY_SPEED,
     CURRENT_HIGH,
@@ -49,8 +50,8 @@ def check_plausible(recording: Recording, arm: Arm) -> None:
     Raises:
         RecordingError: another number or other names of joints; degrees; positions outside the limits; positions that
             jump; dq that is not the derivative of q (unit, sign, swapped columns, time in milliseconds); too fast;
-            torque missing, frozen, too large, or not that of this arm (wrong arm, unit, sign, base orientation, or a
-            channel without gravity). One sentence that names the place.
+            torque missing, frozen, too large, or not that of this arm (wrong arm, unit, sign, base orientation,
+            exchanged columns, or a channel without gravity). One sentence that names the place.
     """
     _check_joints(recording, arm)
     _check_radians(recording, arm)
@@ -231,6 +232,7 @@ def _check_torque_is_the_arms(recording: Recording, arm: Arm) -> None:
     fit = torque_scale(recording, arm)
     if fit is None:
         return
+    check_for_exchanged_torques(recording, arm, fit)
     if fit.is_wrong:
         _check_for_currents(recording, arm, fit.scale)
         _check_for_compensation(recording, arm, fit)

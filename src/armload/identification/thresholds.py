@@ -120,6 +120,13 @@ SCALE_HIGH = 1.7
 SCALE_SURE = 2.0
 # [model errors] rms of what the arm's own torque leaves: a sound log's is about 1 by the meaning of `MODEL_ERROR`
 MODEL_MISFIT = 2.5
+# [model errors] above which columns that are exchanged are looked for: what a sound log's misfit is about. Real logs
+# have 0.1 to 0.7, with two wrist torques exchanged 1 and more
+# (test_exchanged_torque_columns_of_a_real_log_are_named)
+SWAPPED_MISFIT = 1.0
+# of the misfit, what may be left with two torque columns exchanged back: real logs leave at most 0.41
+# (test_exchanged_torque_columns_of_a_real_log_are_named)
+SWAPPED_SHARE = 0.45
 # [N·m/A] torque constant of a joint, gear included, at least: the wrist of a small arm. A UR10e's are 10 to 12
 # (test_motor_currents_are_called_so_with_what_to_do)
 CURRENT_LOW = 4.0
