@@ -62,6 +62,14 @@ def test_the_gains_of_the_joints_that_carry_the_weight_are_found(weighed):
     assert 1e-3 <= weighed.gain_std < 0.03
 
 
+def test_the_gain_of_each_joint_has_an_interval_that_holds_and_is_wide_where_the_weight_is_not_felt(weighed):
+    std = weighed.gain_joint_std
+    assert np.all(np.abs(weighed.gain - (GAIN - 1.0)) < 3.0 * std)
+    prior = 6.0 * 0.005  # of a joint sensor that may be far off
+    assert std.max() <= prior
+    assert std[3] < 0.5 * std[6]  # the elbow bears the weight, the flange's axis hardly
+
+
 def test_another_payload_is_then_found_in_its_own_mass(panda, logs, profile, weighed, tmp_path):
     without, with_ = (identify(logs[5], panda, profile=known) for known in (profile, weighed))
     truth = PAYLOAD.parameters.mass
@@ -71,6 +79,7 @@ def test_another_payload_is_then_found_in_its_own_mass(panda, logs, profile, wei
     assert with_.torque_gain_std == pytest.approx(weighed.gain_std)
     read = load_profile(save_profile(weighed, tmp_path / "weighed.profile"))
     np.testing.assert_allclose(read.gain, weighed.gain)
+    np.testing.assert_allclose(read.gain_joint_std, weighed.gain_joint_std)
     assert identify(logs[5], panda, profile=read).mass == pytest.approx(with_.mass, abs=1e-4)
 
 

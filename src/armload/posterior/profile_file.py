@@ -48,6 +48,8 @@ def save_profile(profile: Profile, path: str | PathLike[str]) -> Path:
     }
     if profile.gain is not None:
         tensors["gain"] = profile.gain
+    if profile.gain_joint_std is not None:
+        tensors["gain_joint_std"] = profile.gain_joint_std
     header = {
         "format": FORMAT,
         "arm": {
@@ -108,6 +110,7 @@ def load_profile(path: str | PathLike[str]) -> Profile:
             tensors["poses"].astype(float),
             tensors.get("gain"),
             header["gain_std"],
+            tensors.get("gain_joint_std"),
         )
     except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
         raise ModelError(f"{path} holds a profile armload cannot use ({error}): learn it again") from None

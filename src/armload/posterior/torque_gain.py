@@ -76,7 +76,9 @@ def with_known_weight(profile: Profile, arm: Arm, log: Recording, mass: float, s
     total = np.linalg.inv(seen.sum(axis=0) + np.diag(payload_prior_std(arm) ** -2.0))
     weight = (total @ (seen @ phi).T)[0] / mass
     share = float(np.sqrt(SMOOTH.overrated * weight @ C @ weight + (std / mass) ** 2))
-    return replace(profile, gain=gamma, gain_std=max(share, _LEAST))
+    each = np.sqrt(SMOOTH.overrated * np.diag(C) + (std / mass) ** 2)
+    each = np.minimum(each, _WIDE * side)  # no more than before the weight was hung on
+    return replace(profile, gain=gamma, gain_std=max(share, _LEAST), gain_joint_std=np.maximum(each, _LEAST))
 
 
 def _solved(

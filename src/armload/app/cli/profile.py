@@ -144,6 +144,7 @@ def _fields(profile: Profile) -> dict[str, Any]:
         "repeated": profile.repeated,
         "torque_gain": None if profile.gain is None else (1.0 + profile.gain).tolist(),
         "torque_gain_std": profile.gain_std,
+        "torque_gain_joint_std": None if profile.gain_joint_std is None else profile.gain_joint_std.tolist(),
         "drift_offset": drift[0].tolist(),
         "drift_coulomb": drift[1].tolist(),
         "sessions": [asdict(session) for session in profile.sessions],
@@ -152,6 +153,7 @@ def _fields(profile: Profile) -> dict[str, Any]:
 
 
 def _print(profile: Profile) -> None:
+    from armload.inertia import Z95
     from armload.posterior.drift import CHANGED
 
     n, drift = profile.n, profile.drift.reshape(-1, profile.n) ** 0.5
@@ -165,6 +167,8 @@ def _print(profile: Profile) -> None:
         rows.add_row(name, *(f"{x:.3f}" for x in values))
     if profile.gain is not None and profile.gain_std is not None:
         rows.add_row("torque sensor's gain", *(f"{1.0 + x:.3f}" for x in profile.gain))
+        if profile.gain_joint_std is not None:
+            rows.add_row("± (95 %)", *(f"{Z95 * x:.3f}" for x in profile.gain_joint_std))
         print(f"a known weight was hung on: the torque is known to {100 * profile.gain_std:.1f} %")
     console().print(rows)
     rows = table("sessions", "log", "time [s]", "offsets [N·m]", "misfit", "noise")
