@@ -24,7 +24,8 @@ probability was right: p_change that what is held is not what the run at work be
 pushes (but for the first and last fifth of a push).
 
 Scenes are cells in out/hand_overs. Written to benchmarks/results/hand_overs.json, where a part that was not asked for
-keeps what was measured of it before. Seeds from 90000; constants were set on seeds below 10.
+keeps what was measured of it before, and from there to docs/online.md. Seeds from 90000; constants were set on seeds
+below 10.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ from events import Push, _payload
 from numpy.typing import NDArray
 from real_logs import data
 from scipy.signal import savgol_filter
-from script import RESULTS, ROOT, options, say, write
+from script import RESULTS, ROOT, markdown_table, options, say, write, write_table
 from threadpoolctl import threadpool_limits
 
 import armload.online
@@ -58,6 +59,17 @@ PARTS = {
     "pushes": 0.0, "drift": 0.0, "quiet": 0.0, "real": 0.0,
 }  # fmt: skip
 LOOKED = (0.5, 1.0, 2.0, 5.0)  # [s] after the end of a change
+NAMES = {
+    "steps": "at once, 0.2 kg and more",
+    "ramps_0.5": "within 0.5 s",
+    "ramps_2": "within 2 s",
+    "ramps_5": "within 5 s",
+    "light": "at once, 50 to 150 g",
+    "slow_rate": "at once, 30 Hz with jitter",
+    "standing": "at once, the arm stands",
+    "real": "at once, the real Panda",
+}  # rows of the page
+PAGE = ROOT / "docs" / "online.md"
 BINS = np.array([0.0, 0.02, 0.1, 0.3, 0.7, 0.9, 0.98, 1.0])
 
 
@@ -271,6 +283,7 @@ def of_part(cells: list[dict[str, Any]]) -> dict[str, Any]:
         out |= {
             "changes": len(changes),
             "missed": sum(x["delay"] is None for x in changes),
+            "missed_kg": sorted(round(abs(x["by"]), 2) for x in changes if x["delay"] is None),
             "median_delay_s": round(float(np.median(delays)), 3) if delays else None,
             "inside_after": {f"{s:g} s": sum(x["inside"][k] for x in changes) for k, s in enumerate(LOOKED)},
             "median_error_g": {
@@ -305,6 +318,63 @@ def reliability(cells: list[dict[str, Any]]) -> dict[str, Any]:
     return out
 
 
+def show(result: dict[str, Any], page: Path = PAGE) -> None:
+    """Put a result between its marks on a page: the table of hand-overs, and what was seen beside them."""
+    parts = result["parts"]
+    rows = []
+    for name, said in NAMES.items():
+        part = parts[name]
+        delay, error, width = part["median_delay_s"], part["median_error_g"], part["median_half_width_g"]
+        rows.append(
+            (
+                said,
+                str(part["changes"]),
+                str(part["missed"]),
+                str(part["false"]),
+                "–" if delay is None else f"{delay:.2f} s",
+                " · ".join(str(n) for n in part["inside_after"].values()) + f" of {part['changes']}",
+                " · ".join(f"{error[t]:.0f} ± {width[t]:.0f}" for t in ("0.5 s", "2 s")),
+            )
+        )
+    columns = (
+        "hand-over",
+        "changes",
+        "missed",
+        "other events",
+        "delay: median",
+        "mass inside its 95 % after " + " · ".join(f"{s:g}" for s in LOOKED) + " s",
+        "median error ± half-width [g] after 0.5 · 2 s",
+    )
+    missed = [f"{kg:.2f}" for kg in sorted({kg for name in NAMES for kg in parts[name]["missed_kg"]})]
+    lines = [markdown_table(columns, "lrrrrrr", rows), ""]
+    if missed:
+        lines.append(f"Masses of the missed changes: {', '.join(missed)} kg.")
+    push, drift, quiet = parts["pushes"], parts["drift"], parts["quiet"]
+    lines += [
+        f"{push['pushes']} pushes at the flange: {push['called_a_change']} called a change, "
+        f"{100 * push['calibrated_during']:.0f} % of the time called calibrated, "
+        f"{100 * push['wrong_and_calibrated']:.1f} % wrong and called calibrated.",
+        f"A drift of ±0.5 N·m within 40 s: {drift['false']} events in {drift['minutes']:.0f} minutes, "
+        f"{100 * drift['inside']:.0f} % of the intervals hold, "
+        f"{100 * drift['calibrated']:.0f} % are called calibrated.",
+        f"Where nothing happens: {quiet['false']} events in {quiet['minutes']:.0f} minutes, "
+        f"{100 * quiet['calibrated']:.0f} % called calibrated.",
+        "",
+        "How often a probability was right, over all these moments:",
+        "",
+        markdown_table(
+            ("probability", "moments", "called, on average", "was so"),
+            "lrrr",
+            [
+                (f"`{name}`", str(x["moments"]), f"{100 * x['called']:.1f} %", f"{100 * x['was']:.1f} %")
+                for name, found in result["reliability"].items()
+                for x in found
+            ],
+        ),
+    ]
+    write_table(page, "hand-overs", "\n".join(lines))
+
+
 def main() -> None:
     asked = options(__doc__, quick=False, parts=",".join(PARTS), scenes=3, jobs=1, cells=ROOT / "out" / "hand_overs")
     code = source_key(*sorted(Path(armload.online.__path__[0]).glob("*.py")))
@@ -325,6 +395,7 @@ def main() -> None:
         print(json.dumps(result, indent=1))
     else:
         write("hand_overs", result)
+        show(result)
 
 
 if __name__ == "__main__":

@@ -410,6 +410,30 @@ def test_a_constant_is_set_wherever_it_is_used_and_put_back(sensitivity):
     assert thresholds.SURE == watch.SURE == 0.999
 
 
+def test_the_built_in_arms_on_the_page_are_those_of_the_committed_measurement():
+    found = json.loads((RESULTS / "built_in_arms.json").read_text())
+    page = (ROOT / "docs" / "arms.md").read_text(encoding="utf-8")
+    boxes = [box for one in found["arms"].values() for box in one["simulated"]]
+    inside = sum(box["low_kg"] <= box["truth_kg"] <= box["high_kg"] for box in boxes)
+    assert f"{inside} of {len(boxes)} true masses" in page
+    for name, log in found["real_logs"].items():
+        (row,) = (
+            line for line in page.splitlines() if f"| `{name.split(' as ')[1]}` |" in line and "joints 2 to 4" in line
+        )
+        slopes = ", ".join(f"{x:.2f}" for x in log["slope"][1:4])
+        low, high = (f"{log[end]:.2f}".replace("-", "−") for end in ("low_kg", "high_kg"))
+        assert f"{log['mass_kg']:.3f}, {'held' if log['held'] else 'nothing held'} | {low} … {high} | {slopes} " in row
+
+
+def test_the_hand_overs_on_the_page_are_those_of_the_committed_measurement(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    hand_overs = importlib.import_module("hand_overs")
+    page = tmp_path / "online.md"
+    page.write_text(hand_overs.PAGE.read_text(encoding="utf-8"), encoding="utf-8")
+    hand_overs.show(json.loads((RESULTS / "hand_overs.json").read_text()), page)
+    assert page.read_text(encoding="utf-8") == hand_overs.PAGE.read_text(encoding="utf-8")
+
+
 def test_the_page_of_the_install_is_that_of_the_committed_measurement(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(ROOT / "benchmarks")
     install = importlib.import_module("install")
