@@ -42,5 +42,5 @@ def test_no_promise_is_wider_than_what_was_known_before():
 def test_what_the_gain_alone_does_not_allow_is_refused_and_a_lighter_payload_named():
     panda = arm("panda")
     keep = Constraints(panda, READY, share=0.7, payload=PayloadRange(3.0))
-    with pytest.raises(MotionError, match=r"calibrated to 0.5 % .* leaves 2.94 times .* less than 1 kg would do"):
+    with pytest.raises(MotionError, match=r"calibrated to 0.5 % .*leaves 2.94 times .*less than 1 kg would do"):
         design_until(keep, Criterion(panda), Accuracy(mass=0.01))

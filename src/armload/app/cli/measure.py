@@ -17,6 +17,7 @@ from armload.app.cli.arguments import (
     at_least,
     file_name,
 )
+from armload.app.cli.motion_arguments import box
 from armload.app.cli.named import arm_of, motion_of, payload_of, read_logs, robot_of, world_of
 from armload.app.cli.printing import print_json, print_note, working, write_json
 from armload.errors import SafetyError, SinkError, UsageError
@@ -26,8 +27,11 @@ if TYPE_CHECKING:
 
     from armload.arms import Arm
     from armload.devices import Mover
+    from armload.excitation import Obstacle
+    from armload.inertia import InertialParameters
     from armload.measuring import Measurement, Plan
     from armload.motion import Motion
+    from armload.posterior import Profile
 
 _EXAMPLES = """\
 examples:
@@ -39,7 +43,8 @@ examples:
   armload measure ros2:///joint_states --robot ur5e --motion excite.json --tare empty.csv
 
 What will move, how far and how fast is said first, and nothing moves until you type yes (or give --move). Ctrl-C stops
-the arm on its path. Keep the emergency stop at hand: nothing here knows what stands around the arm but the floor.
+the arm on its path. Keep the emergency stop at hand: nothing here knows what stands around the arm but the floor and
+the boxes that --box names.
 """
 
 
@@ -79,12 +84,27 @@ def parser() -> Parser:
         "--tare", type=file_name, metavar="LOG0", help="a log of the empty arm: no empty run, the payload is on already"
     )
     add_tare_and_mass_arguments(parser)
+    add("--profile", type=file_name, metavar="P", help="what many logs said of this arm (armload profile)")
+    add(
+        "--tool",
+        type=file_name,
+        metavar="FILE",
+        help="a known tool that is on in both runs (JSON, or franka-hand); the answer is what it carries",
+    )
     add("--method", type=file_name, metavar="M", help="a name `armload methods` lists, or a trained model's path")
     add("--grip", metavar="COMMAND", help="a command that mounts the payload; else you are asked to")
     add_column_arguments(parser)
     safety = parser.add_argument_group("what is allowed").add_argument
     safety(
         "--floor", type=_floor, default=0.0, metavar="Z|none", help="height of the floor in the base's frame [m] (0)"
+    )
+    safety(
+        "--box",
+        type=box,
+        action="append",
+        default=[],
+        metavar="X,Y,Z,SX,SY,SZ",
+        help="an obstacle in the base's frame [m]; repeat for more",
     )
     safety("--approach", type=at_least(0.0, float), metavar="RAD", help="how far a joint may be from the start (1)")
     safety("--off-path", type=at_least(1e-3, float), default=0.05, metavar="RAD", help="more stops the arm (0.05)")
@@ -128,14 +148,21 @@ def run(options: argparse.Namespace) -> int | None:
     from armload.excitation import Accuracy
     from armload.measuring import Procedure
     from armload.measuring.plan import APPROACH
-    from armload.posterior import KnownMass
+    from armload.posterior import KnownMass, load_profile
 
     options.robot = options.robot or robot_of(options.source)
-    arm = arm_of(options)
+    bare = arm_of(options)
+    tool = None if options.tool is None else _tool(options, bare)
+    arm = bare if tool is None else bare.with_payload(tool)
+    profile = None if options.profile is None else load_profile(options.profile)
+    if profile is not None:
+        profile.check(arm)
     motion = None if options.motion is None else _motion(options.motion, arm)
     accuracy = None if options.until is None else Accuracy.read(options.until)
     mass = None if options.mass is None else KnownMass(*options.mass)
-    mounted = None if options.mounted in (None, "nothing") else payload_of(options.mounted, arm)
+    mounted = tool if options.mounted in (None, "nothing") else payload_of(options.mounted, arm)
+    if tool is not None and options.mounted is not None:
+        raise UsageError("--tool is what is on at the empty run, and so is --mounted: give one of them")
     if options.tare_age is not None and options.tare is None:
         raise UsageError("--tare-age says how old a tare is, but there is no --tare")
     _, tare = read_logs(options, arm, None, options.tare)
@@ -143,7 +170,7 @@ def run(options: argparse.Namespace) -> int | None:
     simulated = {} if options.source != "sim" else _simulated(options, arm, motion, loaded=tare is not None)
     with open_mover(options.source, arm, **simulated) as mover:
         if motion is None:
-            motion = _designed(arm, mover.commanded(), options)
+            motion = _designed(arm, mover.commanded(), profile, options)
         if options.apply and not mover.writes:
             raise UsageError(f"{mover.name} takes no payload: leave out --apply, and export the answer")
         procedure = Procedure(
@@ -153,10 +180,12 @@ def run(options: argparse.Namespace) -> int | None:
             folder,
             tare=tare,
             tare_age=options.tare_age,
+            profile=profile,
             mass=mass,
             method=options.method,
             accuracy=accuracy,
             floor=options.floor,
+            boxes=_boxes(options),
             approach=APPROACH if options.approach is None else options.approach,
             thresholds=Thresholds(options.off_path, options.push),
             say=print_note,
@@ -182,15 +211,37 @@ def _motion(name: str, arm: Arm) -> Motion:
     return PathMotion.read(name) if name.lower().endswith(".csv") else motion_of(name, arm)
 
 
-def _designed(arm: Arm, pose: NDArray, options: argparse.Namespace) -> Motion:
+def _tool(options: argparse.Namespace, arm: Arm) -> InertialParameters:
+    """The tool that is on in both runs.
+
+    Raises:
+        UsageError: there is a tare, of which nobody knows whether it was on.
+    """
+    from armload.identification import plausible_tool
+
+    if options.tare is not None:
+        raise UsageError(
+            "--tool and --tare together are for a log (armload identify), which finds out whether the tool was mounted "
+            "at the tare: give one of them; with a tare, the answer is what was added since"
+        )
+    return plausible_tool(arm.in_frame(payload_of(options.tool, arm)), arm)
+
+
+def _boxes(options: argparse.Namespace) -> tuple[Obstacle, ...]:
+    from armload.excitation import Obstacle
+
+    return tuple(Obstacle((b[0], b[1], b[2]), (b[3], b[4], b[5])) for b in options.box)
+
+
+def _designed(arm: Arm, pose: NDArray, profile: Profile | None, options: argparse.Namespace) -> Motion:
     """The motion about the present pose that tells most, for who named none: after an empty run of it, or a tare."""
     from armload.excitation import Constraints, Criterion, PayloadRange, Surroundings, design_motion
 
     heaviest = None if options.mass is None else PayloadRange(options.mass[0] + 3.0 * options.mass[1])
-    around = Surroundings(arm, options.floor)
+    around = Surroundings(arm, options.floor, _boxes(options))
     limits = Constraints(arm, pose, payload=heaviest, surroundings=around, speed=options.tool_speed)
     with working("designing a motion about the present pose"):
-        return design_motion(limits, Criterion(arm, "same"), options.time, name="designed").motion
+        return design_motion(limits, Criterion(arm, "same", profile), options.time, name="designed").motion
 
 
 def _consent(options: argparse.Namespace) -> Callable[[Plan], bool]:
