@@ -6,8 +6,9 @@ Every design has its own pose, time, share of the limits, heaviest payload and t
 arm that differs from its model as real ones do, with a payload of the range and its sensors, none of them among those
 of `designed_motions.py`, from which the factors of `excitation/promise.py` are. The payload is identified after the
 motion is over, with the default of `identify`. A promise is kept in a world where the half-widths given of mass, of all
-moments and of all inertias are within those said: what `--until` relies on. "bound" are the given ones over the bound's,
-"promise" those over the ones that are said (the largest of moments, of inertias). What is measured is kept in out/.
+moments and of all inertias are within those said: what `--until` relies on. "given / bound" is of the estimator's
+half-widths over the bound's, "given / promised" of them over those that are said: of the largest of moments and of
+inertias, median and 5 to 95 %. What is measured is kept in out/.
 Writes benchmarks/results/kept_promises.json and the table in docs/motion.md.
 """
 

@@ -126,11 +126,12 @@ def test_a_design_with_a_profile_tells_more_than_one_without_a_tare(profile, tmp
     words = ["motion", "design", "--robot", "panda", *pose, "--tare", "none", "--out", str(tmp_path / "m.json")]
     alone, known = _said(words, capsys), _said([*words, "--profile", str(profile)], capsys)
     assert known["tare"] == f"without a tare, with the profile {profile}"
-    assert np.all(np.array(known["half_width"]) < alone["half_width"])
+    # its determinant is what a design makes small: widths in the mean of their logarithms, as the motions differ
+    assert np.log(np.array(known["half_width"]) / alone["half_width"]).mean() < -0.1
     assert main([*words[:3], "ur10e", *words[4:], "--profile", str(profile)]) == 2
 
 
-def test_a_path_is_enriched_with_a_profile(folder, profile, tmp_path, capsys):
+def test_a_path_is_enriched_with_a_profile(profile, tmp_path, capsys):
     path = tmp_path / "path.csv"
     t = np.linspace(0.0, 1.0, 101)
     ramp = 10 * t**3 - 15 * t**4 + 6 * t**5
@@ -143,6 +144,7 @@ def test_a_path_is_enriched_with_a_profile(folder, profile, tmp_path, capsys):
     assert np.all(np.array(known["half_width_before"]) < alone["half_width_before"])
 
 
+@pytest.mark.full
 def test_a_measurement_with_a_profile_is_relative_to_its_own_empty_run(profile, tmp_path, capsys):
     save_motion(tmp_path / "m.json", taie2024().scaled(0.25))
     words = ["measure", "sim", "--robot", "panda", "--speed", "max", "--method", "map-gp", "--world", "real-like:3"]

@@ -65,6 +65,7 @@ def test_the_whole_way_prints_and_writes_the_answer(motion, tmp_path, capsys):
     assert not (tmp_path / "again" / "empty.csv").exists()
 
 
+@pytest.mark.full
 def test_with_a_known_tool_on_in_both_runs_the_answer_is_what_it_carries(motion, tmp_path, capsys):
     arguments = ["--motion", motion, "--move", "--dir", str(tmp_path / "logs"), "--json", "--tool", "franka-hand"]
     assert main(["measure", "sim", *QUICK, *arguments]) == 0

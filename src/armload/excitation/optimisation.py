@@ -107,6 +107,7 @@ def design_motion(
         for c, t, label in zip(problem.points(x), times, names, strict=False)
     ]
     told = problem.told(motions)
+    assert constraints.payload is not None
     return Design(
         motions[0],
         motions[1] if len(motions) > 1 else None,

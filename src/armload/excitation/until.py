@@ -75,6 +75,7 @@ def _check_gain(constraints: Constraints, criterion: Criterion, accuracy: Accura
         MotionError: it does not, with the payload of the range that it does for.
     """
     payload = constraints.payload
+    assert payload is not None
     over = accuracy.over(of_gain(criterion, payload))
     if over >= 1.0:
         raise MotionError(
