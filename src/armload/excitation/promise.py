@@ -13,8 +13,9 @@ changes, none of which the bound knows:
 - the gain: torque is calibrated to so many per cent, and the payload is known no better
 
 The first two are the factors f, stated priors: 90 % quantiles over simulated worlds of the estimator's half-width over
-the bound's, without the gain's share, the largest of several designs (`benchmarks/designed_motions.py`). They are
-checked on other poses, worlds and designs in `benchmarks/kept_promises.py`. An f below 1 is what a learned prior and
+the bound's, without the gain's share, the largest of several designs (`benchmarks/designed_motions.py`); with the tare
+elsewhere 10 to 20 % more, as a first check on 50 worlds kept 84 % there. They are checked on other poses, worlds and
+designs in `benchmarks/kept_promises.py`. An f below 1 is what a learned prior and
 the difference of two runs of one motion gain.
 """
 
@@ -31,9 +32,9 @@ from armload.posterior.problem import GAIN_STD
 # [1] f of mass, moments and inertias, by the side of the torque, and whether the empty run is designed with the
 # loaded one, at the same place, or is another log (or there is none). Stated priors, see above
 _FACTORS = {
-    ("link", "other"): (1.1, 1.3, 0.9),
+    ("link", "other"): (1.2, 1.4, 0.9),
     ("link", "place"): (0.8, 0.85, 0.9),
-    ("motor", "other"): (6.0, 5.5, 0.9),
+    ("motor", "other"): (7.0, 6.5, 0.9),
     ("motor", "place"): (7.0, 6.5, 4.0),
 }
 
