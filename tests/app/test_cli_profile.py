@@ -9,7 +9,7 @@ import pytest
 
 from armload.app.cli import main
 from armload.arms import arm
-from armload.motion import random_motion
+from armload.motion import random_motion, save_motion, taie2024
 from armload.payloads import test_payload as make_payload
 from armload.posterior import load_profile
 from armload.recording import write_recording
@@ -114,3 +114,45 @@ def test_a_stream_uses_a_profile_and_leaves_it_as_it_was_where_nothing_was_learn
     assert last["relative_to"] == "profile"
     assert "is as it was" in said.err
     assert profile.read_bytes() == before
+
+
+def _said(words, capsys):
+    assert main([*words, "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_a_design_with_a_profile_tells_more_than_one_without_a_tare(profile, tmp_path, capsys):
+    pose = ["--from", "0,-0.5,0,-2,0,1.6,0.8", "--time", "0.5", "--joints", "6-7", "--payload", "1"]
+    words = ["motion", "design", "--robot", "panda", *pose, "--tare", "none", "--out", str(tmp_path / "m.json")]
+    alone, known = _said(words, capsys), _said([*words, "--profile", str(profile)], capsys)
+    assert known["tare"] == f"without a tare, with the profile {profile}"
+    # its determinant is what a design makes small: widths in the mean of their logarithms, as the motions differ
+    assert np.log(np.array(known["half_width"]) / alone["half_width"]).mean() < -0.1
+    assert main([*words[:3], "ur10e", *words[4:], "--profile", str(profile)]) == 2
+
+
+def test_a_path_is_enriched_with_a_profile(profile, tmp_path, capsys):
+    path = tmp_path / "path.csv"
+    t = np.linspace(0.0, 1.0, 101)
+    ramp = 10 * t**3 - 15 * t**4 + 6 * t**5
+    q = np.array([0, -0.5, 0, -2, 0, 1.6, 0.8]) + 0.3 * ramp[:, None] * np.eye(7)[0]
+    header = "t," + ",".join(f"q{k}" for k in range(1, 8))
+    np.savetxt(path, np.column_stack([t, q]), delimiter=",", header=header, comments="")
+    words = ["motion", "enrich", str(path), "--robot", "panda", "--tare", "none", "--payload", "1"]
+    words += ["--out", str(tmp_path / "out.csv")]
+    alone, known = _said(words, capsys), _said([*words, "--profile", str(profile)], capsys)
+    assert np.all(np.array(known["half_width_before"]) < alone["half_width_before"])
+
+
+@pytest.mark.full
+def test_a_measurement_with_a_profile_is_relative_to_its_own_empty_run(profile, tmp_path, capsys):
+    save_motion(tmp_path / "m.json", taie2024().scaled(0.25))
+    words = ["measure", "sim", "--robot", "panda", "--speed", "max", "--method", "map-gp", "--world", "real-like:3"]
+    words += ["--motion", str(tmp_path / "m.json"), "--move", "--dir", str(tmp_path / "logs")]
+    said = _said([*words, "--profile", str(profile)], capsys)
+    assert said["relative_to"] == "tare"
+    assert said["mass"] == pytest.approx(make_payload().parameters.mass, abs=0.05)
+    logs = [str(tmp_path / "logs" / name) for name in ("loaded.csv", "empty.csv")]
+    words = ["identify", logs[0], "--robot", "panda", "--tare", logs[1], "--profile", str(profile)]
+    again = _said([*words, "--method", "map-gp"], capsys)
+    np.testing.assert_allclose(said["phi"], again["phi"], rtol=1e-9)

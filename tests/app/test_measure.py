@@ -12,6 +12,7 @@ import pytest
 
 from armload.app.cli import main
 from armload.arms import arm
+from armload.identification import identify
 from armload.motion import FourierMotion, save_motion, taie2024
 from armload.payloads import test_payload as held_payload
 from armload.recording import read_recording
@@ -64,6 +65,18 @@ def test_the_whole_way_prints_and_writes_the_answer(motion, tmp_path, capsys):
     assert not (tmp_path / "again" / "empty.csv").exists()
 
 
+@pytest.mark.full
+def test_with_a_known_tool_on_in_both_runs_the_answer_is_what_it_carries(motion, tmp_path, capsys):
+    arguments = ["--motion", motion, "--move", "--dir", str(tmp_path / "logs"), "--json", "--tool", "franka-hand"]
+    assert main(["measure", "sim", *QUICK, *arguments]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["mass"] == pytest.approx(1.48, abs=0.03)
+    assert np.allclose(said["com"], held_payload().parameters.com, atol=0.01)
+    # the log of the empty run shows the hand: the bare arm's model finds it there
+    hand = identify(tmp_path / "logs" / "empty.csv", "panda", method="map")
+    assert hand.mass == pytest.approx(0.73, abs=0.1)
+
+
 def test_without_a_motion_one_about_the_present_pose_is_designed(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     pose = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]
@@ -79,6 +92,10 @@ def test_without_a_motion_one_about_the_present_pose_is_designed(tmp_path, monke
     [
         (["--motion", "MOTION"], "nothing was moved: nobody is at a terminal to agree"),
         (["--motion", "MOTION", "--move", "--floor", "0.6"], "the arm hits the floor"),
+        (["--motion", "MOTION", "--move", "--box", "0.5,0,0.6,0.3,0.3,0.3"], "the arm hits a box"),
+        (["--at", "0,-0.5,0,-2,0,1.6,0.8", "--move", "--box", "0.5,0,0.6,0.3,0.3,0.3"], "is at box 1"),
+        (["--motion", "MOTION", "--move", "--tool", "franka-hand", "--tare", "t.csv"], "--tool and --tare together"),
+        (["--motion", "MOTION", "--move", "--tool", "franka-hand", "--mounted", "nothing"], "give one of them"),
         (["--motion", "MOTION", "--move", "--until", "weight=10g"], "is no accuracy: expected"),
         (["--motion", "MOTION", "--move", "--apply"], "takes no payload: leave out --apply"),
         (["--motion", "MOTION", "--move", "--tare-age", "1d"], "there is no --tare"),

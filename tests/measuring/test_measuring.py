@@ -9,7 +9,7 @@ import pytest
 from armload.devices import SimulatedMover, Thresholds
 from armload.errors import RecordingError, SafetyError, SourceError, UsageError
 from armload.estimators import Estimate
-from armload.excitation import Accuracy
+from armload.excitation import Accuracy, Obstacle
 from armload.inertia import InertialParameters
 from armload.measuring import Procedure, plan_of
 from armload.measuring.plan import BACK, EMPTY, LOADED, TO_START
@@ -145,6 +145,38 @@ class Restless(SimulatedMover):
             if self.movements == 2 and self.count == 100:
                 self.do(self)
             yield sample
+
+
+def test_a_box_in_the_way_is_refused_before_anybody_is_asked(panda, simulated, tmp_path):
+    mover, orders = simulated(), Orders()
+    place = panda.frame_pose(MOTION.position(np.array([1.5])))[1][0]
+    box = Obstacle((float(place[0]), float(place[1]), float(place[2])), (0.1, 0.1, 0.1))
+    procedure = Procedure(mover, panda, MOTION, tmp_path / "logs", boxes=[box])
+    with pytest.raises(SafetyError, match=r"the arm hits a box: .* is at box 1 at t = "):
+        procedure.run(orders.consent, orders.mount(mover))
+    assert orders.seen == []
+    assert not (tmp_path / "logs").exists()
+    np.testing.assert_allclose(poses(mover), np.tile(START, (60, 1)), atol=2e-3)
+
+
+def test_a_plan_says_how_near_the_payload_comes_to_a_wall(panda):
+    wall = Obstacle((3.0, 0.0, 0.5), (2.0, 10.0, 10.0))  # its face is at x = 2 m
+    plan = plan_of(panda, MOTION, START, boxes=[wall])
+    rotation, place = panda.frame_pose(MOTION.position(np.linspace(0.0, MOTION.duration, 2001)))
+    ball = place + 0.1 * rotation[:, :, 2]  # of 0.15 m, the farthest in front
+    assert plan.to_dict()["box_clearance"] == pytest.approx(2.0 - 0.15 - ball[:, 0].max(), abs=1e-4)
+    assert "nearest to a box: " in str(plan)
+    assert plan_of(panda, MOTION, START).to_dict()["box_clearance"] is None
+
+
+def test_movements_are_checked_with_the_payload_that_was_weighed(panda):
+    light, rated = (plan_of(panda, MOTION, START, heaviest=kg).legs[0].check for kg in (0.5, None))
+    assert panda.rated_payload is not None
+    t = np.linspace(0.0, MOTION.duration, 3001)
+    q, dq, ddq = MOTION(t)
+    body = InertialParameters.from_com(0.5, (0.0, 0.0, 0.1), 0.4 * 0.5 * 0.05**2 * np.eye(3))
+    np.testing.assert_allclose(light.peak["torque"], np.abs(panda.with_payload(body).torque(q, dq, ddq)).max(axis=0))
+    assert light.peak["torque"][1] < rated.peak["torque"][1]
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -99,6 +99,11 @@ class Criterion:
         return 2 if self._designed_tare == "own" else 1
 
     @property
+    def designs_tare(self) -> bool:
+        """Whether the empty run is designed with the loaded one, at the same place."""
+        return self._designed_tare is not None
+
+    @property
     def prior_half_width(self) -> NDArray[np.float64]:
         """Of the 95 % intervals before the run (10,)."""
         return Z95 * self._prior.std

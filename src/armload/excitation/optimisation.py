@@ -25,6 +25,7 @@ from armload.errors import MotionError
 from armload.excitation.constraints import LONGEST, SHORTEST, Constraints
 from armload.excitation.criterion import Criterion, Told
 from armload.excitation.penalty import Penalty
+from armload.excitation.promise import promised
 from armload.excitation.track import Track
 from armload.excitation.tube import Tube
 from armload.excitation.verification import Used, used
@@ -49,12 +50,14 @@ class Design:
     """A designed motion, what it tells, and what it uses of its limits.
 
     motion: the loaded run. empty: the empty run that goes with it; None: it is the loaded run's own motion, or none.
-    half_width: of the 95 % intervals (10,) at best. used: of each limit, the most first. evaluations: of the gradient.
+    half_width: of the 95 % intervals (10,) at best. promised: what nine in ten arms stay within (`promise.py`).
+    used: of each limit, the most first. evaluations: of the gradient.
     """
 
     motion: SplineMotion
     empty: SplineMotion | None
     half_width: NDArray[np.float64]
+    promised: NDArray[np.float64]
     information: float
     used: list[Used]
     evaluations: int
@@ -104,10 +107,12 @@ def design_motion(
         for c, t, label in zip(problem.points(x), times, names, strict=False)
     ]
     told = problem.told(motions)
+    assert constraints.payload is not None
     return Design(
         motions[0],
         motions[1] if len(motions) > 1 else None,
         told.half_width,
+        promised(criterion, told.half_width, constraints.payload),
         told.value,
         used(constraints, motions[0]),
         problem.evaluations,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from armload.arms import Arm
 from armload.devices.mover import AT_START
 from armload.errors import SafetyError
+from armload.excitation import Obstacle, PayloadRange, Surroundings
+from armload.inertia import InertialParameters
 from armload.motion import Motion, MotionCheck, StraightMotion, check_motion, rated_load
 
 APPROACH = (
@@ -24,11 +27,12 @@ _TOO_MANY = 100_000  # samples of a check
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """One movement: what it is for, the motion, and what the check of it found."""
+    """One movement: what it is for, the motion, what the check of it found, and how near it comes to a box [m]."""
 
     purpose: str
     motion: Motion
     check: MotionCheck
+    box_clearance: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +96,9 @@ class Plan:
             distance = min(getattr(leg.check, f"{what}_clearance") for leg in self.legs)
             if np.isfinite(distance):
                 lines.append(f"nearest to {'itself' if what == 'self' else 'the floor'}: {distance:.3f} m")
+        to_box = min(leg.box_clearance for leg in self.legs)
+        if np.isfinite(to_box):
+            lines.append(f"nearest to a box: {to_box:.3f} m")
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:
@@ -105,6 +112,7 @@ class Plan:
             ],
             "tool_box": self.tool.tolist(),
             "tool_speed": self.speed,
+            "box_clearance": distance if np.isfinite(distance := min(leg.box_clearance for leg in self.legs)) else None,
             "problems": [problem for leg in self.legs for problem in leg.check.problems],
         }
 
@@ -120,17 +128,21 @@ def plan_of(
     empty_run: bool = True,
     empty_motion: Motion | None = None,
     floor: float | None = 0.0,
+    boxes: Sequence[Obstacle] = (),
+    heaviest: float | None = None,
     approach: float = APPROACH,
 ) -> Plan:
     """The movements of a measurement by an arm that stands.
 
     Args:
-        arm: bare, or with what is mounted; each movement is checked with the rated payload.
+        arm: bare, or with the tool that is mounted in all runs.
         motion: from rest to rest.
         at: where the arm is commanded to be (n,) [rad].
         empty_run: whether the motion is run without the payload first.
         empty_motion: what is run then; None: the same motion.
         floor: height of the floor in the base's frame [m]; None: there is none.
+        boxes: what stands around; the arm, and a ball of 0.15 m around the payload, must not touch them.
+        heaviest: the payload that each movement is checked with [kg]; None: the rated one.
         approach: how far a joint may be from the motion's start [rad].
 
     Raises:
@@ -138,6 +150,7 @@ def plan_of(
         MotionError: the motion is of another arm.
     """
     here, legs = np.asarray(at, dtype=float), []
+    check = _Check(arm, floor, boxes, heaviest)
 
     def add(purpose: str, way: Motion) -> None:
         nonlocal here
@@ -151,8 +164,8 @@ def plan_of(
                     f"{approach:g} rad of --approach: move the arm nearer to {np.round(start, 2).tolist()}, or allow "
                     "more"
                 )
-            legs.append(_way(arm, here, start, TO_START if not legs else BACK, floor))
-        legs.append(Leg(purpose, way, _checked(arm, way, floor)))
+            legs.append(_way(check, here, start, TO_START if not legs else BACK))
+        legs.append(check(purpose, way))
         here = way.position([way.duration])[0]
 
     if empty_run:
@@ -165,19 +178,39 @@ def plan_of(
     return Plan(arm, tuple(legs), np.stack([every.min(axis=0), every.max(axis=0)]), float(max(steps)))
 
 
-def _way(arm: Arm, here: NDArray[np.float64], there: NDArray[np.float64], purpose: str, floor: float | None) -> Leg:
-    """The straight way between two poses, slower where the arm is not strong enough for it with its rated payload."""
+class _Check:
+    """Makes legs of motions: checks each of them, in one room and with one payload."""
+
+    def __init__(self, arm: Arm, floor: float | None, boxes: Sequence[Obstacle], heaviest: float | None) -> None:
+        self.arm, self._floor = arm, floor
+        self._load: InertialParameters | None = rated_load(arm)
+        if heaviest is not None:
+            self._load = PayloadRange(heaviest).payload(1.0, np.zeros(3))
+        self._around = Surroundings(arm, None, tuple(boxes)) if boxes else None
+
+    def __call__(self, purpose: str, motion: Motion) -> Leg:
+        rate = min(_SAMPLES, _TOO_MANY / motion.duration)
+        seldom = min(rate, _CLEARANCES)
+        found = check_motion(self.arm, motion, self._load, floor=self._floor, rate=rate, collision_rate=seldom)
+        if self._around is None:
+            return Leg(purpose, motion, found)
+        t = _times(motion, seldom)
+        q = motion.position(t)
+        distance = self._around.clearance(q)[:, 2]
+        k = int(distance.argmin())
+        if distance[k] <= 0.0:
+            what = f"{self._around.nearest(q[k : k + 1], 2)} at t = {t[k]:.2f} s, {distance[k]:.3f} m"
+            found = replace(found, problems=[*found.problems, f"the arm hits a box: {what}"])
+        return Leg(purpose, motion, found, float(distance[k]))
+
+
+def _way(check: _Check, here: NDArray[np.float64], there: NDArray[np.float64], purpose: str) -> Leg:
+    """The straight way between two poses, slower where the arm is not strong enough for it with its payload."""
     for share in _SHARES:
-        way = StraightMotion.slow(arm, here, there, share, "a straight line in joint space")
-        leg = Leg(purpose, way, _checked(arm, way, floor))
+        leg = check(purpose, StraightMotion.slow(check.arm, here, there, share, "a straight line in joint space"))
         if not leg.check.problems:
             break
     return leg
-
-
-def _checked(arm: Arm, motion: Motion, floor: float | None) -> MotionCheck:
-    rate = min(_SAMPLES, _TOO_MANY / motion.duration)
-    return check_motion(arm, motion, rated_load(arm), floor=floor, rate=rate, collision_rate=min(rate, _CLEARANCES))
 
 
 def _times(motion: Motion, rate: float) -> NDArray[np.float64]:

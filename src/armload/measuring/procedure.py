@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,14 +17,14 @@ from armload.devices.mover import AT_START, Mover, samples_of_movement
 from armload.devices.recorder import Recorder
 from armload.devices.supervision import Thresholds
 from armload.errors import RecordingError, SafetyError, SourceError
-from armload.excitation import Accuracy
+from armload.excitation import Accuracy, Obstacle
 from armload.identification import Identification, identify
 from armload.inertia import Z95
 from armload.measuring.interruption import held_back
 from armload.measuring.plan import APPROACH, BACK, EMPTY, LOADED, TO_START, Plan, plan_of
 from armload.motion import Motion
 from armload.online import OnlineIdentifier
-from armload.posterior import KnownMass
+from armload.posterior import KnownMass, Profile
 from armload.recording import Recording, Sample, read_recording
 
 ENOUGH = "the accuracy asked for is reached"
@@ -61,15 +61,16 @@ class Procedure:
 
     Args:
         mover: the arm, at rest.
-        arm: which it is: bare, or with a tool that is known.
+        arm: which it is: bare, or with a tool that is known and mounted in both runs.
         motion: what is run, from rest to rest; empty_motion: what is run without the payload (None: the same).
         folder: for the logs `empty.csv` and `loaded.csv`, which must not exist.
         tare: a log of the empty arm: there is no empty run, and the payload is on already.
         tare_age: how old that is [s]; None: by the logs' clocks.
-        mass: of the payload, where it was weighed.
+        profile: what many logs said of this arm.
+        mass: of the payload, where it was weighed: 3 sigma more is what the movements are checked with.
         method: of the identification.
         accuracy: the loaded run ends when it is reached; None: with the motion.
-        floor, approach: see `plan_of`.
+        floor, boxes, approach: see `plan_of`.
         thresholds: where a movement is stopped.
         say: told what is being done.
 
@@ -89,10 +90,12 @@ class Procedure:
         empty_motion: Motion | None = None,
         tare: Recording | None = None,
         tare_age: float | None = None,
+        profile: Profile | None = None,
         mass: KnownMass | None = None,
         method: str | Path | None = None,
         accuracy: Accuracy | None = None,
         floor: float | None = 0.0,
+        boxes: Sequence[Obstacle] = (),
         approach: float = APPROACH,
         thresholds: Thresholds | None = None,
         say: Callable[[str], None] = lambda _: None,
@@ -100,7 +103,9 @@ class Procedure:
         self.mover, self.arm, self.motion, self.empty_motion = mover, arm, motion, empty_motion
         self.folder, self.tare, self.tare_age, self.mass, self.method = Path(folder), tare, tare_age, mass, method
         self.accuracy, self.thresholds, self._say = accuracy, thresholds or Thresholds(), say
-        self._room = {"floor": floor, "approach": approach}
+        self.profile = profile
+        heaviest = None if mass is None else mass.mass + 3.0 * mass.std
+        self._room = {"floor": floor, "boxes": boxes, "heaviest": heaviest, "approach": approach}
         for path in (self.folder / "empty.csv", self.folder / "loaded.csv"):
             if path.exists():
                 raise RecordingError(f"{path} exists: a log is never written over; name another folder")
@@ -142,7 +147,8 @@ class Procedure:
         finally:
             identifier.close()
         self._say("identifying")
-        answer = identify(loaded, self.arm, tare=tare, tare_age=self.tare_age, mass=self.mass, method=self.method)
+        known = {"mass": self.mass, "profile": self.profile, "method": self.method}
+        answer = identify(loaded, self.arm, tare=tare, tare_age=self.tare_age, **known)
         reached = None
         if self.accuracy is not None:
             half_width = Z95 * np.sqrt(np.maximum(np.diag(answer.covariance), 0.0))
@@ -183,7 +189,7 @@ class Procedure:
 
     def _warm(self, tare: Recording) -> OnlineIdentifier:
         """An identifier that has compiled and loaded what it needs, and has seen nothing."""
-        identifier = OnlineIdentifier(self.arm, tare, self.method)
+        identifier = OnlineIdentifier(self.arm, tare, self.method, self.profile)
         short = tare.between(tare.t[0], tare.t[0] + _WARM_UP)
         for row in zip(short.t, short.q, short.dq, short.tau, strict=True):
             identifier.update(*row)

@@ -136,6 +136,7 @@ def _fields(
         "units": UNITS,
         "prior_half_width": criterion.prior_half_width.tolist(),
         "half_width": found.half_width.tolist(),
+        "promised_half_width": found.promised.tolist(),
         "used": {what: one.share for what, one in _largest(found).items()},
         "nearest_limit": found.used[0].text,
     }
@@ -144,7 +145,8 @@ def _fields(
 def _print(found: Design, constraints: Constraints, criterion: Criterion, words: str) -> None:
     motion = found.motion
     print(f"{motion.name}: {motion.duration:g} s on {constraints.arm.name}, {words}")
-    print_widths(["before", f"{motion.duration:g} s"], [criterion.prior_half_width, found.half_width])
+    titles = ["before", f"{motion.duration:g} s at best", "9 arms in 10"]
+    print_widths(titles, [criterion.prior_half_width, found.half_width, found.promised])
     rows = table(f"what it uses of the limits, at most {constraints.share:g} of each", "limit", "share of it", "where")
     for what, one in _largest(found).items():
         rows.add_row(what, f"{one.share:.3f}", one.text)
@@ -153,10 +155,10 @@ def _print(found: Design, constraints: Constraints, criterion: Criterion, words:
 
 
 def print_widths(titles: list[str], widths: list[Any]) -> None:
-    """A row for each parameter: 95 % half-widths at best."""
+    """A row for each parameter: 95 % half-widths."""
     from armload.inertia import NAMES, UNITS
 
-    rows = table("95 % half-widths at best", "parameter", "unit", *titles, left=2)
+    rows = table("95 % half-widths", "parameter", "unit", *titles, left=2)
     for k, (name, unit) in enumerate(zip(NAMES, UNITS, strict=True)):
         rows.add_row(name, unit, *(f"{width[k]:.5f}" for width in widths))
     console().print(rows)

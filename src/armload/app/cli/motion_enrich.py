@@ -99,7 +99,7 @@ def run_enrich(options: argparse.Namespace) -> int:
         f"{found.motion.name}: {found.motion.duration:g} s on {arm.name}, {words}; at most "
         f"{1e3 * found.distance:.2g} mm and {np.rad2deg(found.angle):.2g}° off the path"
     )
-    print_widths(["as it was", "enriched"], [found.before, found.after])
+    print_widths(["as it was, at best", "enriched, at best"], [found.before, found.after])
     print_note(f"wrote {out}; run it slowly first")
     return 0
 

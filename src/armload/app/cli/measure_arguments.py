@@ -1,0 +1,141 @@
+"""What `armload measure` is asked."""
+
+from __future__ import annotations
+
+import argparse
+
+from armload.app.cli.arguments import (
+    Parser,
+    add_arm_arguments,
+    add_column_arguments,
+    add_tare_and_mass_arguments,
+    at_least,
+    file_name,
+)
+from armload.app.cli.motion_arguments import box
+
+_EXAMPLES = """\
+examples:
+  armload measure sim --dry-run
+  armload measure sim --motion taie2024 --dry-run
+  armload measure sim --motion taie2024 --move --speed max
+  armload measure fr3://172.16.0.2 --motion excite.json --until mass=10g,moment=1.5g.m
+  armload measure ur://192.168.0.10 --robot ur10e --motion random:1 --mass 1.200±0.002 --out payload.json
+  armload measure ros2:///joint_states --robot ur5e --motion excite.json --tare empty.csv
+
+What will move, how far and how fast is said first, and nothing moves until you type yes (or give --move). Ctrl-C stops
+the arm on its path. Keep the emergency stop at hand: nothing here knows what stands around the arm but the floor and
+the boxes that --box names.
+"""
+
+
+def parser() -> Parser:
+    """The arguments of `armload measure`."""
+    parser = Parser(
+        prog="armload measure",
+        description="Move the arm without and with the payload, and identify it: the whole procedure in one command.",
+        epilog=_EXAMPLES,
+    )
+    add = parser.add_argument
+    add(
+        "source",
+        type=file_name,
+        metavar="SOURCE",
+        help="sim, fr3://ADDRESS, panda://ADDRESS, ur://ADDRESS or ros2:///TOPIC",
+    )
+    add_arm_arguments(parser, required=False)
+    add(
+        "--motion",
+        metavar="MOTION",
+        help="taie2024, a JSON or CSV file, or random:SEED (default: designed about the present pose)",
+    )
+    add("--time", type=at_least(0.2, float, 60.0), default=2.0, metavar="S", help="of a motion that is designed (2)")
+    add(
+        "--tool-speed",
+        type=at_least(0.01, float),
+        default=0.5,
+        metavar="V",
+        help="of the payload frame in a motion that is designed, at most [m/s] (0.5)",
+    )
+    add("--dry-run", action="store_true", help="connect, say what would move and check it; move nothing")
+    add("--move", action="store_true", help="move without asking: for who has seen the dry run")
+    add("--until", metavar="WIDTHS", help="stop when 95%% half-widths are mass=10g,moment=1.5g.m,inertia=1e-3")
+    add("--dir", type=file_name, metavar="DIR", help="folder of the logs (default: measurement-DATE-TIME)")
+    add(
+        "--tare", type=file_name, metavar="LOG0", help="a log of the empty arm: no empty run, the payload is on already"
+    )
+    add_tare_and_mass_arguments(parser)
+    add("--profile", type=file_name, metavar="P", help="what many logs said of this arm (armload profile)")
+    add(
+        "--tool",
+        type=file_name,
+        metavar="FILE",
+        help="a known tool that is on in both runs (JSON, or franka-hand); the answer is what it carries",
+    )
+    add("--method", type=file_name, metavar="M", help="a name `armload methods` lists, or a trained model's path")
+    add("--grip", metavar="COMMAND", help="a command that mounts the payload; else you are asked to")
+    add_column_arguments(parser)
+    safety = parser.add_argument_group("what is allowed").add_argument
+    safety(
+        "--floor", type=_floor, default=0.0, metavar="Z|none", help="height of the floor in the base's frame [m] (0)"
+    )
+    safety(
+        "--box",
+        type=box,
+        action="append",
+        default=[],
+        metavar="X,Y,Z,SX,SY,SZ",
+        help="an obstacle in the base's frame [m]; repeat for more",
+    )
+    safety("--approach", type=at_least(0.0, float), metavar="RAD", help="how far a joint may be from the start (1)")
+    safety("--off-path", type=at_least(1e-3, float), default=0.05, metavar="RAD", help="more stops the arm (0.05)")
+    safety(
+        "--push",
+        type=at_least(0.01, float),
+        metavar="SHARE",
+        help="of a joint's rated torque, beside a rated payload's; more stops the arm (0.15; motor currents: 0.5)",
+    )
+    answer = parser.add_argument_group("the answer").add_argument
+    answer("--json", action="store_true", help="print one JSON object and nothing else")
+    answer("--out", type=file_name, metavar="FILE", help="write the answer as JSON, whole or not at all")
+    answer("--apply", action="store_true", help="write it to the controller, too (UR, Franka)")
+    answer("--mounted", metavar="FILE", help="what was on at the empty run: JSON, franka-hand, or nothing; for --apply")
+    answer(
+        "--undetermined-inertia",
+        action="store_true",
+        help="--apply writes inertia that the runs did not determine, too",
+    )
+    sim = parser.add_argument_group("the simulator (sim)").add_argument
+    sim("--payload", default="test", metavar="FILE", help="what is mounted: JSON, franka-hand, or test (test)")
+    sim(
+        "--world", default="real-like:0", metavar="W", help="the arm as it is: nominal, or real-like:SEED (real-like:0)"
+    )
+    sim(
+        "--at",
+        type=_pose,
+        metavar="Q1,…",
+        help="where it stands [rad] (default: where the motion begins, else the middle of the joints)",
+    )
+    sim("--speed", type=_speed, default=1.0, metavar="X|max", help="1: real time")
+    sim("--seed", type=at_least(0), default=0, metavar="N", help="of the sensors' noise (0)")
+    return parser
+
+
+def _floor(text: str) -> float | None:
+    if text == "none":
+        return None
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a height: expected metres, or none") from None
+
+
+def _pose(text: str) -> list[float]:
+    try:
+        return [float(x) for x in text.split(",")]
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a pose: expected radians, separated by commas") from None
+
+
+def _speed(text: str) -> float | None:
+    return None if text == "max" else at_least(0.01, float)(text)

@@ -1,0 +1,46 @@
+"""What a bound comes to: the torque's own calibration, the side it is measured on, and what was known before."""
+
+import numpy as np
+import pytest
+
+from armload.arms import arm
+from armload.errors import MotionError
+from armload.excitation import Accuracy, Constraints, Criterion, PayloadRange, design_until
+from armload.excitation.promise import of_gain, promised
+
+READY = np.array([0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8])
+LITTLE = np.full(10, 1e-9)
+
+
+@pytest.mark.parametrize(("name", "share"), [("panda", 0.005), ("ur10e", 0.02)])
+def test_no_motion_promises_a_mass_better_than_the_torque_is_calibrated(name, share):
+    criterion, payload = Criterion(arm(name)), PayloadRange(2.0)
+    found = promised(criterion, LITTLE, payload)
+    assert found[0] == pytest.approx(1.959964 * share * 2.0, rel=1e-6)
+    rng = np.random.default_rng(0)
+    for _ in range(20):  # any payload of the range, at any share of its mass
+        phi = payload.payload(rng.uniform(), rng.uniform(-1.0, 1.0, 3)).phi
+        assert np.all(1.959964 * share * np.abs(phi) <= found * (1.0 + 1e-9))
+
+
+def test_nothing_held_leaves_nothing_to_the_gain():
+    assert not of_gain(Criterion(arm("panda")), PayloadRange(0.0)).any()
+
+
+def test_motor_currents_promise_less_than_torque_sensors_do_for_the_same_bound():
+    width, nothing = np.full(10, 1e-3), PayloadRange(0.0)
+    motor, link = (promised(Criterion(arm(name)), width, nothing) for name in ("ur10e", "panda"))
+    assert np.all(motor > 4.0 * link)
+
+
+def test_no_promise_is_wider_than_what_was_known_before():
+    criterion = Criterion(arm("ur10e"))
+    before = criterion.prior_half_width
+    np.testing.assert_allclose(promised(criterion, before, PayloadRange(0.0)), before)
+
+
+def test_what_the_gain_alone_does_not_allow_is_refused_and_a_lighter_payload_named():
+    panda = arm("panda")
+    keep = Constraints(panda, READY, share=0.7, payload=PayloadRange(3.0))
+    with pytest.raises(MotionError, match=r"calibrated to 0.5 % .*leaves 2.94 times .*less than 1 kg would do"):
+        design_until(keep, Criterion(panda), Accuracy(mass=0.01))
