@@ -98,10 +98,10 @@ def parser() -> Parser:
 def run(options: argparse.Namespace) -> int | None:
     """Identify until the source ends (--headless) or somebody interrupts; 2 after an error."""
     from armload.app.cli.headless import lines
-    from armload.app.page.session import Session
     from armload.devices import open_source
     from armload.posterior import load_profile
     from armload.recording import ColumnSpec, check_own_measurements, has_topics
+    from armload.service.session import Session
 
     options.robot = options.robot or robot_of(options.source)
     arm = _arm_of(options)
