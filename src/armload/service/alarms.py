@@ -12,6 +12,7 @@ RAISED_AFTER = (
 )
 CLEARED_AFTER = 5.0  # [s] it does not hold before the alarm is over: a limit that is grazed gives one alarm
 KINDS = ("over_rating", "com_out_of_range", "arm_changed", "source_lost")
+STARTS = 30.0  # [s] a source may take to give its first sample: a process, a reader and a robot that connects
 # why an arm is not heard of; all others are of a source that works
 _LOST = ("starting", "source lost", "silent")
 
@@ -48,7 +49,8 @@ class Alarms:
     """What becomes an alarm of one arm's answers.
 
     A condition must hold for 0.5 s to raise its alarm, and must not hold for 5 s to clear it. While the answer is
-    unknown, nobody knows whether a mass is over the rating: then neither begins nor ends.
+    unknown, nobody knows whether a mass is over the rating: then neither begins nor ends. A source counts as lost 0.5 s
+    after its last sample is half a second old, and where it never came, after 30 s.
 
     >>> alarms = Alarms("left", rating=3.0)
     >>> heavy = {"known": True, "mass": 3.4, "com": [0.0, 0.0, 0.1]}
@@ -76,7 +78,8 @@ class Alarms:
             if holds == was:
                 self._since.pop(kind, None)
             return None
-        if now - self._since.setdefault(kind, now) < (RAISED_AFTER if holds else CLEARED_AFTER):
+        lasts = CLEARED_AFTER if not holds else STARTS if answer.get("unknown") == "starting" else RAISED_AFTER
+        if now - self._since.setdefault(kind, now) < lasts:
             return None
         del self._since[kind]
         (self.raised.add if holds else self.raised.discard)(kind)
@@ -106,6 +109,8 @@ class Alarms:
         return said is not None, said or "the arm is as it was", None, None
 
     def _source_lost(self, answer: Mapping[str, Any]) -> _Found:
+        if answer.get("unknown") == "compiling":
+            return None, "", None, None
         lost = answer.get("unknown") in _LOST
         return lost, answer.get("why") or "samples come again", None, None
 

@@ -51,6 +51,7 @@ class ArmProcess:
     def run(self) -> None:
         """Until the source or standard input ends."""
         self._say(None, Why(Unknown.STARTING, "the source is being opened"))
+        self.source.start()  # it is opened while the state is read
         self.session = session = self._made_session()
         self._saved = time.monotonic()
         try:
@@ -123,11 +124,10 @@ class ArmProcess:
             while data:
                 data = data[os.write(1, data) :]
 
-    def _opens(self, connections: int) -> Detached:
-        settings, record = self.settings, self.settings.record
-        if record is not None:
-            record = next_free(record)
-        more = {"rate": settings.rate} if settings.source == "sim" else {}
+    def _opens(self) -> Detached:
+        settings = self.settings
+        record = None if settings.record is None else next_free(settings.record)
+        more: dict[str, Any] = {"rate": settings.rate} if settings.source == "sim" else {}
         return Detached(settings.source, self.arm, record=record, speed=1.0, loop=settings.loop, **more)
 
     def _made_arm(self) -> Arm:

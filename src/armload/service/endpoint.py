@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hmac
 import json
 import queue
@@ -33,8 +34,8 @@ class Endpoint:
     | `/stream`, `/stream/NAME` | lines of JSON, as on standard output, until the client goes |
 
     Args:
-        service: what to ask. host, port: 0: a free one. token: a request must bring `Authorization: Bearer TOKEN`; None:
-            none is needed, and then only requests to a name of this machine are answered, so that no web page can have
+        service: what to ask. host, port: 0: a free one. token: a request must bring `Authorization: Bearer TOKEN`.
+            None: none is needed, and then only requests to a name of this machine are answered, so that no web page can have
             its visitor's browser ask.
 
     Raises:
@@ -158,9 +159,7 @@ def _into(lines: queue.Queue[dict[str, Any]]) -> Callable[[dict[str, Any]], None
             try:
                 return lines.put_nowait(line)
             except queue.Full:
-                try:
+                with contextlib.suppress(queue.Empty):
                     lines.get_nowait()
-                except queue.Empty:
-                    pass
 
     return put

@@ -24,7 +24,7 @@ class Reconnecting(Source):
     the newest sample, and those in between count as lost. A source that ends by itself, as a log does, has ended.
 
     Args:
-        opens: opens the source; called with the number of connections there were before.
+        opens: opens the source.
         first: the connection to begin with; None: it is opened when samples are asked for.
         said: called with a sentence whenever it is lost and whenever it is there again.
         name, n, rate: what is known of it before it is open.
@@ -37,7 +37,7 @@ class Reconnecting(Source):
 
     def __init__(
         self,
-        opens: Callable[[int], Detached],
+        opens: Callable[[], Detached],
         first: Detached | None = None,
         said: Callable[[str], None] | None = None,
         *,
@@ -53,6 +53,8 @@ class Reconnecting(Source):
         self._opens, self._said = opens, said or (lambda _: None)
         self._source: Detached | None = None
         self._arrived: float | None = None
+        self._trial: threading.Thread | None = None
+        self._made: Detached | Exception | None = None  # by the trial
         self._lost, self._late, self._gone = 0, 0.0, threading.Event()
         self._transit, self._backoff = Transit(), Backoff()
         if first is not None:
@@ -70,6 +72,20 @@ class Reconnecting(Source):
 
     def __iter__(self) -> Iterator[Sample]:
         return (sample for sample in self.samples(1.0) if sample is not None)
+
+    def start(self) -> None:
+        """Begin to open the source, in a thread; `samples` does so itself."""
+        if self._source is not None or self._trial is not None:
+            return
+
+        def trial() -> None:
+            try:
+                self._made = self._opens()
+            except (ArmloadError, OSError) as error:
+                self._made = error
+
+        self._trial = threading.Thread(target=trial, daemon=True)
+        self._trial.start()
 
     def samples(self, tick: float) -> Iterator[Sample | None]:
         """The samples of all connections, and None every `tick` seconds while there is none."""
@@ -137,41 +153,37 @@ class Reconnecting(Source):
         source, self._source = self._source, None
         assert source is not None
         self._lost += source.lost
-        yield from self._beside(source.close, tick)
+        thread = threading.Thread(target=source.close, daemon=True)  # a reader that hangs takes 3 s
+        thread.start()
+        yield from _joined(thread, tick)
         yield from self._waited(wait, tick)
 
     def _opened(self, tick: float) -> Iterator[None]:
         """Open it beside, as that may take ten seconds."""
-        made: list[Detached] = []
-        failed: list[str] = []
-
-        def trial() -> None:
-            try:
-                made.append(self._opens(self.connections))
-            except (ArmloadError, OSError) as error:
-                failed.append(str(error))
-
-        yield from self._beside(trial, tick)
-        if made and self._gone.is_set():
-            made[0].close()
-        elif made:
-            self._take(made[0])
+        self.start()
+        assert self._trial is not None
+        yield from _joined(self._trial, tick)
+        made, self._trial, self._made = self._made, None, None
+        if isinstance(made, Detached):
+            if self._gone.is_set():
+                made.close()
+            self._take(made)
             self._transit = Transit()
-        elif failed:
-            self.state, self.why = "lost", failed[0]
+        else:
+            self.state, self.why = "lost", str(made)
             wait = self._backoff.failed(0.0)
-            self._said(f"{failed[0]}; it is tried again in {wait:.1f} s")
+            self._said(f"{made}; it is tried again in {wait:.1f} s")
             yield from self._waited(wait, tick)
-
-    def _beside(self, what: Callable[[], None], tick: float) -> Iterator[None]:
-        thread = threading.Thread(target=what, daemon=True)
-        thread.start()
-        while thread.is_alive():
-            thread.join(tick)
-            if thread.is_alive():
-                yield None
 
     def _waited(self, wait: float, tick: float) -> Iterator[None]:
         until = time.monotonic() + wait
         while (left := until - time.monotonic()) > 0 and not self._gone.wait(min(left, tick)):
+            yield None
+
+
+def _joined(thread: threading.Thread, tick: float) -> Iterator[None]:
+    """None every tick until a thread has ended."""
+    while thread.is_alive():
+        thread.join(tick)
+        if thread.is_alive():
             yield None

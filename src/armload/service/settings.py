@@ -91,7 +91,8 @@ class ServiceSettings:
             raise UsageError(f"two arms are called {doubled[0]!r}: give each a name of its own")
         if self.port is not None and self.token is None and not is_loopback(self.host):
             raise UsageError(
-                f"the endpoint at {self.host} can be reached from other machines: give it a token, or the host 127.0.0.1"
+                f"the endpoint at {self.host} can be reached from other machines: "
+                "give it a token, or the host 127.0.0.1"
             )
 
 

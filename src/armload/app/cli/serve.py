@@ -8,6 +8,7 @@ import queue
 import signal
 import sys
 import threading
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -151,7 +152,7 @@ class _Output:
                 except queue.Empty:
                     continue
 
-    def start(self, stop) -> None:
+    def start(self, stop: Callable[[], None]) -> None:
         def write() -> None:
             while (line := self._lines.get()) is not None:
                 try:
@@ -159,7 +160,8 @@ class _Output:
                     sys.stdout.flush()
                 except OSError:
                     self.broken = True
-                    return stop()
+                    stop()
+                    return
 
         self._thread = threading.Thread(target=write, daemon=True)
         self._thread.start()
