@@ -35,8 +35,8 @@ class Endpoint:
 
     Args:
         service: what to ask. host, port: 0: a free one. token: a request must bring `Authorization: Bearer TOKEN`.
-            None: none is needed, and then only requests to a name of this machine are answered, so that no web page can have
-            its visitor's browser ask.
+            None: none is needed, and then only requests to a name of this machine are answered, so that no web page can
+            have its visitor's browser ask.
 
     Raises:
         UsageError: the port cannot be had.
