@@ -34,7 +34,7 @@ def source(panda, path):
 
 
 def test_a_reader_that_is_killed_and_one_that_stalls_are_replaced(source):
-    samples, seen = source.samples(0.05), []
+    samples, seen = source.ticking(0.05), []
     reader, hurt = None, 0
     for sample in samples:
         if sample is None:
@@ -57,7 +57,7 @@ def test_a_reader_that_is_killed_and_one_that_stalls_are_replaced(source):
 
 
 def test_whoever_was_away_goes_on_with_the_newest_sample(source):
-    samples = (sample for sample in source.samples(0.05) if sample is not None)
+    samples = (sample for sample in source.ticking(0.05) if sample is not None)
     before = next(samples).t
     time.sleep(1.5)
     next(samples)
@@ -72,7 +72,7 @@ def test_what_cannot_be_opened_is_tried_again_and_ends_when_told(panda, tmp_path
     later = tmp_path / "later.csv"
     source = Reconnecting(lambda: Detached(str(later), panda), name="arm", n=7)
     seen = []
-    for sample in source.samples(0.05):
+    for sample in source.ticking(0.05):
         if source.state == "lost" and not later.exists():
             assert "later.csv" in source.why
             path.rename(later)

@@ -143,9 +143,9 @@ class Detached(Source):
         self._leaves = True
 
     def __iter__(self) -> Iterator[Sample]:
-        return (sample for sample in self.samples(None) if sample is not None)
+        return (sample for sample in self.ticking(None) if sample is not None)
 
-    def samples(self, tick: float | None) -> Iterator[Sample | None]:
+    def ticking(self, tick: float | None) -> Iterator[Sample | None]:
         """The samples as they come, and None whenever none has come for `tick` seconds; tick None: never.
 
         Raises:

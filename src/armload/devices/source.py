@@ -42,7 +42,7 @@ class Source(ABC):
             SourceError: the connection was lost.
         """
 
-    def samples(self, tick: float) -> Iterator[Sample | None]:  # noqa: ARG002
+    def ticking(self, tick: float) -> Iterator[Sample | None]:  # noqa: ARG002
         """The same; None every `tick` seconds while none comes, where the source can tell (`Detached`)."""
         yield from self
 

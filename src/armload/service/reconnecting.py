@@ -71,10 +71,10 @@ class Reconnecting(Source):
         return None if self._source is None else self._source.process
 
     def __iter__(self) -> Iterator[Sample]:
-        return (sample for sample in self.samples(1.0) if sample is not None)
+        return (sample for sample in self.ticking(1.0) if sample is not None)
 
     def start(self) -> None:
-        """Begin to open the source, in a thread; `samples` does so itself."""
+        """Begin to open the source, in a thread; `ticking` does so itself."""
         if self._source is not None or self._trial is not None:
             return
 
@@ -87,7 +87,7 @@ class Reconnecting(Source):
         self._trial = threading.Thread(target=trial, daemon=True)
         self._trial.start()
 
-    def samples(self, tick: float) -> Iterator[Sample | None]:
+    def ticking(self, tick: float) -> Iterator[Sample | None]:
         """The samples of all connections, and None every `tick` seconds while there is none."""
         while not self._gone.is_set():
             if self._source is None:
@@ -95,7 +95,7 @@ class Reconnecting(Source):
                 continue
             began, stopped = time.monotonic(), None
             try:
-                for sample in self._source.samples(tick):
+                for sample in self._source.ticking(tick):
                     if self._gone.is_set():
                         return
                     if sample is None:

@@ -147,7 +147,7 @@ class Session:
             SourceError: the connection was lost.
         """
         first: float | None = None
-        for sample in self.source.samples(TICK):
+        for sample in self.source.ticking(TICK):
             while not self._orders.empty():
                 self._orders.get()()
             if sample is None:
