@@ -15,12 +15,11 @@ from scipy.spatial import KDTree
 
 from armload.app.cli import main
 from armload.app.cli.headless import lines
-from armload.app.page import History, Session, com_region, equivalent_box
+from armload.app.page import com_region, equivalent_box
 from armload.app.page.curves import AXES, GROUPS, HEIGHT, PADDING, data_of, series_of
 from armload.app.page.download import ENDINGS, file_of
 from armload.app.page.drawing import arm_parts, capsule, drum, edges, frame_poses
 from armload.app.page.page import Page, methods_for
-from armload.app.page.recent import Recent
 from armload.app.page.tables import com_std, events, headline, parameters, stream
 from armload.arms import arm as arm_named
 from armload.devices import FORMS, Detached, Recorded, Replay, Simulator, Source, open_source, read_load
@@ -30,6 +29,8 @@ from armload.inertia import InertialParameters
 from armload.online import OnlineIdentifier
 from armload.payloads import random_payload, solids, test_payload
 from armload.recording import Recording, Sample, read_recording, write_recording
+from armload.service import History, Session
+from armload.service.recent import Recent
 
 HELD = test_payload().parameters
 # what was started in the background of a shell is deaf to Ctrl-C, and so are its children

@@ -21,12 +21,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from armload.app.page import Session
 from armload.app.page.page import Page
 from armload.arms import arm as arm_named
 from armload.devices import Replay, Simulator, read_load
 from armload.payloads import test_payload
 from armload.recording import read_recording
+from armload.service import Session
 
 pytestmark = pytest.mark.full
 

@@ -95,6 +95,7 @@ class Detached(Source):
         self._received = b""
         self._listening = threading.Lock()  # held while events are read
         self._arrived: float | None = None
+        self._left, self._leaves = 0, False  # samples left out because newer ones were asked for; whether that is asked
         self._last: dict[str, Any] | None = None  # how it ended
         self._calls = 0
         command = [sys.executable, "-P", "-m", "armload.devices.reader_process"]
@@ -134,21 +135,44 @@ class Detached(Source):
 
     @property
     def lost(self) -> int:
-        """Samples this process was too slow to take."""
-        return self._reader.lost
+        """Samples this process was too slow to take, and those left out by `leave`."""
+        return self._reader.lost + self._left
+
+    def leave(self) -> None:
+        """Go on with the newest sample: what waits is left out, and counted among the lost."""
+        self._leaves = True
 
     def __iter__(self) -> Iterator[Sample]:
+        return (sample for sample in self.ticking(None) if sample is not None)
+
+    def ticking(self, tick: float | None) -> Iterator[Sample | None]:
+        """The samples as they come, and None whenever none has come for `tick` seconds; tick None: never.
+
+        Raises:
+            SourceError: the reader ended, or its source was lost.
+        """
         n = self.n
         while True:
+            silent = False
             with self._waiting:
                 if self._closed:
                     return
                 rows = self._reader.read()
-                if not len(rows) and not os.read(self._wake, 1 << 16) and self._reader.next >= self._ring.written:
-                    return self._raise_error_of_end()
-            for row in rows:
+                if not len(rows):
+                    silent = tick is not None and not select.select([self._wake], [], [], tick)[0]
+                    if not silent and not os.read(self._wake, 1 << 16) and self._reader.next >= self._ring.written:
+                        return self._raise_error_of_end()
+            if silent:
+                yield None
+            for k, row in enumerate(rows):
                 self._note(row[3 * n + 1 :])
                 yield Sample(float(row[0]), row[1 : n + 1], row[n + 1 : 2 * n + 1], row[2 * n + 1 : 3 * n + 1])
+                if self._leaves:
+                    self._leaves = False
+                    self._left += len(rows) - k - 1
+                    with self._waiting:
+                        self._left += 0 if self._closed else self._reader.leave()
+                    break
 
     def _note(self, beside: NDArray[np.float64]) -> None:
         """Keep what comes beside a sample."""

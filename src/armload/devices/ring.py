@@ -113,6 +113,11 @@ class RingReader:
         self.next += whole
         return values[:whole].view(np.float64)
 
+    def leave(self) -> int:
+        """Leave out all but the newest sample; how many those were, which do not count as lost."""
+        before, self.next = self.next, max(self.next, self._ring.written - 1)
+        return self.next - before
+
     def _skip(self, oldest: int) -> None:
         if oldest > self.next:
             self.lost += oldest - self.next

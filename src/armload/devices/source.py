@@ -42,6 +42,10 @@ class Source(ABC):
             SourceError: the connection was lost.
         """
 
+    def ticking(self, tick: float) -> Iterator[Sample | None]:  # noqa: ARG002
+        """The same; None every `tick` seconds while none comes, where the source can tell (`Detached`)."""
+        yield from self
+
     @abstractmethod
     def close(self) -> None:
         """Let go of the robot or the file; nothing happens the second time."""

@@ -191,14 +191,19 @@ def add_cluster_argument(parser: argparse.ArgumentParser | argparse._ArgumentGro
     )
 
 
-def add_tool_and_topic_arguments(parser: argparse.ArgumentParser) -> None:
-    """`--tool` and `--topic`."""
+def add_tool_argument(parser: argparse.ArgumentParser) -> None:
+    """`--tool`."""
     parser.add_argument(
         "--tool",
         type=file_name,
         metavar="FILE",
         help="a mounted tool that is known (JSON, or franka-hand); the answer is what it carries",
     )
+
+
+def add_tool_and_topic_arguments(parser: argparse.ArgumentParser) -> None:
+    """`--tool` and `--topic`."""
+    add_tool_argument(parser)
     parser.add_argument("--topic", metavar="T", help="JointState topic of a bag, where it has several")
 
 

@@ -8,10 +8,10 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
-from armload.app.cli.printing import finite
-from armload.app.page.session import Session
 from armload.inertia import InertialParameters
 from armload.online import OnlineEstimate
+from armload.service.finite import finite
+from armload.service.session import Session
 
 
 def lines(session: Session, every: float = 0.1, duration: float | None = None) -> Iterator[str]:

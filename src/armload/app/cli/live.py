@@ -20,6 +20,8 @@ from armload.errors import ArmloadError, UsageError
 
 if TYPE_CHECKING:
     from armload.arms import Arm
+    from armload.devices import Detached
+    from armload.service import Reconnecting
 
 _EXAMPLES = """\
 examples:
@@ -98,10 +100,10 @@ def parser() -> Parser:
 def run(options: argparse.Namespace) -> int | None:
     """Identify until the source ends (--headless) or somebody interrupts; 2 after an error."""
     from armload.app.cli.headless import lines
-    from armload.app.page.session import Session
-    from armload.devices import open_source
+    from armload.devices import Detached, open_source
     from armload.posterior import load_profile
     from armload.recording import ColumnSpec, check_own_measurements, has_topics
+    from armload.service.session import Session
 
     options.robot = options.robot or robot_of(options.source)
     arm = _arm_of(options)
@@ -126,6 +128,8 @@ def run(options: argparse.Namespace) -> int | None:
         topic=options.topic,
         columns=columns if of_log and not (has_topics(options.source) and options.tare is not None) else None,
     )
+    if isinstance(source, Detached) and "://" in options.source:
+        source = _reopened(source, options, arm)
     with source:
         session = Session(source, arm, tare, options.method, _warn, profile)
         try:
@@ -138,6 +142,19 @@ def run(options: argparse.Namespace) -> int | None:
             session.close()
             if options.learn and options.profile is not None and session.error is None:
                 _learn(session, options.profile)
+
+
+def _reopened(first: Detached, options: argparse.Namespace, arm: Arm) -> Reconnecting:
+    """A robot that is opened again when it is lost; each connection has a record of its own."""
+    from armload.devices import Detached
+    from armload.service import Reconnecting
+    from armload.service.arm_process import next_free
+
+    def opens() -> Detached:
+        record = None if options.record is None else next_free(options.record)
+        return Detached(options.source, arm, record=record)
+
+    return Reconnecting(opens, first, _warn)
 
 
 def _arm_of(options: argparse.Namespace) -> Arm:

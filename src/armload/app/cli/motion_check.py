@@ -7,7 +7,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from armload.app.cli.printing import console, finite, table
+from armload.app.cli.printing import console, table
+from armload.service.finite import finite
 
 if TYPE_CHECKING:
     from armload.arms import Arm

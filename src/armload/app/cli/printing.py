@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -34,15 +33,6 @@ def write_json(path: str, value: dict[str, Any]) -> None:
         raise UsageError(
             f"{path} cannot be written: {error.strerror or error}; name a file in a folder you can write to"
         ) from None
-
-
-def finite(value: Any) -> Any:
-    """Numbers, however nested in dictionaries and lists, with null for what is not finite."""
-    if isinstance(value, dict):
-        return {key: finite(each) for key, each in value.items()}
-    if isinstance(value, list):
-        return [finite(each) for each in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def print_note(text: str) -> None:

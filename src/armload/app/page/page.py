@@ -17,11 +17,11 @@ from armload.app.page import tables
 from armload.app.page.curves import AXES, GROUPS, HEIGHT, PADDING, bands_of, data_of, legend_of, series_of
 from armload.app.page.download import ENDINGS, file_of
 from armload.app.page.scene import Scene
-from armload.app.page.session import Session
 from armload.arms import Arm
 from armload.errors import ArmloadError, ModelError, UsageError
 from armload.extras import install
 from armload.identification import METHODS, default_for
+from armload.service.session import Session
 
 _NUMBERS, _CURVES = 3, 8  # pictures from which on numbers and curves follow
 SPANS = {"last 30 s": 30.0, "last 2 min": 120.0, "last 10 min": 600.0, "last hour": 3600.0, "everything": float("inf")}

@@ -8,11 +8,11 @@ from html import escape
 import numpy as np
 
 from armload.app.page.drawing import CHI2_95, com_region
-from armload.app.page.session import Entry
 from armload.inertia import NAMES, UNITS, Z95, InertialParameters
 from armload.online import OnlineEstimate
 from armload.online.listening import UNUSED
 from armload.recording import GAP
+from armload.service.session import Entry
 
 _DIM = "color:var(--mantine-color-dimmed)"
 _TEXT = "font-size:13px;line-height:1.45;font-variant-numeric:tabular-nums;padding:2px 8px"

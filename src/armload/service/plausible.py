@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from armload.app.page.recent import Recent
 from armload.arms import Arm
 from armload.errors import ArmloadError
 from armload.identification import check_plausible
 from armload.identification.torque_scale import TorqueScale, torque_scale
 from armload.online import Health, OnlineEstimate
 from armload.recording import Recording, Sample
+from armload.service.recent import Recent
 
 _IMPLAUSIBLE = "the samples are not plausible, the answer is not to be trusted"
 # [s] of motion to the first check, and at most between two; meanwhile each comes after twice the motion, as the checks

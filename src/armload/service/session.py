@@ -16,18 +16,20 @@ from queue import SimpleQueue
 
 import numpy as np
 
-from armload.app.page.history import History
-from armload.app.page.plausible import Plausibility
-from armload.app.page.recent import Recent
 from armload.arms import Arm
 from armload.devices import Source
 from armload.errors import IdentificationError, SourceError
 from armload.inertia import Z95, InertialParameters
 from armload.online import Event, OnlineEstimate, OnlineIdentifier
+from armload.online.learning import change_of_arm
 from armload.posterior import Profile
 from armload.recording import Recording, Sample
+from armload.service.history import History
+from armload.service.plausible import Plausibility
+from armload.service.recent import Recent
 
 _AGAIN = 10.0  # [s] between two warnings of samples that cannot be used
+TICK = 0.1  # [s] between two looks at a silent source: as often as lines come
 _TARE_LONGEST, _TARE_SHORTEST = 30.0, 3.0  # [s] of what was just seen that a tare is made of
 
 
@@ -58,7 +60,7 @@ class Session:
     Args:
         source: closed with the session.
         arm: the bare arm, or with a tool that is known. tare: an earlier log of it. method, profile: see
-            `OnlineIdentifier`.
+            `OnlineIdentifier`. identifier: one that goes on, made with these.
         warn: called with each warning on the stream, also with the error it ended with in a thread (`start`).
 
     Attributes:
@@ -79,14 +81,16 @@ class Session:
         method: str | Path | None = None,
         warn: Callable[[str], None] | None = None,
         profile: Profile | None = None,
+        identifier: OnlineIdentifier | None = None,
     ) -> None:
         self.source, self.arm, self.tare, self.profile = source, arm, tare, profile
         self._warn_too = warn or (lambda _: None)
         # what was held while the tare was recorded; None: nobody knows
         self._tared = InertialParameters.zero(arm.frame) if tare is None else None
-        self._identifier = self._made(tare, method)
+        self._identifier = self._made(tare, method) if identifier is None else identifier
         self.sample: Sample | None = None
         self.estimate: OnlineEstimate | None = None
+        self._answered: OnlineEstimate | None = None  # the same when its sample had just arrived
         self.history = History(30)
         self.log: deque[Entry] = deque(maxlen=200)
         self.ended = False
@@ -105,6 +109,25 @@ class Session:
         return self._identifier.method
 
     @property
+    def doubt(self) -> str | None:
+        """Why the samples cannot come from this arm; None: nothing says so."""
+        return self._plausibility.doubt
+
+    @property
+    def trouble(self) -> str | None:
+        """What keeps samples from being used at present."""
+        return self._identifier.trouble
+
+    @property
+    def arm_changed(self) -> str | None:
+        """That the arm is not as at its tare or profile; None: it is, as far as anybody can tell."""
+        return change_of_arm(self._identifier.engine, self._identifier.relative_to)
+
+    def save(self, path: str | Path) -> Path:
+        """Write the identifier's state (`OnlineIdentifier.save`); only from the thread that runs the loop."""
+        return self._identifier.save(path)
+
+    @property
     def lost(self) -> int:
         """Samples the source had to drop because the identifier was too slow."""
         return int(getattr(self.source, "lost", 0))
@@ -118,15 +141,23 @@ class Session:
     def estimates(self, duration: float | None = None) -> Iterator[OnlineEstimate]:
         """One estimate per sample, until the source ends or has given `duration` [s].
 
+        While none comes, the last one every `TICK` seconds, older each time, where the source can tell.
+
         Raises:
             SourceError: the connection was lost.
         """
         first: float | None = None
-        for sample in self.source:
+        for sample in self.source.ticking(TICK):
             while not self._orders.empty():
                 self._orders.get()()
-            estimate = self._take(sample)
-            yield estimate
+            if sample is None:
+                if self._answered is not None:
+                    self.estimate = self._answered.behind(self.source.lag())
+                    yield self.estimate
+                if self._stop:
+                    break
+                continue
+            yield self._take(sample)
             if first is None and math.isfinite(sample.t):
                 first = sample.t
             if self._stop or (duration is not None and first is not None and sample.t - first >= duration):
@@ -174,7 +205,8 @@ class Session:
             self._recent.append(sample)
             if self._plausibility.look(sample, estimate.health, self._recent):
                 self._doubted()
-        estimate = self._plausibility.qualified(estimate).behind(self.source.lag())
+        self._answered = self._plausibility.qualified(estimate)
+        estimate = self._answered.behind(self.source.lag())
         self.sample, self.estimate = sample if usable else self.sample, estimate
         if self._trouble or self._identifier.trouble is not None:
             self._report_trouble(self._identifier.trouble)

@@ -1,0 +1,119 @@
+"""Hours of a stream, faster than real time: does memory stay flat, and what does it cost?
+
+    python benchmarks/soak.py --hours 6
+
+One arm of the service (`Session`: gate, rows, posterior, hybrid, checks of the samples, answers ten times a second as
+JSON, the state saved every minute) is fed by a simulated Panda at 200 samples per second whose payload changes every
+15 s of the stream. Once a simulated minute the resident size of the process is noted. After the first quarter, in which
+buffers fill, a straight line is fitted; as sizes a minute apart are not independent, its 95 % interval is from the
+slopes of ten consecutive blocks. Processor time is of all threads, without what the simulator took. The result is
+written after every simulated hour, so that it can be stopped at any time.
+"""
+
+import argparse
+import json
+import os
+import time
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import t as student
+
+from armload.arms import arm, rated_mass
+from armload.atomic import replacing
+from armload.devices import Simulator, Source
+from armload.payloads import draw_payload
+from armload.service import Session
+from armload.simulation import Sensors, World
+
+RATE = 200.0
+RESULT = Path(__file__).parent / "results" / "soak.json"
+
+
+class Timed(Source):
+    """A source whose own processor time is known."""
+
+    def __init__(self, source):
+        self.source, self.taken = source, 0.0
+        self.name, self.n, self.rate = source.name, source.n, source.rate
+
+    def __iter__(self):
+        samples = iter(self.source)
+        while True:
+            began = time.thread_time()
+            sample = next(samples, None)
+            self.taken += time.thread_time() - began
+            if sample is None:
+                return
+            yield sample
+
+    def close(self):
+        self.source.close()
+
+
+def resident():
+    """[MB] of this process."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def slope(hours, megabytes, blocks=10):
+    """Mean and half-width of the 95 % interval of the slopes of consecutive blocks [MB/h]."""
+    slopes = [
+        np.polyfit(h, m, 1)[0]
+        for h, m in zip(np.array_split(hours, blocks), np.array_split(megabytes, blocks), strict=True)
+    ]
+    return float(np.mean(slopes)), float(student.ppf(0.975, blocks - 1) * np.std(slopes, ddof=1) / np.sqrt(blocks))
+
+
+def summary(rows, cpu, saves):
+    hours, megabytes = np.array(rows).T
+    late = hours >= 0.25 * hours[-1]
+    mean, half = slope(hours[late], megabytes[late]) if late.sum() >= 40 else (None, None)
+    return {
+        "hours": float(hours[-1]),
+        "rate": RATE,
+        "saves": saves,
+        "resident [MB]": {f"{h:.2f} h": round(float(m), 1) for h, m in rows[:: max(1, len(rows) // 20)]},
+        "last [MB]": float(megabytes[-1]),
+        "slope after the first quarter [MB/h]": mean,
+        "half-width of its 95 % interval [MB/h]": half,
+        "share of a core": cpu / (3600.0 * float(hours[-1])),
+    }
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--hours", type=float, default=24.0)
+    parser.add_argument("--state", default="/tmp/armload-soak.npz")
+    parser.add_argument("--out", type=Path, default=RESULT)
+    options = parser.parse_args()
+    panda = arm("panda")
+    count, rated = round(options.hours * 240), rated_mass(panda)
+    held = [(15.0 * k, draw_payload("boxes", k, rated=rated) if k % 2 else None) for k in range(1, count)]
+    world, sensors = World.real_like(panda, seed=1), Sensors.of(panda)
+    source = Timed(Simulator(panda, payloads=held, world=world, sensors=sensors, rate=RATE, speed=None))
+    session = Session(source, panda)
+    minute, spoken, rows, saves, began, skipped = 1, 0.0, [], 0, None, 0.0
+    for estimate in session.estimates(3600.0 * options.hours):
+        if estimate.t >= 10.0 and began is None:  # what is loaded and compiled once is no cost of an hour
+            began, skipped = time.process_time() - source.taken, estimate.t
+        if estimate.t - spoken >= 0.1:
+            json.dumps(estimate.to_dict())
+            spoken = estimate.t
+        if estimate.t >= 60.0 * minute:
+            session.save(options.state)
+            saves += 1
+            rows.append((estimate.t / 3600.0, resident()))
+            if minute % 15 == 0:
+                cpu = (time.process_time() - source.taken - began) * estimate.t / (estimate.t - skipped)
+                result = summary(rows, cpu, saves)
+                print(json.dumps(result), flush=True)
+                with replacing(options.out) as part:
+                    part.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+            minute += 1
+    session.close()
+
+
+if __name__ == "__main__":
+    main()

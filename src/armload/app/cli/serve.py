@@ -1,0 +1,174 @@
+"""`armload serve`: identify beside robots for months, with a process for each, alarms and an endpoint."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import queue
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from armload.app.cli.arguments import (
+    Parser,
+    add_arm_arguments,
+    add_identifier_arguments,
+    add_tool_argument,
+    at_least,
+    file_name,
+)
+from armload.app.cli.named import robot_of
+from armload.app.cli.printing import print_note
+from armload.errors import UsageError
+
+if TYPE_CHECKING:
+    from armload.service import ServiceSettings
+
+_EXAMPLES = """\
+examples:
+  armload serve cell.toml
+  armload serve fr3://172.16.0.2 --save /var/lib/armload --port 8090
+  armload serve sim --duration 20
+
+cell.toml names arms as [[arm]] tables; docs/service.md has an example. Options of this line take the place of what the
+file says of the service. Lines of JSON come on stdout, what happens on stderr. SIGTERM saves and ends it.
+"""
+
+
+def parser() -> Parser:
+    """The arguments of `armload serve`."""
+    parser = Parser(
+        prog="armload serve",
+        description="Identify beside one or several robots for months: reconnects, keeps its state, tells its age.",
+        epilog=_EXAMPLES,
+    )
+    add = parser.add_argument
+    add(
+        "sources",
+        nargs="+",
+        type=file_name,
+        metavar="CONFIG.toml|SOURCE",
+        help="a file that names the arms, or sources of one kind of arm: sim, a log, or a robot's address",
+    )
+    add_arm_arguments(parser, required=False)
+    add_identifier_arguments(parser)
+    add_tool_argument(parser)
+    add("--save", type=file_name, metavar="DIR", help="keep the state in this folder, every minute")
+    add("--loop", action="store_true", help="replay a log again and again")
+    add("--every", type=at_least(0.02, float), metavar="S", help="seconds between lines of an arm (0.1)")
+    add("--quiet", action="store_true", help="no lines on stdout but alarms")
+    add("--host", metavar="H", help="interface of the endpoint (127.0.0.1); others need --token-file")
+    add(
+        "--port",
+        type=at_least(0, int, 65535),
+        metavar="P",
+        help="of the endpoint (default: there is none; 0: a free one)",
+    )
+    add("--token-file", type=file_name, metavar="F", help="holds the token that requests must bring")
+    add("--webhook", metavar="URL", help="alarms are posted to it")
+    add("--duration", type=at_least(0.0, float), metavar="S", help="end after so many seconds")
+    return parser
+
+
+def run(options: argparse.Namespace) -> int | None:
+    """Serve until all sources end, or until SIGTERM; 2 where an arm cannot be begun with."""
+    from armload.service import Endpoint, Service
+    from armload.service.service import checked
+
+    settings = settings_of(options)
+    checked(settings)
+    service, output = Service(settings, print_note), _Output(alarms_only=options.quiet)
+    endpoint = None
+    signal.signal(signal.SIGTERM, lambda *_: threading.Thread(target=service.stop, daemon=True).start())
+    try:
+        with service.heard_by(output.put):
+            if settings.port is not None:
+                endpoint = Endpoint(service, settings.host, settings.port, settings.token)
+                print_note(f"{len(settings.arms)} arms: {endpoint.url}/arms")
+            output.start(service.stop)
+            service.run(settings.duration)
+    finally:
+        if endpoint is not None:
+            endpoint.close()
+        service.close()
+        output.close()
+    if output.broken:
+        raise BrokenPipeError
+    if service.error is not None:
+        raise UsageError(service.error)
+    return None
+
+
+def settings_of(options: argparse.Namespace) -> ServiceSettings:
+    """What a command line asks for."""
+    from armload.service import ArmSettings, ServiceSettings, read_settings
+    from armload.service.settings import read_token
+
+    names = ("every", "host", "port", "webhook", "duration")
+    over: dict[str, Any] = {name: value for name in names if (value := getattr(options, name)) is not None}
+    if options.token_file is not None:
+        over["token"] = read_token(options.token_file)
+    if options.webhook is not None and not options.webhook.startswith(("http://", "https://")):
+        raise UsageError(f"--webhook is {options.webhook!r}: expected an address such as https://HOST/PATH")
+    of_arms = ("frame", "gravity", "tare", "profile", "tool", "method")
+    if options.sources[0].endswith(".toml"):
+        given = [name for name in ("robot", *of_arms) if getattr(options, name) is not None]
+        if given or len(options.sources) > 1 or options.loop:
+            what = f"--{given[0]}" if given else "--loop" if options.loop else options.sources[1]
+            raise UsageError(f"{options.sources[0]} names the arms, but there is also {what}: write it into the file")
+        settings = read_settings(options.sources[0], **over)
+        if options.save is None:
+            return settings
+        return replace(settings, arms=tuple(replace(arm, save=options.save) for arm in settings.arms))
+    more = {name: getattr(options, name) for name in (*of_arms, "save", "loop")}
+    arms = []
+    for k, source in enumerate(options.sources):
+        robot = options.robot or robot_of(source)
+        arms.append(ArmSettings(f"arm{k + 1}", source, robot, **more))
+    return ServiceSettings(tuple(arms), **over)
+
+
+class _Output:
+    """Lines on stdout from a thread of its own: who reads slowly loses the oldest lines, and delays nobody."""
+
+    def __init__(self, alarms_only: bool, most: int = 1000) -> None:
+        self.broken = False
+        self._alarms_only = alarms_only
+        self._lines: queue.Queue[dict[str, Any] | None] = queue.Queue(most)
+        self._thread: threading.Thread | None = None
+
+    def put(self, line: dict[str, Any]) -> None:
+        if self._alarms_only and "alarm" not in line:
+            return None
+        while True:
+            try:
+                return self._lines.put_nowait(line)
+            except queue.Full:
+                try:
+                    self._lines.get_nowait()
+                except queue.Empty:
+                    continue
+
+    def start(self, stop: Callable[[], None]) -> None:
+        def write() -> None:
+            while (line := self._lines.get()) is not None:
+                try:
+                    sys.stdout.write(json.dumps(line, allow_nan=False) + "\n")
+                    sys.stdout.flush()
+                except OSError:
+                    self.broken = True
+                    stop()
+                    return
+
+        self._thread = threading.Thread(target=write, daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        if self._thread is not None and not self.broken:
+            if self._lines.full():
+                self._lines.get_nowait()
+            self._lines.put_nowait(None)
+            self._thread.join(2.0)

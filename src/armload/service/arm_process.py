@@ -1,0 +1,228 @@
+"""One arm's own process: reads its source, identifies, saves its state, and says every tenth of a second what it knows.
+
+Started by `Service` as `python -m armload.service.arm_process`. The first line of standard input says what to do; when
+standard input ends, the process saves and ends, however whoever started it has ended. Standard output has one JSON
+object per line: an answer (with "told", when it was made on the monotonic clock), or {"note": …}.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import logging
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from armload.arms import Arm, arm
+from armload.devices import Detached
+from armload.errors import ArmloadError, IdentificationError
+from armload.kernels import COMPILING
+from armload.online import OnlineEstimate, OnlineIdentifier
+from armload.posterior import load_profile
+from armload.recording import read_recording
+from armload.service.finite import finite
+from armload.service.reconnecting import Reconnecting
+from armload.service.session import TICK, Session
+from armload.service.settings import ArmSettings
+from armload.service.unknown import Link, Unknown, Why, why_unknown
+
+SAVE_EVERY = 60.0  # [s] of what a kill may cost; saving takes the stream a tenth of a second
+
+
+class ArmProcess:
+    """The run of one process."""
+
+    def __init__(self, settings: ArmSettings, every: float) -> None:
+        self.settings, self.every = settings, every
+        self._told = self._saved = -float("inf")
+        self._kept: float | None = None  # when the state was last saved or taken up, by the wall's clock
+        self._failed: str | None = None  # why it could not be saved
+        self._line = threading.Lock()
+        self.arm = self._made_arm()
+        self.source = Reconnecting(self._opens, said=self.note, name=settings.source, n=self.arm.n)
+        self.session: Session | None = None
+
+    def run(self) -> None:
+        """Until the source or standard input ends."""
+        self._say(None, Why(Unknown.STARTING, "the source is being opened"))
+        self.source.start()  # it is opened while the state is read
+        self.session = session = self._made_session()
+        self._saved = time.monotonic()
+        try:
+            for sample in self._ticks(session):
+                now = time.monotonic()
+                if now - self._told >= 0.999 * self.every:
+                    self._tell(session, now)
+                if sample and now - self._saved >= SAVE_EVERY:
+                    self._save(session)
+            if session.estimate is not None:
+                self._tell(session, time.monotonic())
+                self._save(session)
+        finally:
+            session.close()
+
+    def note(self, text: str) -> None:
+        """A sentence for whoever reads the log of the service."""
+        self._write({"note": text})
+
+    def _ticks(self, session: Session) -> Iterator[bool]:
+        """True for each answer, False while there is none yet; ends with the source."""
+        waiting = threading.Event()
+
+        def speak() -> None:  # until the first sample nothing of the session comes: compiling and connecting take long
+            while not waiting.wait(self.every if self.every > TICK else TICK):
+                if session.estimate is None:
+                    self._tell(session, time.monotonic())
+
+        threading.Thread(target=speak, daemon=True).start()
+        try:
+            for estimate in session.estimates():
+                waiting.set()
+                yield estimate is not None
+        finally:
+            waiting.set()
+
+    def _tell(self, session: Session, now: float) -> None:
+        self._told = now
+        source, estimate = self.source, session.estimate
+        link = Link(source.state, source.why, source.connections, source.resumed, source.heard)
+        why = why_unknown(estimate, link, now, session.trouble, session.doubt)
+        if estimate is None and _compiling.is_set() and source.state == "streaming":
+            why = Why(Unknown.COMPILING, COMPILING)
+        self._say(estimate, why)
+
+    def _say(self, estimate: OnlineEstimate | None, why: Why | None) -> None:
+        source, now = self.source, time.monotonic()
+        head = {
+            "arm": self.settings.name,
+            "robot": self.arm.name,
+            "told": now,
+            "known": why is None,
+            "unknown": None if why is None else why.reason.value,
+            "why": None if why is None else why.text,
+            "source": source.name,
+            "connection": source.state,
+            "connections": source.connections,
+            "lost": source.lost,
+            "saved": None if self._kept is None else max(0.0, time.time() - self._kept),
+            "arm_changed": None if self.session is None else self.session.arm_changed,
+        }
+        if estimate is None:
+            self._write({**head, "age": None, "lag": None, "mass": None})
+            return
+        self._write({**head, **estimate.to_dict()})
+
+    def _write(self, fields: dict[str, Any]) -> None:
+        data = (json.dumps(finite(fields), allow_nan=False) + "\n").encode()
+        with self._line, contextlib.suppress(BrokenPipeError):
+            while data:
+                data = data[os.write(1, data) :]
+
+    def _opens(self) -> Detached:
+        settings = self.settings
+        record = None if settings.record is None else next_free(settings.record)
+        more: dict[str, Any] = {"rate": settings.rate} if settings.source == "sim" else {}
+        return Detached(settings.source, self.arm, record=record, speed=1.0, loop=settings.loop, **more)
+
+    def _made_arm(self) -> Arm:
+        settings = self.settings
+        gravity = {} if settings.gravity is None else {"gravity": settings.gravity}
+        made = arm(settings.robot, settings.frame, **gravity)
+        if settings.tool is None:
+            return made
+        from armload.identification import plausible_tool
+        from armload.payloads import hand_on, read_payload
+
+        tool = hand_on(made) if settings.tool == "franka-hand" else read_payload(settings.tool)
+        return made.with_payload(plausible_tool(made.in_frame(tool.parameters), made))
+
+    def _made_session(self) -> Session:
+        settings = self.settings
+        profile = None if settings.profile is None else load_profile(settings.profile)
+        kept, identifier = settings.state, None
+        if kept is not None and kept.exists():
+            try:
+                identifier = OnlineIdentifier.restore(kept, self.arm, settings.method, profile)
+                self._kept = kept.stat().st_mtime
+                self.note(f"continued from {kept}, saved {time.time() - self._kept:.0f} s ago")
+            except (IdentificationError, OSError) as error:
+                self.note(f"{error}: begun anew")
+        tare = None if settings.tare is None else read_recording(settings.tare, self.arm)
+        return Session(self.source, self.arm, tare, settings.method, self.note, profile, identifier)
+
+    def _save(self, session: Session) -> None:
+        self._saved, path = time.monotonic(), self.settings.state
+        if path is None:
+            return
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            session.save(path)
+            self._kept, self._failed = time.time(), None
+        except (ArmloadError, OSError) as error:
+            if str(error) != self._failed:
+                self.note(f"the state cannot be saved: {error}")
+            self._failed = str(error)
+
+
+_compiling = threading.Event()
+
+
+class _Compiling(logging.Handler):
+    """Hears that functions are compiled, which `armload.kernels` logs."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if record.getMessage() == COMPILING:
+            _compiling.set()
+
+
+def next_free(record: str) -> str:
+    """The record's name, or the first of run.again1.csv, run.again2.csv, … that does not exist yet."""
+    path, k = Path(record), 0
+    while path.exists():
+        k += 1
+        path = Path(record).with_suffix(f".again{k}{Path(record).suffix}")
+    return str(path)
+
+
+def main() -> None:
+    """Read the order, run, and end when standard input does."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # goes to the whole group; whoever started this decides
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    logger = logging.getLogger("armload")
+    logger.addHandler(_Compiling())
+    logger.setLevel(logging.INFO)
+    order = json.loads(_line())
+    facts = order["arm"]
+    facts["gravity"] = None if facts["gravity"] is None else tuple(facts["gravity"])
+    try:
+        process = ArmProcess(ArmSettings(**facts), order["every"])
+
+        def listen() -> None:
+            while os.read(0, 1 << 12):
+                pass
+            process.source.close()
+
+        threading.Thread(target=listen, daemon=True).start()
+        process.run()
+    except (ArmloadError, OSError) as error:
+        data = json.dumps({"error": str(error)}) + "\n"
+        with contextlib.suppress(BrokenPipeError):
+            os.write(1, data.encode())
+        sys.exit(2)
+
+
+def _line() -> bytes:
+    line = b""
+    while not line.endswith(b"\n") and (more := os.read(0, 1)):
+        line += more
+    return line
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,165 @@
+"""Answers over HTTP: the newest of each arm, all of them, and a stream of lines; nothing can be changed through it."""
+
+from __future__ import annotations
+
+import contextlib
+import hmac
+import json
+import queue
+import sys
+import threading
+from collections.abc import Callable
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import TYPE_CHECKING, Any
+from urllib.parse import unquote, urlsplit
+
+from armload.errors import UsageError
+from armload.service.settings import is_loopback
+
+if TYPE_CHECKING:
+    from armload.service.service import Service
+
+_MOST = 32  # connections at once: a page and some scripts, not a crowd
+_PATIENCE = 10.0  # [s] a client may take to send its request, or to take a line
+
+
+class Endpoint:
+    """A small server in threads of its own.
+
+    | address | answer |
+    |---|---|
+    | `/arms` | the newest answers of all arms, by name |
+    | `/arms/NAME` | one of them |
+    | `/health` | 200 if all arms are known, else 503, with the reasons |
+    | `/stream`, `/stream/NAME` | lines of JSON, as on standard output, until the client goes |
+
+    Args:
+        service: what to ask. host, port: 0: a free one. token: a request must bring `Authorization: Bearer TOKEN`.
+            None: none is needed, and then only requests to a name of this machine are answered, so that no web page can
+            have its visitor's browser ask.
+
+    Raises:
+        UsageError: the port cannot be had.
+    """
+
+    def __init__(self, service: Service, host: str, port: int, token: str | None = None) -> None:
+        handler = type("Handler", (_Handler,), {"service": service, "token": token})
+        try:
+            self._server = _Server((host, port), handler)
+        except OSError as error:
+            raise UsageError(
+                f"the endpoint cannot listen at {host}:{port}: {error.strerror}; name another port"
+            ) from None
+        self.url = f"http://{host}:{self._server.server_address[1]}"
+        self._thread = threading.Thread(target=self._server.serve_forever, args=(0.2,), daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """End it."""
+        self._server.shutdown()
+        self._server.server_close()
+        self._thread.join()
+
+
+class _Server(ThreadingHTTPServer):
+    daemon_threads = True
+    block_on_close = False
+
+    def __init__(self, *arguments: Any) -> None:
+        self._free = threading.Semaphore(_MOST)
+        super().__init__(*arguments)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        if not self._free.acquire(blocking=False):
+            self.shutdown_request(request)
+            return
+        super().process_request(request, client_address)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._free.release()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A client that goes is no error; anything else is shown."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
+
+
+class _Handler(BaseHTTPRequestHandler):
+    service: Service
+    token: str | None
+    timeout = _PATIENCE
+
+    def do_GET(self) -> None:
+        if not self._allowed():
+            return
+        parts = [unquote(part) for part in urlsplit(self.path).path.split("/") if part]
+        names = self.service.names
+        if len(parts) == 2 and parts[0] in ("arms", "stream") and parts[1] not in names:
+            self._answer(404, {"error": f"there is no arm {parts[1]!r}: expected one of {', '.join(names)}"})
+        elif parts == ["arms"]:
+            self._answer(200, {name: self.service.answer(name) for name in names})
+        elif len(parts) == 2 and parts[0] == "arms":
+            self._answer(200, self.service.answer(parts[1]))
+        elif parts == ["health"]:
+            unknown = {name: self.service.answer(name) for name in names}
+            unknown = {name: said["why"] for name, said in unknown.items() if not said["known"]}
+            self._answer(503 if unknown else 200, {"well": not unknown, "unknown": unknown})
+        elif parts[:1] == ["stream"] and len(parts) <= 2:
+            self._stream(parts[1] if len(parts) == 2 else None)
+        else:
+            self._answer(404, {"error": "expected /arms, /arms/NAME, /health, /stream or /stream/NAME"})
+
+    def _allowed(self) -> bool:
+        if self.token is not None:
+            given = self.headers.get("Authorization", "")
+            if hmac.compare_digest(given.encode(), f"Bearer {self.token}".encode()):
+                return True
+            self._answer(401, {"error": "expected the header Authorization: Bearer TOKEN"})
+            return False
+        host = urlsplit(f"//{self.headers.get('Host', '')}").hostname
+        if host is not None and is_loopback(host):
+            return True
+        self._answer(403, {"error": "expected a request to 127.0.0.1 or localhost"})
+        return False
+
+    def _answer(self, code: int, value: Any) -> None:
+        text = (json.dumps(value, allow_nan=False) + "\n").encode()
+        self.send_response(code)
+        self.send_header("Content-Type", "application/json")
+        self.send_header("Content-Length", str(len(text)))
+        self.send_header("Cache-Control", "no-store")
+        self.end_headers()
+        self.wfile.write(text)
+
+    def _stream(self, name: str | None) -> None:
+        self.send_response(200)
+        self.send_header("Content-Type", "application/x-ndjson")
+        self.send_header("Cache-Control", "no-store")
+        self.end_headers()
+        lines: queue.Queue[dict[str, Any]] = queue.Queue(100)
+        with self.service.heard_by(_into(lines)):
+            while True:
+                line = lines.get()
+                if name is None or line.get("arm") == name:
+                    self.wfile.write((json.dumps(line, allow_nan=False) + "\n").encode())
+                    self.wfile.flush()
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Requests are not logged."""
+
+
+def _into(lines: queue.Queue[dict[str, Any]]) -> Callable[[dict[str, Any]], None]:
+    """Puts a line into a queue; where its reader is too slow, the oldest gives way."""
+
+    def put(line: dict[str, Any]) -> None:
+        while True:
+            try:
+                return lines.put_nowait(line)
+            except queue.Full:
+                with contextlib.suppress(queue.Empty):
+                    lines.get_nowait()
+
+    return put

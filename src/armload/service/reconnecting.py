@@ -1,0 +1,189 @@
+"""A source that is opened again whenever it is lost, and never gets older than a second."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+from armload.devices import Detached, Source
+from armload.errors import ArmloadError, SourceError
+from armload.inertia import InertialParameters
+from armload.recording import Sample
+from armload.service.backoff import Backoff
+from armload.service.transit import Transit
+
+STALLED = 3.0  # [s] without a sample after which the connection counts as lost: two lost TCP packets cost three
+BEHIND = 1.0  # [s] a sample may wait before the newest takes its place: saving a state takes a tenth
+
+
+class Reconnecting(Source):
+    """A source in a process of its own that is opened again after its reader was killed, a stall of 3 s, a lost robot.
+
+    The waits between two trials are those of `Backoff`. Where the identifier is more than 1 s behind, it goes on with
+    the newest sample, and those in between count as lost. A source that ends by itself, as a log does, has ended.
+
+    Args:
+        opens: opens the source.
+        first: the connection to begin with; None: it is opened when samples are asked for.
+        said: called with a sentence whenever it is lost and whenever it is there again.
+        name, n, rate: what is known of it before it is open.
+
+    Attributes:
+        state: "connecting", "streaming", "lost" or "ended". why: it was lost, one sentence; None while it streams.
+        connections: how many there were. resumed: when the present one gave its first sample [s, monotonic].
+        heard: when the last sample was handed on [s, monotonic].
+    """
+
+    def __init__(
+        self,
+        opens: Callable[[], Detached],
+        first: Detached | None = None,
+        said: Callable[[str], None] | None = None,
+        *,
+        name: str = "",
+        n: int = 0,
+        rate: float = 0.0,
+    ) -> None:
+        self.name, self.n, self.rate, self.speed = name, n, rate, 1.0
+        self.state, self.connections = "connecting", 0
+        self.why: str | None = None
+        self.resumed: float | None = None
+        self.heard: float | None = None
+        self._opens, self._said = opens, said or (lambda _: None)
+        self._source: Detached | None = None
+        self._arrived: float | None = None
+        self._trial: threading.Thread | None = None
+        self._made: Detached | Exception | None = None  # by the trial
+        self._lost, self._late, self._gone = 0, 0.0, threading.Event()
+        self._transit, self._backoff = Transit(), Backoff()
+        if first is not None:
+            self._take(first)
+
+    @property
+    def lost(self) -> int:
+        """Samples that were left out, over all connections."""
+        return self._lost + (0 if self._source is None else self._source.lost)
+
+    @property
+    def process(self):
+        """The present reader's process; None while there is none."""
+        return None if self._source is None else self._source.process
+
+    def __iter__(self) -> Iterator[Sample]:
+        return (sample for sample in self.ticking(1.0) if sample is not None)
+
+    def start(self) -> None:
+        """Begin to open the source, in a thread; `ticking` does so itself."""
+        if self._source is not None or self._trial is not None:
+            return
+
+        def trial() -> None:
+            try:
+                self._made = self._opens()
+            except (ArmloadError, OSError) as error:
+                self._made = error
+
+        self._trial = threading.Thread(target=trial, daemon=True)
+        self._trial.start()
+
+    def ticking(self, tick: float) -> Iterator[Sample | None]:
+        """The samples of all connections, and None every `tick` seconds while there is none."""
+        while not self._gone.is_set():
+            if self._source is None:
+                yield from self._opened(tick)
+                continue
+            began, stopped = time.monotonic(), None
+            try:
+                for sample in self._source.ticking(tick):
+                    if self._gone.is_set():
+                        return
+                    if sample is None:
+                        silent = time.monotonic() - (began if self.heard is None else max(began, self.heard))
+                        if silent > STALLED:
+                            raise SourceError(f"{self.name} has sent nothing for {STALLED:g} s")
+                    else:
+                        self._noted(sample)
+                    yield sample
+            except (ArmloadError, OSError) as error:
+                stopped = str(error)
+            if self._gone.is_set():
+                return
+            if stopped is None:
+                self.state = "ended"
+                return
+            self.state, self.why = "lost", stopped
+            wait = self._backoff.failed(time.monotonic() - began)
+            self._said(f"{stopped}; it is opened again in {wait:.1f} s")
+            yield from self._let_go(wait, tick)
+
+    def close(self) -> None:
+        """End it; who waits for a sample sees its end."""
+        self._gone.set()
+        if self._source is not None:
+            self._source.close()
+
+    def arrived(self) -> float | None:
+        """When the last sample left the robot, as far as the shortest way tells (`Transit`), monotonic [s]."""
+        return self._arrived
+
+    def truth(self, t: float) -> InertialParameters | None:
+        """What the source knows."""
+        return None if self._source is None else self._source.truth(t)
+
+    def _take(self, source: Detached) -> None:
+        self._source, self.connections = source, self.connections + 1
+        self.name, self.n, self.rate, self.speed = source.name, source.n, source.rate, source.speed
+        self.resumed = None
+
+    def _noted(self, sample: Sample) -> None:
+        assert self._source is not None
+        now, arrived = time.monotonic(), self._source.arrived()
+        assert arrived is not None
+        if self.state != "streaming":
+            if self.state == "lost" or self.connections > 1:
+                self._said(f"{self.name} sends samples again")
+            self.state, self.why, self.resumed = "streaming", None, now
+        self._late = self._transit.late(sample.t / self.speed, arrived)
+        self.heard, self._arrived = now, arrived - self._late
+        if now - arrived > BEHIND:
+            self._source.leave()
+
+    def _let_go(self, wait: float, tick: float) -> Iterator[None]:
+        source, self._source = self._source, None
+        assert source is not None
+        self._lost += source.lost
+        thread = threading.Thread(target=source.close, daemon=True)  # a reader that hangs takes 3 s
+        thread.start()
+        yield from _joined(thread, tick)
+        yield from self._waited(wait, tick)
+
+    def _opened(self, tick: float) -> Iterator[None]:
+        """Open it beside, as that may take ten seconds."""
+        self.start()
+        assert self._trial is not None
+        yield from _joined(self._trial, tick)
+        made, self._trial, self._made = self._made, None, None
+        if isinstance(made, Detached):
+            if self._gone.is_set():
+                made.close()
+            self._take(made)
+            self._transit = Transit()
+        else:
+            self.state, self.why = "lost", str(made)
+            wait = self._backoff.failed(0.0)
+            self._said(f"{made}; it is tried again in {wait:.1f} s")
+            yield from self._waited(wait, tick)
+
+    def _waited(self, wait: float, tick: float) -> Iterator[None]:
+        until = time.monotonic() + wait
+        while (left := until - time.monotonic()) > 0 and not self._gone.wait(min(left, tick)):
+            yield None
+
+
+def _joined(thread: threading.Thread, tick: float) -> Iterator[None]:
+    """None every tick until a thread has ended."""
+    while thread.is_alive():
+        thread.join(tick)
+        if thread.is_alive():
+            yield None

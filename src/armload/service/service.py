@@ -1,0 +1,243 @@
+"""Several arms, one supervised process each; what they say goes on, with its true age, and alarms are made of it."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from armload.arms import arm, rated_mass
+from armload.errors import ArmloadError
+from armload.service.alarms import Alarm, Alarms
+from armload.service.backoff import Backoff
+from armload.service.settings import ArmSettings, ServiceSettings
+from armload.service.unknown import Unknown
+from armload.service.webhook import Webhook
+
+HUNG = 10.0  # [s] without a line after which an arm's process is killed: it speaks ten times a second
+HUNG_COMPILING = 300.0  # [s] the same until its first answer: on a slow machine compiling takes minutes
+_LOOK = 0.1  # [s] between two looks at the processes
+_TO_END = 6.0  # [s] a process may take to save and end: its reader may take three
+
+Listener = Callable[[dict[str, Any]], None]
+
+
+class Service:
+    """All arms of the settings, until `close`.
+
+    An arm's process that ends, or says nothing for 10 s, is started again at once, then after 0.1, 0.2, … 5 s, and goes
+    on from its saved state. What it needs not know: other arms, the endpoint, alarms.
+
+    Args:
+        settings: arms, and whom to tell. note: called with each sentence for a log.
+
+    Attributes:
+        processes: of each arm, by its name, while it runs.
+        error: why the service cannot go on; None: it does.
+    """
+
+    def __init__(self, settings: ServiceSettings, note: Callable[[str], None] | None = None) -> None:
+        self.settings, self._note = settings, note or (lambda _: None)
+        self.names = [arm.name for arm in settings.arms]
+        self.error: str | None = None
+        self.processes: dict[str, subprocess.Popen[bytes]] = {}
+        self._alarms = {a.name: Alarms(a.name, _rating(a), a.com_range) for a in settings.arms}
+        self._answers = {a.name: _starting(a) for a in settings.arms}
+        self._heard = dict.fromkeys(self.names, time.monotonic())
+        self._restarts = dict.fromkeys(self.names, 0)
+        self._ended: set[str] = set()
+        self._listeners: list[Listener] = []
+        self._state, self._gone = threading.RLock(), threading.Event()
+        self._webhook = None if settings.webhook is None else Webhook(settings.webhook, settings.headers)
+        self._threads = [
+            threading.Thread(target=self._keep, args=(a,), name=f"armload-{a.name}", daemon=True) for a in settings.arms
+        ]
+
+    def run(self, duration: float | None = None) -> None:
+        """Until all sources have ended, `close`, or so many seconds [s] have passed."""
+        for thread in self._threads:
+            thread.start()
+        until = None if duration is None else time.monotonic() + duration
+        while not self._gone.wait(_LOOK) and len(self._ended) < len(self.names):
+            if self.error is not None or (until is not None and time.monotonic() > until):
+                break
+            self._look()
+
+    def stop(self) -> None:
+        """Make `run` return; from any thread."""
+        self._gone.set()
+
+    def close(self) -> None:
+        """Let all processes save and end."""
+        self._gone.set()
+        for process in list(self.processes.values()):
+            with contextlib.suppress(OSError):
+                assert process.stdin is not None
+                process.stdin.close()
+        until = time.monotonic() + _TO_END
+        for thread in self._threads:
+            if thread.is_alive():
+                thread.join(max(0.0, until - time.monotonic()))
+        for process in list(self.processes.values()):
+            process.kill()
+        if self._webhook is not None:
+            self._webhook.close()
+
+    def answer(self, name: str) -> dict[str, Any]:
+        """An arm's newest answer, as old as it is now."""
+        with self._state:
+            return self._as_of_now(dict(self._answers[name]), name)
+
+    @contextmanager
+    def heard_by(self, listener: Listener) -> Iterator[None]:
+        """Within the block a listener hears every line: answers, and alarms (which have "alarm"). It must not wait."""
+        with self._state:
+            self._listeners.append(listener)
+        try:
+            yield
+        finally:
+            with self._state:
+                self._listeners.remove(listener)
+
+    # ------------------------------------------------------------------ one arm's process
+
+    def _keep(self, settings: ArmSettings) -> None:
+        """Keep an arm's process running."""
+        backoff, name = Backoff(), settings.name
+        while not self._gone.is_set():
+            began = time.monotonic()
+            with self._state:
+                self._heard[name] = began
+            process = self._started(settings)
+            try:
+                error = self._listen(process, name)
+            finally:
+                code = process.wait()
+                self.processes.pop(name, None)
+            if error is not None or code == 0 or self._gone.is_set():
+                if error is not None:
+                    self.error = f"{name}: {error}"
+                break
+            how = f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
+            wait = backoff.failed(time.monotonic() - began)
+            self._note(f"{name}: its process {how}; it is started again in {wait:.1f} s")
+            with self._state:
+                self._restarts[name] += 1
+                self._answers[name] = {**self._answers[name], **_unknown(f"its process {how}")}
+            self._gone.wait(wait)
+        self._ended.add(name)
+
+    def _started(self, settings: ArmSettings) -> subprocess.Popen[bytes]:
+        process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "armload.service.arm_process"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        )
+        self.processes[settings.name] = process
+        assert process.stdin is not None
+        with contextlib.suppress(OSError):
+            order = {"arm": settings.to_dict(), "every": self.settings.every}
+            process.stdin.write((json.dumps(order) + "\n").encode())
+            process.stdin.flush()
+        if self._gone.is_set():
+            process.stdin.close()
+        return process
+
+    def _listen(self, process: subprocess.Popen[bytes], name: str) -> str | None:
+        """Pass on what a process says until it ends; what it cannot begin with, if that is why."""
+        assert process.stdout is not None
+        with process.stdout as lines:
+            for line in lines:
+                try:
+                    said = json.loads(line)
+                except ValueError:  # cut off by a kill
+                    continue
+                if "error" in said:
+                    return said["error"]
+                with self._state:
+                    self._heard[name] = time.monotonic()
+                if "note" in said:
+                    self._note(f"{name}: {said['note']}")
+                else:
+                    self._take(name, said)
+        return None
+
+    # ------------------------------------------------------------------ answers
+
+    def _take(self, name: str, said: dict[str, Any]) -> None:
+        with self._state:
+            self._answers[name] = said
+            self._tell(name)
+
+    def _tell(self, name: str) -> None:
+        answer = self.answer(name)
+        for alarm in self._alarms[name].look(answer, time.monotonic()):
+            self._alarm(alarm)
+        for listener in self._listeners:
+            listener(answer)
+
+    def _alarm(self, alarm: Alarm) -> None:
+        message = {**alarm.to_dict(), "time": time.time()}
+        self._note(f"{alarm.arm}: {alarm.kind} {message['state']}: {alarm.text}")
+        for listener in self._listeners:
+            listener(message)
+        if self._webhook is not None:
+            self._webhook.post(message)
+
+    def _as_of_now(self, answer: dict[str, Any], name: str) -> dict[str, Any]:
+        """The answer with what has passed since it was made; of a process that is silent nothing is known."""
+        since = max(0.0, time.monotonic() - answer.pop("told"))
+        for key in ("age", "lag"):
+            answer[key] = None if answer.get(key) is None else answer[key] + since
+        if since > 1.0 and answer["unknown"] not in (Unknown.STARTING, Unknown.COMPILING, Unknown.SOURCE_ENDED):
+            answer |= _unknown(f"its process has said nothing for {since:.1f} s")
+        return {**answer, "restarts": self._restarts[name], "alarms": sorted(self._alarms[name].raised)}
+
+    def _look(self) -> None:
+        """Speak for processes that do not, and end those that hang."""
+        for name in self.names:
+            with self._state:
+                silent = time.monotonic() - self._heard[name]
+                if silent < 2.0 * max(_LOOK, self.settings.every) or name in self._ended:
+                    continue
+                self._tell(name)
+                first = self._answers[name].get("t") is None
+            process = self.processes.get(name)
+            if silent > (HUNG_COMPILING if first else HUNG) and process is not None:
+                self._note(f"{name}: its process has said nothing for {silent:.0f} s and is ended")
+                process.kill()
+
+
+def _rating(settings: ArmSettings) -> float:
+    if settings.rating is not None:
+        return settings.rating
+    return float(rated_mass(arm(settings.robot, settings.frame)))
+
+
+def _starting(settings: ArmSettings) -> dict[str, Any]:
+    """What is said of an arm before its process says anything."""
+    head = {"arm": settings.name, "robot": settings.robot, "told": time.monotonic()}
+    rest = {"connection": "connecting", "connections": 0, "lost": 0, "age": None, "lag": None, "mass": None}
+    return {**head, **_unknown("its process is being started"), "source": settings.source, **rest}
+
+
+def _unknown(why: str) -> dict[str, Any]:
+    return {"known": False, "unknown": Unknown.STARTING.value, "why": why}
+
+
+def checked(settings: ServiceSettings) -> None:
+    """Make once what each process will make, so that what cannot be is said at once.
+
+    Raises:
+        ArmloadError: an arm, a frame or a rating that there is not.
+    """
+    for each in settings.arms:
+        try:
+            gravity = {} if each.gravity is None else {"gravity": each.gravity}
+            arm(each.robot, each.frame, **gravity)
+        except ArmloadError as error:
+            raise type(error)(f"{each.name}: {error}") from None

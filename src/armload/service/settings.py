@@ -1,0 +1,180 @@
+"""What a service is to do: arms and their sources, and whom to tell, from a TOML file."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import ipaddress
+import json
+import re
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from armload.errors import UsageError
+
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
+_PATHS = ("tare", "profile", "tool", "save", "record")
+_KINDS = {"str": str, "float": (int, float), "bool": bool, "int": int, "tuple": list, "dict": dict}
+
+
+@dataclass(frozen=True)
+class ArmSettings:
+    """One arm.
+
+    name: in lines and addresses. source: see `open_source`. robot, frame, gravity, tare, profile, tool, method: as the
+    options of `armload live`. save: the folder of its state; None: nothing is kept. record: a `.csv` file that does not
+    exist yet. rating: the most it may hold [kg]; None: what the arm is rated for. com_range: the farthest its payload's
+    centre of mass may be [m]. loop: replay a log again and again. rate: of the simulator [Hz].
+    """
+
+    name: str
+    source: str
+    robot: str
+    frame: str | None = None
+    gravity: tuple[float, float, float] | None = None
+    tare: str | None = None
+    profile: str | None = None
+    tool: str | None = None
+    method: str | None = None
+    save: str | None = None
+    record: str | None = None
+    rating: float | None = None
+    com_range: float | None = None
+    loop: bool = False
+    rate: float = 1000.0
+
+    @property
+    def state(self) -> Path | None:
+        """The file of the identifier's state. Other settings have another name: a state with another tare is none."""
+        if self.save is None:
+            return None
+        asked = {
+            key: value for key, value in self.to_dict().items() if key not in ("save", "record", "rating", "com_range")
+        }
+        for key in ("tare", "profile", "tool"):
+            if asked[key] is not None and (path := Path(asked[key])).is_file():
+                asked[key] = [asked[key], hashlib.sha256(path.read_bytes()).hexdigest()]
+        digest = hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:8]
+        return Path(self.save) / f"{self.name}-{digest}.npz"
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return dataclasses.asdict(self)
+
+
+@dataclass(frozen=True)
+class ServiceSettings:
+    """The whole service.
+
+    arms: one process each. every: [s] between two lines of an arm. host, port: of the endpoint; port None: there is
+    none. token: what a request must bring; required beyond loopback. webhook: where alarms go. headers: sent with them.
+    duration: end after so long [s].
+    """
+
+    arms: tuple[ArmSettings, ...]
+    every: float = 0.1
+    host: str = "127.0.0.1"
+    port: int | None = None
+    token: str | None = None
+    webhook: str | None = None
+    headers: dict[str, str] = field(default_factory=dict)
+    duration: float | None = None
+
+    def __post_init__(self) -> None:
+        names = [arm.name for arm in self.arms]
+        if not names:
+            raise UsageError("no arm is named: expected a source, or a file with [[arm]] tables")
+        if doubled := sorted({name for name in names if names.count(name) > 1}):
+            raise UsageError(f"two arms are called {doubled[0]!r}: give each a name of its own")
+        if self.port is not None and self.token is None and not is_loopback(self.host):
+            raise UsageError(
+                f"the endpoint at {self.host} can be reached from other machines: "
+                "give it a token, or the host 127.0.0.1"
+            )
+
+
+def is_loopback(host: str) -> bool:
+    """Whether an address is of this machine alone."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def read_settings(path: str | Path, **over: Any) -> ServiceSettings:
+    """The settings in a TOML file; paths in it are relative to its folder.
+
+    Args:
+        path: the file. over: settings of the service that take the place of the file's.
+
+    Raises:
+        UsageError: the file is missing or none, or says what nobody knows.
+    """
+    path = Path(path)
+    try:
+        said = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UsageError(f"{path} cannot be read: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UsageError(f"{path} is no TOML: {error}") from None
+    tables = said.pop("arm", [])
+    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
+        raise UsageError(f"{path}: arm is no list of tables: expected [[arm]] before each")
+    if (file := said.pop("token_file", None)) is not None:
+        said["token"] = read_token(path.parent / str(file))
+    arms = tuple(_arm(table, path) for table in tables)
+    service = _checked(said, ServiceSettings, f"{path}", ("arms", "duration"))
+    return ServiceSettings(arms, **{**service, **over})
+
+
+def read_token(path: str | Path) -> str:
+    """The token in a file.
+
+    Raises:
+        UsageError: the file cannot be read, or holds fewer than 16 characters.
+    """
+    try:
+        token = Path(path).read_text(encoding="utf-8").strip()
+    except OSError as error:
+        raise UsageError(f"the token's file {path} cannot be read: {error.strerror}") from None
+    if len(token) < 16 or not token.isascii():
+        raise UsageError(f"the token in {path} has {len(token)} characters: expected 16 or more, all of ASCII")
+    return token
+
+
+def _arm(table: dict[str, Any], path: Path) -> ArmSettings:
+    where = f"{path}, arm {table.get('name', '?')!r}"
+    settings = _checked(table, ArmSettings, where)
+    for key in ("name", "source", "robot"):
+        if key not in settings:
+            raise UsageError(f"{where}: there is no {key}: expected name, source and robot for each arm")
+    for key in _PATHS:
+        if key in settings and settings[key] not in ("franka-hand", "test"):
+            settings[key] = str(path.parent / settings[key])
+    if "://" not in settings["source"] and settings["source"] != "sim":
+        settings["source"] = str(path.parent / settings["source"])
+    if "gravity" in settings:
+        if len(settings["gravity"]) != 3:
+            raise UsageError(f"{where}: gravity has {len(settings['gravity'])} numbers: expected three, in m/s²")
+        settings["gravity"] = tuple(float(x) for x in settings["gravity"])
+    if not _NAME.fullmatch(settings["name"]):
+        raise UsageError(f"{where}: the name is expected to be of letters, digits, '-', '_' and '.'")
+    return ArmSettings(**settings)
+
+
+def _checked(said: dict[str, Any], kind: type, where: str, without: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Known keys with values of their types."""
+    fields = {f.name: str(f.type).split(" | ")[0].split("[")[0] for f in dataclasses.fields(kind)}
+    for key, value in said.items():
+        if key not in fields or key in without:
+            known = ", ".join(name for name in fields if name not in without)
+            raise UsageError(f"{where}: unknown setting {key!r}: expected some of {known}")
+        expected = _KINDS[fields[key]]
+        if not isinstance(value, expected) or (isinstance(value, bool) and fields[key] != "bool"):
+            raise UsageError(f"{where}: {key} is {value!r}: expected a {fields[key].replace('tuple', 'list')}")
+    if "webhook" in said and urlsplit(said["webhook"]).scheme not in ("http", "https"):
+        raise UsageError(f"{where}: the webhook is {said['webhook']!r}: expected an address such as https://HOST/PATH")
+    return dict(said)

@@ -1,0 +1,98 @@
+"""Alarms to a web address: one JSON object for each, tried again until it is taken, and nobody waits for it."""
+
+from __future__ import annotations
+
+import json
+import threading
+import urllib.error
+import urllib.request
+from collections import deque
+from collections.abc import Mapping
+from typing import Any
+from urllib.parse import urlsplit
+
+from armload.errors import UsageError
+from armload.service.backoff import Backoff
+
+_ANSWERED = 5.0  # [s] a receiver may take
+_LONGEST = 60.0  # [s] between two trials
+_KEPT = 1000  # messages that wait; then the oldest give way: an hour of alarms every four seconds
+_WAIT_AT_END = 2.0  # [s] that `close` gives to what still waits
+
+
+class Webhook:
+    """Posts messages in their order from a thread of its own.
+
+    What is not taken (an error, a status of 300 or more, no answer within 5 s) is posted again after 1, 2, 4, … 60 s.
+    A status of 400 to 499 but 408 and 429 means that this message will never be taken: it is dropped.
+
+    Args:
+        url: http:// or https://. headers: sent with each message, as `Authorization`.
+
+    Attributes:
+        sent, dropped: messages. failed: why the last trial failed; None: it did not.
+
+    Raises:
+        UsageError: the address is none.
+    """
+
+    def __init__(self, url: str, headers: Mapping[str, str] | None = None) -> None:
+        if urlsplit(url).scheme not in ("http", "https") or not urlsplit(url).hostname:
+            raise UsageError(f"the webhook is {url!r}: expected an address such as https://HOST/PATH")
+        self.url, self._headers = url, {"Content-Type": "application/json", **(headers or {})}
+        self.sent = self.dropped = 0
+        self.failed: str | None = None
+        self._waiting: deque[bytes] = deque()
+        self._there, self._gone = threading.Condition(), threading.Event()
+        self._thread = threading.Thread(target=self._run, name="armload-webhook", daemon=True)
+        self._thread.start()
+
+    def post(self, message: Mapping[str, Any]) -> None:
+        """Take a message to be sent; returns at once."""
+        with self._there:
+            if len(self._waiting) >= _KEPT:
+                self._waiting.popleft()
+                self.dropped += 1
+            self._waiting.append(json.dumps(message, allow_nan=False).encode())
+            self._there.notify()
+
+    def close(self) -> None:
+        """Give what waits two more seconds, and end."""
+        with self._there:
+            self._gone.set()
+            self._there.notify()
+        self._thread.join(_WAIT_AT_END)
+
+    def _run(self) -> None:
+        backoff = Backoff(1.0, _LONGEST)
+        while True:
+            with self._there:
+                self._there.wait_for(lambda: self._waiting or self._gone.is_set())
+                if not self._waiting:
+                    return
+                message = self._waiting[0]
+            taken = self._taken(message)
+            if taken is None:
+                if self._gone.wait(backoff.failed(0.0)):
+                    return
+                continue
+            backoff = Backoff(1.0, _LONGEST)
+            self.sent, self.dropped = self.sent + taken, self.dropped + (not taken)
+            with self._there:
+                if self._waiting and self._waiting[0] is message:
+                    self._waiting.popleft()
+
+    def _taken(self, message: bytes) -> bool | None:
+        """Whether it was taken; None: try again."""
+        request = urllib.request.Request(self.url, message, self._headers, method="POST")
+        try:
+            with urllib.request.urlopen(request, timeout=_ANSWERED):
+                self.failed = None
+                return True
+        except urllib.error.HTTPError as error:
+            error.close()
+            self.failed = f"{self.url} answered {error.code}"
+            return False if 400 <= error.code < 500 and error.code not in (408, 429) else None
+        except (OSError, ValueError) as error:
+            self.failed = f"{self.url} did not answer: {error}"
+            return None

@@ -1,0 +1,149 @@
+"""Alarms: one for each episode, told to a receiver that may be away."""
+
+import json
+import threading
+import time
+from http.server import BaseHTTPRequestHandler, HTTPServer
+
+import pytest
+
+from armload.errors import UsageError
+from armload.service import Alarms, Webhook
+from armload.service.alarms import CLEARED_AFTER, RAISED_AFTER
+
+
+def answer(mass=1.0, com=(0.0, 0.0, 0.05), **more):
+    known = {"known": True, "unknown": None, "why": None, "held": True, "determined": [True] * 10}
+    return {**known, "mass": mass, "com": list(com), **more}
+
+
+UNKNOWN = {"known": False, "unknown": "changing", "why": "", "mass": 9.0, "com": None}
+
+
+def told(alarms, said, seconds, start, step=0.1):
+    """Alarms while the same is said for so long, and when that ends."""
+    steps = round(seconds / step)
+    return [a for k in range(steps) for a in alarms.look(said, start + k * step)], start + steps * step
+
+
+def test_an_episode_raises_once_and_clears_once():
+    alarms, now, seen = Alarms("a", rating=3.0), 0.0, []
+    for _ in range(2):
+        for mass, seconds in ((3.5, 2.0), (1.0, CLEARED_AFTER + 1.0)):
+            found, now = told(alarms, answer(mass), seconds, now)
+            seen += [(a.kind, a.raised) for a in found]
+    assert seen == [("over_rating", True), ("over_rating", False)] * 2
+
+
+def test_a_limit_that_is_grazed_gives_one_alarm():
+    alarms, now, seen = Alarms("a", rating=3.0), 0.0, []
+    for k in range(20):
+        found, now = told(alarms, answer(3.1 if k % 2 == 0 else 2.9), 1.0, now)
+        seen += found
+    assert [a.raised for a in seen] == [True]
+
+
+def test_what_lasts_shorter_than_the_hysteresis_is_no_alarm():
+    alarms = Alarms("a", rating=3.0)
+    found, now = told(alarms, answer(3.5), 0.9 * RAISED_AFTER, 0.0)
+    assert found == []
+    assert told(alarms, answer(1.0), 3.0, now)[0] == []
+
+
+def test_an_unknown_answer_neither_raises_nor_clears_a_mass():
+    alarms = Alarms("a", rating=3.0)
+    assert told(alarms, UNKNOWN, 60.0, 0.0)[0] == []
+    told(alarms, answer(3.5), 2.0, 60.0)
+    assert alarms.raised == {"over_rating"}
+    assert told(alarms, UNKNOWN, 60.0, 62.0)[0] == []
+    assert alarms.raised == {"over_rating"}
+
+
+@pytest.mark.parametrize(
+    ("said", "kind"),
+    [
+        (answer(com=(0.0, 0.3, 0.4)), "com_out_of_range"),
+        (answer(arm_changed="another arm"), "arm_changed"),
+        ({**UNKNOWN, "unknown": "samples implausible", "why": "tau of joint 2 has the wrong sign"}, "arm_changed"),
+        ({**UNKNOWN, "unknown": "source lost", "why": "gone"}, "source_lost"),
+        ({**UNKNOWN, "unknown": "silent", "why": "gone"}, "source_lost"),
+    ],
+)
+def test_each_kind_is_told_with_what_it_rests_on(said, kind):
+    (alarm,) = told(Alarms("a", rating=3.0, com_range=0.4), said, 2.0, 0.0)[0]
+    assert (alarm.kind, alarm.raised) == (kind, True)
+    assert alarm.text
+    if kind == "com_out_of_range":
+        assert (alarm.value, alarm.limit) == (pytest.approx(0.5), 0.4)
+
+
+def test_a_centre_of_mass_of_nothing_is_no_alarm():
+    far = answer(mass=0.01, com=(5.0, 0.0, 0.0), held=False)
+    assert told(Alarms("a", com_range=0.1), far, 5.0, 0.0)[0] == []
+
+
+@pytest.fixture
+def receiver():
+    """A real server that takes what it is sent after it has answered as told."""
+    taken, codes = [], [503, 200]
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_POST(self):
+            body = self.rfile.read(int(self.headers["Content-Length"]))
+            code = codes.pop(0) if codes else 200
+            if code == 200:
+                taken.append((json.loads(body), self.headers.get("Authorization")))
+            self.send_response(code)
+            self.end_headers()
+
+        def log_message(self, *_):
+            pass
+
+    with HTTPServer(("127.0.0.1", 0), Handler) as server:
+        thread = threading.Thread(target=server.serve_forever, args=(0.05,))
+        thread.start()
+        yield f"http://127.0.0.1:{server.server_address[1]}/alarms", taken, codes
+        server.shutdown()
+        thread.join()
+
+
+def until(condition, seconds=10.0):
+    end = time.monotonic() + seconds
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.02)
+    assert condition()
+
+
+def test_alarms_arrive_in_order_though_the_receiver_fails_first(receiver):
+    url, taken, _ = receiver
+    webhook = Webhook(url, {"Authorization": "Bearer x"})
+    for k in range(3):
+        webhook.post({"number": k})
+    until(lambda: len(taken) == 3)
+    webhook.close()
+    assert taken == [({"number": k}, "Bearer x") for k in range(3)]
+
+
+def test_a_message_that_will_never_be_taken_holds_up_no_other(receiver):
+    url, taken, codes = receiver
+    codes[:] = [400]
+    webhook = Webhook(url)
+    webhook.post({"number": 0})
+    webhook.post({"number": 1})
+    until(lambda: taken and webhook.sent == 1)
+    webhook.close()
+    assert [message["number"] for message, _ in taken] == [1]
+    assert (webhook.sent, webhook.dropped) == (1, 1)
+
+
+def test_what_waits_for_a_dead_receiver_is_bounded():
+    webhook = Webhook("http://127.0.0.1:9/nobody")
+    for k in range(3000):
+        webhook.post({"number": k})
+    assert webhook.dropped >= 1990
+    webhook.close()
+
+
+def test_an_address_that_is_none_is_refused():
+    with pytest.raises(UsageError, match="expected an address"):
+        Webhook("ftp://host/x")

@@ -1,0 +1,232 @@
+"""The whole service as its users start it: processes that are killed, two arms, the endpoint, alarms, its state."""
+
+import json
+import os
+import queue
+import signal
+import subprocess
+import sys
+import threading
+import time
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armload.payloads import test_payload
+from armload.recording import write_recording
+
+HELD = test_payload().parameters
+
+
+@pytest.fixture
+def cell(panda, analytic_log, tmp_path):
+    """A file of arms that replay a log in a circle; the second alternates with it."""
+    write_recording(tmp_path / "run.csv", analytic_log(panda, HELD, duration=8.0))
+
+    def make(*names, **service):
+        lines = [f"{key} = {json.dumps(value)}" for key, value in service.items()]
+        for name in names:
+            lines += ["[[arm]]", f'name = "{name}"', 'source = "run.csv"', 'robot = "panda"', 'method = "map"']
+            lines += ["loop = true", 'save = "state"', "rating = 0.5" if name == "heavy" else ""]
+        path = tmp_path / "cell.toml"
+        path.write_text("\n".join(lines))
+        return path
+
+    return make
+
+
+class Running:
+    """`armload serve`, and what it has said."""
+
+    def __init__(self, *arguments):
+        command = [sys.executable, "-m", "armload", "serve", *map(str, arguments)]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.lines, self.notes = queue.Queue(), []
+        self.threads = [
+            threading.Thread(target=self.hear, daemon=True),
+            threading.Thread(target=self.read, daemon=True),
+        ]
+        for thread in self.threads:
+            thread.start()
+
+    def hear(self):
+        for line in self.process.stdout:
+            self.lines.put(json.loads(line))
+
+    def read(self):
+        for line in self.process.stderr:
+            self.notes.append(line)
+
+    def until(self, condition, seconds=120.0):
+        """The first line that fulfils a condition."""
+        end = time.monotonic() + seconds
+        while True:
+            left = end - time.monotonic()
+            assert left > 0, self.notes
+            try:
+                line = self.lines.get(timeout=min(left, 1.0))
+            except queue.Empty:
+                assert self.process.poll() is None, self.notes
+                continue
+            if condition(line):
+                return line
+
+    def url(self):
+        while not any("http://" in note for note in self.notes):
+            time.sleep(0.02)
+        note = next(note for note in self.notes if "http://" in note)
+        return note.split()[-1].removesuffix("/arms")
+
+    def close(self):
+        self.process.kill()
+        self.process.wait()
+        for thread in self.threads:
+            thread.join()
+        self.process.stdout.close()
+        self.process.stderr.close()
+
+
+@pytest.fixture
+def serve():
+    started = []
+
+    def start(*arguments):
+        started.append(Running(*arguments))
+        return started[-1]
+
+    yield start
+    for running in started:
+        running.close()
+
+
+def known(name):
+    return lambda line: line["arm"] == name and line.get("known")
+
+
+def children(pid):
+    """Processes a process has started, and those that these have."""
+    text = Path(f"/proc/{pid}/task/{pid}/children")
+    found = [int(child) for task in text.parent.parent.iterdir() for child in (task / "children").read_text().split()]
+    return found + [deeper for child in found for deeper in children(child)]
+
+
+def ended(pids):
+    """Which of some processes have not ended."""
+    return [pid for pid in pids if Path(f"/proc/{pid}").exists() and " Z " not in Path(f"/proc/{pid}/stat").read_text()]
+
+
+def get(url, **headers):
+    try:
+        with urllib.request.urlopen(urllib.request.Request(url, headers=headers), timeout=10) as response:
+            return response.status, json.loads(response.read())
+    except urllib.error.HTTPError as error:
+        with error:
+            return error.code, json.loads(error.read())
+
+
+def test_two_arms_answer_over_http_and_a_kill_of_one_leaves_the_other(serve, cell):
+    running = serve(cell("light", "heavy", port=0, every=0.2))
+    assert running.until(known("light"))["mass"] == pytest.approx(HELD.mass, abs=0.05)
+    running.until(known("heavy"))
+    raised = running.until(lambda line: line.get("alarm") == "over_rating")
+    assert (raised["arm"], raised["state"], raised["limit"]) == ("heavy", "raised", 0.5)
+    url = running.url()
+    status, answers = get(f"{url}/arms")
+    assert status == 200
+    assert set(answers) == {"light", "heavy"}
+    assert get(f"{url}/arms/none")[0] == get(f"{url}/x")[0] == 404
+    assert get(f"{url}/arms", Host="evil.example")[0] == 403
+    with urllib.request.urlopen(f"{url}/stream/light", timeout=10) as stream:
+        assert json.loads(stream.readline())["arm"] == "light"
+
+    arms = [pid for pid in children(running.process.pid) if b"arm_process" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+    before = answers["light"]["restarts"], answers["heavy"]["restarts"]
+    assert before == (0, 0)
+    os.kill(arms[0], signal.SIGKILL)
+    gone = running.until(lambda line: line.get("known") is False)
+    assert gone["unknown"] == "starting"
+    running.until(known(gone["arm"]))
+    answers = get(f"{url}/arms")[1]
+    assert {name: said["restarts"] for name, said in answers.items()} == {
+        name: int(name == gone["arm"]) for name in ("light", "heavy")
+    }
+    running.process.terminate()
+    assert running.process.wait(30) == 0
+    assert ended(arms) == []
+    assert len(list((cell("light").parent / "state").glob("*.npz"))) == 2
+
+
+@pytest.mark.full
+def test_kill_9_of_the_service_ends_all_its_processes_and_the_next_goes_on_from_their_state(serve, cell):
+    path = cell("light")
+    first = serve(path)
+    seen = first.until(lambda line: line.get("n_samples", 0) > 1000)
+    below = children(first.process.pid)
+    assert len(below) == 2
+    first.process.kill()
+    end = time.monotonic() + 20.0
+    while ended(below) and time.monotonic() < end:
+        time.sleep(0.05)
+    assert ended(below) == []
+    second = serve(path)
+    again = second.until(lambda line: line.get("n_samples", 0) > 0)
+    assert again["n_samples"] >= seen["n_samples"]  # nothing was forgotten
+    assert any("continued from" in note for note in second.notes)
+
+
+@pytest.mark.full
+def test_kill_9_of_every_process_in_turn_is_survived(serve, cell):
+    running = serve(cell("light", "heavy"))
+    for name in ("light", "heavy"):
+        running.until(known(name))
+    for _ in range(2):
+        for pid in children(running.process.pid):
+            if not ended([pid]):
+                continue  # a reader ends with its arm's process
+            os.kill(pid, signal.SIGKILL)
+            running.until(lambda line: line.get("known") is False)
+            for name in ("light", "heavy"):
+                running.until(known(name))
+    assert running.process.poll() is None
+
+
+@pytest.mark.full
+def test_a_process_that_hangs_is_replaced(serve, cell):
+    running = serve(cell("light"))
+    running.until(known("light"))
+    (pid,) = [p for p in children(running.process.pid) if b"arm_process" in Path(f"/proc/{p}/cmdline").read_bytes()]
+    os.kill(pid, signal.SIGSTOP)
+    silent = running.until(lambda line: line["known"] is False)
+    assert "has said nothing" in silent["why"]
+    ages = [running.until(lambda line: line.get("age") is not None)["age"] for _ in range(10)]
+    assert ages == sorted(ages)
+    running.until(known("light"))
+    assert any("is ended" in note for note in running.notes)
+
+
+@pytest.mark.full
+def test_on_busy_cores_the_age_is_what_an_outsider_measures(serve, cell):
+    """The log's clock is the wall's: whoever reads the lines sees from t how late they are, and age has to say so."""
+    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2 * (os.cpu_count() or 1))]
+    try:
+        running = serve(cell("light"))
+        running.until(known("light"))
+        (pid,) = [p for p in children(running.process.pid) if b"arm_process" in Path(f"/proc/{p}/cmdline").read_bytes()]
+        late, age = [], []
+        for k in range(120):
+            if k in (40, 80):
+                os.kill(pid, (signal.SIGSTOP, signal.SIGCONT)[k == 80])
+            line = running.until(lambda line: line.get("age") is not None)
+            late.append(time.monotonic() - line["t"])
+            age.append(line["age"])
+        late = np.array(late) - min(late)
+        assert late.max() > 2.0
+        untold = late - age
+        assert untold.max() < 0.25 * late.max()  # the way of a line to its reader, for which processors are busy too
+    finally:
+        for process in busy:
+            process.kill()
+            process.wait()

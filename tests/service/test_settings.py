@@ -1,0 +1,82 @@
+"""What a file may say, and what is said of one that cannot be meant."""
+
+import pytest
+
+from armload.app.cli import main
+from armload.errors import UsageError
+from armload.service import ArmSettings, ServiceSettings, read_settings
+
+CELL = """
+every = 0.5
+port = 0
+webhook = "https://cell.example/alarms"
+[headers]
+Authorization = "Bearer abc"
+
+[[arm]]
+name = "left"
+source = "fr3://172.16.0.2"
+robot = "fr3"
+tare = "empty.csv"
+save = "state"
+rating = 2.5
+
+[[arm]]
+name = "right"
+source = "sim"
+robot = "panda"
+gravity = [0, 0, -9.8]
+"""
+
+
+def test_a_file_says_what_it_says_with_paths_from_its_own_folder(tmp_path):
+    (tmp_path / "cell.toml").write_text(CELL)
+    settings = read_settings(tmp_path / "cell.toml", every=1.0)
+    left, right = settings.arms
+    assert (settings.every, settings.port, settings.headers) == (1.0, 0, {"Authorization": "Bearer abc"})
+    assert (left.tare, left.save, left.rating) == (str(tmp_path / "empty.csv"), str(tmp_path / "state"), 2.5)
+    assert (right.source, right.gravity, right.state) == ("sim", (0.0, 0.0, -9.8), None)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("rating = 2.5", "ratting = 2.5"), "unknown setting 'ratting'"),
+        (("rating = 2.5", 'rating = "2.5"'), "rating is '2.5': expected a float"),
+        (("every = 0.5", "every = true"), "every is True"),
+        (('name = "right"', 'name = "left"'), "two arms are called 'left'"),
+        (('name = "right"', 'name = "../right"'), "letters, digits"),
+        (('robot = "panda"\n', ""), "there is no robot"),
+        (("[[arm]]", "[arm]"), "cannot|no TOML|list of tables"),
+        (("gravity = [0, 0, -9.8]", "gravity = [0, 0]"), "expected three"),
+        (("https://", "mqtt://"), "expected an address"),
+        (("every = 0.5", 'every = 0.5\nhost = "0.0.0.0"'), "give it a token"),
+        (("every = 0.5", 'token_file = "short"'), "expected 16 or more"),
+    ],
+)
+def test_what_cannot_be_meant_is_one_sentence(tmp_path, capsys, change, said):
+    (tmp_path / "short").write_text("secret")
+    (tmp_path / "cell.toml").write_text(CELL.replace(*change))
+    with pytest.raises(UsageError, match=said):
+        read_settings(tmp_path / "cell.toml")
+    assert main(["serve", str(tmp_path / "cell.toml")]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+
+
+def test_a_state_belongs_to_the_settings_it_was_made_with(tmp_path):
+    (tmp_path / "empty.csv").write_text("1")
+    settings = ArmSettings("left", "sim", "panda", save=str(tmp_path), tare=str(tmp_path / "empty.csv"))
+    first = settings.state
+    assert settings.state == first
+    (tmp_path / "empty.csv").write_text("2")
+    assert settings.state != first
+    assert ArmSettings("left", "sim", "panda", save=str(tmp_path), rating=2.0).state == (
+        ArmSettings("left", "sim", "panda", save=str(tmp_path), rating=3.0).state
+    )
+
+
+def test_a_service_without_arms_is_refused():
+    with pytest.raises(UsageError, match="no arm"):
+        ServiceSettings(())
