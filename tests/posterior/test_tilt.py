@@ -6,13 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.stats
 
 from armload import arm
 from armload.arms.momentum_row import MomentumRow, leaning_row
 from armload.identification import identify
+from armload.identification.notes import gravity_doubted
 from armload.lab.episodes import draw_episodes, simulate_episodes
 from armload.online import OnlineIdentifier
 from armload.posterior import HybridIdentifier
+from armload.posterior.tilt import Tilt
 from armload.regression import Correction
 
 ANGLES = np.radians([3.0, -4.0])  # 5° together
@@ -110,3 +113,23 @@ def test_a_concluded_stream_says_that_the_base_leans(panda, leaning):
     online.close()
     assert said.interval == "approximate"
     assert any(note.startswith("the base leans by ") for note in said.notes)
+
+
+def test_a_lean_in_doubt_is_said_beyond_what_a_level_base_shows_of_an_arm_whose_links_are_known(panda):
+    level = float(scipy.stats.chi2(2).ppf(0.95))
+    for share, said in ((0.99, False), (1.01, True)):
+        tilt = Tilt(np.radians([1.5, 0.0]), share * level, False)
+        assert (gravity_doubted(panda, tilt, "link") is not None) == said
+        assert gravity_doubted(panda, tilt, "motor") is None  # friction holds a joint as gravity does
+        assert (
+            gravity_doubted(arm("iiwa14"), tilt, "link") is None
+        )  # so do links of which only nominal figures are known
+    assert "by about 1.5°" in (gravity_doubted(panda, Tilt(np.radians([1.5, 0.0]), 9.0, False), "link") or "")
+
+
+@pytest.mark.full  # some seconds
+def test_a_base_that_may_lean_is_said_and_no_answer_of_it_is_called_calibrated(panda):
+    for log in logs_of(panda, panda.leaning(np.radians([1.2, -1.6])), count=4):  # 2° together
+        answer = identify(log.run, panda, tare=log.tare)
+        assert answer.interval == "approximate"
+        assert any("lean" in note for note in answer.notes)

@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
-from armload.identification.thresholds import KNOWN, NOMINAL
+from armload.identification.thresholds import KNOWN, MAY_LEAN, NOMINAL
 from armload.inertia import NAMES, SHRINK, Z95
 from armload.posterior import KnownMass
 from armload.posterior.drift import Drift
 from armload.posterior.scales import AnotherArm
+from armload.posterior.tilt import Tilt
 from armload.recording import Recording
 
 RECORD = "record the arm as it is, without the payload, on any motion of 20 s, and name the log with --tare"
@@ -129,6 +130,23 @@ def gravity_turned(given: ArrayLike, found: ArrayLike, answered: bool) -> str:
         f"the base leans by {angle:.1f}° against the gravity that was given: "
         + ("this is the answer for" if answered else "answer anew with")
         + f" --gravity={option}, as the torques show it; level the base, or give its gravity"
+    )
+
+
+def gravity_doubted(arm: Arm, tilt: Tilt | None, torque: str) -> str | None:
+    """That the base may lean, which the log does not tell for sure; None: there is no reason to think so.
+
+    Args:
+        tilt: what the test of gravity found; None: it was not made. torque: "link" or "motor", the side it seems to be
+            measured on. Errors of nominal links, and friction of gears, look like a base that leans a little.
+    """
+    told = torque == "link" and arm.link_spread < NOMINAL
+    if tilt is None or tilt.found or not told or tilt.statistic <= MAY_LEAN:
+        return None
+    angle = np.degrees(np.linalg.norm(tilt.angles))
+    return (
+        f"the base may lean, by about {angle:.1f}° against the gravity that was given, which the answer believes: check "
+        "that it is level, give its gravity (--gravity), or record a tare of more poses"
     )
 
 

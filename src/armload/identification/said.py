@@ -15,6 +15,7 @@ from armload.identification.intervals import about_com, intervals, phi_interval
 from armload.identification.notes import (
     another_model,
     arm_changed,
+    gravity_doubted,
     gravity_turned,
     lacking,
     leaning_on_prior,
@@ -111,6 +112,8 @@ def _doubts(found: Found, arm: Arm, mass_determined: bool, relative_to: str) -> 
         leans = gravity_turned(arm.gravity, found.gravity, True)
     elif found.tilt is not None and found.tilt.found:
         leans = gravity_turned(arm.gravity, arm.leaning(found.tilt.angles).gravity, False)
+    else:
+        leans = gravity_doubted(arm, found.tilt, "motor" if arm.motor_torque or found.friction_found else "link")
     return [doubt for doubt in (leans, _doubt(found, arm, mass_determined, relative_to)) if doubt is not None]
 
 

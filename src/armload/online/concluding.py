@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from armload.arms import Arm
 from armload.estimators import Estimate, Identifier
-from armload.identification.notes import gravity_turned, not_rigid
+from armload.identification.notes import gravity_doubted, gravity_turned, not_rigid
 from armload.identification.said import EXCHANGED, NO_BODY
 from armload.identification.thresholds import MISFIT
 from armload.inertia import distance_to_body
@@ -31,4 +31,7 @@ def doubts_of(run: Identifier, estimate: Estimate, arm: Arm) -> tuple[bool, tupl
     if tilt is not None and tilt.found:
         doubted = True
         notes.append(gravity_turned(arm.gravity, arm.leaning(tilt.angles).gravity, False))
+    elif (may := gravity_doubted(arm, tilt, posterior.posterior.torque)) is not None:
+        doubted = True
+        notes.append(may)
     return doubted, tuple(notes)
