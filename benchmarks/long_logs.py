@@ -106,7 +106,8 @@ def main() -> None:
     slopes = {}
     for kind in asked.kinds.split(","):
         of = [(one["log [s]"], one["peak [MB]"]) for one in found if one["kind"] == kind and one["log [s]"] >= 60.0]
-        slopes[kind] = float(np.polyfit(*np.array(of).T, 1)[0]) if len(of) > 1 else None
+        t, peak = np.array(of).reshape(-1, 2).T
+        slopes[kind] = float(np.polyfit(t, peak, 1)[0]) if len(of) > 1 else None
     say(f"slopes [MB/s]: {slopes}")
     heads = ["log", "seconds", "file [MB]", "peak memory [MB]", "CPU [s]"]
     rows = [[str(x) if isinstance(x, str) else f"{x:.0f}" for x in one.values()] for one in found]

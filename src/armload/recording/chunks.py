@@ -20,7 +20,7 @@ from armload.recording.ros_bag import bag_chunks
 from armload.recording.spooled import spooled
 
 # [bytes] of a file from which a log is long: below, reading it whole takes a few times as much memory, and no disk
-LONG = 32e6
+LONG = 8e6
 _TEXT = 200  # bytes of a line: of text, as many bytes are read at a time as make about so many rows
 _TABLES: dict[str, Callable[..., Iterator[Recording]]] = {
     ".parquet": parquet_chunks,

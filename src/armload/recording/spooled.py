@@ -74,12 +74,12 @@ class SpooledRecording(Recording):
         if len(index) < 2 or np.any(np.diff(index) != 1):
             return self._in_memory(index)
         part = slice(int(index[0]), int(index[-1]) + 1)
-        on_disk: Any = {name: getattr(self, name).within(part) for name in QUANTITIES}
-        return replace(self, t=self.t[part], **on_disk)
+        q, dq, tau = (getattr(self, name).within(part) for name in QUANTITIES)
+        return replace(self, t=self.t[part], q=q, dq=dq, tau=tau)
 
     def _in_memory(self, index: NDArray) -> Recording:
-        about = (self.channel, self.joint_names, self.source, self.notes, self.epoch)
-        return Recording(self.t[index], *(getattr(self, name)[index] for name in QUANTITIES), *about)
+        q, dq, tau = (getattr(self, name)[index] for name in QUANTITIES)
+        return Recording(self.t[index], q, dq, tau, self.channel, self.joint_names, self.source, self.notes, self.epoch)
 
 
 def spooled(chunks: Iterable[Recording], where: str, folder: str | Path | None = None) -> Recording:
@@ -101,8 +101,9 @@ def spooled(chunks: Iterable[Recording], where: str, folder: str | Path | None =
     if last is None:
         raise RecordingError(f"{where} holds no rows of data: expected at least 2, one per sample")
     t, n = np.concatenate(times), last.n
-    on_disk: Any = [OnDisk(file, 3 * n, slice(k * n, (k + 1) * n), slice(0, len(t))) for k in range(3)]
-    return SpooledRecording(t, *on_disk, last.channel, last.joint_names, where, last.notes, last.epoch)
+    on_disk: list[Any] = [OnDisk(file, 3 * n, slice(k * n, (k + 1) * n), slice(0, len(t))) for k in range(3)]
+    q, dq, tau = on_disk
+    return SpooledRecording(t, q, dq, tau, last.channel, last.joint_names, where, last.notes, last.epoch)
 
 
 def extremes(x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -165,7 +165,8 @@ class _Reading:
         else:
             t = self._seconds(table, time, raw[:, 0])
         self._count += len(rows)
-        return np.column_stack([t, raw[:, len(extra) : len(extra) + len(self._places)] * self._scales])[rows], rows
+        motion = raw[:, len(extra) : len(extra) + len(self._places)] * self._scales
+        return np.asarray(np.column_stack([t, motion])[rows], dtype=np.float64), rows
 
     def _seconds(self, table: Table, time: TimeColumns, raw: NDArray[np.float64]) -> NDArray[np.float64]:
         if self._in_pieces and time.other is not None:
