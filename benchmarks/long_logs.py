@@ -1,123 +1,118 @@
-"""Whether the hybrid's error bars hold on logs longer than those they were calibrated on.
+"""What a survey of one log takes in memory, against the length of the log.
 
-    python benchmarks/long_logs.py [--robot panda] [--episodes 40] [--worlds real_like] [--jobs 1]
+    python benchmarks/long_logs.py [--kinds mcap,parquet] [--seconds 10,60,600,3600] [--rate 1000] [--out out/long-logs]
 
-The shipped model's widths were calibrated up to 6 s after a run began. Here runs last 60 s: every episode is another
-arm, payload and motion (a Fourier motion that repeats, a slow one that does not, stops at ever new poses, pick and
-place), logged at 200 Hz, identified without and with a tare of 20 s on another motion, at several times of the same
-run. Goes on from out/long_logs. Written to benchmarks/results/long_logs_ROBOT.json, for each world, with and without a
-tare, and each group of parameters, over time:
-
-coverage: share of the 95 % intervals that hold the truth. The episodes are few: `standard_error` is that of the
-    coverage, with an episode's parameters taken as one observation.
-half_width, error: mean over episodes and parameters, in kg, kg·m, kg·m²; the median of the half-widths, too: where an
-    answer leaves the families of payloads for the prior's wide component, its half-width grows tenfold.
-widen: 95 % quantile of |error| over half-width: by which factor the error bars would have to be widened.
-slope: d ln(error) / d ln(t) between two times; −0.5 where errors average out, 0 where more of the log tells no more.
+An empty Panda on an endless motion (`simulate_inverse`, a minute of it again and again, with noise of its own in each),
+without a tare. The peak is of all that one process touches (`ru_maxrss`), start-up included; the slope is that of a
+line through the logs of a minute and more. Printed, and written to benchmarks/results/long_logs.json and a table of
+docs/survey.md.
 """
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
-from functools import cache
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from script import ROOT, options, say, write
+from script import ROOT, markdown_table, options, say, write, write_table
 
-from armload import Arm, Recording, arm
-from armload.inertia import Z95
-from armload.lab.cells import key_of
-from armload.lab.episodes import Episode, Recipe, draw_episodes, simulate_episodes
-from armload.lab.experiment import Task, run_tasks, source_key
-from armload.posterior import HybridIdentifier, HybridModel, shipped_model
+from armload import arm
+from armload.motion import FourierMotion, random_motion
+from armload.simulation import Sensors, simulate_inverse
 
-TIMES = (1.0, 3.0, 6.0, 15.0, 30.0, 60.0)  # [s] since the run began
-FIRST_SEED = 910_001  # nothing is trained on it
-GROUPS = {"mass": slice(0, 1), "first_moment": slice(1, 4), "inertia": slice(4, 10)}
-MOTIONS = ("harmonics", "long", "point-to-point", "pick-and-place")
-LONG = Recipe(payloads=("boxes", "shapes", "tools", "container"), motions=MOTIONS, duration=TIMES[-1])
+MINUTE = 60.0  # [s] of motion that is repeated
 
 
-@cache
-def episodes(robot: Arm, world: str, count: int) -> list[Episode]:
-    """`count` long episodes on arms of a world."""
-    recipe = replace(LONG, worlds=(world,), elapsed=(30.0, 600.0) if world == "beyond" else LONG.elapsed)
-    return draw_episodes(robot, recipe, count, FIRST_SEED, motions=count)
+def minutes(rate: float, seconds: float) -> Any:
+    """The log, a minute or less at a time."""
+    panda = arm("panda")
+    motion: FourierMotion = random_motion(panda, 7, duration=MINUTE)
+    base = simulate_inverse(panda, motion, sensors=Sensors.panda(panda).evenly(), rate=rate, duration=MINUTE, seed=1)
+    steps, rng = round(MINUTE * rate), np.random.default_rng(3)
+    for k in range(int(np.ceil(seconds / MINUTE))):
+        rows = slice(0, min(steps, round((seconds - k * MINUTE) * rate)))
+        one = base.select(rows)
+        tau = one.tau + 0.01 * rng.normal(size=one.tau.shape)
+        yield replace(one, t=(k * steps + np.arange(len(one))) / rate, tau=tau)
 
 
-def answered(
-    robot: Arm, model: HybridModel, run: Recording, tare: Recording | None, truth: NDArray
-) -> dict[str, list[list[float]]]:
-    """|error| and half-width (T, 10) at the times."""
-    found = HybridIdentifier(robot, tare, model).at(run, TIMES)
-    error, half = np.abs([e.phi - truth for e in found]), Z95 * np.array([e.std for e in found])
-    return {"error": error.tolist(), "half": half.tolist()}
+def write_parquet(path: Path, parts: Any) -> None:
+    """A row group for each minute."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    from armload.recording.columns import column_names
+
+    writer = None
+    for part in parts:
+        columns = np.hstack([part.t[:, None], part.q, part.dq, part.tau]).T
+        table = pa.table(dict(zip(column_names(part.n), map(pa.array, columns), strict=True)))
+        writer = writer or parquet.ParquetWriter(path, table.schema)
+        writer.write_table(table)
+    assert writer is not None
+    writer.close()
 
 
-def measured(name: str, world: str, count: int, k: int) -> dict[str, Any]:
-    """One episode as a cell's numbers."""
-    robot = arm(name)
-    model, episode = shipped_model(robot), episodes(robot, world, count)[k]
-    logs = next(iter(simulate_episodes([episode])))
-    return {
-        "motion": next(kind for kind in MOTIONS if f"run-{kind}" in str(episode.motion.name)),
-        "no tare": answered(robot, model, logs.run, None, logs.truth.phi),
-        "tare": answered(robot, model, logs.run, logs.tare, logs.truth.phi),
-    }
+def write_mcap(path: Path, parts: Any) -> None:
+    """A ROS 2 bag of JointState messages."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    kind, store = "sensor_msgs/msg/JointState", get_typestore(Stores.ROS2_HUMBLE)
+    state, header, time = (store.types[x] for x in (kind, "std_msgs/msg/Header", "builtin_interfaces/msg/Time"))
+    names = list(arm("panda").joint_names)
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connection = writer.add_connection("/joint_states", kind, typestore=store)
+        for part in parts:
+            for sample in part:
+                now = 1_790_000_000_000_000_000 + round(sample.t * 1e9)
+                message = state(header(time(now // 10**9, now % 10**9), "base"), names, *sample[1:])
+                writer.write(connection, now, store.serialize_cdr(message, kind))
 
 
-def table(error: NDArray, half: NDArray) -> dict:
-    """What is written of one world with or without a tare; (E, T, 10) both."""
-    inside = error <= half
-    out = {}
-    for name, part in {**GROUPS, "all": slice(0, 10)}.items():
-        shares = inside[..., part].mean(axis=2)  # (E, T)
-        wrong = error[..., part].mean(axis=(0, 2))
-        out[name] = {
-            "coverage": shares.mean(axis=0).round(3).tolist(),
-            "standard_error": (shares.std(axis=0) / np.sqrt(len(shares))).round(3).tolist(),
-            "widen": [
-                round(float(np.quantile(error[:, k, part] / half[:, k, part], 0.95)), 2) for k in range(len(TIMES))
-            ],
-        }
-        if name in GROUPS:  # units do not mix
-            out[name] |= {
-                "half_width": [float(f"{x:.4g}") for x in half[..., part].mean(axis=(0, 2))],
-                "median_half_width": [float(f"{x:.4g}") for x in np.median(half[..., part], axis=(0, 2))],
-                "error": [float(f"{x:.4g}") for x in wrong],
-                "slope": (np.diff(np.log(wrong)) / np.diff(np.log(TIMES))).round(2).tolist(),
-            }
-    return out
+def surveyed(path: Path, folder: Path) -> tuple[float, float]:
+    """Peak memory [MB] and CPU time [s] of the survey of one log."""
+    table = folder / "table.json"
+    shutil.rmtree(table.with_name(f"{table.name}.cells"), ignore_errors=True)
+    words = [sys.executable, "-m", "armload", "survey", str(path), "--robot", "panda", "--jobs", "1"]
+    process = subprocess.Popen([*words, "--out", str(table)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    _, status, used = os.wait4(process.pid, 0)
+    assert status == 0, f"the survey of {path} failed"
+    assert '"answered"' in table.read_text(encoding="utf-8"), table.read_text(encoding="utf-8")[:2000]
+    return used.ru_maxrss / 1e3, used.ru_utime + used.ru_stime
 
 
 def main() -> None:
-    asked = options(__doc__, robot="panda", episodes=40, worlds="real_like", jobs=1)
-    name, count, code, worlds = asked.robot, asked.episodes, source_key(), {}
-    for world in asked.worlds.split(","):
-        tasks = [
-            Task.of_one(f"{name}-{world}-{count}-{k}", key_of(code, TIMES), measured, name, world, count, k)
-            for k in range(count)
-        ]
-        cells = list(run_tasks(tasks, ROOT / "out" / "long_logs", jobs=asked.jobs, say=say).values())
-        kinds = np.array([cell["motion"] for cell in cells])
-        tables = worlds[world] = {}
-        for what in ("no tare", "tare"):
-            error, half = (np.array([cell[what][x] for cell in cells]) for x in ("error", "half"))
-            inside = (error <= half).mean(axis=2)
-            by_motion = {kind: inside[kinds == kind].mean(axis=0).round(3).tolist() for kind in sorted(set(kinds))}
-            tables[what] = table(error, half) | {"coverage_by_motion": by_motion}
-    trained = shipped_model(arm(name)).training
-    result = {
-        "robot": name,
-        "model": None if trained is None else asdict(trained),
-        "first_seed": FIRST_SEED,
-        "episodes": count,
-        "times_s": list(TIMES),
-        "worlds": worlds,
-    }
-    write(f"long_logs_{name}", result)
+    asked = options(__doc__, kinds="mcap,parquet", seconds="10,60,600,3600", rate=1000.0, out="out/long-logs")
+    folder = Path(asked.out)
+    folder.mkdir(parents=True, exist_ok=True)
+    found: list[dict[str, Any]] = []
+    for kind in asked.kinds.split(","):
+        for seconds in map(float, asked.seconds.split(",")):
+            path = folder / (f"{seconds:g}.parquet" if kind == "parquet" else f"{seconds:g}")
+            shutil.rmtree(path, ignore_errors=True)
+            parts = minutes(asked.rate, seconds)
+            (write_parquet if kind == "parquet" else write_mcap)(path, parts)
+            size = sum(f.stat().st_size for f in ([path] if path.is_file() else path.iterdir())) / 1e6
+            peak, cpu = surveyed(path, folder)
+            found.append({"kind": kind, "log [s]": seconds, "file [MB]": size, "peak [MB]": peak, "cpu [s]": cpu})
+            say(str(found[-1]))
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+    slopes = {}
+    for kind in asked.kinds.split(","):
+        of = [(one["log [s]"], one["peak [MB]"]) for one in found if one["kind"] == kind and one["log [s]"] >= 60.0]
+        t, peak = np.array(of).reshape(-1, 2).T
+        slopes[kind] = float(np.polyfit(t, peak, 1)[0]) if len(of) > 1 else None
+    say(f"slopes [MB/s]: {slopes}")
+    heads = ["log", "seconds", "file [MB]", "peak memory [MB]", "CPU [s]"]
+    rows = [[str(x) if isinstance(x, str) else f"{x:.0f}" for x in one.values()] for one in found]
+    write_table(ROOT / "docs" / "survey.md", "long", markdown_table(heads, "lrrrr", rows))
+    write("long_logs", {"rate [Hz]": asked.rate, "logs": found, "slope [MB/s]": slopes})
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from armload.arms import Arm
 from armload.errors import IdentificationError
 from armload.inertia import NAMES, UNITS, Z95, InertialParameters
-from armload.recording import Recording, Sample
+from armload.recording import BLOCK, Recording, Sample
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -92,7 +92,6 @@ class Identifier(ABC):
     calibrated: bool = False
     payload_prior: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     _now: float = np.nan  # time of the last sample
-    _CHUNK = 4096  # samples at a time: bounds the memory of the intermediate arrays
 
     @property
     def weak_std(self) -> NDArray[np.float64] | None:
@@ -173,8 +172,8 @@ class Identifier(ABC):
         self.reset()
         out = []
         for start, stop in zip([0, *stops], stops, strict=False):
-            for k in range(start, stop, self._CHUNK):
-                part = slice(k, min(k + self._CHUNK, stop))
+            for k in range(start, stop, BLOCK):
+                part = slice(k, min(k + BLOCK, stop))
                 self._take(recording.t[part], recording.q[part], recording.dq[part], recording.tau[part])
             self._now = float(recording.t[stop - 1])
             out.append(self._estimate(self._now))

@@ -6,6 +6,7 @@ payloads up to twice the rated one, and to refuse what would give a wrong answer
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -34,7 +35,7 @@ from armload.identification.thresholds import (
     WINDOW_MOVES,
 )
 from armload.identification.torque_scale import TorqueScale, torque_scale
-from armload.recording import Recording, with_gravity
+from armload.recording import Recording, blocks, with_gravity
 from armload.recording.columns import check_joint_count
 from armload.recording.windows import integrals, windows
 
@@ -79,24 +80,32 @@ def _check_joints(recording: Recording, arm: Arm) -> None:
 
 def _check_radians(recording: Recording, arm: Arm) -> None:
     """Most rows outside the limits, several angles beyond a full turn, and none outside once taken as degrees."""
-    q, beyond = recording.q, _beyond(recording.q, arm) > POSITION_TOLERANCE
-    mostly_outside = np.mean(np.any(beyond, axis=1)) > 0.5
-    turns = np.sum(np.abs(q).max(axis=0) > DEGREES_FROM)
-    if mostly_outside and turns >= min(2, arm.n) and np.all(_beyond(q / _DEGREE, arm) <= POSITION_TOLERANCE):
-        k, j = np.unravel_index(int(np.argmax(np.abs(q))), q.shape)
+    outside, fits = 0, True
+    for q in _parts(recording.q):
+        outside += int(np.any(_beyond(q, arm) > POSITION_TOLERANCE, axis=1).sum())
+        fits = fits and bool(np.all(_beyond(q / _DEGREE, arm) <= POSITION_TOLERANCE))
+    largest, rows = _largest(recording.q)
+    if outside > 0.5 * len(recording) and np.sum(largest > DEGREES_FROM) >= min(2, arm.n) and fits:
+        j = int(np.argmax(largest))
+        k = rows[j]
+        q = float(recording.q[k : k + 1][0, j])
         raise RecordingError(
-            f"{recording.source}: positions look like degrees (q{j + 1} = {q[k, j]:.4g} at {_row(recording, k)}): "
+            f"{recording.source}: positions look like degrees (q{j + 1} = {q:.4g} at {_row(recording, k)}): "
             "expected radians; of a table say so with --columns q_unit=deg,dq_unit=deg/s, else multiply by pi/180"
         )
 
 
 def _check_limits(recording: Recording, arm: Arm) -> None:
-    bad = np.argwhere(_beyond(recording.q, arm) > POSITION_TOLERANCE)
-    if len(bad):
-        k, j = bad[0]
+    first = 0
+    for q in _parts(recording.q):
+        bad = np.argwhere(_beyond(q, arm) > POSITION_TOLERANCE)
+        if not len(bad):
+            first += len(q)
+            continue
+        k, j = first + bad[0][0], bad[0][1]
         low, high = arm.limits.position_low[j], arm.limits.position_high[j]
         raise RecordingError(
-            f"{recording.source}: q{j + 1} = {recording.q[k, j]:.4f} rad at {_row(recording, k)} is outside the limits "
+            f"{recording.source}: q{j + 1} = {q[bad[0][0], j]:.4f} rad at {_row(recording, k)} is outside the limits "
             f"of {arm.name}'s {arm.joint_names[j]} ({low:.4f} to {high:.4f} rad): expected the joint positions of this "
             "robot; check the robot, the order of the joints and the unit"
         )
@@ -108,16 +117,20 @@ def _beyond(q: NDArray[np.float64], arm: Arm) -> NDArray[np.float64]:
 
 
 def _check_jumps(recording: Recording, arm: Arm) -> None:
-    step = np.diff(recording.t)[:, None]
     speed = np.where(np.isfinite(arm.limits.velocity), arm.limits.velocity, ANY_SPEED)
-    jump = np.abs(np.diff(recording.q, axis=0))
-    bad = np.argwhere(jump > SPEED * speed * step + JUMP)
-    if len(bad):
+    for part in blocks(len(recording)):
+        rows = slice(max(part.start - 1, 0), part.stop)
+        step = np.diff(recording.t[rows])[:, None]
+        jump = np.abs(np.diff(recording.q[rows], axis=0))
+        bad = np.argwhere(jump > SPEED * speed * step + JUMP)
+        if not len(bad):
+            continue
         k, j = bad[0]
         wrap = " (a full turn: unwrap the angle)" if abs(jump[k, j] - _FULL_TURN) < 0.3 else ""
         raise RecordingError(
             f"{recording.source}: q{j + 1} jumps by {jump[k, j]:.3f} rad in {step[k, 0]:.4g} s at "
-            f"{_row(recording, k + 1)}{wrap}: expected a continuous motion; remove the rows or split the log there"
+            f"{_row(recording, rows.start + k + 1)}{wrap}: expected a continuous motion; remove the rows or "
+            "split the log there"
         )
 
 
@@ -127,7 +140,7 @@ def _check_velocity_is_derivative(recording: Recording) -> None:
     if len(parts.first) < 3:
         return
     change = recording.q[parts.last] - recording.q[parts.first]
-    integral = integrals(recording, recording.dq, parts)
+    integral = integrals(recording, lambda rows: recording.dq[rows], parts)
     size_q, size_dq = _rms(change), _rms(integral)
     moves = np.maximum(size_q, size_dq) > WINDOW_MOVES
     difference = _rms(change - integral) / np.maximum(np.maximum(size_q, size_dq), WINDOW_MOVES)
@@ -170,46 +183,56 @@ def _why_not_derivative(change: NDArray, integral: NDArray, wrong: NDArray) -> s
 
 def _check_speed(recording: Recording, arm: Arm) -> None:
     limit = arm.limits.velocity
-    bad = np.argwhere(np.abs(recording.dq) > SPEED * limit)
-    if len(bad):
-        k, j = bad[0]
-        degrees = np.all(np.percentile(np.abs(recording.dq), 99, axis=0) / _DEGREE < limit)
-        unit = "; q and dq look like degrees" if degrees and len(bad) > 0.05 * len(recording) else ""
+    count, found = 0, None
+    for part in blocks(len(recording)):
+        bad = np.argwhere(np.abs(recording.dq[part]) > SPEED * limit)
+        count += len(bad)
+        if found is None and len(bad):
+            found = part.start + int(bad[0][0]), int(bad[0][1])
+    if found is not None:
+        k, j = found
+        speed = float(recording.dq[k : k + 1][0, j])
+        degrees = np.all(np.percentile(np.abs(recording.dq[:]), 99, axis=0) / _DEGREE < limit)
+        unit = "; q and dq look like degrees" if degrees and count > 0.05 * len(recording) else ""
         raise RecordingError(
-            f"{recording.source}: dq{j + 1} = {recording.dq[k, j]:.4g} rad/s at {_row(recording, k)} is more than "
+            f"{recording.source}: dq{j + 1} = {speed:.4g} rad/s at {_row(recording, k)} is more than "
             f"{SPEED:g} times the limit of {arm.joint_names[j]} ({limit[j]:.4g} rad/s): expected rad/s of "
             f"{arm.name}{unit}"
         )
 
 
 def _check_effort(recording: Recording, arm: Arm) -> None:
-    size = np.abs(recording.tau)
-    if recording.channel == "measured" and size.max() < NO_TORQUE:
+    largest, at = _largest(recording.tau)
+    if recording.channel == "measured" and largest.max() < NO_TORQUE:
         rows = np.linspace(0, len(recording) - 1, 20).round().astype(int)
         if np.abs(arm.torque(recording.q[rows])).max() > 1.0:
             raise RecordingError(
                 f"{recording.source}: tau is zero in all joints and rows although {arm.name} has weight to hold: "
                 "expected the measured joint torque in N·m, gravity included"
             )
-    beyond = size / arm.limits.effort > EFFORT
-    share = beyond.mean(axis=0)
-    if np.any(share > EFFORT_SHARE) or np.any(size > EFFORT_EVER * arm.limits.effort):
-        j = int(np.argmax((size / arm.limits.effort).max(axis=0)))
-        k = int(np.argmax(size[:, j]))
+    beyond = sum((np.abs(tau) / arm.limits.effort > EFFORT).sum(axis=0) for tau in _parts(recording.tau))
+    if np.any(beyond > EFFORT_SHARE * len(recording)) or np.any(largest > EFFORT_EVER * arm.limits.effort):
+        j = int(np.argmax(largest / arm.limits.effort))
+        k = at[j]
+        tau = float(recording.tau[k : k + 1][0, j])
         raise RecordingError(
-            f"{recording.source}: tau{j + 1} = {recording.tau[k, j]:.4g} at {_row(recording, k)} is "
-            f"{size[k, j] / arm.limits.effort[j]:.3g} times the limit of {arm.joint_names[j]} "
+            f"{recording.source}: tau{j + 1} = {tau:.4g} at {_row(recording, k)} is "
+            f"{largest[j] / arm.limits.effort[j]:.3g} times the limit of {arm.joint_names[j]} "
             f"({arm.limits.effort[j]:g} N·m): expected joint torque in N·m of {arm.name}"
         )
 
 
 def _check_torque_goes_on(recording: Recording) -> None:
     """Refuse torque that repeats itself exactly in all joints while the arm moves: its sensor or logger stood still."""
-    same = np.r_[False, np.all(recording.tau[1:] == recording.tau[:-1], axis=1), False]
-    edges = np.diff(same.astype(int))
+    same = np.zeros(len(recording) + 1, dtype=np.int8)
+    for part in blocks(len(recording)):
+        rows = slice(max(part.start - 1, 0), part.stop)
+        tau = recording.tau[rows]
+        same[rows.start + 1 : rows.stop] = np.all(tau[1:] == tau[:-1], axis=1)
+    edges = np.diff(same)
     for first, last in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
         time = recording.t[last] - recording.t[first]
-        if time > FROZEN_TIME and np.any(np.ptp(recording.q[first : last + 1], axis=0) > FROZEN_MOTION):
+        if time > FROZEN_TIME and np.any(_span(recording.q, slice(first, last + 1)) > FROZEN_MOTION):
             raise RecordingError(
                 f"{recording.source}: tau stays exactly the same in all joints from {_row(recording, first)} for "
                 f"{time:.2f} s although the arm moves: expected the torque of every moment; remove the rows"
@@ -218,12 +241,12 @@ def _check_torque_goes_on(recording: Recording) -> None:
 
 def _check_no_torque_is_dead(recording: Recording) -> None:
     """Refuse a torque that is exactly the same in all rows although its joint moves, beside others that are alive."""
-    dead = np.ptp(recording.tau, axis=0) == 0.0
-    moves = np.ptp(recording.q, axis=0) > FROZEN_MOTION
+    dead = _span(recording.tau) == 0.0
+    moves = _span(recording.q) > FROZEN_MOTION
     if np.any(dead & moves) and not np.all(dead):
         j = int(np.flatnonzero(dead & moves)[0])
         raise RecordingError(
-            f"{recording.source}: tau{j + 1} is {recording.tau[0, j]:.4g} in all rows although q{j + 1} moves: "
+            f"{recording.source}: tau{j + 1} is {recording.tau[:1][0, j]:.4g} in all rows although q{j + 1} moves: "
             "expected the measured joint torque in N·m; the channel is dead, or another one was meant"
         )
 
@@ -293,6 +316,32 @@ def _check_for_compensation(recording: Recording, arm: Arm, seen: TorqueScale) -
         f"{recording.source}: tau seems to have gravity taken out: expected the measured joint torque in N·m, gravity "
         "included; say what the controller was set to carry (--compensated nothing, or a payload's file)"
     )
+
+
+def _parts(x: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
+    """x (N, n) a block at a time, as it lies in memory or on disk."""
+    return (x[rows] for rows in blocks(len(x)))
+
+
+def _largest(x: NDArray[np.float64]) -> tuple[NDArray[np.float64], list[int]]:
+    """The largest size of each column (n,), and the first rows that have it."""
+    largest, at, first = np.full(x.shape[1], -np.inf), [0] * x.shape[1], 0
+    for part in _parts(x):
+        size = np.abs(part)
+        rows = size.argmax(axis=0)
+        for j, k in enumerate(rows.tolist()):
+            if size[k, j] > largest[j]:
+                largest[j], at[j] = size[k, j], first + k
+        first += len(part)
+    return largest, at
+
+
+def _span(x: NDArray[np.float64], rows: slice | None = None) -> NDArray[np.float64]:
+    """Largest less smallest of each column (n,), of some rows."""
+    inside = slice(0, len(x)) if rows is None else rows
+    parts = (slice(inside.start + r.start, inside.start + r.stop) for r in blocks(inside.stop - inside.start))
+    low, high = zip(*((part.min(axis=0), part.max(axis=0)) for part in (x[r] for r in parts)), strict=True)
+    return np.max(high, axis=0) - np.min(low, axis=0)
 
 
 def _likeness(a: NDArray, b: NDArray) -> float:

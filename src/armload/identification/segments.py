@@ -44,7 +44,7 @@ from armload.regression import payload_prior_std, solution_prior_std
 from armload.regression.information import RegressionData, Session
 from armload.regression.lag import GAIN
 from armload.regression.noise import SMOOTH
-from armload.regression.rows import Rows
+from armload.regression.rows_of_log import RowsOfLog
 
 _ITERATIONS = 3  # of expectation–maximisation: the scales change little after
 _FINER = 4  # cuts on either side of the best one, twice
@@ -93,7 +93,7 @@ def changes_of_payload(
 class _Search:
     """The rows of a log, and the cuts in them."""
 
-    def __init__(self, physics: SmoothPosteriorLeastSquares, rows: Rows, kappa: float) -> None:
+    def __init__(self, physics: SmoothPosteriorLeastSquares, rows: RowsOfLog, kappa: float) -> None:
         self.physics, self.rows, self.kappa = physics, rows, kappa
         self.weak = solution_prior_std(physics.arm)
         self.known = [_without_payload(tare, physics.arm, physics.start) for tare in physics.stream.tares]
@@ -104,8 +104,7 @@ class _Search:
         cls, recording: Recording, arm: Arm, tare: Recording | None, profile: Profile | None, kappa: float
     ) -> _Search:
         physics = SmoothPosteriorLeastSquares(arm, tare, profile=profile)
-        rows = physics.stream.rows_of(recording.t, recording.q, recording.dq, recording.tau)
-        return cls(physics, rows, kappa)
+        return cls(physics, RowsOfLog(physics.stream.regression(), recording), kappa)
 
     def all(self) -> Changes:
         """Changes of the whole log."""
@@ -141,7 +140,8 @@ class _Search:
 
     def _data(self, part: slice) -> RegressionData:
         data = self.physics.empty_data()
-        data.take(Rows(*(value[part] for value in self.rows)))
+        for rows in self.rows.between(part.start, part.stop):
+            data.take(rows)
         return data
 
     def _statistic(self, before: list[RegressionData], after: list[RegressionData]) -> tuple[float, float]:

@@ -109,9 +109,9 @@ def _averages(recording: Recording, arm: Arm, parts: Windows) -> tuple[NDArray, 
     weight = np.r_[0.5, np.ones(_POINTS - 2), 0.5] / (_POINTS - 1)  # trapezoidal mean
     own = (p[:, -1] - p[:, 0]) / T + np.einsum("wpi,p->wi", drift, weight)
     payload = (Yp[:, -1] - Yp[:, 0]) / T[:, :, None] + np.einsum("wpij,p->wij", Yd, weight)
-    tau = integrals(recording, recording.tau, parts) / T
-    direction = np.tanh(dq / FRICTION_WIDTH)
-    friction, moving = (integrals(recording, x, parts) / T for x in (direction, np.abs(direction)))
+    tau = integrals(recording, lambda rows: recording.tau[rows], parts) / T
+    friction = integrals(recording, lambda rows: np.tanh(dq[rows] / FRICTION_WIDTH), parts) / T
+    moving = integrals(recording, lambda rows: np.abs(np.tanh(dq[rows] / FRICTION_WIDTH)), parts) / T
     return own, payload, tau, friction, moving
 
 

@@ -87,7 +87,7 @@ class StreamingPosterior:
         mean, root = (np.zeros(10), np.diag(prior_std)) if prior is None else (prior.mean.copy(), prior.root)
         self._gaussian = mean, np.ascontiguousarray(root), np.ascontiguousarray(root.T)
         self.tares, self.gain, self.start = tuple(tares), gain, start
-        self._regression = FilteredRegression(correction.arm, gain, correction, features, REGRESSOR_RATE, noise.block)
+        self._regression = self.regression()
         self._same_motion = same_motion
         self._whole = whole_noise(correction, noise)
         self._base: SequentialPosterior | None = None
@@ -165,9 +165,10 @@ class StreamingPosterior:
             self.rows += len(rows.t)
             self.seconds += float(rows.h.sum())
 
-    def rows_of(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> Rows:
-        """The rows of samples (N,), (N, n), which count for nothing here."""
-        return self._regression.rows(t, q, dq, tau)
+    def regression(self) -> FilteredRegression:
+        """What makes rows as this stream does, for rows that count for nothing here."""
+        arm, settling = self.correction.arm, self.noise.block
+        return FilteredRegression(arm, self.gain, self.correction, self.features, REGRESSOR_RATE, settling)
 
     def look(self, t: float, q: NDArray, dq: NDArray, tau: NDArray) -> Row | None:
         """Pass a sample over: the row it completes, if it does, counts for nothing here."""

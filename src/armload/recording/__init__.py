@@ -1,14 +1,17 @@
 """Recordings: what a robot's joints did, the files they come in, and whether their data are valid."""
 
 from armload.recording.alignment import Alignment, same_motion
+from armload.recording.chunks import read_long, recording_chunks
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.compensated import with_gravity
 from armload.recording.copies import check_own_measurements, shared_samples
 from armload.recording.files import LOG_SUFFIXES, has_topics, read_recording, write_recording
 from armload.recording.lerobot import data_set_episodes, is_data_set
-from armload.recording.recording import CHANNELS, GAP, JITTERED, Recording, Sample
+from armload.recording.recording import BLOCK, CHANNELS, GAP, JITTERED, Recording, Sample
+from armload.recording.spooled import blocks, extremes
 
 __all__ = [
+    "BLOCK",
     "CHANNELS",
     "GAP",
     "JITTERED",
@@ -17,11 +20,15 @@ __all__ = [
     "ColumnSpec",
     "Recording",
     "Sample",
+    "blocks",
     "check_own_measurements",
     "data_set_episodes",
+    "extremes",
     "has_topics",
     "is_data_set",
+    "read_long",
     "read_recording",
+    "recording_chunks",
     "same_motion",
     "shared_samples",
     "with_gravity",

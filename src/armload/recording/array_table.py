@@ -33,10 +33,11 @@ class ArrayTable:
     Args:
         columns: the arrays that could be columns.
         where: the file.
+        first: number of the first row, of a piece of a table.
     """
 
-    def __init__(self, columns: Mapping[str, Column], where: str) -> None:
-        self.where = where
+    def __init__(self, columns: Mapping[str, Column], where: str, first: int = 0) -> None:
+        self.where, self._first = where, first
         self.notes: Sequence[str] = ()
         self._columns = columns
         self._elements: list[tuple[str, int | None]] = []
@@ -71,7 +72,7 @@ class ArrayTable:
 
     def row_name(self, row: int) -> str:
         """The row, the first being 0."""
-        return f"row {row}"
+        return f"row {self._first + row}"
 
     def _column(self, place: int) -> NDArray:
         name, element = self._elements[place]

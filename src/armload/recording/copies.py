@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
 from armload.errors import RecordingError
 from armload.recording.recording import Recording
+from armload.recording.spooled import blocks
 
 
 def check_own_measurements(log: Recording, tare: Recording) -> None:
@@ -31,11 +34,17 @@ def shared_samples(log: Recording, other: Recording) -> int:
     """
     if log.n != other.n:
         return 0
-    measured = set(_keys(other, np.any(other.dq, axis=1)))
-    if moving := sum(key in measured for key in _keys(log, np.any(log.dq, axis=1))):
+    measured = set(_moving(other))
+    if moving := sum(key in measured for key in _moving(log)):
         return moving
     _, here, there = np.intersect1d(log.t, other.t, return_indices=True)
     return len(here) if _keys(log, here) == _keys(other, there) else 0
+
+
+def _moving(log: Recording) -> Iterator[bytes]:
+    """The samples at which the arm moves."""
+    for part in blocks(len(log)):
+        yield from _keys(log, part.start + np.flatnonzero(np.any(log.dq[part], axis=1)))
 
 
 def _keys(log: Recording, rows: NDArray) -> list[bytes]:

@@ -12,10 +12,10 @@ from __future__ import annotations
 import contextlib
 import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ from armload.recording.columns import column_names
 from armload.recording.csv_layout import NUMBER, layout_of
 from armload.recording.dates import nanoseconds
 from armload.recording.recording import Recording
-from armload.recording.table import read_table
+from armload.recording.table import NotInPieces, read_table, table_chunks
 
 _BEGINS_A_NUMBER = re.compile(r"[+-]?[0-9]*\.?[0-9]*([eE][+-]?[0-9]*)?")
 _DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+([eE][+-]?[0-9]{1,5})?")
@@ -38,6 +38,33 @@ _NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)", re.IGNORECASE)
 def read_csv(path: Path, where: str, arm: Arm | None = None, spec: ColumnSpec | None = None) -> Recording:
     """Read a text log; see `read_recording` for what it raises."""
     return read_table(_Csv(path.read_bytes(), where), where, arm, spec or ColumnSpec())
+
+
+def csv_chunks(path: Path, where: str, arm: Arm | None, spec: ColumnSpec, size: int) -> Iterator[Recording]:
+    """A text log, `size` bytes at a time; see `table_chunks` for what it raises."""
+    return table_chunks(_pieces(path, where, size), where, arm, spec)
+
+
+def _pieces(path: Path, where: str, size: int) -> Iterator[_Piece]:
+    """The header with each of the blocks of lines that follow it."""
+    with path.open("rb") as file:
+        now, header, first = _to_line_end(file, size), b"", 0
+        while now:
+            following = _to_line_end(file, size)
+            if following and len(following) < size:  # the last lines are judged beside those before them
+                now, following = now + following, b""
+            piece = _Piece(header + now, where, first)
+            if not header:
+                lines = now.splitlines(keepends=True)
+                header = b"".join(lines[: piece.layout.first - 1])
+                first -= piece.layout.first - 1
+            yield piece
+            first += now.count(b"\n")
+            now = following
+
+
+def _to_line_end(file: BinaryIO, size: int) -> bytes:
+    return (block + file.readline()) if (block := file.read(size)) else b""
 
 
 def write_csv(path: Path, recording: Recording) -> None:
@@ -217,6 +244,27 @@ class _Csv:
             self.notes.append(f"{self.where}: dropped the last line, which was cut off: {cut} bytes")
         elif zeros:
             _refuse_zeros(self.where, self.layout.first + len(self._body) - 1)
+
+
+class _Piece(_Csv):
+    """Some lines of a text file, under its header; `first`: lines of the data before them."""
+
+    def __init__(self, data: bytes, where: str, first: int) -> None:
+        if b"\r" in data.replace(b"\r\n", b""):
+            raise NotInPieces(f"{where}: other line ends")
+        super().__init__(data, where)
+        self._earlier = first
+
+    def numbers(self, places: Sequence[int]) -> NDArray[np.float64]:
+        """The columns at these places (N, k), of lines without flaw."""
+        table = self._fast(places)
+        if table is None:
+            raise NotInPieces(f"{self.where}: a line is not as the others")
+        return table
+
+    def row_name(self, row: int) -> str:
+        """The line of the file, the first being 1."""
+        return f"line {self.layout.first + self._earlier + row}"
 
 
 def _nanoseconds(cell: str) -> float:

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import zipfile
+from collections.abc import Iterator
+from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +19,7 @@ from armload.recording.aliases import QUANTITIES
 from armload.recording.array_table import WIDEST, ArrayTable, Column
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.recording import CHANNELS, Recording
-from armload.recording.table import read_table
+from armload.recording.table import NotInPieces, read_table, table_chunks
 
 _ARRAYS = ("t", *QUANTITIES)
 _LABELS = ("channel", "joint_names")
@@ -46,6 +50,60 @@ def read_npz(path: Path, where: str, arm: Arm | None = None, spec: ColumnSpec | 
     }
     log = read_table(ArrayTable(columns, where), where, arm, spec or ColumnSpec(), channel=channel)
     return log if joints is None or len(joints) != log.n else replace(log, joint_names=joints)
+
+
+def npz_chunks(path: Path, where: str, arm: Arm | None, spec: ColumnSpec, size: int) -> Iterator[Recording]:
+    """An NPZ log, `size` rows at a time, each array unpacked as far as it is needed; see `table_chunks`."""
+    with zipfile.ZipFile(path) as archive, ExitStack() as stack:
+        labels: dict[str, NDArray] = {}
+        arrays: dict[str, _Packed] = {}
+        for member in archive.namelist():
+            name, stream = member.removesuffix(".npy"), stack.enter_context(archive.open(member))
+            if name in _LABELS:
+                labels[name] = np.lib.format.read_array(stream, allow_pickle=False)
+                continue
+            packed = _Packed(stream, where)
+            if len(packed.shape) in (1, 2) and 0 < packed.width <= WIDEST:
+                arrays[name] = packed
+        channel = str(labels.get("channel", "measured"))
+        if channel not in CHANNELS:
+            raise NotInPieces(f"{where}: an unknown channel")
+        joints = tuple(str(name) for name in np.ravel(labels["joint_names"])) if "joint_names" in labels else None
+
+        def pieces() -> Iterator[ArrayTable]:
+            for k in range(0, max((packed.shape[0] for packed in arrays.values()), default=0), size):
+                columns = {
+                    name: Column(
+                        packed.width if len(packed.shape) == 2 else None,
+                        partial(packed.rows, k, size),
+                        packed.dtype.kind == "M",
+                    )
+                    for name, packed in arrays.items()
+                }
+                yield ArrayTable(columns, where, k)
+
+        for log in table_chunks(pieces(), where, arm, spec, channel):
+            yield log if joints is None or len(joints) != log.n else replace(log, joint_names=joints)
+
+
+class _Packed:
+    """An array in an archive, read from its beginning on."""
+
+    def __init__(self, stream: Any, where: str) -> None:
+        version = np.lib.format.read_magic(stream)
+        header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        self.shape, fortran, self.dtype = header(stream)
+        if fortran or self.dtype.hasobject or not self.shape:
+            raise NotInPieces(f"{where}: an array that is not stored row by row")
+        self.width = int(np.prod(self.shape[1:]))
+        self._stream, self._begins = stream, stream.tell()
+
+    def rows(self, first: int, count: int) -> NDArray:
+        """Rows from the first on, later than those before."""
+        row = self.width * self.dtype.itemsize
+        count = max(min(count, self.shape[0] - first), 0)
+        self._stream.seek(self._begins + first * row)
+        return np.frombuffer(self._stream.read(count * row), self.dtype).reshape(count, *self.shape[1:])
 
 
 def write_npz(path: Path, recording: Recording) -> None:

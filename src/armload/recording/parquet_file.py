@@ -6,7 +6,7 @@ A file written here holds channel and joint names in its metadata. pyarrow is im
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -22,9 +22,10 @@ from armload.recording.array_table import WIDEST, ArrayTable, Column
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.columns import column_names
 from armload.recording.recording import CHANNELS, Recording
-from armload.recording.table import read_table
+from armload.recording.table import read_table, table_chunks
 
 _METADATA = b"armload.recording"
+_BUFFER = 1 << 20  # bytes of a column that are read at a time
 
 
 def read_parquet(
@@ -61,6 +62,41 @@ def read_parquet(
     return log if joints is None or len(joints) != log.n else replace(log, joint_names=joints)
 
 
+def parquet_chunks(path: Path, where: str, arm: Arm | None, spec: ColumnSpec, size: int) -> Iterator[Recording]:
+    """A Parquet log, `size` rows at a time; see `table_chunks` for what it raises."""
+    pa, parquet = pyarrow_for(where)
+    how: Any = {"page_checksum_verification": True, "pre_buffer": False, "buffer_size": _BUFFER}
+    with parquet.ParquetFile(path, **how) as file:
+        names = [entry.name for entry in file.schema_arrow if not _is_text(pa, entry.type)]
+        channel, joints = _about((file.schema_arrow.metadata or {}).get(_METADATA))
+
+        def pieces() -> Iterator[ArrayTable]:
+            first = 0
+            for batch in file.iter_batches(size, columns=names, use_threads=False):
+                yield ArrayTable(_columns_of(pa, pa.Table.from_batches([batch]), where), where, first)
+                first += batch.num_rows
+
+        for log in table_chunks(pieces(), where, arm, spec, channel):
+            yield log if joints is None or len(joints) != log.n else replace(log, joint_names=joints)
+
+
+def _columns_of(pa: Any, table: Any, where: str) -> dict[str, Column]:
+    columns = {}
+    for entry in table.schema:
+        read = partial(_values, table.column(entry.name), entry.name, where)
+        if not _is_list(pa, entry.type):
+            columns[entry.name] = Column(None, read, pa.types.is_timestamp(entry.type))
+        elif (lists := read()).shape[1] <= WIDEST:
+            columns[entry.name] = Column(lists.shape[1], lambda lists=lists: lists)
+    return columns
+
+
+def _is_text(pa: Any, kind: Any) -> bool:
+    return not (
+        pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_timestamp(kind)
+    ) and not _is_list(pa, kind)
+
+
 def pyarrow_for(where: str | Path) -> tuple[Any, Any]:
     """pyarrow and its Parquet module.
 
@@ -89,8 +125,12 @@ def _column(file: Any, name: str, where: str) -> NDArray:
     Raises:
         RecordingError: text, a cell that is empty, or lists of different lengths.
     """
+    return _values(file.read([name], use_threads=False).column(name), name, where)
+
+
+def _values(column: Any, name: str, where: str) -> NDArray:
+    """The same of a column that was read."""
     pa, _ = pyarrow_for(where)
-    column = file.read([name], use_threads=False).column(name)
     if column.null_count:
         row = int(np.flatnonzero(np.asarray(column.is_null()))[0])
         raise RecordingError(f"{where}, row {row}: {name} is empty: expected a number")

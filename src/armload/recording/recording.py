@@ -18,6 +18,7 @@ CHANNELS = ("measured", "desired", "external")
 # September 2001
 _CLOCK = 1e9
 GAP = 0.1  # [s] a longer pause between samples ends whatever has a memory of those before it
+BLOCK = 4096  # samples that are worked on at a time: bounds the memory of what is made of them
 JITTERED = 0.9  # of a rate's sample time, after which the next sample of that rate is due: clocks jitter
 
 
@@ -135,7 +136,7 @@ class Recording:
     @property
     def rate(self) -> float:
         """Median sample rate [Hz]."""
-        return float(1.0 / np.median(np.diff(self.t)))
+        return float(1.0 / np.median(np.diff(self.t), overwrite_input=True))
 
     def between(self, start: float, stop: float) -> Recording:
         """The samples with start ≤ t < stop [s], on the recording's own clock."""

@@ -9,7 +9,7 @@ them, it is the time of logging.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from armload.arms import Arm, names_among
 from armload.errors import RecordingError, one_line
 from armload.extras import missing
-from armload.recording.columns import checked_recording
+from armload.recording.checked import Chunks
 from armload.recording.recording import Recording
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
@@ -36,10 +36,21 @@ class _Message(NamedTuple):
 
 def read_bag(path: Path, where: str, arm: Arm | None = None, topic: str | None = None) -> Recording:
     """Read the JointState messages of a bag; see `read_recording` for what it raises."""
+    return next(bag_chunks(path, where, arm, topic))
+
+
+def bag_chunks(
+    path: Path, where: str, arm: Arm | None = None, topic: str | None = None, size: int | None = None
+) -> Iterator[Recording]:
+    """The JointState messages of a bag, `size` at a time (None: all at once), read as they are asked for.
+
+    Raises:
+        RecordingError: as `read_recording`.
+    """
     try:
         with ExitStack() as stack:
             bag = _Bag([stack.enter_context(reader) for reader in _readers(path, where, stack)])
-            return _recording(bag, _choose(bag, where, arm, topic), where, arm)
+            yield from _recordings(bag, _choose(bag, where, arm, topic), where, arm, size)
     except RecordingError:
         raise
     except ModuleNotFoundError as error:
@@ -148,11 +159,14 @@ def _choose(bag: _Bag, where: str, arm: Arm | None, topic: str | None) -> str:
     return candidates[0]
 
 
-def _recording(bag: _Bag, topic: str, where: str, arm: Arm | None) -> Recording:
+def _recordings(bag: _Bag, topic: str, where: str, arm: Arm | None, size: int | None) -> Iterator[Recording]:
     wanted = None if arm is None else arm.joint_names
     called: tuple[str, ...] | None = None  # what the log calls the arm's joints
     columns: dict[tuple[str, ...], list[int] | None] = {}  # by names in a message: places of the arm's joints
-    stamps, log_times, rows, numbers = [], [], [], []
+    messages: list[tuple[int, int, int, NDArray[np.float64]]] = []  # number, stamp, time of logging, values
+    channel = "desired" if "desired" in topic.rsplit("/", 1)[-1] else "measured"
+    tables = _Tables(where, topic)
+    chunks = Chunks(where, channel)
     for number, message in enumerate(bag.messages(topic), start=1):
         if wanted is None:
             wanted = message.names
@@ -164,30 +178,56 @@ def _recording(bag: _Bag, topic: str, where: str, arm: Arm | None) -> Recording:
         order = columns[message.names]
         if order is None:
             continue  # another device on the same topic, such as a gripper
-        rows.append(np.concatenate(_values(message, order, f"{where}, {topic} message {number}")))
-        stamps.append(message.stamp)
-        log_times.append(message.log_time)
-        numbers.append(number)
-    if not rows:
+        values = np.concatenate(_values(message, order, f"{where}, {topic} message {number}"))
+        messages.append((number, message.stamp, message.log_time, values))
+        if len(messages) == size:
+            yield from chunks.take(*tables.of(messages), joint_names=wanted, epoch=tables.epoch)
+            messages = []
+    if not messages and not tables.begun:
         if not columns or wanted is None:
             raise RecordingError(f"{where}: topic {topic} has no messages: expected at least 2")
         if arm is not None:
             _refuse_joints(where, f"topic {topic}", arm, sorted({name for names in columns for name in names}))
-    notes = []
-    if len(set(stamps)) == 1 and len(stamps) > 1:
-        notes.append(f"{where}: the messages of {topic} are not stamped: took the times of logging")
-        stamps = log_times
-    t = np.array([stamp - stamps[0] for stamp in stamps], dtype=np.int64) * 1e-9  # exact to the ns, unlike since 1970
-    table = np.column_stack([t, np.array(rows)]).astype(float)
-    return checked_recording(
-        table,
-        where,
-        lambda k: f"{topic} message {numbers[k]}",
-        channel="desired" if "desired" in topic.rsplit("/", 1)[-1] else "measured",
-        joint_names=wanted,
-        notes=tuple(notes),
-        epoch=stamps[0] * 1e-9,
-    )
+    if messages:
+        yield from chunks.take(*tables.of(messages), joint_names=wanted, epoch=tables.epoch)
+    yield chunks.last(tables.notes)
+
+
+class _Tables:
+    """Messages as rows (N, 1 + 3n), timed by their stamps, or by the times of logging where all stamps are equal."""
+
+    def __init__(self, where: str, topic: str) -> None:
+        self._where, self._topic = where, topic
+        self._stamp: int | None = None  # the first; all messages have it where they are not stamped
+        self._stamped, self._origin = True, 0
+        self.notes: tuple[str, ...] = ()
+
+    @property
+    def begun(self) -> bool:
+        """Whether there was a message."""
+        return self._stamp is not None
+
+    @property
+    def epoch(self) -> float:
+        """What times are counted from [s]."""
+        return self._origin * 1e-9
+
+    def of(self, messages: list[tuple[int, int, int, NDArray]]) -> tuple[NDArray, Callable[[int], str]]:
+        """The rows, and how to call them; whether messages are stamped is judged by the first that are given."""
+        numbers, stamps, log_times, values = zip(*messages, strict=True)
+        if self._stamp is None:
+            self._stamp, self._stamped = stamps[0], len(set(stamps)) > 1 or len(stamps) == 1
+            self._origin = stamps[0] if self._stamped else log_times[0]
+            if not self._stamped:
+                said = f"{self._where}: the messages of {self._topic} are not stamped: took the times of logging"
+                self.notes = (said,)
+        elif not self._stamped and set(stamps) != {self._stamp}:
+            raise RecordingError(
+                f"{self._where}: only some messages of {self._topic} are stamped: expected all or none; record it anew"
+            )
+        times = np.array(stamps if self._stamped else log_times, dtype=np.int64) - self._origin
+        t = times * 1e-9  # exact to the ns, unlike since 1970
+        return np.column_stack([t, np.array(values)]).astype(float), lambda k: f"{self._topic} message {numbers[k]}"
 
 
 def _values(message: _Message, order: list[int], place: str) -> list[NDArray[np.float64]]:

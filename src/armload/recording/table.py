@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from armload.arms import Arm
 from armload.errors import EpisodesError, RecordingError
 from armload.recording.aliases import EPISODE, QUANTITIES, TIME_UNITS
+from armload.recording.checked import Chunks
 from armload.recording.choice import DATE, TimeColumns
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.columns import checked_recording
@@ -51,6 +52,10 @@ class Table(Protocol):
         ...
 
 
+class NotInPieces(RecordingError):
+    """A table that must be read whole: to name what is wrong with it, or because one row depends on all."""
+
+
 def read_table(table: Table, where: str, arm: Arm | None, spec: ColumnSpec, channel: str = "measured") -> Recording:
     """The log in a table.
 
@@ -63,49 +68,122 @@ def read_table(table: Table, where: str, arm: Arm | None, spec: ColumnSpec, chan
         RecordingError: the columns are not clear, or a row is not valid.
     """
     columns: ColumnMap = map_columns(table.names, where, arm, spec, table.text, table.dates)
-    places = [place for key in QUANTITIES for place in columns.places[key]]
-    time = columns.time
-    extra = [] if time is None else [time.place]
-    values = table.numbers([*extra, *places, *([] if columns.episode is None else [columns.episode])])
-    if columns.episode is not None:
-        keep = _episode(values[:, -1], spec, where)
-    elif spec.episode is None:
-        keep = np.ones(len(values), dtype=bool)
-    else:
-        raise RecordingError(f"{where} has no column {EPISODE!r}: expected none of --episode; leave it out")
-    names = [table.names[place] for place in places]
-    scales = np.array([scale for key in QUANTITIES for scale in columns.scales[key]])
-    motion = values[:, len(extra) : len(extra) + len(places)] * scales
+    reading = _Reading(columns, where, spec)
+    motion, rows = reading.values(table)
     notes = columns.notes
     if columns.wanted is not None:
         n = len(columns.wanted[0])
-        moment, current = (table.numbers(at)[keep] for at in columns.wanted)
-        constants = controller_constants(moment, current, motion[keep, n : 2 * n], where)
-        motion[:, 2 * n :] *= constants
+        moment, current = (table.numbers(at)[rows] for at in columns.wanted)
+        constants = controller_constants(moment, current, motion[:, 1 + n : 1 + 2 * n], where)
+        motion[:, 1 + 2 * n :] *= constants
         notes = (
             *notes,
             of_currents(where, constants.tolist(), " (the controller's own target_moment over target_current)"),
         )
-    if time is None:
-        assert spec.rate is not None
-        (t, epoch), label = (np.maximum(np.cumsum(keep) - 1, 0) / spec.rate, 0.0), "t"
-    else:
-        (t, epoch), label = _seconds(table, time, values[:, 0], where), table.names[time.place]
-    rows = np.flatnonzero(keep)
     return checked_recording(
-        np.column_stack([t, motion])[rows],
+        motion,
         where,
         lambda k: table.row_name(int(rows[k])),
-        labels=[label, *names],
+        labels=reading.labels(table),
         channel=channel,
         joint_names=columns.joints,
         notes=(*table.notes, *notes),
-        epoch=epoch,
+        epoch=reading.epoch,
     )
 
 
-def _seconds(table: Table, time: TimeColumns, raw: NDArray[np.float64], where: str) -> tuple[NDArray, float]:
-    """The times (N,) [s], and what they are counted from [s since the clock's own beginning].
+def table_chunks(
+    pieces: Iterable[Table], where: str, arm: Arm | None, spec: ColumnSpec, channel: str = "measured"
+) -> Iterator[Recording]:
+    """The log in a table that comes in pieces, each with its own rows and the same columns.
+
+    Raises:
+        NotInPieces: the log must be read whole. RecordingError: it would be refused then, too.
+    """
+    columns: ColumnMap | None = None
+    reading: _Reading | None = None
+    chunks: Chunks | None = None
+    names, dates, notes = [], [], []
+    for table in pieces:
+        if columns is None or reading is None or chunks is None:
+            columns = map_columns(table.names, where, arm, spec, _refuse_text, table.dates)
+            if columns.wanted is not None:
+                raise NotInPieces(f"{where}: torque per ampere is found from all rows")
+            reading = _Reading(columns, where, spec, in_pieces=True)
+            chunks = Chunks(where, channel, reading.labels(table))
+            names, dates = list(table.names), list(table.dates)
+        if list(table.names) != names or list(table.dates) != dates:
+            raise NotInPieces(f"{where}: the columns change")
+        motion, rows = reading.values(table)
+        notes += table.notes
+        name = table.row_name
+        if len(motion):
+            of_rows = lambda k, rows=rows, name=name: name(int(rows[k]))  # noqa: E731
+            yield from chunks.take(motion, of_rows, columns.joints, reading.epoch)
+    if columns is None or chunks is None:
+        raise NotInPieces(f"{where} has no rows")
+    yield chunks.last((*notes, *columns.notes))
+
+
+def _refuse_text(_: int) -> str | None:
+    raise NotInPieces("a column of names is the same in all rows, or is not")
+
+
+class _Reading:
+    """Rows of a table as t [s], q, dq, tau, one piece of it after the other."""
+
+    def __init__(self, columns: ColumnMap, where: str, spec: ColumnSpec, in_pieces: bool = False) -> None:
+        self._columns, self._where, self._spec, self._in_pieces = columns, where, spec, in_pieces
+        self._places = [place for key in QUANTITIES for place in columns.places[key]]
+        self._scales = np.array([scale for key in QUANTITIES for scale in columns.scales[key]])
+        self._count = 0  # rows that were kept so far
+        self._origin: int | None = None  # the first stamp, where times are counted from it
+        self.epoch = 0.0
+
+    def labels(self, table: Table) -> list[str]:
+        """How to call the columns in a message."""
+        time = self._columns.time
+        return ["t" if time is None else table.names[time.place], *(table.names[place] for place in self._places)]
+
+    def values(self, table: Table) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+        """The rows (N, 1 + 3n) of the episode asked for, and their places in the table."""
+        columns, time, where, spec = self._columns, self._columns.time, self._where, self._spec
+        extra = [] if time is None else [time.place]
+        raw = table.numbers([*extra, *self._places, *([] if columns.episode is None else [columns.episode])])
+        if columns.episode is not None:
+            if self._in_pieces and len(np.unique(raw[:, -1])) > 1:
+                raise NotInPieces(f"{where} holds several episodes")
+            keep = _episode(raw[:, -1], spec, where)
+        elif spec.episode is None:
+            keep = np.ones(len(raw), dtype=bool)
+        else:
+            raise RecordingError(f"{where} has no column {EPISODE!r}: expected none of --episode; leave it out")
+        rows = np.flatnonzero(keep)
+        if time is None:
+            assert spec.rate is not None
+            t = np.maximum(self._count + np.cumsum(keep) - 1, 0) / spec.rate
+        else:
+            t = self._seconds(table, time, raw[:, 0])
+        self._count += len(rows)
+        motion = raw[:, len(extra) : len(extra) + len(self._places)] * self._scales
+        return np.asarray(np.column_stack([t, motion])[rows], dtype=np.float64), rows
+
+    def _seconds(self, table: Table, time: TimeColumns, raw: NDArray[np.float64]) -> NDArray[np.float64]:
+        if self._in_pieces and time.other is not None:
+            raise NotInPieces(f"{self._where}: whether it is stamped shows in all rows together")
+        t, stamps, scale = _seconds(table, time, raw, self._where)
+        if stamps is None:
+            return t
+        if self._origin is None and len(stamps):
+            self._origin = int(stamps[0])
+            self.epoch = float(stamps[0] * scale)
+        return (stamps - (self._origin or 0)) * scale
+
+
+def _seconds(
+    table: Table, time: TimeColumns, raw: NDArray[np.float64], where: str
+) -> tuple[NDArray, NDArray[np.int64] | None, float]:
+    """The times (N,) [s]; or stamps (N,) and their unit [s], from which times are counted.
 
     Stamps in nanoseconds are subtracted as whole numbers first: since 1970 a double resolves 0.2 µs. They begin at 0.
     """
@@ -114,7 +192,7 @@ def _seconds(table: Table, time: TimeColumns, raw: NDArray[np.float64], where: s
         seconds, nanoseconds = table.whole_numbers(time.place), table.whole_numbers(time.nanoseconds)
         if seconds is None or nanoseconds is None:
             raise RecordingError(f"{where}: columns {name!r} and {table.names[time.nanoseconds]!r} hold broken numbers")
-        return _counted(seconds * 1_000_000_000 + nanoseconds, 1e-9)
+        return raw, seconds * 1_000_000_000 + nanoseconds, 1e-9
     if time.unit is None:
         with np.errstate(invalid="ignore"):  # numbers that are not finite are refused later, by their row
             step = float(np.median(np.diff(raw))) if len(raw) > 1 else 0.0
@@ -123,10 +201,10 @@ def _seconds(table: Table, time: TimeColumns, raw: NDArray[np.float64], where: s
                 f"{where}: times in column {name!r} are {step:g} apart, too far for seconds: expected the unit; say it "
                 "with --columns t_unit=ms (or us, ns, s)"
             )
-        return raw, 0.0
+        return raw, None, 1.0
     scale = 1e-9 if time.unit == DATE else TIME_UNITS[time.unit.strip().lower()]
     if scale == 1.0:
-        return raw, 0.0
+        return raw, None, 1.0
     whole = table.whole_numbers(time.place)
     if whole is None:
         if time.unit == DATE:
@@ -136,16 +214,11 @@ def _seconds(table: Table, time: TimeColumns, raw: NDArray[np.float64], where: s
                 f"{where}: {time.tool} writes whole {time.unit} in column {name!r}, here they are broken: expected the "
                 "unit; say it with --columns t_unit=s (or ms, us, ns)"
             )
-        return raw * scale, 0.0
+        return raw * scale, None, 1.0
     if time.other is not None and len(whole) > 1 and (whole == whole[0]).all():
         other = table.whole_numbers(time.other)  # messages that were not stamped: the time of logging, as in bags
         whole = whole if other is None else other
-    return _counted(whole, scale)
-
-
-def _counted(whole: NDArray[np.int64], scale: float) -> tuple[NDArray, float]:
-    """Times (N,) [s] from the first of some stamps, and that stamp [s]."""
-    return (whole - whole[:1]) * scale, float(whole[0] * scale) if len(whole) else 0.0
+    return raw, whole, scale
 
 
 def _episode(episodes: NDArray[np.float64], spec: ColumnSpec, where: str) -> NDArray[np.bool_]:

@@ -115,6 +115,15 @@ class FilteredRegression:
         self._regressor = np.zeros((2, n, self._wide))  # states of the lags, their last inputs
         self._pose, self._velocity = np.zeros((2, pose)), np.zeros((2, n, velocity))
 
+    @property
+    def state(self) -> tuple[NDArray[np.float64], ...]:
+        """A copy of all that is remembered of the samples so far; set it, and the next samples go on from there."""
+        return tuple(x.copy() for x in (self._clock, self._joints, self._regressor, self._pose, self._velocity))
+
+    @state.setter
+    def state(self, state: tuple[NDArray[np.float64], ...]) -> None:
+        self._clock, self._joints, self._regressor, self._pose, self._velocity = (x.copy() for x in state)
+
     def rows(self, t: ArrayLike, q: ArrayLike, dq: ArrayLike, tau: ArrayLike) -> Rows:
         """The rows that the next N samples complete: t (N,) rising [s]; q, dq, tau (N, n) [rad, rad/s, N·m]."""
         times = np.require(np.atleast_1d(t), float, ["C", "W"])

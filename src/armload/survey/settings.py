@@ -13,7 +13,7 @@ from armload.errors import UsageError
 from armload.lab.cells import key_of
 from armload.payloads import Payload, hand_on, read_payload
 from armload.posterior import HybridModel, Profile, load_profile
-from armload.recording import ColumnSpec, Recording, read_recording
+from armload.recording import ColumnSpec, Recording, read_long
 from armload.survey.logs import Log, file_hash
 from armload.version import __version__
 
@@ -84,7 +84,7 @@ class Settings:
         wanted = log.episode if episode is None else episode
         columns = None if has_topics(path) else ColumnSpec.of(dict(self.columns)).over(episode=wanted)
         topic = self.topic if has_topics(path) else None
-        return read_recording(path, self.arm(), topic=topic, columns=columns)
+        return read_long(path, self.arm(), topic=topic, columns=columns)
 
     def mounted(self) -> Payload | None:
         """The tool that is mounted, read once for each process."""

@@ -1,0 +1,118 @@
+"""A long recording that lies on disk: its samples are read when they are asked for, its times alone are in memory.
+
+Whatever takes a `Recording` takes it. Of `q`, `dq` and `tau` a part is read by its rows, as `log.q[1000:2000]`; all of
+one of them is made an array by NumPy (`np.asarray(log.q)`), with what that takes.
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+import tempfile
+import weakref
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.errors import RecordingError
+from armload.recording.aliases import QUANTITIES
+from armload.recording.recording import BLOCK, Recording
+
+
+class _File:
+    """A file without a name, which is gone with the last that refers to it, however the process ends."""
+
+    def __init__(self, folder: str | Path | None) -> None:
+        self.number, path = tempfile.mkstemp(prefix="armload-", dir=folder)
+        os.unlink(path)
+        weakref.finalize(self, os.close, self.number)
+
+    def array(self) -> NDArray[np.float64]:
+        """All numbers, of which those are read that are looked at."""
+        return np.frombuffer(mmap.mmap(self.number, 0, access=mmap.ACCESS_READ))
+
+
+class OnDisk:
+    """Some rows and columns of a file of doubles, as far as an array is needed: length, shape, and parts of it."""
+
+    def __init__(self, file: _File, width: int, columns: slice, rows: slice) -> None:
+        self._file, self._width, self._columns, self._rows = file, width, columns, rows
+        self.shape = (rows.stop - rows.start, columns.stop - columns.start)
+        self.ndim, self.dtype = 2, np.dtype(float)
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, index: Any) -> NDArray[np.float64]:
+        whole = self._file.array().reshape(-1, self._width)
+        return np.array(whole[self._rows, self._columns][index])  # a copy: the map and its pages are given back
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[np.float64]:
+        del copy  # it always is one
+        return self[:].astype(dtype or float, copy=False)
+
+    def within(self, rows: slice) -> OnDisk:
+        """The same of fewer rows."""
+        start = self._rows.start
+        return OnDisk(self._file, self._width, self._columns, slice(start + rows.start, start + rows.stop))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SpooledRecording(Recording):
+    """A `Recording` whose q, dq and tau are `OnDisk`; made by `spooled`, from samples that were checked."""
+
+    def __post_init__(self) -> None:
+        self.t.setflags(write=False)
+
+    def select(self, rows: NDArray | slice) -> Recording:
+        """The samples at the given rows: on disk where they follow each other, else in memory."""
+        index = np.arange(len(self))[rows]
+        if len(index) < 2 or np.any(np.diff(index) != 1):
+            return self._in_memory(index)
+        part = slice(int(index[0]), int(index[-1]) + 1)
+        q, dq, tau = (getattr(self, name).within(part) for name in QUANTITIES)
+        return replace(self, t=self.t[part], q=q, dq=dq, tau=tau)
+
+    def _in_memory(self, index: NDArray) -> Recording:
+        q, dq, tau = (getattr(self, name)[index] for name in QUANTITIES)
+        return Recording(self.t[index], q, dq, tau, self.channel, self.joint_names, self.source, self.notes, self.epoch)
+
+
+def spooled(chunks: Iterable[Recording], where: str, folder: str | Path | None = None) -> Recording:
+    """One recording from the chunks of a log.
+
+    Args:
+        chunks: of one log, each later than the one before (`recording_chunks`).
+        where: what the recording is called (its `source`).
+        folder: where its samples lie meanwhile, 24 bytes for each joint and sample; None: the system's own.
+
+    Raises:
+        RecordingError: there are no chunks. OSError: the folder is full.
+    """
+    file, times, last = _File(folder), [], None
+    with open(file.number, "wb", closefd=False) as writer:
+        for last in chunks:
+            writer.write(np.hstack([last.q, last.dq, last.tau]).tobytes())
+            times.append(last.t)
+    if last is None:
+        raise RecordingError(f"{where} holds no rows of data: expected at least 2, one per sample")
+    t, n = np.concatenate(times), last.n
+    on_disk: list[Any] = [OnDisk(file, 3 * n, slice(k * n, (k + 1) * n), slice(0, len(t))) for k in range(3)]
+    q, dq, tau = on_disk
+    return SpooledRecording(t, q, dq, tau, last.channel, last.joint_names, where, last.notes, last.epoch)
+
+
+def extremes(x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Smallest and largest of each column of x (N, n), N ≥ 1, as it lies in memory or on disk."""
+    found = [(part.min(axis=0), part.max(axis=0)) for part in (x[rows] for rows in blocks(len(x)))]
+    low, high = zip(*found, strict=True)
+    return np.min(low, axis=0), np.max(high, axis=0)
+
+
+def blocks(count: int) -> Iterator[slice]:
+    """The rows 0 … count in blocks: at the same places, however a log is held."""
+    return (slice(k, min(k + BLOCK, count)) for k in range(0, count, BLOCK))

@@ -1,0 +1,120 @@
+"""Object stores, a full disk, a share that is gone: a survey loses nothing, and says the same in the end."""
+
+from __future__ import annotations
+
+import resource
+import shutil
+import subprocess
+import sys
+import threading
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+import pytest
+
+from armload.motion import random_motion
+from armload.recording import write_recording
+from armload.simulation import simulate_inverse
+from armload.survey import Settings, read_rows, survey
+
+SETTINGS = Settings("panda", method="map")
+
+
+@pytest.fixture(scope="module")
+def logs(panda, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("share") / "arm"
+    folder.mkdir()
+    for k in range(3):
+        log = simulate_inverse(panda, random_motion(panda, k, duration=3.0), rate=100.0, seed=k)
+        write_recording(folder / f"{k}.csv", log)
+    return folder
+
+
+@pytest.fixture
+def share(logs, tmp_path):
+    """A copy of the logs that may vanish."""
+    return Path(shutil.copytree(logs, tmp_path / "arm"))
+
+
+def answers(rows):
+    """What the rows say, but for where the logs lay."""
+    return [{k: v for k, v in row.items() if k not in ("log", "key")} for row in rows]
+
+
+@pytest.fixture(scope="module")
+def whole(logs, tmp_path_factory):
+    return survey([str(logs)], SETTINGS, tmp_path_factory.mktemp("whole") / "survey.json", jobs=1).rows
+
+
+def test_logs_in_an_object_store_are_answered_as_those_on_disk_and_once(logs, whole, tmp_path):
+    fsspec = pytest.importorskip("fsspec")
+    store = fsspec.filesystem("memory")
+    try:
+        for path in logs.iterdir():
+            store.pipe(f"/cell/arm/{path.name}", path.read_bytes())
+        found = survey(["memory://cell/arm"], SETTINGS, tmp_path / "survey.json", jobs=1)
+        assert answers(found.rows) == answers(whole)
+        store.pipe("/cell/arm/1.csv", (logs / "0.csv").read_bytes())
+        again = survey(["memory://cell/arm"], SETTINGS, tmp_path / "survey.json", jobs=1)
+        assert (again.logs, again.anew) == (3, 1)
+    finally:
+        store.rm("/cell", recursive=True)
+
+
+def test_logs_behind_a_web_server_are_answered_as_those_on_disk(logs, whole, tmp_path):
+    pytest.importorskip("fsspec")
+    pytest.importorskip("aiohttp")
+
+    class Quiet(SimpleHTTPRequestHandler):
+        def log_message(self, *_):
+            pass
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=str(logs.parent)))
+    thread = threading.Thread(target=server.serve_forever)
+    thread.start()
+    try:
+        urls = [f"http://127.0.0.1:{server.server_port}/arm/{k}.csv" for k in range(3)]
+        found = survey(urls, SETTINGS, tmp_path / "survey.json", jobs=1)
+    finally:
+        server.shutdown()
+        thread.join()
+        server.server_close()
+    assert answers(found.rows) == answers(whole)
+
+
+def test_a_full_disk_is_said_and_the_survey_goes_on_from_there(share, whole, tmp_path):
+    out = tmp_path / "survey.json"
+    words = [sys.executable, "-m", "armload", "survey", str(share), "--robot", "panda", "--method", "map"]
+    words += ["--jobs", "1", "--out", str(out)]
+    most = 4000  # bytes of a file: cells of a log fit, the table of all three does not
+
+    def limited():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
+
+    done = subprocess.run(words, preexec_fn=limited, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "File too large" in done.stderr
+    assert not out.exists()
+    kept = {path.name for path in (tmp_path / "survey.json.cells").iterdir()}
+    again = survey([str(share)], SETTINGS, out, jobs=1)
+    assert answers(again.rows) == answers(whole)
+    assert again.anew == 3 - len(kept)
+    assert len(kept) == 3
+
+
+def test_a_share_that_vanishes_costs_no_row_once_it_is_back(share, whole, tmp_path):
+    out = tmp_path / "survey.json"
+    away = share.with_name("away")
+    survey([str(share)], SETTINGS, out, jobs=1)
+    before = out.read_bytes()
+    paths = sorted(str(path) for path in share.iterdir())
+    share.rename(away)
+    gone = survey(paths, SETTINGS, out, jobs=1)
+    assert [row["status"] for row in gone.rows] == ["unusable"] * 3
+    assert all("does not exist" in row["reason"] or "cannot be read" in row["reason"] for row in gone.rows)
+    away.rename(share)
+    back = survey(paths, SETTINGS, out, jobs=1)
+    assert answers(back.rows) == answers(whole)
+    assert out.read_bytes() == before
+    assert read_rows(out)[0] == back.rows
