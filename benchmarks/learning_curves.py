@@ -1,4 +1,4 @@
-"""Where trees that see (t, q, dq, tau) stop memorising: errors over how many payloads, motions and arms were trained on.
+"""Where trees that see (t, q, dq, tau) stop memorising: errors over numbers of payloads, motions and arms trained on.
 
     python benchmarks/learning_curves.py [--logs 1000] [--seeds 2] [--minutes 60] [--work out/learning-curves]
 
@@ -7,9 +7,9 @@ k mod M on arm k mod A, so that P·M·A combinations do not all occur. An ensemb
 limits; its answer for a run is the mean over the run's rows. It is judged in MuJoCo on payloads never seen: on the
 training's first motion and arm (`payload`), on other motions of that arm (`motion`), and on motions of other arms,
 drawn from `World.beyond`, where training draws from `World.real_like` (`arm`). Beside it, on the same runs: the mean of
-the training payloads; least squares with the smooth mismatch with the weak prior (map-gp), with the training payloads
-as one Gaussian prior (same-prior), and the hybrid, each with and without a tare, a bare run of that arm on another
-motion. The trees have no tare; on `payload` and `motion` they know the arm from their training.
+the training payloads; least squares with the smooth mismatch with the weak prior (map-gp) and with those payloads
+as one Gaussian prior (same-prior); the latter and the hybrid with a tare too, a bare run of that arm on another motion.
+The trees have no tare; on `payload` and `motion` they know the arm from their training.
 
 Writes benchmarks/results/learning_curves.json; goes on from --work.
 """
@@ -38,14 +38,17 @@ from armload.recording import Recording
 from armload.regression import GaussianPrior
 from armload.simulation import Run, Sensors, World, simulate_inverse, simulate_many
 
-# (payloads, motions, arms): one number grows at a time, then motions and arms together
+# (payloads, motions, arms): one number grows at a time, or motions and arms together; the most telling first
 PLAN = (
-    *((p, 1, 1) for p in (10, 100, 1000)),
-    *((1000, 1, a) for a in (10, 100, 1000)),
-    *((1000, m, 1) for m in (10, 100)),
-    *((1000, n, n) for n in (10, 100)),
-    (1000, 1000, 1),
+    (10, 1, 1),
+    (1000, 1, 1),
     (1000, 1000, 1000),
+    (1000, 1, 1000),
+    (1000, 1000, 1),
+    (100, 1, 1),
+    *((1000, n, n) for n in (100, 10)),
+    *((1000, 1, a) for a in (100, 10)),
+    *((1000, m, 1) for m in (100, 10)),
 )
 RATE = 50.0  # [Hz] of every log: the sensors' noise is that of single samples, so a higher rate adds only cost
 ROWS = 20  # of each training log, evenly over its 6 s
@@ -130,14 +133,14 @@ def physics(name: str, seed: int) -> dict[str, Any]:
     started = time.process_time()
     for run, tare, phi in judged(name, seed):
         found["training mean"].append(known.mean - phi)
-        for given, told in ((None, ""), (tare, ", with tare")):
-            methods = {
-                "map-gp": SmoothPosteriorLeastSquares(robot, given),
-                "same-prior": SmoothPosteriorLeastSquares(robot, given, prior=known),
-                "hybrid": HybridIdentifier(robot, given),
-            }
-            for method, identifier in methods.items():
-                found.setdefault(method + told, []).append(identifier.run(run).phi - phi)
+        methods = {
+            "map-gp": SmoothPosteriorLeastSquares(robot),
+            "same-prior": SmoothPosteriorLeastSquares(robot, prior=known),
+            "same-prior, with tare": SmoothPosteriorLeastSquares(robot, tare, prior=known),
+            "hybrid, with tare": HybridIdentifier(robot, tare),
+        }
+        for method, identifier in methods.items():
+            found.setdefault(method, []).append(identifier.run(run).phi - phi)
     return {
         "set": name,
         "seed": seed,
@@ -147,7 +150,7 @@ def physics(name: str, seed: int) -> dict[str, Any]:
 
 
 def sampler(robot: Arm, seeds: int = 4) -> dict[str, Any]:
-    """Torque of the fast sampler minus MuJoCo's, rms [N·m] by joint, beside the torque's own rms; nothing but the arm."""
+    """Torque of the fast sampler minus MuJoCo's, rms [N·m] by joint, beside the torque's own; nothing but the arm."""
     difference, size = [], []
     for k in range(_UNSEEN, _UNSEEN + seeds):
         payload = draw_payload("boxes", k)
