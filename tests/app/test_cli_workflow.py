@@ -177,6 +177,7 @@ def test_a_bad_data_set_is_refused(call, tmp_path, argv, named):
     assert captured.err.count("\n") == 1
 
 
+@pytest.mark.full
 def test_train_prints_errors_by_payload_and_by_row_beside_the_mean(work, call):
     argv = ("train", "--dataset", work / "data", "--kind", "network", "--stages", "2", "--members", "2")
     out = call(*argv, "--epochs", "2", "--split", "row", "--out", work / "net.safetensors").out
@@ -229,6 +230,7 @@ def few_points(monkeypatch):
     monkeypatch.setattr(report_command, "_POINTS", 4)
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("few_points")
 def test_report_of_a_log_shows_motion_torques_and_every_method(call, work, tmp_path):
     panda = arm("panda")

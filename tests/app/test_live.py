@@ -477,6 +477,7 @@ def test_a_doubt_stays_though_too_little_is_seen_of_the_next_payload_to_say_it_a
     assert not any("plausible now" in entry.text for entry in session.log)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("method", ["map", "rls"])  # one takes the turns for changes of payload
 def test_a_doubt_is_taken_back_by_evidence_and_the_checks_go_on(panda, analytic_log, method):
     """The sign of the torque is turned, set right after 4 s, and turned again after 40 s."""

@@ -123,6 +123,7 @@ def test_a_saved_model_predicts_without_the_libraries_that_trained_it(saved):
     np.testing.assert_array_equal(json.loads(run.stdout), model.predict(np.ones((1, 22))))
 
 
+@pytest.mark.full
 def test_training_says_nothing_on_its_own(tmp_path):
     """No banner, warning or log of JAX reaches the user's terminal."""
     program = (

@@ -414,6 +414,7 @@ def test_the_filter_tells_friction_from_payload(panda, analytic_log):
     assert found.phi[:4] / UNITS[:4] == pytest.approx(CAMERA.phi[:4] / UNITS[:4], abs=0.15)
 
 
+@pytest.mark.full
 def test_the_filter_s_error_is_as_large_as_its_covariance_says(panda, analytic_log):
     """Normalised squared error of ten parameters: chi-square, 10 on average, under the noise the filter assumes."""
     clean, density, squares = analytic_log(panda, CAMERA, duration=2.0), 0.05, []

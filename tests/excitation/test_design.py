@@ -136,6 +136,7 @@ def test_a_pair_tells_more_than_the_loaded_run_alone(panda, allowed):
     assert np.all(pair.half_width < alone.half_width)
 
 
+@pytest.mark.full
 def test_until_reaches_the_accuracy_and_half_its_time_does_not(panda, allowed):
     wanted = Accuracy(mass=0.03, moment=0.006)
     found = design_until(allowed, Criterion(panda, "same"), wanted, **QUICK)

@@ -122,6 +122,7 @@ def test_what_was_taken_off_since_the_tare_is_negative_and_said_so(panda, simula
     assert "within three standard deviations" not in str(answer)
 
 
+@pytest.mark.full
 def test_taken_off_asks_for_as_much_evidence_as_held(panda, simulated):
     now, tare = simulated("tool", 4), simulated("nothing", 3)
     added = identify(now, panda, tare=tare)

@@ -114,6 +114,7 @@ def test_the_mass_is_right_whatever_the_clock_and_its_interval_holds(panda, logs
         assert holds(answer, truth)[0]
 
 
+@pytest.mark.full
 @TARED
 def test_30_hz_100_hz_and_1_khz_of_one_run_agree_within_their_intervals(panda, logs, tared):
     for run, tare, truth in logs[: 2 if tared else 1]:
@@ -220,6 +221,7 @@ def test_map_alone_finds_the_mass_from_motor_currents_without_a_tare(panda, moto
     assert all(holds(identify(log.run, panda, method="map"), log.truth)[0] for log in motor_logs)
 
 
+@pytest.mark.full
 @pytest.mark.xfail(
     strict=True, reason="the gain of a link-side torque is taken to be known to 0.5 %, whatever the log says"
 )

@@ -57,6 +57,7 @@ def real(real_data):
     }
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["panda", "ur10e"])
 def test_simulated_logs_up_to_twice_the_rated_payload_pass(sound, name):
     robot, logs = sound[name]

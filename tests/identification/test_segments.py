@@ -50,6 +50,7 @@ def taken_up(panda, payload):
     return log_of(panda, [(0.0, None), (2.5, payload)])
 
 
+@pytest.mark.full
 def test_two_changes_within_six_seconds_are_found_and_no_third(panda, payload):
     found = identify(log_of(panda, [(0.0, None), (2.0, payload), (4.0, None)]), panda)
     assert [part.start for part in found.segments] == [0.0, pytest.approx(2.0, abs=0.15), pytest.approx(4.0, abs=0.15)]

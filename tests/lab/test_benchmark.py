@@ -298,6 +298,7 @@ def test_what_is_measured_is_not_measured_again_and_a_further_method_is_all_that
     assert all(after[name] == at for name, at in before.items())
 
 
+@pytest.mark.full
 def test_a_cell_counts_only_with_its_key(finished):
     cell = load_cells(finished / "cells")["untared-900001-rls-filter"]
     assert finished_cell(finished / "cells", cell["name"], cell["key"]) == cell

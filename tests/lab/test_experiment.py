@@ -117,6 +117,7 @@ def test_a_process_that_is_killed_costs_its_task_only(tmp_path):
     assert [cell["square"] for cell in found.values()] == [0, 1, 4]
 
 
+@pytest.mark.full
 def test_a_task_whose_process_is_killed_each_time_is_said_to_be_lost(tmp_path):
     wanted = [Task.of_one("of-0", "a", killed_at_first, tmp_path, 0, True), *tasks(tmp_path, 3)[1:]]
     found = run_tasks(

@@ -155,6 +155,7 @@ def test_a_study_that_was_stopped_goes_on_and_measures_nothing_twice(small):
     assert again == []
 
 
+@pytest.mark.full
 def test_the_same_seed_gives_the_same_numbers(small):
     folder, _, cells, _ = small
     name = next(name for name in cells if name.startswith("tree-2stage"))

@@ -98,6 +98,7 @@ def test_a_missing_cell_is_a_gap_and_not_a_number(tmp_path):
     assert "not measured" in page_of(cells, tmp_path)
 
 
+@pytest.mark.full
 def test_the_same_cells_give_the_same_page(tmp_path):
     assert page_of(study(), tmp_path) == page_of(dict(reversed(study().items())), tmp_path)
 
@@ -237,6 +238,7 @@ def test_first_estimates_stand_beside_the_training_mean_s_and_the_last_ones():
         assert "–" not in row(table, name).values()
 
 
+@pytest.mark.full
 def test_both_calibrations_are_in_fig_7_and_one_of_them_is_the_benchmark_s(tmp_path):
     cells = study()
     shown = dict(benchmark_rows(cells))
@@ -438,6 +440,7 @@ def test_errors_averaged_over_time_are_shown_for_held_out_payloads():
 # ------------------------------------------------------------------ report and summary
 
 
+@pytest.mark.full
 def test_the_report_shows_figures_4_to_8(tmp_path):
     cells = study()
     text = html_report(cells, evaluate(cells), tmp_path / "report.html").read_text(encoding="utf-8")

@@ -58,6 +58,7 @@ def streamed(panda, world, profile, held):
     return last, learned
 
 
+@pytest.mark.full
 def test_a_stream_of_the_empty_arm_is_one_more_session(panda, world, profile):
     last, learned = streamed(panda, world, profile, [(0.0, None)])
     assert not last.held

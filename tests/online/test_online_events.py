@@ -221,6 +221,7 @@ def test_a_cycle_in_step_with_the_motion_stays_as_good_in_its_second_half_as_in_
     assert np.median(half_width[late]) < 0.1
 
 
+@pytest.mark.full
 def test_another_payload_of_another_mass_is_no_return():
     other = box(0.9)
     estimates, events = said(stream(3, [(5.0, HALF_KILO), (9.0, other)], 13.0), "map-gp")
@@ -272,6 +273,7 @@ def test_a_replay_says_the_same_bit_for_bit_however_the_second_thread_fares():
         np.testing.assert_array_equal(a.covariance, b.covariance)
 
 
+@pytest.mark.full
 def test_threads_do_not_pile_up_with_the_changes():
     def running():
         return sum(thread.name == "armload-scales" for thread in threading.enumerate())
@@ -306,6 +308,7 @@ def breaking_away(real_data):
     return loaded.t[0], estimates
 
 
+@pytest.mark.full
 def test_a_real_arm_that_breaks_away_from_rest_is_no_change_of_payload(breaking_away):
     start, estimates = breaking_away
     assert estimates[-1].event is None
@@ -329,6 +332,7 @@ def test_a_change_is_said_to_have_begun_when_it_did(rate):
     assert 5.0 < events[0].t < 5.2
 
 
+@pytest.mark.full
 def test_the_run_of_the_empty_arm_counts_beside_a_tare_that_was_given():
     panda, log, found = arm("panda"), stream(1, [(6.0, HALF_KILO)], 8.0), {}
     elsewhere = random_motion(panda, 98, duration=20.0, harmonics=10)

@@ -66,6 +66,7 @@ def test_what_was_exchanged_since_the_tare_is_covered_or_said(panda, exchanged):
     assert np.mean(fine) > 0.85
 
 
+@pytest.mark.full
 def test_a_difference_that_is_surely_no_body_is_answered_as_it_is_and_said(panda, exchanged):
     """A kilogram far off the flange for a hand of 0.7 kg: 0.3 kg whose centre lies 0.4 m away."""
     logs, runs = exchanged

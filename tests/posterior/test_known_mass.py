@@ -27,6 +27,7 @@ def test_a_gaussian_given_one_of_its_coordinates_is_what_many_draws_near_it_show
     assert covariance == pytest.approx(spread, abs=0.05 * np.diag(C).max())
 
 
+@pytest.mark.full
 def test_a_known_mass_makes_the_moments_better_and_their_intervals_narrower_and_they_hold():
     panda = arm("panda")
     better, inside = [], []

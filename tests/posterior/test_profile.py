@@ -109,6 +109,7 @@ def test_a_profile_knows_the_payload_better_than_a_tare_of_another_day(panda, li
     assert error[0] < error[1]
 
 
+@pytest.mark.full
 def test_a_file_holds_all_of_a_profile_in_a_few_megabytes(panda, run, profile, tmp_path):
     path = save_profile(profile, tmp_path / "arm.profile")
     assert path.stat().st_size < 5e6
@@ -138,6 +139,7 @@ def test_a_profile_of_another_arm_or_base_is_refused(panda, run, profile):
         identify(run, panda, profile=profile, method="ols")
 
 
+@pytest.mark.full
 def test_a_body_is_the_same_about_another_frame(panda, run, profile):
     here = identify(run, panda, profile=profile, method="map-gp")
     joint = arm("panda", "panda_link7")

@@ -51,6 +51,7 @@ def test_the_residual_s_power_is_that_of_its_rows(panda, sound):
     np.testing.assert_allclose(joined.residual_power(x, weights), power, rtol=1e-9)
 
 
+@pytest.mark.full
 def test_a_rigid_payload_is_no_more_restless_than_its_tare(panda, sound):
     for log in sound:
         identifier = HybridIdentifier(panda, log.tare)

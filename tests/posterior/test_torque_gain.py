@@ -70,6 +70,7 @@ def test_the_gain_of_each_joint_has_an_interval_that_holds_and_is_wide_where_the
     assert std[3] < 0.5 * std[6]  # the elbow bears the weight, the flange's axis hardly
 
 
+@pytest.mark.full
 def test_another_payload_is_then_found_in_its_own_mass(panda, logs, profile, weighed, tmp_path):
     without, with_ = (identify(logs[5], panda, profile=known) for known in (profile, weighed))
     truth = PAYLOAD.parameters.mass

@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from armload.motion import random_motion
 from armload.posterior import load_profile
@@ -14,6 +15,7 @@ from armload.simulation import World, simulate_inverse
 from armload.survey import Settings, learning, survey
 
 
+@pytest.mark.full
 def test_an_exchanged_arm_is_not_averaged_with_the_one_before(panda, tmp_path, monkeypatch):
     monkeypatch.setattr(learning, "FIRST", 2)  # fewer logs than a profile chooses its capacity from: quick
     world = World.real_like(panda, 3)

@@ -137,6 +137,7 @@ def test_another_question_is_another_key(fleet, tmp_path):
     assert survey(text, replace(SETTINGS, frame="panda_link7"), out, jobs=1).anew == 0
 
 
+@pytest.mark.full
 def test_a_survey_that_was_killed_goes_on_and_ends_with_the_same_bytes(surveyed, fleet, tmp_path):
     out = tmp_path / "survey.parquet"
     words = [
