@@ -15,7 +15,7 @@ PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-r
 .tests test-all test-full: export MPLBACKEND = agg
 
 .DEFAULT_GOAL := help
-.PHONY: help demo docs test .tests test-all test-full parts lint format lock clean
+.PHONY: help demo docs test .tests .kernels test-all test-full parts lint format lock clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -29,8 +29,11 @@ docs: $(VENV)/.stamp ## the pages as a site, strictly: build/site/index.html
 test: $(VENV)/.stamp ## lint, types and every test that needs nothing but Python, side by side (this is what CI runs)
 	@$(MAKE) --no-print-directory --jobs 2 lint .tests
 
-.tests: $(VENV)/.stamp
+.tests: .kernels
 	$(PYTEST) -m "not full"
+
+.kernels: $(VENV)/.stamp
+	@$(BIN)/python hatch_build.py --here
 
 test-all: lint parts ## as test, and the tests marked full too (skipped with a reason where their program is missing)
 	$(PYTEST) -m ""

@@ -25,6 +25,7 @@ MODULES = {
     "distributed": ("distributed", "cluster"),
     "h5py": ("h5py", "hdf5"),
     "viser": ("viser", "live"),
+    "numba": ("numba", "jit"),
     "rosbags": ("rosbags", "bags"),
     "ruamel": ("rosbags", "bags"),  # which brings it: YAML
     "pylibfranka": ("pylibfranka", "franka"),

@@ -1,35 +1,36 @@
-"""How functions are compiled: each once for each machine, and whoever waits for it is told.
+"""Functions in machine code: compiled with the package where it was installed from a wheel, else when first called.
 
-`kernel` is numba's `njit` with what all of armload's compiled functions share. They divide as numpy does (x/0 is ±inf
-or nan: a test of each divisor costs branches), leave the interpreter alone, and are kept on disk. Compiling takes
-seconds, so they do without what numba compiles slowly: an assignment to a slice (`a[:] = b`) brings along the text of
-its error and costs a second, a whole-array function (`a.sum()`) a tenth, where a loop costs nothing.
+A wheel holds two libraries made by `compile_kernels.py`, one for processors of the last ten years and one for any:
+nothing is compiled then, and numba, which brings a whole LLVM, is not needed. In a checkout `kernel` is numba's `njit`,
+which keeps on disk what it compiled; whoever waits for it is told.
+
+All kernels divide as numpy does (x/0 is ±inf or nan: a test of each divisor costs branches) and leave the interpreter
+alone. Compiling takes seconds, so they do without what numba compiles slowly: an assignment to a slice (`a[:] = b`)
+brings along the text of its error and costs a second, a whole-array function (`a.sum()`) a tenth, where a loop costs
+nothing.
 """
 
 from __future__ import annotations
 
+import inspect
+import json
 import logging
+from collections.abc import Callable
+from functools import cache, cached_property
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
-from numba import njit
-from numba.core import event
+import numpy as np
 
 COMPILING = "compiling for this machine, which is done once and takes a while"
-
-
-class _Listener(event.Listener):
-    """Logs once in each process that something of armload is compiled; what is found on disk is not."""
-
-    told = False
-
-    def on_start(self, event: event.Event) -> None:
-        compiled: Any = event.data
-        if not self.told and compiled["dispatcher"].py_func.__module__.startswith("armload."):
-            self.told = True
-            logging.getLogger("armload").info(COMPILING)
-
-    def on_end(self, event: event.Event) -> None:
-        pass
+SIGNATURES = Path(__file__).with_name("kernels.json")  # of each kernel, what it is compiled for ahead
+LIBRARIES = {  # name: what the compiler calls the processor, and what /proc/cpuinfo must list for it; the best first
+    "_kernels_v3": ("x86-64-v3", frozenset({"avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe"})),
+    "_kernels_any": ("", frozenset[str]()),
+}
+_TYPES = {"float64": float, "float32": np.float32, "int64": np.int64, "int32": np.int32, "bool": bool}
 
 
 def kernel(function: Any = None, **options: Any) -> Any:
@@ -37,9 +38,135 @@ def kernel(function: Any = None, **options: Any) -> Any:
 
     Arguments are arrays that can be written, in C order, and numbers: for others it is compiled once more.
     """
-    settings: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
-    compiled: Any = njit(**settings, **options)
-    return compiled if function is None else compiled(function)
+    if function is None:
+        return lambda function: kernel(function, **options)
+    library = _library()
+    return _just_in_time(function, options) if library is None else _Ahead(function, options, library)
 
 
-event.register("numba:compile", _Listener())
+def symbol(function: Callable[..., Any], k: int) -> str:
+    """The name that a library gives the function compiled for its k-th signature."""
+    return f"{name_of(function).replace('.', '_')}_{k}"
+
+
+def name_of(function: Callable[..., Any]) -> str:
+    """The function's name in `SIGNATURES`."""
+    return f"{function.__module__.removeprefix('armload.')}.{function.__name__}"
+
+
+def settings(options: dict[str, Any]) -> dict[str, Any]:
+    """What numba is asked for, whenever it compiles."""
+    return {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, **options}
+
+
+class _Ahead:
+    """A function from a library, and numba's for arguments of other types than it was compiled for.
+
+    The library believes what it is told of an array's type and order, so these are looked at in each call.
+    """
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any], library: Any) -> None:
+        self.py_func, self._options = function, options
+        self.__doc__, self.__name__ = function.__doc__, function.__name__
+        known = signatures().get(name_of(function), ())
+        self._calls = [(_kind(kinds), getattr(library, symbol(function, k))) for k, kinds in enumerate(known)]
+        self._defaults = inspect.signature(function)
+
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        if named or len(arguments) != len(self._defaults.parameters):
+            bound = self._defaults.bind(*arguments, **named)
+            bound.apply_defaults()
+            arguments = bound.args
+        for kinds, call in self._calls:
+            if _fit(kinds, arguments):
+                return call(*arguments)
+        return self._compiled(*arguments)
+
+    @cached_property
+    def _compiled(self) -> Any:
+        return _just_in_time(self.py_func, self._options)
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What numba takes this for, in another kernel that calls it."""
+        return self._compiled._numba_type_
+
+
+def _kind(one: Any) -> Any:
+    """What an argument must be: (type, dimensions) of an array, a type of a number, a list for a tuple."""
+    if isinstance(one, list):
+        return [_kind(part) for part in one]
+    name, _, axes = one.partition("[")
+    return (np.dtype(_TYPES[name]), axes.count(":")) if axes else _TYPES[name]
+
+
+def _fit(kinds: list[Any], arguments: tuple[Any, ...]) -> bool:
+    for kind, x in zip(kinds, arguments, strict=True):
+        if type(kind) is tuple:
+            if type(x) is not np.ndarray or x.dtype != kind[0] or x.ndim != kind[1] or not x.flags.c_contiguous:
+                return False
+        elif type(kind) is list:
+            if type(x) is not tuple or len(x) != len(kind) or not _fit(kind, x):
+                return False
+        elif kind is float:
+            if not isinstance(x, float | int):
+                return False
+        elif kind is bool:
+            if type(x) is not bool and type(x) is not np.bool_:
+                return False
+        elif not isinstance(x, int | np.integer):
+            return False
+    return True
+
+
+@cache
+def signatures() -> dict[str, list[list[Any]]]:
+    """Of each kernel that Python calls, what it is compiled for ahead: "float64[:, :]", "int64", a list for a tuple."""
+    return json.loads(SIGNATURES.read_text())
+
+
+@cache
+def _library() -> Any:
+    """The best library that this processor can run, None where the package holds none."""
+    for name, (_, needed) in LIBRARIES.items():
+        if find_spec(f"armload.{name}") is not None and needed <= _processor():
+            return import_module(f"armload.{name}")
+    return None
+
+
+@cache
+def _processor() -> frozenset[str]:
+    """What the processor can do, in Linux's words; empty where nothing says so."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(errors="replace").splitlines()
+    except OSError:
+        return frozenset()
+    flags = next((line for line in lines if line.startswith("flags")), "")
+    return frozenset(flags.partition(":")[2].split())
+
+
+def _just_in_time(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+    from numba import njit
+
+    _tell_who_waits()
+    return njit(**settings(options))(function)
+
+
+@cache
+def _tell_who_waits() -> None:
+    from numba.core import event
+
+    class Listener(event.Listener):
+        """Logs once in each process that something of armload is compiled; what is found on disk is not."""
+
+        told = False
+
+        def on_start(self, event: Any) -> None:
+            if not self.told and event.data["dispatcher"].py_func.__module__.startswith("armload."):
+                self.told = True
+                logging.getLogger("armload").info(COMPILING)
+
+        def on_end(self, event: Any) -> None:
+            pass
+
+    event.register("numba:compile", Listener())

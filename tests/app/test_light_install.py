@@ -2,9 +2,9 @@
 
 What the package depends on is that of the running tests, less every module of a distribution that the wheel does not
 require: importing one of those fails as if it were not installed. So this shows that armload gets along without them.
-The package is the one under test, which has the files of the wheel and has been compiled; what is marked full is the
-wheel itself, as pip installs it into an environment of its own. That pip finds what is required shows
-`benchmarks/install.py`, which needs the network.
+The package is the one under test, which has the files of the wheel but for the compiled functions (numba compiles
+them); what is marked full is the wheel itself, as pip installs it into an environment of its own, without numba. That
+pip finds what is required shows `benchmarks/install.py`, which needs the network.
 """
 
 import json
@@ -62,43 +62,61 @@ def required(names):
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
     folder = tmp_path_factory.mktemp("wheel")
+    return built(folder, {"ARMLOAD_PURE_WHEEL": "1"})
+
+
+def built(folder, settings):
+    """A wheel of the project."""
     build = [sys.executable, "-m", "hatchling", "build", "--target", "wheel", "--directory", str(folder)]
-    subprocess.run(build, cwd=ROOT, check=True, capture_output=True)
-    (built,) = folder.glob("*.whl")
-    return built
+    subprocess.run(build, cwd=ROOT, check=True, capture_output=True, env=os.environ | settings)
+    (wheel,) = folder.glob("*.whl")
+    return wheel
 
 
 @pytest.fixture(scope="module")
-def hook(wheel):
-    """The source of a module that refuses to import what the wheel does not require."""
+def refused(wheel):
+    """The modules of all that is installed and the wheel does not require."""
     (info,) = (path for path in zipfile.Path(wheel).iterdir() if path.name.endswith(".dist-info"))
     core = [Requirement(line) for line in PathDistribution(info).requires or []]  # type: ignore[arg-type]
     allowed = required(r.name for r in core if r.marker is None or r.marker.evaluate({"extra": ""}))
-    refused = {
+    found = {
         module
         for module, owners in packages_distributions().items()
         if module != "armload" and not {canonicalize_name(owner) for owner in owners} & allowed
     }
-    assert {"mujoco", "sklearn", "jax", "matplotlib", "jinja2", "joblib", "trimesh", "viser", "rosbags"} <= refused
-    return HOOK.format(refused=refused)
+    assert {
+        "numba",
+        "llvmlite",
+        "mujoco",
+        "sklearn",
+        "jax",
+        "matplotlib",
+        "jinja2",
+        "joblib",
+        "trimesh",
+        "viser",
+        "rosbags",
+    } <= found
+    return found
 
 
 @pytest.fixture(scope="module", params=["package", pytest.param("wheel", marks=pytest.mark.full)])
-def light(request, wheel, hook, tmp_path_factory):
+def light(request, refused, tmp_path_factory):
     """Runs Python with armload and what it requires, and nothing else."""
     folder = tmp_path_factory.mktemp("light")
     if request.param == "package":
         home, python = Path(armload.__file__).parents[1], sys.executable
         kept = os.environ | {"PYTHONPATH": os.pathsep.join([str(folder), str(home)])}
-        (folder / "sitecustomize.py").write_text(hook)
+        compiler = {"numba", "llvmlite"}  # a checkout holds no compiled functions
+        (folder / "sitecustomize.py").write_text(HOOK.format(refused=refused - compiler))
     else:
         home, python = folder, str(folder / "venv" / "bin" / "python")
         kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "NUMBA"))}
         subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(folder / "venv")], check=True)
         pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet", "--python", python]
-        subprocess.run([*pip, "install", "--no-deps", "--no-index", str(wheel)], check=True, cwd=folder)
+        subprocess.run([*pip, "install", "--no-deps", "--no-index", str(built(folder, {}))], check=True, cwd=folder)
         (place,) = (folder / "venv" / "lib").glob("python*/site-packages")
-        (place / "only_required.py").write_text(hook)
+        (place / "only_required.py").write_text(HOOK.format(refused=refused))
         packages = sysconfig.get_path("purelib")
         # the hook last: the packages' own may import anything
         start = f"import site; site.addsitedir({packages!r}); import only_required\n"
@@ -209,4 +227,4 @@ def test_light_commands_import_nothing_of_the_extras(command, absent, panda, ana
     status, loaded = json.loads(done.stdout.splitlines()[-1])
     assert status == 0, done.stderr
     # numba imports scipy where it is installed; that nothing needs it show the tests in the light environment
-    assert not set(loaded) & (set(extras.MODULES) - {"scipy"} | absent)
+    assert not set(loaded) & (set(extras.MODULES) - {"scipy", "numba"} | absent)
