@@ -128,7 +128,7 @@ MODEL_MISFIT = 2.5
 # have 0.1 to 0.7, with two wrist torques exchanged 1 and more
 # (test_exchanged_torque_columns_of_a_real_log_are_named)
 SWAPPED_MISFIT = 1.0
-# of the misfit, what may be left with two torque columns exchanged back: real logs leave at most 0.41
+# of the misfit, what may be left with two torque columns exchanged back: real logs leave at most 0.449
 # (test_exchanged_torque_columns_of_a_real_log_are_named)
 SWAPPED_SHARE = 0.45
 # [N·m/A] torque constant of a joint, gear included, at least: the wrist of a small arm. A UR10e's are 10 to 12
