@@ -29,3 +29,12 @@ def test_what_became_of_the_requests_is_what_was_counted_and_none_was_rejected(m
     assert sentence(found) in PAGE
     assert found["designed"] + found["refused"] == found["requests"]
     assert found["rejected"] == []
+
+
+def test_the_table_of_promises_is_that_of_the_committed_benchmark(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    from kept_promises import table
+
+    found = result("kept_promises")["rows"]
+    assert {name.split(",")[0] for name in found} == {"panda", "ur10e"}
+    assert table(found) in PAGE
