@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
-from armload.identification.thresholds import KNOWN, MAY_LEAN, NOMINAL
+from armload.identification.thresholds import KNOWN, NOMINAL
 from armload.inertia import NAMES, SHRINK, Z95
 from armload.posterior import KnownMass
 from armload.posterior.drift import Drift
 from armload.posterior.scales import AnotherArm
-from armload.posterior.tilt import Tilt
+from armload.posterior.tilt import MAY_LEAN, Tilt
 from armload.recording import Recording
 
 RECORD = "record the arm as it is, without the payload, on any motion of 20 s, and name the log with --tare"
@@ -145,8 +145,8 @@ def gravity_doubted(arm: Arm, tilt: Tilt | None, torque: str) -> str | None:
         return None
     angle = np.degrees(np.linalg.norm(tilt.angles))
     return (
-        f"the base may lean, by about {angle:.1f}° against the gravity that was given, which the answer believes: check "
-        "that it is level, give its gravity (--gravity), or record a tare of more poses"
+        f"the base may lean, by about {angle:.1f}° against the gravity that was given, which the answer believes: "
+        "check that it is level, give its gravity (--gravity), or record a tare of more poses"
     )
 
 

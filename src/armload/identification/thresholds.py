@@ -41,10 +41,6 @@ FARTHEST = 1.0
 # A Panda's have 1, an FR3's 3, those of arms that nobody has identified 10
 # (test_where_figures_are_nominal_the_first_advice_is_a_tare)
 NOMINAL = 5.0
-# [squared standard deviations] T of gravity's two angles (`posterior.tilt`) beyond which the base may lean, of an arm
-# whose links are known: the 95 % quantile of a chi-squared distribution of two degrees of freedom, T allowing for a base
-# that is level to 0.5° (test_a_base_that_may_lean_is_said_and_no_answer_of_it_is_called_calibrated)
-MAY_LEAN = 5.991464547107979
 # times the standard deviation that counts as determined: what even an arm known exactly would leave beyond lacks
 # motion, what it would leave within may lack a tare. More than 1, as a tare lowers the noise that is found, too
 # (test_what_is_said_to_lack_motion_a_tare_does_not_tell_either)
