@@ -21,7 +21,7 @@ from armload.posterior import HybridIdentifier, KnownMass, PosteriorLeastSquares
 from armload.posterior.drift import Drift
 from armload.posterior.scales import AnotherArm
 from armload.posterior.tilt import TURNED, TURNS, Tilt
-from armload.recording import Recording, extremes
+from armload.recording import Recording, span
 from armload.regression import payload_prior_std
 
 # [squared expected deviations, summed over links] that no sound arm with joint torque sensors shows: simulated ones as
@@ -184,7 +184,6 @@ def _offset_ratio(mismatch: ArmMismatch, recording: Recording) -> float:
     """How many times the torque offsets are what is expected of an arm; 0 where that is not too often."""
     ratios = mismatch.offset_ratios
     if mismatch.torque == "motor":  # there a joint at rest is held by any friction below stiction
-        low, high = extremes(recording.q)
-        ratios = ratios[high - low > MOVES]
+        ratios = ratios[span(recording.q) > MOVES]
     times = float(np.sqrt(ratios.mean())) if ratios.size else 0.0
     return times if times > LARGEST_OFFSETS[mismatch.torque] else 0.0

@@ -8,7 +8,7 @@ from armload.recording.copies import check_own_measurements, shared_samples
 from armload.recording.files import LOG_SUFFIXES, has_topics, read_recording, write_recording
 from armload.recording.lerobot import data_set_episodes, is_data_set
 from armload.recording.recording import BLOCK, CHANNELS, GAP, JITTERED, Recording, Sample
-from armload.recording.spooled import blocks, extremes
+from armload.recording.spooled import blocks, largest, parts_of, span
 
 __all__ = [
     "BLOCK",
@@ -23,14 +23,16 @@ __all__ = [
     "blocks",
     "check_own_measurements",
     "data_set_episodes",
-    "extremes",
     "has_topics",
     "is_data_set",
+    "largest",
+    "parts_of",
     "read_long",
     "read_recording",
     "recording_chunks",
     "same_motion",
     "shared_samples",
+    "span",
     "with_gravity",
     "write_recording",
 ]

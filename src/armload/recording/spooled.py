@@ -106,13 +106,32 @@ def spooled(chunks: Iterable[Recording], where: str, folder: str | Path | None =
     return SpooledRecording(t, q, dq, tau, last.channel, last.joint_names, where, last.notes, last.epoch)
 
 
-def extremes(x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Smallest and largest of each column of x (N, n), N ≥ 1, as it lies in memory or on disk."""
-    found = [(part.min(axis=0), part.max(axis=0)) for part in (x[rows] for rows in blocks(len(x)))]
-    low, high = zip(*found, strict=True)
-    return np.min(low, axis=0), np.max(high, axis=0)
-
-
 def blocks(count: int) -> Iterator[slice]:
     """The rows 0 … count in blocks: at the same places, however a log is held."""
     return (slice(k, min(k + BLOCK, count)) for k in range(0, count, BLOCK))
+
+
+def parts_of(x: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
+    """x (N, n) a block at a time, as it lies in memory or on disk."""
+    return (x[rows] for rows in blocks(len(x)))
+
+
+def largest(x: NDArray[np.float64]) -> tuple[NDArray[np.float64], list[int]]:
+    """The largest size of each column (n,), and the first rows that have it."""
+    found, at, first = np.full(x.shape[1], -np.inf), [0] * x.shape[1], 0
+    for part in parts_of(x):
+        size = np.abs(part)
+        rows = size.argmax(axis=0)
+        for j, k in enumerate(rows.tolist()):
+            if size[k, j] > found[j]:
+                found[j], at[j] = size[k, j], first + k
+        first += len(part)
+    return found, at
+
+
+def span(x: NDArray[np.float64], rows: slice | None = None) -> NDArray[np.float64]:
+    """Largest less smallest of each column (n,), of some rows."""
+    inside = slice(0, len(x)) if rows is None else rows
+    parts = (slice(inside.start + r.start, inside.start + r.stop) for r in blocks(inside.stop - inside.start))
+    low, high = zip(*((part.min(axis=0), part.max(axis=0)) for part in (x[r] for r in parts)), strict=True)
+    return np.max(high, axis=0) - np.min(low, axis=0)

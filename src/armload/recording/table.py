@@ -145,7 +145,7 @@ class _Reading:
         time = self._columns.time
         return ["t" if time is None else table.names[time.place], *(table.names[place] for place in self._places)]
 
-    def values(self, table: Table) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    def values(self, table: Table) -> tuple[NDArray, NDArray[np.intp]]:
         """The rows (N, 1 + 3n) of the episode asked for, and their places in the table."""
         columns, time, where, spec = self._columns, self._columns.time, self._where, self._spec
         extra = [] if time is None else [time.place]
@@ -166,9 +166,9 @@ class _Reading:
             t = self._seconds(table, time, raw[:, 0])
         self._count += len(rows)
         motion = raw[:, len(extra) : len(extra) + len(self._places)] * self._scales
-        return np.asarray(np.column_stack([t, motion])[rows], dtype=np.float64), rows
+        return np.column_stack([t, motion])[rows], rows
 
-    def _seconds(self, table: Table, time: TimeColumns, raw: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _seconds(self, table: Table, time: TimeColumns, raw: NDArray[np.float64]) -> NDArray:
         if self._in_pieces and time.other is not None:
             raise NotInPieces(f"{self._where}: whether it is stamped shows in all rows together")
         t, stamps, scale = _seconds(table, time, raw, self._where)

@@ -1,0 +1,162 @@
+"""Is the torque of a log that of this arm? Missing, frozen, too large, of another arm, in another unit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from armload.arms import ARMS, Arm
+from armload.errors import RecordingError
+from armload.identification.exchanged import check_for_exchanged_torques
+from armload.identification.thresholds import (
+    CURRENT_HIGH,
+    CURRENT_LOW,
+    EFFORT,
+    EFFORT_EVER,
+    EFFORT_SHARE,
+    FROZEN_MOTION,
+    FROZEN_TIME,
+    MODEL_MISFIT,
+    NO_TORQUE,
+    SCALE_SURE,
+)
+from armload.identification.torque_scale import TorqueScale, torque_scale
+from armload.recording import Recording, blocks, largest, parts_of, span, with_gravity
+
+# of the arm's own torque: of what holds less the percentage is said; where that may be none, gravity was taken out
+_NEARLY_NONE = 0.25
+
+
+def check_torque(recording: Recording, arm: Arm) -> None:
+    """Refuse torque that no log of this arm holds.
+
+    Raises:
+        RecordingError: one sentence that names the place.
+    """
+    _check_effort(recording, arm)
+    if recording.channel == "measured":  # the others need not hold the arm's own weight
+        _check_torque_goes_on(recording)
+        _check_no_torque_is_dead(recording)
+        _check_torque_is_the_arms(recording, arm)
+
+
+def _check_effort(recording: Recording, arm: Arm) -> None:
+    most, at = largest(recording.tau)
+    if recording.channel == "measured" and most.max() < NO_TORQUE:
+        rows = np.linspace(0, len(recording) - 1, 20).round().astype(int)
+        if np.abs(arm.torque(recording.q[rows])).max() > 1.0:
+            raise RecordingError(
+                f"{recording.source}: tau is zero in all joints and rows although {arm.name} has weight to hold: "
+                "expected the measured joint torque in N·m, gravity included"
+            )
+    beyond = sum((np.abs(tau) / arm.limits.effort > EFFORT).sum(axis=0) for tau in parts_of(recording.tau))
+    if np.any(beyond > EFFORT_SHARE * len(recording)) or np.any(most > EFFORT_EVER * arm.limits.effort):
+        j = int(np.argmax(most / arm.limits.effort))
+        k = at[j]
+        tau = float(recording.tau[k : k + 1][0, j])
+        raise RecordingError(
+            f"{recording.source}: tau{j + 1} = {tau:.4g} at {row_of(recording, k)} is "
+            f"{most[j] / arm.limits.effort[j]:.3g} times the limit of {arm.joint_names[j]} "
+            f"({arm.limits.effort[j]:g} N·m): expected joint torque in N·m of {arm.name}"
+        )
+
+
+def _check_torque_goes_on(recording: Recording) -> None:
+    """Refuse torque that repeats itself exactly in all joints while the arm moves: its sensor or logger stood still."""
+    same = np.zeros(len(recording) + 1, dtype=np.int8)
+    for part in blocks(len(recording)):
+        rows = slice(max(part.start - 1, 0), part.stop)
+        tau = recording.tau[rows]
+        same[rows.start + 1 : rows.stop] = np.all(tau[1:] == tau[:-1], axis=1)
+    edges = np.diff(same)
+    for first, last in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
+        time = recording.t[last] - recording.t[first]
+        if time > FROZEN_TIME and np.any(span(recording.q, slice(first, last + 1)) > FROZEN_MOTION):
+            raise RecordingError(
+                f"{recording.source}: tau stays exactly the same in all joints from {row_of(recording, first)} for "
+                f"{time:.2f} s although the arm moves: expected the torque of every moment; remove the rows"
+            )
+
+
+def _check_no_torque_is_dead(recording: Recording) -> None:
+    """Refuse a torque that is exactly the same in all rows although its joint moves, beside others that are alive."""
+    dead = span(recording.tau) == 0.0
+    moves = span(recording.q) > FROZEN_MOTION
+    if np.any(dead & moves) and not np.all(dead):
+        j = int(np.flatnonzero(dead & moves)[0])
+        raise RecordingError(
+            f"{recording.source}: tau{j + 1} is {recording.tau[:1][0, j]:.4g} in all rows although q{j + 1} moves: "
+            "expected the measured joint torque in N·m; the channel is dead, or another one was meant"
+        )
+
+
+def _check_torque_is_the_arms(recording: Recording, arm: Arm) -> None:
+    fit = torque_scale(recording, arm)
+    if fit is None:
+        return
+    check_for_exchanged_torques(recording, arm, fit)
+    if fit.is_wrong:
+        _check_for_currents(recording, arm, fit.scale)
+        _check_for_compensation(recording, arm, fit)
+        if fit.is_negative:
+            what = "has the opposite sign of"
+        elif fit.scale < _NEARLY_NONE:
+            what = f"holds only {max(fit.scale, 0.0):.0%} of"
+        else:
+            what = f"is {fit.scale:.2f} times"
+        raise RecordingError(
+            f"{recording.source}: tau {what} the torque {arm.name} needs to carry itself: expected the measured joint "
+            "torque in N·m, gravity included; check the robot, the unit, the torque channel and the base (--gravity)"
+        )
+    if fit.misfit > MODEL_MISFIT:
+        raise RecordingError(
+            f"{recording.source}: tau does not fit {arm.name} with any payload (misfit {fit.misfit:.1f} times a sound "
+            "robot's): expected a log of this robot; check the robot, the order of the joints and the base (--gravity)"
+        )
+
+
+def _check_for_currents(recording: Recording, arm: Arm, scale: float) -> None:
+    """Refuse motor currents in A by name: of a known arm what its torque constants make a sound log of.
+
+    Of an arm whose gears or sensors nobody has described the size alone says so.
+    """
+    facts = ARMS.get(arm.known_as or "")
+    constants = None if facts is None else facts.torque_constants
+    if constants is not None:
+        torque = replace(recording, tau=recording.tau * np.array(constants))
+        fit = torque_scale(torque, arm)
+        if fit is None or fit.is_wrong or fit.misfit > MODEL_MISFIT:
+            return
+        how = f"multiply each by its joint's torque constant ({', '.join(f'{k:g}' for k in constants)} N·m/A)"
+    elif facts is not None and facts.torque_side == "link":
+        return  # sensors in the joints: there is no current to be logged
+    elif not 1.0 / CURRENT_HIGH < scale < 1.0 / CURRENT_LOW:
+        return
+    else:
+        how = "multiply each by its joint's torque constant [N·m/A, at the joint], from the maker"
+    raise RecordingError(
+        f"{recording.source}: tau holds only {scale:.0%} of the torque {arm.name} needs to carry itself: these look "
+        f"like currents, in A; expected joint torque in N·m: {how}"
+    )
+
+
+def _check_for_compensation(recording: Recording, arm: Arm, seen: TorqueScale) -> None:
+    """Refuse torque without gravity by name: it holds nothing of the arm's own, and with gravity put back it is sound.
+
+    Only of arms that measure motor current: their controllers report such torque. The payload that the controller was
+    set to is not known here; the arm's own gravity is most of it.
+    """
+    if not arm.motor_torque or abs(seen.scale) > min(SCALE_SURE * seen.std, _NEARLY_NONE):
+        return
+    fit = torque_scale(with_gravity(recording, arm), arm)
+    if fit is None or fit.is_wrong or fit.misfit > MODEL_MISFIT:
+        return
+    raise RecordingError(
+        f"{recording.source}: tau seems to have gravity taken out: expected the measured joint torque in N·m, gravity "
+        "included; say what the controller was set to carry (--compensated nothing, or a payload's file)"
+    )
+
+
+def row_of(recording: Recording, k: int | np.integer) -> str:
+    return f"row {int(k)} (t = {recording.t[int(k)]:.4f} s)"
