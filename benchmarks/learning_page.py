@@ -74,6 +74,8 @@ def figure(cells: list[dict[str, Any]]) -> None:
         for axes, (name, title) in zip(panels, SETS.items(), strict=True):
             for (label, place), colour in zip(AXES.items(), COLOURS, strict=False):
                 points = sorted((x, mass(pooled(c, name))) for k, c in trained.items() if (x := place(*k)) is not None)
+                if len(points) < 2:  # the others are not measured yet
+                    continue
                 x, y, spread = ([p[0] for p in points], [p[1][0] for p in points], [p[1][1] for p in points])
                 axes.errorbar(x, y, spread, marker="o", ms=4, capsize=2, color=colour, label=f"trees over {label}")
             rivals = [cell for cell in cells if cell.get("set") == name]
@@ -83,6 +85,8 @@ def figure(cells: list[dict[str, Any]]) -> None:
                 axes.axhline(mass(pooled(rivals, method))[0], color=colour, linestyle=style, label=method)
             axes.set(xscale="log", yscale="log", title=title, xlabel="how many were trained on")
         panels[0].set_ylabel("mean error of the mass [g]")
+        panels[0].set_yticks([10, 20, 50, 100, 200, 500], ["10", "20", "50", "100", "200", "500"])
+        panels[0].minorticks_off()
         handles, labels = panels[0].get_legend_handles_labels()
         canvas.legend(handles, labels, loc="lower center", ncols=3, fontsize=8)
         canvas.tight_layout(rect=(0, 0.2, 1, 1))
