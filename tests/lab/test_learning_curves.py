@@ -1,0 +1,60 @@
+"""The parts of the learning curves: what a training holds, what is never seen by it, and what a row is."""
+
+import importlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armload import InertialParameters, arm
+from armload.payloads import draw_payload, random_payload
+
+FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
+
+
+@pytest.fixture
+def curves(monkeypatch):
+    monkeypatch.syspath_prepend(FOLDER)
+    return importlib.import_module("learning_curves")
+
+
+def test_a_training_holds_as_many_payloads_as_it_says_and_repeats_them(curves):
+    phi = np.array([curves.training_log(k, (3, 1, 1), 0)[1] for k in range(7)])
+    assert len(np.unique(phi, axis=0)) == 3
+    np.testing.assert_array_equal(phi[:3], phi[3:6])
+    np.testing.assert_array_equal(phi[1], random_payload(1).parameters.phi)
+
+
+def test_only_what_is_counted_changes_from_log_to_log(curves):
+    (one, _), (other, _) = (curves.training_log(k, (1, 1, 2), 0) for k in (0, 1))
+    (same, _), (moved, _) = (curves.training_log(k, (1, 2, 1), 0) for k in (0, 1))
+    assert np.abs(one.q - other.q).max() < 0.01 < np.abs(same.q - moved.q).max()
+    assert np.abs(one.tau - other.tau).mean() > 0.1  # another arm, which differs from its model in its own way
+
+
+def test_a_log_is_the_inverse_dynamics_of_its_payload_but_for_the_arm_s_own_residual(curves):
+    log, phi = curves.training_log(0, (5, 1, 1), 0)
+    robot = arm("panda")
+    ddq = np.gradient(log.dq, log.t, axis=0)
+    bare, loaded = (
+        np.abs(log.tau - a.torque(log.q, log.dq, ddq)).mean()
+        for a in (robot, robot.with_payload(InertialParameters(phi)))
+    )
+    assert loaded < 0.7 * bare
+
+
+def test_no_payload_that_is_judged_was_trained_on(curves, monkeypatch):
+    monkeypatch.setattr(curves, "RUNS", 2)
+    curves.judged.cache_clear()
+    truth = [phi for _, _, phi in curves.judged("payload", 0)]
+    curves.judged.cache_clear()
+    trained = np.array([draw_payload("boxes", k).parameters.phi for k in range(1000)])
+    assert min(np.abs(trained - phi).max(axis=1).min() for phi in truth) > 0.0
+
+
+def test_trainings_of_another_size_are_measured_anew_and_the_physics_beside_them_is_not(curves):
+    small, large = ({task.name: task.keys[task.name] for task in curves.tasks(n, 2)} for n in (10, 20))
+    assert len(small) == 1 + 2 * (len(curves.SETS) + len(curves.PLAN))
+    changed = {name for name in small if small[name] != large[name]}
+    assert changed == {name for name in small if name.startswith("trees")}
+    assert len({small[name] for name in changed}) == len(changed)
