@@ -8,6 +8,11 @@ from typing import Any
 KINDS = ("change", "grasp", "release", "swap", "return")
 
 
+def kind_of(before: bool, after: bool) -> str:
+    """The kind of a change, by whether anything is held before and after it."""
+    return {(False, True): "grasp", (True, False): "release", (True, True): "swap"}.get((before, after), "change")
+
+
 @dataclass(frozen=True)
 class Event:
     """Something was taken up, put down or exchanged.

@@ -6,10 +6,11 @@ The watch is in one of three phases, by what the last rows are (`modes.py`):
 
     FOLLOWING   the run takes the sample;
                 it is probably not steady → DOUBTING, the payload has surely changed or is changing → SETTLING
-    DOUBTING    the sample is looked at, and the run is not told;
+    DOUBTING    the sample is looked at, and the run does not take it;
                 steady again, or not for too long → FOLLOWING, the payload has surely changed → SETTLING
-    SETTLING    the sample is looked at with what the run before knows, the next run is made beside and told of what
-                may be the new payload; that stays → FOLLOWING with the next run, it was none → DOUBTING with the old
+    SETTLING    the sample is looked at with what the run before knows, the next run is made in the background
+                and takes what may be of the new payload;
+                that stays → FOLLOWING with the next run, it was none → DOUBTING with the old
 
 After a change the new run is *judged* while it is followed: it says what the change was, once its mass is known, and
 gives way to the earlier run if it holds what that one held. The run of the empty arm is a tare of the runs after it,
@@ -19,39 +20,35 @@ is noticed.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import Future
-from dataclasses import dataclass, replace
-from typing import Any, Literal
+from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
 from armload.estimators import Estimate
-from armload.online.event import Event
+from armload.online.background import Background
+from armload.online.change import Change, next_run
+from armload.online.detector import ChangeDetector
+from armload.online.event import Event, kind_of
 from armload.online.modes import Modes
 from armload.online.runs import Gaussian, Runs
 from armload.online.schedule import Deferred
 from armload.online.thresholds import (
-    AFTER_CONTACT,
     FIRST_TARED,
     FIRST_UNTARED,
-    HOLDS,
     KIND_FROM,
     KIND_LATEST,
     KIND_STD,
-    LAG,
-    LIGHT,
     LIKELY,
-    LONG_ENOUGH,
     PATIENCE,
     RETURN_STD,
     RETURN_UNTIL,
     SURE,
     TAKEN_BACK,
 )
+from armload.online.tracking import Tracker
 from armload.posterior import PosteriorLeastSquares
 from armload.posterior.sequential import SequentialPosterior
-from armload.posterior.worker import Worker
 from armload.recording import GAP, Sample
 from armload.regression import payload_prior_std
 from armload.regression.rows import Row
@@ -60,19 +57,6 @@ Phase = Literal["following", "doubting", "settling"]
 FOLLOWING: Phase = "following"
 DOUBTING: Phase = "doubting"
 SETTLING: Phase = "settling"
-
-
-@dataclass
-class _Change:
-    """A change that is settling: noticed and begun when [s], the posterior that looks on, and the run after it,
-    told since when [s] if it is.
-    """
-
-    t: float
-    began: float
-    state: SequentialPosterior
-    following: Future[PosteriorLeastSquares] | PosteriorLeastSquares
-    told: float | None = None
 
 
 class PayloadWatch:
@@ -90,13 +74,12 @@ class PayloadWatch:
         self.runs = Runs(first)
         self._unit = float(payload_prior_std(first.arm)[0])
         self._look = Deferred()
-        self._worker: Worker | None = None
-        self._closing: Future[None] | None = None
+        self._background = Background()
         self.reset()
 
     def reset(self) -> None:
         """Forget the stream; the next sample is the first."""
-        self._wait_for_closing()
+        self._background.wait()
         self.runs.reset()
         self._look.reset()
         self.phase: Phase = FOLLOWING
@@ -104,13 +87,11 @@ class PayloadWatch:
         self.event: Event | None = None
         self._modes = Modes(self._unit, self.run.stream.correction.effort)
         self._gaussian: tuple[PosteriorLeastSquares, Gaussian] | None = None  # before the row, and of which run
-        self._row_t = self._steady_t = self._doubted_at = -np.inf  # of the last row, the last steady one, the doubt
-        self._sure_t = np.inf  # since when the payload has surely changed
-        self._touched = False  # whether something has touched the arm since it was steady
+        self._detector, self._tracker = ChangeDetector(self._unit), Tracker()
+        self._row_t = self._doubted_at = -np.inf  # of the last row, of the doubt
         self._gave_up = False  # doubting: what does not fit is believed until it fits again
-        self._lately = 0.0, np.zeros(10)  # shift of phi, lagged, and when it was last followed
-        self._change: _Change | None = None
-        self._judging = self._unnamed = False  # whether the run is new, and may give way; whether its kind is not told
+        self._change: Change | None = None
+        self._judging = self._unnamed = False  # whether the run is new, and may give way; whether its kind is not known
         self._held_before = False  # the change, or the doubt
 
     @property
@@ -124,11 +105,6 @@ class PayloadWatch:
         return self.phase == SETTLING
 
     @property
-    def doubting(self) -> bool:
-        """Whether samples are left out because they do not fit: a push, or a change not yet sure."""
-        return self.phase == DOUBTING
-
-    @property
     def likely(self) -> tuple[float, float, float]:
         """Probabilities that the payload is not what the run holds, or changes; of a contact; of a drift of the arm."""
         return self._modes.handing + self._modes.other, self._modes.contact, self._modes.drift
@@ -139,17 +115,9 @@ class PayloadWatch:
         return self.phase == FOLLOWING and sum(self.likely) < 1.0 - LIKELY
 
     def track(self) -> Gaussian:
-        """Follow phi (10,) and its covariance to the last rows, which the run was not told of.
-
-        The mixture of both hypotheses, the same payload and another; it is the wider the faster phi has moved since
-        the last call.
-        """
-        (shift, spread), p, last = self._modes.shift(going_on=True), self.likely[0], self.run.last
-        since, lately = self._lately
-        lately = lately + min((self._row_t - since) / LAG, 1.0) * (shift - lately)
-        self._lately, late = (self._row_t, lately), p * (shift - lately)
-        spread = p * spread + p * (1.0 - p) * np.outer(shift, shift) + np.outer(late, late)
-        return last.phi + p * shift, last.covariance + spread
+        """Follow phi (10,) and its covariance to the last rows, which the run did not take."""
+        last = self.run.last
+        return self._tracker.track(self._modes, self._row_t, (last.phi, last.covariance))
 
     def update(self, sample: Sample, held: bool) -> Estimate | None:
         """Take one sample; None while it does not count. `held`: whether anything was, by the last estimate."""
@@ -213,7 +181,7 @@ class PayloadWatch:
     # ------------------------------------------------------------------ doubting
 
     def _looked(self, sample: Sample, state: SequentialPosterior | None) -> bool:
-        """Look at a sample that the run is not told; whether it completed a row that says something."""
+        """Look at a sample that the run does not take; whether it completed a row that says something."""
         assert state is not None
         row = self.run.stream.look(*sample)
         if row is None:
@@ -225,24 +193,15 @@ class PayloadWatch:
         return True
 
     def _weigh(self, row: Row, h: float, state: SequentialPosterior) -> None:
-        """Weigh a row that the run was not told of, for as long as it stands."""
+        """Weigh a row that the run did not take, for as long as it stands."""
         seen, scale = state.predict(row._replace(h=h))
         self._modes.take(h, seen, row.X, scale, *self._before_row, False)
 
     def _decide(self, sample: Sample, held: bool) -> None:
         """What becomes of the run, by what the last rows are."""
-        modes = self._modes
-        if modes.steady > LIKELY:
-            self._steady_t, self._touched = self._row_t, False
-        self._touched = self._touched or modes.contact > 0.5
-        changed = modes.other if self._touched else modes.other + modes.handing
-        if not (changed > SURE and (not self._touched or modes.stays >= AFTER_CONTACT) and self._possible()):
-            self._sure_t = np.inf
-        else:
-            self._sure_t = min(self._sure_t, self._row_t)
-        if self._row_t - self._sure_t >= HOLDS:
+        if self._detector.take(self._modes, self._row_t, self._before_row):
             self._begin_change(sample, held)
-        elif modes.steady > 0.5:
+        elif self._modes.steady > 0.5:
             self.phase, self._gave_up = FOLLOWING, False
         elif self.phase == DOUBTING:
             self._gave_up = sample.t - self._doubted_at > PATIENCE
@@ -250,35 +209,20 @@ class PayloadWatch:
         elif not self._gave_up:
             self.phase, self._doubted_at, self._held_before = DOUBTING, sample.t, held
 
-    def _possible(self) -> bool:
-        """Whether what would be held now has a mass that can be."""
-        (mean, covariance), (shift, spread) = self._before_row, self._modes.shift()
-        std = float(np.sqrt(covariance[0, 0] + spread[0, 0]))
-        return float(mean[0] + shift[0]) > -LIGHT * self._unit - std
-
     # ------------------------------------------------------------------ a change, and the run after it
 
     def _begin_change(self, sample: Sample, held: bool) -> None:
-        """A change: the next run is made beside the stream while it settles."""
+        """A change: the next run is made in the background while it settles."""
         run = self.run
         state = run.stream.state
         assert state is not None
         if self.phase == FOLLOWING:
             self._held_before = held
-        began = max(self._steady_t, sample.t - PATIENCE)
+        began = max(self._detector.steady_t, sample.t - PATIENCE)
         until = began - max(sample.t - began, TAKEN_BACK)
         self.event, self._judging, self._unnamed = Event("change", sample.t, began, None), False, True
-        following = self._beside(self._made, run, self.runs.reference_for_next(self._held_before), until)
-        self._change, self.phase = _Change(sample.t, began, state, following), SETTLING
-
-    @staticmethod
-    def _made(
-        run: PosteriorLeastSquares, reference: PosteriorLeastSquares | None, until: float
-    ) -> PosteriorLeastSquares:
-        run.stream.finish(until)
-        following = run.another(reference)
-        following.prepare()
-        return following
+        following = self._background.submit(next_run, run, self.runs.reference_for_next(self._held_before), until)
+        self._change, self.phase = Change(sample.t, began, state, following), SETTLING
 
     def _settle(self, sample: Sample) -> None:
         """A sample while the payload may go on changing; then the next run begins, or the run before goes on."""
@@ -288,38 +232,18 @@ class PayloadWatch:
         if looked and modes.steady + modes.contact > SURE:
             self._call_off()
             return
-        if looked and (modes.other < 0.5 or modes.stays < LAG):
-            change.told = None
-        elif looked and (change.told is None or change.told < self._row_t - modes.stays):
-            self._ready(change).reset()
-            change.told = sample.t
-        if change.told is not None:
-            self._ready(change).update(sample)
-        if sample.t - change.t > PATIENCE or (looked and modes.other > LIKELY and self._stays(change)):
+        if looked:
+            change.looked(sample.t, modes, self._row_t)
+        change.take(sample)
+        if sample.t - change.t > PATIENCE or (looked and modes.other > LIKELY and change.stays(modes, self._row_t)):
             self._take_up_the_next()
-
-    def _stays(self, change: _Change) -> bool:
-        """Whether the payload has been the same for so long that it would show, had it gone on changing.
-
-        At the mean rate since the change began its mass would spread by rate·T/√12 over T: three of its deviations.
-        """
-        (shift, spread), T = self._modes.shift(), self._modes.stays
-        seen = abs(float(shift[0])) * T / (self._row_t - change.began) > 3.0 * np.sqrt(12.0 * float(spread[0, 0]))
-        return T >= LAG and (seen or T > LONG_ENOUGH)
-
-    @staticmethod
-    def _ready(change: _Change) -> PosteriorLeastSquares:
-        """The run after a change, waited for."""
-        if isinstance(change.following, Future):
-            change.following = change.following.result()
-        return change.following
 
     def _call_off(self) -> None:
         """The payload is what it was: the run before goes on."""
         assert self._change is not None
         assert self.event is not None
         change, self._change = self._change, None
-        self._closing = self._beside(self._ready(change).close)
+        self._background.close_run(change.run)
         self.event = replace(self.event, kind="return", mass=0.0)
         self.phase, self._doubted_at, self._gave_up = DOUBTING, change.t, False
 
@@ -328,9 +252,9 @@ class PayloadWatch:
         self.hold()
         assert self._change is not None
         change, self._change = self._change, None
-        if change.told is None:
-            self._ready(change).reset()
-        self._watch_anew(self.runs.follow(self._ready(change)))
+        if change.taken_from is None:
+            change.run.reset()
+        self._watch_anew(self.runs.follow(change.run))
         self._judging = True
 
     def _judge(self, estimate: Estimate, held: bool) -> None:
@@ -345,51 +269,32 @@ class PayloadWatch:
             self._judging = False
             self.event = replace(self.event, kind="return")
         elif self._unnamed and (std <= KIND_STD or seconds > KIND_LATEST or self.run.stream.stands):
-            known = {(False, True): "grasp", (True, False): "release", (True, True): "swap"}
             self._unnamed = False
-            self.event = replace(self.event, kind=known.get((self._held_before, held), "change"))
+            self.event = replace(self.event, kind=kind_of(self._held_before, held))
 
     def _watch_anew(self, dropped: PosteriorLeastSquares | None) -> None:
         """Begin to watch the current run; one that is not wanted any more has its thread stopped."""
         self._modes.reset()
-        self._sure_t = np.inf
+        self._detector.begin_run()
         self._look.clear()
         self.phase, self._gave_up = FOLLOWING, False
         if dropped is not None:
-            self._closing = self._beside(dropped.close)
-
-    # ------------------------------------------------------------------ what is done beside
-
-    def _beside(self, task: Callable, *arguments: Any) -> Future:
-        """Have something done by the watch's own thread."""
-        if self._worker is None:
-            self._worker = Worker()
-        return self._worker.submit(task, *arguments)
-
-    def _wait_for_closing(self) -> None:
-        if self._closing is not None:
-            self._closing.result()
-            self._closing = None
+            self._background.close_run(dropped)
 
     def hold(self) -> None:
-        """Wait for what is done beside."""
-        self._wait_for_closing()
-        if self._change is not None:
-            self._ready(self._change)
-        for run in (*self.runs, *self._next):
+        """Wait for what is done in the background."""
+        self._background.wait()
+        for run in self._all:
             run.stream.hold()
 
     def close(self) -> None:
-        """Stop what runs beside."""
+        """Stop what runs in the background."""
         self.hold()
-        for run in (*self.runs, *self._next):
+        for run in self._all:
             run.close()
-        if self._worker is not None:
-            self._worker.stop()
-            self._worker = None
+        self._background.stop()
 
     @property
-    def _next(self) -> list[PosteriorLeastSquares]:
-        """The run after a change, where it is ready."""
-        made = None if self._change is None else self._change.following
-        return [made] if isinstance(made, PosteriorLeastSquares) else []
+    def _all(self) -> list[PosteriorLeastSquares]:
+        """The runs that are kept, and the run after a change, waited for."""
+        return [*self.runs, *([] if self._change is None else [self._change.run])]

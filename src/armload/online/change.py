@@ -1,0 +1,73 @@
+"""A change of payload that settles: the run after it is made, and takes the samples that may be of the new payload."""
+
+from __future__ import annotations
+
+from concurrent.futures import Future
+from dataclasses import dataclass
+
+import numpy as np
+
+from armload.online.modes import Modes
+from armload.online.thresholds import LAG, LONG_ENOUGH
+from armload.posterior import PosteriorLeastSquares
+from armload.posterior.sequential import SequentialPosterior
+from armload.recording import Sample
+
+
+def next_run(
+    run: PosteriorLeastSquares, reference: PosteriorLeastSquares | None, until: float
+) -> PosteriorLeastSquares:
+    """The run after one that ends: that one's rows from `until` [s] on are taken back, `reference` becomes a tare."""
+    run.stream.finish(until)
+    following = run.another(reference)
+    following.prepare()
+    return following
+
+
+@dataclass
+class Change:
+    """A change that is settling.
+
+    Attributes:
+        t: when it was noticed [s]. began: when it began [s]. state: the posterior of the run before, which samples are
+            looked at with. following: the run after it. taken_from: since when that run takes samples [s], if it does.
+    """
+
+    t: float
+    began: float
+    state: SequentialPosterior
+    following: Future[PosteriorLeastSquares] | PosteriorLeastSquares
+    taken_from: float | None = None
+
+    @property
+    def run(self) -> PosteriorLeastSquares:
+        """The run after the change, waited for."""
+        if isinstance(self.following, Future):
+            self.following = self.following.result()
+        return self.following
+
+    def looked(self, t: float, modes: Modes, row_t: float) -> None:
+        """A sample at t [s] completed a row at `row_t` [s]: whether the run takes samples, and from which on."""
+        if modes.other < 0.5 or modes.stays < LAG:
+            self.taken_from = None
+        elif self.taken_from is None or self.taken_from < row_t - modes.stays:
+            self.begin(t)
+
+    def begin(self, t: float) -> None:
+        """The run takes samples from t [s] on."""
+        self.run.reset()
+        self.taken_from = t
+
+    def take(self, sample: Sample) -> None:
+        """A sample, for the run if it takes samples."""
+        if self.taken_from is not None:
+            self.run.update(sample)
+
+    def stays(self, modes: Modes, row_t: float) -> bool:
+        """Whether the payload has been the same for so long that it would show, had it gone on changing.
+
+        At the mean rate since the change began its mass would spread by rate·T/√12 over T: three of its deviations.
+        """
+        (shift, spread), T = modes.shift(), modes.stays
+        seen = abs(float(shift[0])) * T / (row_t - self.began) > 3.0 * np.sqrt(12.0 * float(spread[0, 0]))
+        return T >= LAG and (seen or T > LONG_ENOUGH)
