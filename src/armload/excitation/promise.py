@@ -15,7 +15,8 @@ changes, none of which the bound knows:
 The first two are the factors f, stated priors: 90 % quantiles over simulated worlds of the estimator's half-width over
 the bound's, without the gain's share, the largest of several designs (`benchmarks/designed_motions.py`); with the tare
 elsewhere 10 to 20 % more, as a first check on 50 worlds kept 84 % there. They are checked on other poses, worlds and
-designs in `benchmarks/kept_promises.py`. An f below 1 is what a learned prior and
+designs in `benchmarks/kept_promises.py`: one design of a Panda, with an empty run of its own, does not keep them yet.
+An f below 1 is what a learned prior and
 the difference of two runs of one motion gain.
 """
 
