@@ -127,6 +127,7 @@ def get(url, **headers):
             return error.code, json.loads(error.read())
 
 
+@pytest.mark.full
 def test_two_arms_answer_over_http_and_a_kill_of_one_leaves_the_other(serve, cell):
     running = serve(cell("light", "heavy", port=0, every=0.2))
     assert running.until(known("light"))["mass"] == pytest.approx(HELD.mass, abs=0.05)
