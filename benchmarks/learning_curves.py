@@ -105,7 +105,8 @@ def trees(counts: tuple[int, int, int], logs: int, seed: int) -> dict[str, Any]:
     """A training: its cost, and its errors (runs, 10) in each set."""
     started = time.process_time()
     drawn = [training_log(k, counts, seed) for k in range(logs)]
-    every = [np.linspace(0, len(log) - 1, ROWS).round().astype(int) for log, _ in drawn]
+    generator = np.random.default_rng(seed)  # other times in each log: fixed ones would leave the rest of a run unseen
+    every = [generator.choice(len(log), ROWS, replace=False) for log, _ in drawn]
     X = np.concatenate([rows_of(log)[rows] for (log, _), rows in zip(drawn, every, strict=True)])
     y = np.repeat([phi for _, phi in drawn], ROWS, axis=0)
     simulated = time.process_time() - started

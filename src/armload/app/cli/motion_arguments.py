@@ -109,7 +109,7 @@ def add_design_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--until",
         metavar="ACCURACY",
-        help="in place of --time: the shortest motion after which nine arms in ten are within these 95 %% half-widths, "
+        help="in place of --time: the shortest motion that promises these 95 %% half-widths, "
         "such as mass=10g,moment=1.5g.m,inertia=1e-3",
     )
     parser.add_argument("--joints", type=joints, metavar="5-7", help="that may move (default: all)")

@@ -145,7 +145,7 @@ def _fields(
 def _print(found: Design, constraints: Constraints, criterion: Criterion, words: str) -> None:
     motion = found.motion
     print(f"{motion.name}: {motion.duration:g} s on {constraints.arm.name}, {words}")
-    titles = ["before", f"{motion.duration:g} s at best", "9 arms in 10"]
+    titles = ["before", f"{motion.duration:g} s at best", "promised"]
     print_widths(titles, [criterion.prior_half_width, found.half_width, found.promised])
     rows = table(f"what it uses of the limits, at most {constraints.share:g} of each", "limit", "share of it", "where")
     for what, one in _largest(found).items():
