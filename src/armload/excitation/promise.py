@@ -15,8 +15,8 @@ changes, none of which the bound knows:
 The first two are the factors f, stated priors: 90 % quantiles over simulated worlds of the estimator's half-width over
 the bound's, without the gain's share, the largest of several designs (`benchmarks/designed_motions.py`); with the tare
 elsewhere 10 to 20 % more, as a first check on 50 worlds kept 84 % there; for sensors on the link side with the tare at
-the place 1.6, as 0.8 was kept in 73 of 84 worlds, 1.2 in 7 of 12 of another drawing. They are checked on other poses, worlds and designs in
-`benchmarks/kept_promises.py`. An f below 1 is what a learned prior gains.
+the place 1.6, as 0.8 was kept in 73 of 84 worlds, 1.2 in 7 of 12 of another drawing. They are checked on other poses,
+worlds and designs in `benchmarks/kept_promises.py`. An f below 1 is what a learned prior gains.
 """
 
 from __future__ import annotations
