@@ -11,6 +11,7 @@ tests do so once, where two of their processes would do it side by side.
 
 from __future__ import annotations
 
+import hashlib
 import os
 import platform
 import subprocess
@@ -19,6 +20,7 @@ import tempfile
 import warnings
 from collections.abc import Iterator
 from importlib import import_module
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -37,10 +39,25 @@ class Kernels(BuildHookInterface):
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         if version == "editable" or self.target_name != "wheel" or os.environ.get(PURE):
             return
-        self.folder = tempfile.TemporaryDirectory(prefix="armload-kernels-")
-        for library in compile_all(Path(self.folder.name)):
+        for library in kept(ROOT / "build"):
             build_data["force_include"][str(library)] = f"armload/{library.name}"
         build_data["pure_python"], build_data["infer_tag"] = False, True
+
+
+def kept(folder: Path) -> list[Path]:
+    """The libraries of this source and Python, compiled where they are not there: pip asks for a wheel twice."""
+    sources = [Path(__file__), *sorted((ROOT / "src" / "armload").rglob("*.py")), ROOT / "src/armload/kernels.json"]
+    key = hashlib.sha256(repr((sys.version, platform.machine(), version("numba"))).encode())
+    for path in sources:
+        key.update(path.read_bytes())
+    place = folder / f"kernels-{key.hexdigest()[:16]}"
+    if not place.is_dir():
+        folder.mkdir(exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder, prefix="compiling-") as name:
+            compile_all(Path(name))
+            Path(name).rename(place)
+            Path(name).mkdir()  # which is removed now
+    return sorted(place.glob("_kernels_*.so"))
 
 
 def compile_all(folder: Path) -> list[Path]:
