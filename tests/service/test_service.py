@@ -230,4 +230,5 @@ def test_on_busy_cores_the_age_is_what_an_outsider_measures(serve, cell):
     finally:
         for process in busy:
             process.kill()
+        for process in busy:
             process.wait()
