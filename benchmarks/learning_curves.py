@@ -2,11 +2,12 @@
 
     python benchmarks/learning_curves.py [--logs 1000] [--seeds 2] [--minutes 60] [--work out/learning-curves]
 
-Every training has the same number of logs, by `simulate_inverse`, and of rows; log k holds payload k mod P, runs motion
-k mod M on arm k mod A, so that P·M·A combinations do not all occur. An ensemble is the paper's: five trees without
-limits; its answer for a run is the mean over the run's rows. It is judged in MuJoCo on payloads never seen: on the
-training's first motion and arm (`payload`), on other motions of that arm (`motion`), and on motions of other arms,
-drawn from `World.beyond`, where training draws from `World.real_like` (`arm`). Beside it, on the same runs: the mean of
+Every training but the last has the same number of logs, by `simulate_inverse`, and of rows; the last, of 10 000
+payloads, motions and arms, has ten times as many. Log k holds payload k mod P, runs motion k mod M on arm k mod A, so
+that P·M·A combinations do not all occur. An ensemble is the paper's: five trees without limits; its answer for a run is
+the mean over the run's rows. It is judged in MuJoCo on payloads never seen: on the training's first motion and arm
+(`payload`), on other motions of that arm (`motion`), and on motions of other arms, drawn from `World.beyond`, where
+training draws from `World.real_like` (`arm`). Beside it, on the same runs: the mean of
 the training payloads; least squares with the smooth mismatch with the weak prior (map-gp) and with those payloads
 as one Gaussian prior (same-prior); the latter and the hybrid with a tare too, a bare run of that arm on another motion.
 The trees have no tare; on `payload` and `motion` they know the arm from their training.
@@ -49,9 +50,10 @@ PLAN = (
     *((1000, n, n) for n in (100, 10)),
     *((1000, 1, a) for a in (100, 10)),
     *((1000, m, 1) for m in (100, 10)),
+    (10000, 10000, 10000),  # with ten times the logs: whether more data would bring it
 )
 RATE = 50.0  # [Hz] of every log: the sensors' noise is that of single samples, so a higher rate adds only cost
-ROWS = 20  # of each training log, evenly over its 6 s
+ROWS = 20  # of each training log, at random times
 RUNS = 8  # judged in each set
 SETS = ("payload", "motion", "arm")
 PARTS = ("ensembles", "simulation", "motion", "payloads", "arms")  # of the package: what a training depends on
@@ -170,8 +172,8 @@ def tasks(logs: int, seeds: int) -> list[Task]:
     for seed in range(seeds):
         made += [Task.of_one(f"physics-{s}-{seed}", key_of(code, source_key()), physics, s, seed) for s in SETS]
         for counts in PLAN:
-            name = f"trees-{'-'.join(map(str, counts))}-{seed}"
-            made.append(Task.of_one(name, key_of(code, counts, logs, seed), trees, counts, logs, seed))
+            name, many = f"trees-{'-'.join(map(str, counts))}-{seed}", logs * max(1, max(counts) // 1000)
+            made.append(Task.of_one(name, key_of(code, counts, many, seed), trees, counts, many, seed))
     return made
 
 

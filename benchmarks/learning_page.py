@@ -56,7 +56,8 @@ def table(cells: list[dict[str, Any]]) -> str:
     for counts, same in sorted(trainings(cells).items()):
         simulate, train = (np.mean([cell["cost_s"][part] for cell in same]) for part in ("simulate", "train"))
         errors = [shown(pooled(same, name)) for name in ("training's own logs", *SETS)]
-        rows.append([f"trees: {' · '.join(map(str, counts))}", *errors, f"{simulate:.0f} + {train:.0f}"])
+        logs = "" if same[0]["logs"] == 1000 else f" ({same[0]['logs']} logs)"
+        rows.append([f"trees: {' · '.join(map(str, counts))}{logs}", *errors, f"{simulate:.0f} + {train:.0f}"])
     judged = {s: [cell for cell in cells if cell.get("set") == s] for s in SETS}
     for method in PHYSICS:
         rows.append([method, "–", *(shown(pooled(judged[s], method)) for s in SETS), "–"])
