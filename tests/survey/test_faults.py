@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import resource
 import shutil
 import subprocess
 import sys
@@ -85,14 +84,13 @@ def test_logs_behind_a_web_server_are_answered_as_those_on_disk(logs, whole, tmp
 
 def test_a_full_disk_is_said_and_the_survey_goes_on_from_there(share, whole, tmp_path):
     out = tmp_path / "survey.json"
-    words = [sys.executable, "-m", "armload", "survey", str(share), "--robot", "panda", "--method", "map"]
-    words += ["--jobs", "1", "--out", str(out)]
     most = 4000  # bytes of a file: cells of a log fit, the table of all three does not
-
-    def limited():
-        resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
-
-    done = subprocess.run(words, preexec_fn=limited, capture_output=True, text=True)
+    limited = (
+        f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({most}, {most})); from armload.app import main"
+    )
+    words = [sys.executable, "-c", f"{limited}; raise SystemExit(main())", "survey", str(share), "--robot", "panda"]
+    words += ["--method", "map", "--jobs", "1", "--out", str(out)]
+    done = subprocess.run(words, capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (2, "")
     assert "File too large" in done.stderr
     assert not out.exists()
