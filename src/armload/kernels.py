@@ -70,11 +70,11 @@ class _Ahead:
         self.__doc__, self.__name__ = function.__doc__, function.__name__
         known = signatures().get(name_of(function), ())
         self._calls = [(_kind(kinds), getattr(library, symbol(function, k))) for k, kinds in enumerate(known)]
-        self._defaults = inspect.signature(function)
+        self._signature = inspect.signature(function)
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
-        if named or len(arguments) != len(self._defaults.parameters):
-            bound = self._defaults.bind(*arguments, **named)
+        if named or len(arguments) != len(self._signature.parameters):
+            bound = self._signature.bind(*arguments, **named)
             bound.apply_defaults()
             arguments = bound.args
         for kinds, call in self._calls:

@@ -18,12 +18,13 @@ import zipfile
 from importlib.metadata import PackageNotFoundError, PathDistribution, distribution, packages_distributions
 from pathlib import Path
 
+import numpy as np
 import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 import armload
-from armload import extras
+from armload import extras, kernels
 from armload.payloads import test_payload as payload_of_the_tests
 from armload.recording import write_recording
 
@@ -149,6 +150,28 @@ def test_a_wheel_without_extras_identifies_exports_and_follows_a_replay(light, p
     last = json.loads(done.stdout.splitlines()[-1])
     assert last["t"] == pytest.approx(2.0, abs=0.1)
     assert last["mass"] == pytest.approx(body.parameters.mass, abs=0.1)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("light", ["wheel"], indirect=True)
+def test_each_library_of_a_wheel_says_what_numba_says(light, panda, analytic_log, tmp_path):
+    log, tare = tmp_path / "log.csv", tmp_path / "tare.csv"
+    write_recording(log, analytic_log(panda, payload_of_the_tests().parameters, duration=2.0))
+    write_recording(tare, analytic_log(panda, duration=2.0, phase=1.0))
+    wanted = armload.identify(log, "panda", tare=tare)
+    for name, (_, needed) in kernels.LIBRARIES.items():
+        if not needed <= kernels._processor():
+            continue  # which would not run on this processor
+        code = (
+            f"import armload.kernels as kernels; kernels._processor = lambda: {needed!r}; import armload; "
+            f"found = armload.identify({str(log)!r}, 'panda', tare={str(tare)!r}); "
+            "print(kernels._library().__name__, *found.phi)"
+        )
+        done = light("-c", code)
+        assert done.returncode == 0, done.stderr
+        library, *phi = done.stdout.split()
+        assert library == f"armload.{name}"
+        np.testing.assert_allclose(np.array(phi, dtype=float), wanted.phi, atol=1e-9)
 
 
 @pytest.mark.parametrize(
