@@ -95,10 +95,6 @@ class JointFeatures:
         ratio = np.atleast_2d(dq) / _SLOW
         return np.arcsinh(ratio), 1.0 / (_SLOW * np.sqrt(1.0 + ratio**2))
 
-    def of_sample(self, q: NDArray[np.float64], dq: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
-        """f (pose,) and g (n, velocity) of one sample (n,): for a live stream, at its pace."""
-        return features_of_sample(q, dq, self.waves, self.velocity_waves)
-
 
 @kernel
 def features_of_sample(q, dq, waves, velocity_waves):  # pragma: no cover - compiled
