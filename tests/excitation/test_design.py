@@ -140,9 +140,9 @@ def test_a_pair_tells_more_than_the_loaded_run_alone(panda, allowed):
 def test_until_reaches_the_accuracy_and_half_its_time_does_not(panda, allowed):
     wanted = Accuracy(mass=0.03, moment=0.006)
     found = design_until(allowed, Criterion(panda, "same"), wanted, **QUICK)
-    assert wanted.over(found.half_width) <= 1.0
+    assert wanted.over(found.promised) <= 1.0
     shorter = design_motion(allowed, Criterion(panda, "same"), 0.5 * found.motion.duration, **QUICK)
-    assert wanted.over(shorter.half_width) > 1.0
+    assert wanted.over(shorter.promised) > 1.0
 
 
 def test_an_accuracy_that_any_motion_reaches_is_reached_by_one_that_can_be_run():
