@@ -3,6 +3,7 @@
 Each server (`servers`) moves armload's simulated arm by the maker's protocol, and prints what it was told, in order.
 """
 
+import functools
 import json
 import os
 import shlex
@@ -37,6 +38,26 @@ MAKES["panda"] = ("panda", "panda_py", "franka_robot.py")
 MAKES["ros2"] = ("panda", None, "ros_robot.py")
 
 
+class Late(Exception):
+    """A client or its robot gave up the other: both have to answer within milliseconds, which tests cannot promise."""
+
+
+def in_time(test):
+    """Tried with a new robot, twice more at most, where a link was lost that nobody had cut."""
+
+    @functools.wraps(test)
+    def wrapped(serve):
+        for _ in range(2):
+            try:
+                return test(serve())
+            except Late:
+                continue
+        return test(serve())
+
+    del wrapped.__wrapped__  # pytest asks for the arguments of what was wrapped
+    return wrapped
+
+
 class Served:
     """A server, what it said, and `armload measure` against it."""
 
@@ -61,7 +82,11 @@ class Served:
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=self.env)
         self.listener = threading.Thread(target=self._listen, daemon=True)
         self.listener.start()
-        self.wait("ready")
+        try:
+            self.wait("ready")
+        except BaseException:
+            self.close()
+            raise
 
     def _listen(self):
         for line in self.process.stdout:
@@ -96,6 +121,8 @@ class Served:
         if not wait:
             return run
         out, err = run.communicate(timeout=240.0)
+        if run.returncode == 2:
+            in_vain(err)
         return run.returncode, out, err
 
     def _mount(self, run):
@@ -113,22 +140,38 @@ class Served:
                 run.communicate()
         self.process.kill()
         self.process.wait()
-        self.listener.join()
+        self.listener.join(60.0)
         for stream in (self.process.stdin, self.process.stdout):
             stream.close()
 
 
+def in_vain(err):
+    """Raise `Late` where a run says that the link was lost."""
+    if any(words in err for words in ("was lost", "stopped by itself", "no state for")):
+        raise Late(err)
+
+
 @pytest.fixture(params=MAKES)
-def served(request, tmp_path):
+def serve(request, tmp_path):
+    """Starts a robot; the one before is gone then."""
     worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
     if request.param == "ros2":
         if not Path(ROS_PYTHON).exists():
             pytest.skip("no ROS 2: make .venv-ros/.stamp, or ARMLOAD_ROS_PYTHON")
     else:
         pytest.importorskip(MAKES[request.param][1], reason="the maker's client has no wheel for this Python")
-    made = Served(request.param, tmp_path, f"127.0.7.{40 + worker}")
-    yield made
-    made.close()
+    made = []
+
+    def start():
+        for before in made:
+            before.close()
+        (folder := tmp_path / str(len(list(tmp_path.iterdir())))).mkdir()
+        made[:] = [Served(request.param, folder, f"127.0.7.{40 + worker}")]
+        return made[0]
+
+    yield start
+    for last in made:
+        last.close()
 
 
 def child_of(process):
@@ -137,6 +180,7 @@ def child_of(process):
     return int(children[0])
 
 
+@in_time
 def test_nothing_moves_without_consent_nor_past_a_limit(served):
     for arguments, said in (
         ((), "nobody is at a terminal to agree"),
@@ -152,6 +196,7 @@ def test_nothing_moves_without_consent_nor_past_a_limit(served):
     assert set(served.said()) == {"ready"}
 
 
+@in_time
 def test_whatever_ends_it_the_arm_comes_to_rest_and_the_log_can_be_read(served):
     path = served.motion.position(np.linspace(0.0, served.motion.duration, 5001))
     ways = ["Ctrl-C", "kill", "kill of the one that streams"]
@@ -162,7 +207,10 @@ def test_whatever_ends_it_the_arm_comes_to_rest_and_the_log_can_be_read(served):
         until = time.monotonic() + 120.0
         while not (log.exists() and served.said(since).count("moving") == 2):  # to the start, and then
             assert time.monotonic() < until, served.said(since)
-            assert run.poll() is None, run.communicate()[1]
+            if run.poll() is not None:
+                err = run.communicate()[1]
+                in_vain(err)
+                pytest.fail(err)
             time.sleep(0.02)
         since = len(served.events)  # a busy machine may let the arm come to rest before it is told to
         time.sleep(1.5)
@@ -184,6 +232,7 @@ def test_whatever_ends_it_the_arm_comes_to_rest_and_the_log_can_be_read(served):
         assert np.abs(recording.dq).max() > 0.02
 
 
+@in_time
 def test_the_answer_is_written_in_the_controller_s_order_after_both_runs(served):
     out = served.folder / "answer.json"
     if served.spec.startswith("ros2"):

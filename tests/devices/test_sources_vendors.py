@@ -280,6 +280,14 @@ def test_the_wrong_client_for_a_robot_says_which_is_the_right_one(system, addres
         open_source(f"{name}://{address}", arm(name))
 
 
+def test_the_thread_that_opens_a_robot_keeps_its_priority(system, address, tmp_path):
+    name, version = system
+    with franka(arm(name), version, address, tmp_path), FrankaSource(address, arm(name), name) as source:
+        assert os.sched_getscheduler(0) == os.SCHED_OTHER
+        source.state()
+        assert os.sched_getscheduler(0) == os.SCHED_OTHER
+
+
 def test_the_maker_s_model_means_by_a_load_what_we_mean(address, tmp_path):
     """libfranka's own rigid-body model, fed with our arm and our load, needs the gravity torque we expect."""
     pytest.importorskip("pylibfranka", reason="pylibfranka has no wheel for this Python")

@@ -24,16 +24,18 @@ class SimulatedArm:
         self.gains = Gains.of(self.robot)
         self.target, self.speed = np.array(q, dtype=float), np.zeros(self.robot.n)
         self.halting, self.loaded = False, False
+        loaded = self.robot.with_payload(test_payload().parameters)
         self.model = build_model(self.robot, self.gains, STEP)
+        self.model_loaded = build_model(
+            loaded, self.gains, STEP
+        )  # now, as a client gives up one that is silent for 1 s
         self.data = mujoco.MjData(self.model)
         rest = (self.target, self.speed, self.speed)
         self.data.qpos[:] = settled_start(self.model, self.gains, rest, self.robot.torque(self.target))
 
     def mount(self):
         """From now on it holds the test payload."""
-        self.loaded = True
-        loaded = self.robot.with_payload(test_payload().parameters)
-        self.model = build_model(loaded, self.gains, STEP)
+        self.loaded, self.model = True, self.model_loaded
 
     def command(self, target):
         """Hold this from now on."""

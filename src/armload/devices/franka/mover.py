@@ -49,7 +49,7 @@ class FrankaMover(StreamedMover):
     def __init__(self, address: str, arm: Arm, system: str = "fr3") -> None:
         super().__init__(arm)
         self._client = load_client(system)
-        self._source = FrankaSource(address, arm, system)
+        self._source = FrankaSource(address, arm, system, realtime=True)
         self.name, self.rate = self._source.name, self._source.rate
         self._control: Any = None
         self._target: NDArray[np.float64] | None = None

@@ -9,7 +9,9 @@ are lost packets.
 
 from __future__ import annotations
 
+import contextlib
 import importlib
+import os
 import time
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -54,6 +56,8 @@ class FrankaSource(Source):
         address: host name or IP address of the robot.
         arm: an arm of 7 joints.
         system: "fr3" or "panda".
+        realtime: leave this thread the real-time priority that the FR3's client gives it where it may. Only commands
+            need it: a busy thread that it starts would inherit it, and let nothing else run.
 
     Attributes:
         robot: the maker's client.
@@ -64,7 +68,7 @@ class FrankaSource(Source):
 
     rate = 1000.0
 
-    def __init__(self, address: str, arm: Arm, system: str = "fr3") -> None:
+    def __init__(self, address: str, arm: Arm, system: str = "fr3", *, realtime: bool = False) -> None:
         facts = SYSTEMS[system]
         if arm.n != 7:
             raise SourceError(f"{arm.name} has {arm.n} joints: a {facts.called} has 7; name the arm that is there")
@@ -73,7 +77,8 @@ class FrankaSource(Source):
         self._arrived: float | None = None
         client = load_client(system)
         try:
-            self.robot: Any = client.Robot(address, client.RealtimeConfig.kIgnore)
+            with contextlib.nullcontext() if realtime else _priority_kept():
+                self.robot: Any = client.Robot(address, client.RealtimeConfig.kIgnore)
         except Exception as error:  # the maker's errors have no common base in Python
             raise SourceError(unreachable(address, one_line(error), system)) from None
 
@@ -126,6 +131,20 @@ class FrankaSource(Source):
             return robot.read_once()
         except Exception as error:
             raise SourceError(f"{self.name} was lost: {one_line(error)}") from None
+
+
+@contextlib.contextmanager
+def _priority_kept() -> Iterator[None]:
+    """Let this thread be scheduled afterwards as it was before."""
+    if not hasattr(os, "sched_getscheduler"):
+        yield
+        return
+    before, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        yield
+    finally:
+        if os.sched_getscheduler(0) != before:
+            os.sched_setscheduler(0, before, parameters)
 
 
 def load_client(system: str) -> Any:
