@@ -72,13 +72,13 @@ def another_arm(
             others = other.improved(others, other.posterior(others))
         others = replace(others, noise=S[1:])
         together = Scales(S, scales.eta, scales.features, scales.payloads, same.drift_variance)
-        alone = Scales(S[:1], scales.eta, scales.features, scales.payloads[:10])
+        scales_before = Scales(S[:1], scales.eta, scales.features, scales.payloads[:10])
         rng = np.random.default_rng(0)
-        drawn = _drawn(before, alone, same, S, rng)
+        drawn = _drawn(before, scales_before, same, S, rng)
         vectors = [np.concatenate(both, axis=2) for both in zip([run.b[:, :, None] for run in own], drawn, strict=True)]
         b0 = np.repeat(first.b[:, :, None], _DRAWS + 1, axis=2)
         B = _log_evidence(other, others, vectors) - _log_evidence(same, together, [b0, *vectors])
-        B += _log_evidence(before, alone, [b0])
+        B += _log_evidence(before, scales_before, [b0])
     expected, spread = float(B[1:].mean()), max(float(B[1:].std()), _NAT)
     surprise = (float(B[0]) - expected) / spread
     return AnotherArm(float(B[0]), expected, spread, surprise, surprise > SURPRISING and B[0] > LEAST)

@@ -249,14 +249,14 @@ class PosteriorLeastSquares(Identifier):
     def evidence(self, elapsed: float | None = None) -> Evidence:
         """What the logs say as the stream stands, without a prior on the payload, `elapsed` [s] after the run began."""
         stream, now = self.stream, self._elapsed if elapsed is None else elapsed
-        said = stream if stream.difference is None else stream.difference
+        evidence = stream if stream.difference is None else stream.difference
         earlier = 0.0 if self.reference is None else self.reference.stream.seconds
         speed, weak = float(np.sqrt(self._squares / self._values)), self._weak
         difference = stream.difference is not None
         tare_time = self._tare_time + earlier
         if stream.without_tare:
             tare_time = sum(run.blocks.duration for run in stream.tares[1:])
-        log = (said.information, said.vector, stream.posterior, now, tare_time, speed, weak, difference)
+        log = (evidence.information, evidence.vector, stream.posterior, now, tare_time, speed, weak, difference)
         return Evidence.of(*log, self._traits_frame)
 
     # ------------------------------------------------------------------ beside a running robot

@@ -61,11 +61,11 @@ def with_known_weight(profile: Profile, arm: Arm, log: Recording, mass: float, s
     runs, wide = [profile.data(correction, GAIN, SMOOTH.block), data], solution_prior_std(arm)
     with threads().limit(limits=1):
         found = solve(runs, wide, None, SMOOTH, 3, profile.scales)
-        phi, alone = found.phi, float(np.sqrt(found.covariance[0, 0]))
+        phi, mass_std = found.phi, float(np.sqrt(found.covariance[0, 0]))
         side = GAIN_STD[found.torque]
-        if abs(phi[0] - mass) > HELD * np.hypot(alone, _WIDE * side * mass):
+        if abs(phi[0] - mass) > HELD * np.hypot(mass_std, _WIDE * side * mass):
             raise IdentificationError(
-                f"{log.source} carries {phi[0]:.4g} ± {Z95 * alone:.2g} kg by the profile: expected the weight of "
+                f"{log.source} carries {phi[0]:.4g} ± {Z95 * mass_std:.2g} kg by the profile: expected the weight of "
                 f"{mass:.4g} kg that is known; check what was hung on, and what was mounted in the profile's logs"
             )
         problem = Problem(runs, wide, None, SMOOTH)
