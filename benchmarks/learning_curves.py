@@ -33,8 +33,7 @@ from armload.lab.cells import key_of
 from armload.lab.experiment import Task, listed, run_tasks, source_key
 from armload.motion import random_motion
 from armload.payloads import draw_payload
-from armload.posterior import HybridIdentifier
-from armload.posterior.map import SmoothPosteriorLeastSquares
+from armload.posterior import HybridIdentifier, SmoothPosteriorLeastSquares
 from armload.recording import Recording
 from armload.regression import GaussianPrior
 from armload.simulation import Run, Sensors, World, simulate_inverse, simulate_many

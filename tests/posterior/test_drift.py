@@ -15,7 +15,6 @@ from armload.online import OnlineIdentifier
 from armload.posterior import HybridIdentifier, SmoothPosteriorLeastSquares
 from armload.posterior.drift import CHANGED
 from armload.posterior.problem import Problem
-from armload.regression.rows import Rows
 from armload.simulation import World
 
 OFFSET = np.array([0.3, -0.3, 0.3, -0.3, 0.1, -0.1, 0.1])  # [N·m]
@@ -95,8 +94,7 @@ def test_rows_one_by_one_give_the_posterior_of_the_accumulated_rows_with_a_drift
     stream.hold()
     running = stream.information.copy(), stream.vector.copy()
     scales = stream.posterior.scales
-    run = stream._run
-    run.take(Rows.of(stream._waiting))
+    run = stream.accumulated()
     problem = Problem([*stream.tares, run], stream.prior_std, stream.prior, stream.noise)
     whole = problem.sequential(scales)
     assert running[0] == pytest.approx(whole.information, rel=1e-6, abs=1e-6 * np.abs(whole.information).max())

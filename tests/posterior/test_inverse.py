@@ -5,7 +5,7 @@ import pytest
 from scipy import linalg, special
 
 from armload.estimators.total import _relative
-from armload.posterior.problem import _inverse
+from armload.posterior.elimination import inverse
 from armload.regression.features import _VELOCITY_SCALE, JointFeatures
 
 
@@ -18,7 +18,7 @@ def positive(n, decades=6, seed=1):
 @pytest.mark.parametrize("n", [1, 2, 39, 40, 41, 140])
 def test_the_inverse_is_symmetric_and_that_of_its_cholesky_factor(n):
     A = positive(n)
-    found = _inverse(A)
+    found = inverse(A)
     np.testing.assert_array_equal(found, found.T)
     expected = linalg.cho_solve(linalg.cho_factor(A), np.eye(n))
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
@@ -28,9 +28,9 @@ def test_the_inverse_is_symmetric_and_that_of_its_cholesky_factor(n):
 def test_a_matrix_that_is_not_positive_definite_is_refused(n):
     A = positive(n) - 2.0 * 10**6 * np.eye(n)
     with pytest.raises(np.linalg.LinAlgError):
-        _inverse(A)
+        inverse(A)
     with pytest.raises(np.linalg.LinAlgError):
-        _inverse(np.full((n, n), np.nan))
+        inverse(np.full((n, n), np.nan))
 
 
 def test_relative_eigenvalues_are_those_of_the_pair():

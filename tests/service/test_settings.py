@@ -67,13 +67,13 @@ def test_what_cannot_be_meant_is_one_sentence(tmp_path, capsys, change, said):
 
 def test_a_state_belongs_to_the_settings_it_was_made_with(tmp_path):
     (tmp_path / "empty.csv").write_text("1")
-    settings = ArmSettings("left", "sim", "panda", save=str(tmp_path), tare=str(tmp_path / "empty.csv"))
+    settings = ArmSettings("panda", name="left", source="sim", save=str(tmp_path), tare=str(tmp_path / "empty.csv"))
     first = settings.state
     assert settings.state == first
     (tmp_path / "empty.csv").write_text("2")
     assert settings.state != first
-    assert ArmSettings("left", "sim", "panda", save=str(tmp_path), rating=2.0).state == (
-        ArmSettings("left", "sim", "panda", save=str(tmp_path), rating=3.0).state
+    assert ArmSettings("panda", name="left", source="sim", save=str(tmp_path), rating=2.0).state == (
+        ArmSettings("panda", name="left", source="sim", save=str(tmp_path), rating=3.0).state
     )
 
 

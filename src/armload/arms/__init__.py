@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from armload.arms.facts import ARMS, ArmFacts, Capsule
     from armload.arms.forward import ForwardDerivatives, ForwardDynamics
     from armload.arms.matching import link_fingerprint, names_among, prefixed_frame
-    from armload.arms.model import LINK_SPREAD, Arm, BodyMotion, Limits
+    from armload.arms.model import LINK_SPREAD, Arm, Limits
     from armload.arms.regressors import (
         MomentumRegressor,
         full_arm_regressor,
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
         momentum_regressor,
         payload_regressor,
     )
+    from armload.arms.rigid_body import BodyMotion
     from armload.arms.strength import FRICTION_WIDTH, PAYLOAD_REACH, poses, rated_effort, rated_mass
 
 __all__ = [

@@ -1,33 +1,22 @@
-"""The arm's rigid-body model (Pinocchio): bare torque, momentum, limits, and the motion of the payload frame."""
+"""A serial arm: bare torque, momentum, limits, and the motion of the payload frame, by Pinocchio (`rigid_body.py`)."""
 
 from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from armload.arms.description import read_chain
-from armload.arms.parser_log import caught_parser_errors
+from armload.arms.rigid_body import Body, BodyMotion, body_motions, built, placement_of
 from armload.errors import ArmError
-from armload.inertia import InertialParameters, from_order, to_order
+from armload.inertia import InertialParameters, from_order
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
-
-
-class BodyMotion(NamedTuple):
-    """How a body frame moves with the joints, for N samples of an arm with n joints.
-
-    jacobian: body Jacobian J (N, 6, n), angular rows first: twist (omega, v) = J·dq in the frame's axes.
-    gravity: gravity g_b (N, 3) in the frame's axes [m/s²].
-    """
-
-    jacobian: NDArray[np.float64]
-    gravity: NDArray[np.float64]
 
 
 # one `link_spread`: standard deviation of a link's mass [1], centre of mass [m] and inertia [1]
@@ -255,11 +244,11 @@ class Arm:
     def frame_motion(self, q: ArrayLike) -> BodyMotion:
         """Jacobian and gravity in the payload frame for samples q (N, n)."""
         placement = self._frame_placement
-        return self._body_motion(q, [(self.n, placement.rotation, placement.translation)])[0]
+        return self._motions(q, [Body(self.n, placement.rotation, placement.translation)])[0]
 
     def link_motions(self, q: ArrayLike) -> list[BodyMotion]:
         """Jacobian and gravity in the joint frame of each moving link for samples q (N, n)."""
-        return self._body_motion(q, [(k, np.eye(3), np.zeros(3)) for k in range(1, self.n + 1)])
+        return self._motions(q, [Body(k, np.eye(3), np.zeros(3)) for k in range(1, self.n + 1)])
 
     def frame_pose(self, q: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Rotation (N, 3, 3) and position (N, 3) [m] of the payload frame in the base."""
@@ -286,27 +275,8 @@ class Arm:
 
     @cached_property
     def _model(self) -> pin.Model:
-        messages: list[str] = []
-        try:
-            with caught_parser_errors() as messages:
-                model = pin.buildModelFromXML(self.urdf)
-        except (ValueError, RuntimeError) as error:
-            reason = messages[0] if messages else " ".join(str(error).split())
-            raise ArmError(f"the description of {self.name} cannot be used: {reason}") from None
-        if model.nv != self.n or list(model.names[1:]) != list(self.joint_names):
-            raise ArmError(f"{self.name} is not a serial chain of 1-axis joints to the frame {self.frame!r}")
-        model.gravity.linear = np.array(self.gravity)
-        if self.links is not None:
-            for k, phi in enumerate(self.links, start=1):
-                model.inertias[k] = _pin_inertia(InertialParameters(phi))
-        if self.attached is not None:
-            placement = self._placement(model)
-            moved = self.attached.moved(placement.rotation, placement.translation)
-            last = from_order(model.inertias[self.n].toDynamicParameters(), "pinocchio")
-            model.inertias[self.n] = _pin_inertia(last + moved)  # added as numbers: a payload may weigh nothing
-        if not any(model.inertias[k].mass > 0 for k in range(1, self.n + 1)):
-            raise ArmError(f"no link of {self.name} has a mass: expected a URDF with <inertial> elements")
-        return model
+        about = (self.name, self.urdf, self.joint_names, str(self.frame), self.gravity)
+        return built(*about, self.links, self.attached)
 
     @cached_property
     def _data(self) -> pin.Data:
@@ -314,10 +284,7 @@ class Arm:
 
     @property
     def _frame_placement(self) -> pin.SE3:
-        return self._placement(self._model)
-
-    def _placement(self, model: pin.Model) -> pin.SE3:
-        return model.frames[model.getFrameId(self.frame, pin.FrameType.BODY)].placement
+        return placement_of(self._model, str(self.frame))
 
     def _samples(self, q: ArrayLike, dq: ArrayLike | None, ddq: ArrayLike | None) -> tuple[NDArray[np.float64], ...]:
         q = np.asarray(q, dtype=float)
@@ -327,33 +294,5 @@ class Arm:
             raise ArmError(f"joint arrays have shapes {[x.shape for x in out]}: {self.name} has {self.n} joints")
         return out
 
-    def _body_motion(
-        self, q: ArrayLike, bodies: list[tuple[int, NDArray[np.float64], NDArray[np.float64]]]
-    ) -> list[BodyMotion]:
-        q = self._samples(q, None, None)[0]
-        N, n, model, data = len(q), self.n, self._model, self._data
-        J = np.empty((N, 6, n))  # world frame, linear rows first
-        joints = {joint: (np.empty((N, 3, 3)), np.empty((N, 3))) for joint, _, _ in bodies}
-        for k in range(N):
-            J[k] = pin.computeJointJacobians(model, data, q[k]).reshape(6, n)  # one joint: pin gives a vector
-            for joint, (R, p) in joints.items():
-                placement = data.oMi[joint]
-                R[k], p[k] = placement.rotation, placement.translation
-        linear, angular = J[:, :3], J[:, 3:]
-        out = []
-        for joint, rotation, translation in bodies:
-            R, p = joints[joint][0] @ rotation, joints[joint][1] + joints[joint][0] @ translation
-            at_body = linear + np.cross(angular, p[:, :, None], axis=1)  # v_p = v_0 + omega × p
-            Rt = np.swapaxes(R, 1, 2)
-            jacobian = np.concatenate([Rt @ angular, Rt @ at_body], axis=1)  # (N, 6, n)
-            jacobian[:, :, joint:] = 0.0  # joints beyond the body do not move it
-            out.append(BodyMotion(jacobian, Rt @ np.array(self.gravity)))
-        return out
-
-
-def _pin_inertia(parameters: InertialParameters) -> pin.Inertia:
-    if parameters.mass == 0.0:  # Pinocchio keeps the CoM, which a massless body does not have
-        if np.any(parameters.first_moment):
-            raise ArmError("a link without mass has a first moment: Pinocchio cannot hold such a body; give it a mass")
-        return pin.Inertia(0.0, np.zeros(3), parameters.inertia)
-    return pin.Inertia.FromDynamicParameters(to_order(parameters, "pinocchio"))
+    def _motions(self, q: ArrayLike, bodies: list[Body]) -> list[BodyMotion]:
+        return body_motions(self._model, self._data, self.gravity, self._samples(q, None, None)[0], bodies)

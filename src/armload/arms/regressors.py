@@ -17,7 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armload.arms.model import Arm, BodyMotion
+from armload.arms.model import Arm
+from armload.arms.rigid_body import BodyMotion
 from armload.inertia import inertia_matrix, skew
 
 # L(omega)·vech(I) = I·omega: the constant tensor (3, 6, 3)

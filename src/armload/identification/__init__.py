@@ -1,11 +1,18 @@
 """One log in, one answer out: plausibility, choice of method, answer."""
 
-from armload.identification.answer import Identification
-from armload.identification.arm_health import ArmHealth
-from armload.identification.choice import Choice, choose
-from armload.identification.identify_log import check_usable, identify, plausible_tool
-from armload.identification.methods import DEFAULT, LEFT_OUT, METHODS, Method, default_for
-from armload.identification.plausibility import check_plausible
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from armload.lazy import on_first_use
+
+if TYPE_CHECKING:
+    from armload.identification.answer import Identification
+    from armload.identification.arm_health import ArmHealth
+    from armload.identification.choice import Choice, choose
+    from armload.identification.identify_log import check_usable, identify, plausible_tool
+    from armload.identification.methods import DEFAULT, LEFT_OUT, METHODS, Method, default_for
+    from armload.identification.plausibility import check_plausible
 
 __all__ = [
     "DEFAULT",
@@ -22,3 +29,5 @@ __all__ = [
     "identify",
     "plausible_tool",
 ]
+
+__getattr__, __dir__ = on_first_use(__name__)

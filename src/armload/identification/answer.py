@@ -143,8 +143,8 @@ class Identification:
             if entry.metadata.get("json", True):
                 value = getattr(self, entry.name)
                 out[entry.name] = value.tolist() if isinstance(value, np.ndarray) else value
-        said = {"notes": list(self.notes), "parameters": list(NAMES), "version": __version__}
-        return out | said | {"segments": [segment.to_dict() for segment in self.segments]}
+        about = {"notes": list(self.notes), "parameters": list(NAMES), "version": __version__}
+        return out | about | {"segments": [segment.to_dict() for segment in self.segments]}
 
     @property
     def parameters(self) -> InertialParameters:

@@ -103,11 +103,11 @@ class Found(NamedTuple):
 
     def less(self, tool: NDArray[np.float64]) -> Found:
         """The same without a tool (10,)."""
-        said = None if self.unprojected is None else (self.unprojected[0] - tool, self.unprojected[1])
+        unprojected = None if self.unprojected is None else (self.unprojected[0] - tool, self.unprojected[1])
         mass = self.mass and KnownMass(self.mass.mass - float(tool[0]), self.mass.std)
         alone = self.mass_alone and (self.mass_alone[0] - float(tool[0]), self.mass_alone[1])
         estimate = replace(self.estimate, phi=self.estimate.phi - tool)
-        return self._replace(estimate=estimate, unprojected=said, mass=mass, mass_alone=alone)
+        return self._replace(estimate=estimate, unprojected=unprojected, mass=mass, mass_alone=alone)
 
 
 def found_in(recording: Recording, arm: Arm, tare: Recording | None, asked: Asked) -> Found:

@@ -17,7 +17,7 @@ from armload.identification.choice import choose
 from armload.identification.found import Asked, found_in
 from armload.identification.notes import MAY_CHANGE, changed_within, of_both
 from armload.identification.plausibility import check_plausible
-from armload.identification.said import answered
+from armload.identification.reporting import answered
 from armload.identification.segments import changes_of_payload
 from armload.identification.tare_age import drift_since
 from armload.identification.thresholds import DECISIVE, HEAVIEST, LOWEST_RATE, PAYLOAD_MAY_CHANGE, SETTLED

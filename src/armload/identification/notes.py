@@ -49,31 +49,33 @@ def lacking(
         known_arm_std: standard deviation (10,), were the arm known exactly: a tare can tell no more. None: not known.
         weak_std: standard deviation (10,) before the log.
     """
-    said = []
+    notes = []
     nominal = not tared and arm.link_spread >= NOMINAL
     if nominal:
-        said.append(
+        notes.append(
             f"record a tare: the figures of this arm's links are nominal, and their errors count as payload ({RECORD})"
         )
     missing = ~determined
     if known_arm_std is None or tared:
         if missing.any():
-            said.append(f"this motion does not determine {_names(missing)}: what was known before is reported for them")
-        return said
+            notes.append(
+                f"this motion does not determine {_names(missing)}: what was known before is reported for them"
+            )
+        return notes
     hidden = missing & (known_arm_std <= KNOWN * weak_std / SHRINK)
     still = missing & ~hidden
     if hidden.any():
         record = "a tare" if nominal else f"a tare ({RECORD})"
-        said.append(
+        notes.append(
             f"errors of the arm's model hide {_names(hidden)} from this log: {record} is missing, or a faster motion "
             "of the wrist; what was known before is reported for them"
         )
     if still.any():
-        said.append(
+        notes.append(
             f"this motion does not determine {_names(still)}, with a tare or without: move the wrist faster and "
             "further; what was known before is reported for them"
         )
-    return said
+    return notes
 
 
 def another_model(name: str, links: float) -> str:
@@ -140,8 +142,8 @@ def gravity_doubted(arm: Arm, tilt: Tilt | None, torque: str) -> str | None:
         tilt: what the test of gravity found; None: it was not made. torque: "link" or "motor", the side it seems to be
             measured on. Errors of nominal links, and friction of gears, look like a base that leans a little.
     """
-    told = torque == "link" and arm.link_spread < NOMINAL
-    if tilt is None or tilt.found or not told or tilt.statistic <= MAY_LEAN:
+    link_sensors = torque == "link" and arm.link_spread < NOMINAL
+    if tilt is None or tilt.found or not link_sensors or tilt.statistic <= MAY_LEAN:
         return None
     angle = np.degrees(np.linalg.norm(tilt.angles))
     return (

@@ -148,12 +148,12 @@ class _Search:
         parts = [RegressionData.joined(before), RegressionData.joined(after)]
         for part in parts:
             part.session = self.session
-        said = solve([*self.known, *parts], self.weak, None, SMOOTH, _ITERATIONS, self.physics.start)
+        solution = solve([*self.known, *parts], self.weak, None, SMOOTH, _ITERATIONS, self.physics.start)
         wide = np.diag(self.weak**-2.0)  # directions that neither part tells
-        T = float(said.vector @ np.linalg.solve(said.information + wide, said.vector)) / self.kappa
+        T = float(solution.vector @ np.linalg.solve(solution.information + wide, solution.vector)) / self.kappa
         if self.physics.arm.motor_torque or not self.known:
             return T, 0.0  # friction that grows with the load differs from part to part as a weight does
-        return T, _OF_MASS * of_mass(said.information / self.kappa, said.vector / self.kappa)
+        return T, _OF_MASS * of_mass(solution.information / self.kappa, solution.vector / self.kappa)
 
 
 def of_mass(information: np.ndarray, vector: np.ndarray) -> float:

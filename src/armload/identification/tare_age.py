@@ -40,8 +40,8 @@ def drift_since(tare: Recording, recording: Recording, age: float | None) -> tup
     if tare.date is not None and recording.date is not None:
         seconds = abs(float(recording.epoch - tare.epoch + recording.t[0] - tare.t[-1]))
         drift = drift_after(seconds)
-        said = f"by the logs' clocks the tare is {in_words(seconds)} old: offsets and friction may have changed since"
-        return drift, (said,) if drift else ()
+        note = f"by the logs' clocks the tare is {in_words(seconds)} old: offsets and friction may have changed since"
+        return drift, (note,) if drift else ()
     dates = [_date(log) for log in (tare, recording)]
     if dates[0] is not None and dates[1] is not None and abs(dates[1] - dates[0]) > DAY:
         apart = in_words(abs(dates[1] - dates[0]))

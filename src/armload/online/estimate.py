@@ -63,13 +63,13 @@ class OnlineEstimate(Estimate):
     notes: tuple[str, ...]
 
     @classmethod
-    def of(cls, said: dict[str, Any]) -> Self:
-        """The same as the constructor, from all fields by name; `said` becomes the estimate's own.
+    def of(cls, fields: dict[str, Any]) -> Self:
+        """The same as the constructor, from all fields by name; `fields` becomes the estimate's own.
 
         The constructor sets frozen fields one by one: 2 µs that a stream would pay for each sample.
         """
         made = object.__new__(cls)
-        object.__setattr__(made, "__dict__", said)
+        object.__setattr__(made, "__dict__", fields)
         return made
 
     def behind(self, lag: float) -> Self:

@@ -58,10 +58,10 @@ class Health:
         return sum(self.left_out.values())
 
     def __str__(self) -> str:
-        said = [f"{count} {reason}" for reason, count in self.left_out.items() if count]
-        said += [f"{self.pauses} pauses"] if self.pauses else []
-        said += [f"{self.clock_jumps} clock jumps"] if self.clock_jumps else []
-        return f"{self.used} samples" + (f", left out: {', '.join(said)}" if said else "")
+        counts = [f"{count} {reason}" for reason, count in self.left_out.items() if count]
+        counts += [f"{self.pauses} pauses"] if self.pauses else []
+        counts += [f"{self.clock_jumps} clock jumps"] if self.clock_jumps else []
+        return f"{self.used} samples" + (f", left out: {', '.join(counts)}" if counts else "")
 
 
 class Gate:

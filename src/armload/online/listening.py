@@ -31,7 +31,7 @@ class Listening:
         self._used: float | None = None  # time of the last sample that could be used, or of the first of all
         self._shift = 0.0
         self._pauses, self._apart = 0, 0  # pauses so far; in a row
-        self._number, self._told = 0, 0  # bad samples in a row; tenths of a second of them that were told
+        self._number, self._reported = 0, 0  # bad samples in a row; tenths of a second of them that were reported
         self._before: tuple[int, ...] = ()  # counts of each reason before these
 
     def used(self, gate: Gate, t: float) -> None:
@@ -67,11 +67,11 @@ class Listening:
         counts = tuple(gate.health.left_out.values())
         if self._number == 0:
             own = REASONS.index(gate.reason)
-            self._before, self._told = tuple(c - (k == own) for k, c in enumerate(counts)), 0
+            self._before, self._reported = tuple(c - (k == own) for k, c in enumerate(counts)), 0
         self._number += 1
         tenths = int(self.ahead / SILENT)
-        if tenths > self._told or self._number % BAD_IN_A_ROW == 0:
-            self._told = tenths
+        if tenths > self._reported or self._number % BAD_IN_A_ROW == 0:
+            self._reported = tenths
             most = max(range(len(REASONS)), key=lambda k: counts[k] - self._before[k])
             since = f" for {self.ahead:.1f} s" if tenths else ""
             why = gate.why(REASONS[most], t, q, dq, tau)

@@ -98,18 +98,18 @@ class Modes:
         scale: NDArray[np.float64],
         mean: NDArray[np.float64],
         covariance: NDArray[np.float64],
-        told: bool,
+        taken: bool,
     ) -> None:
         """Take a row.
 
         Args:
             h: what the row stands for [s]. seen: (n, 12) as in `SequentialPosterior`. X: (n, ≥ 10) the row's regressor,
                 payload first. scale: (n,) what the row was multiplied by. mean, covariance: of phi before the row.
-            told: whether the run was told of it, too.
+            taken: whether the run took it, too.
         """
-        shared = 1.0 if told else 1.0 + 2.0 * SAME_ERROR / h
+        shared = 1.0 if taken else 1.0 + 2.0 * SAME_ERROR / h
         U, d, v = _innovation(seen, X, scale, self.root, mean, covariance, shared, self.level)
-        if told:
+        if taken:
             self._listen(h, scale * scale / v, scale * d / v)
         row, state = (h, U, d, v, scale, self.effort), (self._b, self._x, self._P, self._A, self._c)
         known = (self._sizes, self._times, BODY_SIZES, HANDING_TIMES, STARTS)
@@ -171,7 +171,7 @@ class Modes:
             k -= len(BODY_SIZES)
             A, c = self._A[k] + np.tril(self._A[k], -1).T, self._c[k]
             found = [(s * s * c @ np.linalg.solve(M := np.eye(10) + s * s * A, c), M, s) for s in BODY_SIZES]
-            likely = [said - np.linalg.slogdet(M)[1] for said, M, _ in found]
+            likely = [square - np.linalg.slogdet(M)[1] for square, M, _ in found]
             P = np.linalg.inv(A + np.eye(10) / found[int(np.argmax(likely))][2] ** 2)
             x = P @ c
         return self.root @ x, self.root @ P @ self.root.T
@@ -267,7 +267,7 @@ def _weigh(
                     A[k, i, m] += z * U[j, m]
         total = -np.inf
         for size in bodies:  # L·Lᵀ = 1 + s²·A, L·y = s·c
-            said = -math.log(len(bodies))
+            log_evidence = -math.log(len(bodies))
             for i in range(10):
                 y[i] = size * c[k, i]
                 for j in range(i + 1):
@@ -278,8 +278,8 @@ def _weigh(
                 for m in range(i):
                     y[i] -= L[i, m] * y[m]
                 y[i] /= L[i, i]
-                said += 0.5 * y[i] * y[i] - math.log(L[i, i])
-            total = np.logaddexp(total, said)
+                log_evidence += 0.5 * y[i] * y[i] - math.log(L[i, i])
+            total = np.logaddexp(total, log_evidence)
         gains[other_from + k], found[k] = total - found[k], total
     p *= np.exp(gains - gains.max())
     p += 1e-30

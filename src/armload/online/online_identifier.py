@@ -18,30 +18,22 @@ import numpy as np
 from armload.arms import Arm
 from armload.errors import IdentificationError
 from armload.estimators import Estimate, Identifier
-from armload.identification.answer import body_of
 from armload.identification.choice import choose
 from armload.identification.intervals import Before
-from armload.inertia import determined, held, held_probability
-from armload.online.concluding import doubts_of
 from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
 from armload.online.gate import Gate, Health, all_finite
-from armload.online.learning import change_of_arm, learned_from
+from armload.online.judgement import CHANGING, LEFT_OUT, Judgement
+from armload.online.learning import learned_from
 from armload.online.listening import Listening
-from armload.online.restoring import known_parts, origin, same_origin
-from armload.online.state import load_state, save_state
+from armload.online.restoring import load_identifier, save_identifier
 from armload.online.step import mass_step
-from armload.online.thresholds import MOVING, RECENT, STANDS
+from armload.online.thresholds import MOVING, RECENT
 from armload.online.watch import PayloadWatch
 from armload.posterior import PosteriorLeastSquares, Profile
 from armload.posterior.map import PUBLISH
 from armload.recording import Recording, Sample
 from armload.regression import payload_prior_std
-
-_STANDING = "standing: nothing new is told until the arm moves, or what it holds changes"
-_STANDING_MOTOR = "standing: a change of payload is noticed only when the arm moves"
-_CHANGING = "the payload is changing"
-_DOUBT = "samples that do not fit are left out: something pulls at the arm, or the payload is changing"
 
 
 class OnlineIdentifier:
@@ -73,16 +65,14 @@ class OnlineIdentifier:
     ) -> None:
         self.arm, self.tare, self.profile, self._tared = arm, tare, profile, tare is not None
         choice = choose(arm, tare, method, live=True, profile=profile)
-        first = choice.identifier
+        self._engine = first = choice.identifier
         self._watch = PayloadWatch(first) if isinstance(first, PosteriorLeastSquares) else None
-        self._engine = first
         self.method = self.engine.name
         self._gate = Gate(arm)
         self._stream = Listening()
         self._weak = payload_prior_std(arm)
-        known = first.payload_prior
-        mean, std = (np.zeros(10), self._weak) if known is None else known
-        self._before = Before(mean, std, choice.prior)
+        mean, std = first.payload_prior or (np.zeros(10), self._weak)
+        self._judgement = Judgement(str(arm.frame), self._weak, Before(mean, std, choice.prior))
         self.reset()
 
     @property
@@ -98,7 +88,7 @@ class OnlineIdentifier:
         """
         if self._tared:
             return "tare"
-        if getattr(self._source or self.engine, "reference", None) is not None:
+        if getattr(self._judgement.run or self.engine, "reference", None) is not None:
             return "before"
         if self.profile is not None:
             return "profile"
@@ -128,18 +118,11 @@ class OnlineIdentifier:
             self._watch.reset()
         self._stream.reset()
         self._internal = 0.0
-        self._told = -np.inf  # time of the newest sample that counted in the answer, on our own clock
         self._ended: PosteriorLeastSquares | None = None  # the run before the last change
-        self._p_held = 0.0
-        self._moved = -np.inf
+        self._moved = self._published = -np.inf
         self._since: float | None = None
-        self._published = -np.inf
         self._event: Event | None = None
-        self._estimate = self._nothing()
-        self._around, self._doubted = self._estimate.phi, False  # where the intervals are; what `conclude` found
-        self._source: Identifier | None = None  # the run it is of
-        self._determined, self._held = np.zeros(10, dtype=bool), False
-        self._notes: tuple[str, ...] = ()
+        self._judgement.reset()
 
     def __repr__(self) -> str:
         return f"<OnlineIdentifier {self.method} for {self.arm.name} about {self.arm.frame}>"
@@ -153,7 +136,7 @@ class OnlineIdentifier:
         sample = self._gate.take(t, q, dq, tau)
         if sample is None:
             self._stream.left_out(self._gate, t, q, dq, tau)
-            return self._said()
+            return self._present()
         self._internal = sample.t
         self._stream.used(self._gate, float(t))
         if self._since is None:
@@ -161,7 +144,7 @@ class OnlineIdentifier:
         if sample.t - self._moved > 0.1 * RECENT and np.abs(sample.dq).max() > MOVING:
             self._moved = sample.t
         self._identify(sample)
-        return self._said()
+        return self._present()
 
     def conclude(self) -> OnlineEstimate:
         """A last solution from all samples of the current payload, as no more will come.
@@ -169,19 +152,14 @@ class OnlineIdentifier:
         It says what `armload.identify` says of a log of the same samples, if they show no change of payload.
         """
         if self._watch is not None and self._watch.settling:
-            return self._said()
+            return self._present()
         if self.health.used:
             estimate = self._engine.conclude() if self._watch is None else self._watch.conclude()
             if all_finite(estimate.phi):
                 run = self._engine if self._watch is None else self._watch.answered
-                self._told = self._internal
-                self._judge(estimate, run, False)
-                exchanged = isinstance(run, PosteriorLeastSquares) and run.exchanged
-                self._estimate = replace(estimate, phi=body_of(estimate, bool(self._determined[0]), exchanged))
-                self._source, self._around = run, estimate.phi
-                self._doubted, notes = doubts_of(run, estimate, self.arm)
-                self._notes = (*self._notes, *notes)
-        return self._said()
+                self._judge(estimate, run)
+                self._judgement.conclude(estimate, run, self.arm, self._internal)
+        return self._present()
 
     def learned(self, name: str = "stream") -> Profile | None:
         """The profile with this stream as one more session (`learning.learned_from`); None: there is nothing to learn.
@@ -208,8 +186,7 @@ class OnlineIdentifier:
         if self._watch is not None:
             self._watch.hold()
         state = {k: v for k, v in vars(self).items() if k not in ("arm", "tare", "profile")}
-        own = origin(self.arm, self.method, self._engine)
-        return save_state({"state": state, "tared": self._tared}, known_parts(self.arm, self._engine), path, own)
+        return save_identifier(state, self.arm, self.method, self._engine, path)
 
     @classmethod
     def restore(
@@ -229,12 +206,10 @@ class OnlineIdentifier:
         """
         new = cls(arm, method=method, profile=profile)
         try:
-            own = origin(arm, new.method, new._engine)
-            saved = load_state(path, known_parts(arm, new._engine), same_origin(path, arm, own))
+            saved = load_identifier(path, arm, new.method, new._engine)
         finally:
             new.close()
-        new.__dict__.update(saved["state"])
-        new._tared = saved["tared"]
+        new.__dict__.update(saved)
         return new
 
     def _identify(self, sample: Sample) -> None:
@@ -243,111 +218,76 @@ class OnlineIdentifier:
             estimate, fresh = run.update(sample), not 0.0 <= sample.t - self._published < PUBLISH
         else:
             known = self._watch.event
-            estimate = self._watch.update(sample, self._held)
+            estimate = self._watch.update(sample, self._judgement.held)
             if self._watch.event is not known:
-                self._noticed(sample.t)
+                self._noticed(self._watch, sample.t)
             if estimate is None:
                 if sample.t - self._published > PUBLISH:
-                    self._track(sample)
+                    self._track(self._watch, sample)
                 return
             run = self._watch.answered
             fresh = run.fresh
-            if not fresh and run is not self._source and math.isfinite(run.data_t):
+            if not fresh and run is not self._judgement.run and math.isfinite(run.data_t):
                 return  # a run just taken up again: until it answers anew, its answer is of long ago
         if (fresh or self._watch is None) and not all_finite(estimate.phi):
             return
-        stands = self._counted(sample, run)
+        counts, stands = self._judgement.counts(sample.t, run)
+        if counts and self._stream.unseen:
+            self._stream.forget_pauses()
         if fresh:
             self._published = sample.t
             self._judge(estimate, run, stands)
-        self._estimate, self._source, self._around = estimate, run, estimate.phi
-        self._doubted = change_of_arm(run) is not None
+        self._judgement.take(estimate, run)
 
-    def _track(self, sample: Sample) -> None:
+    def _track(self, watch: PayloadWatch, sample: Sample) -> None:
         """While samples are left out: what all that may have happened makes of the payload."""
-        assert self._watch is not None
-        self._published, run = sample.t, self._watch.run
-        phi, covariance = self._watch.track()
-        self._estimate = replace(run.last, t=sample.t, phi=phi, covariance=covariance)
-        self._around, self._source = phi, None
-        if self._watch.settling or self._watch.likely[0] > 0.5:  # then phi follows what the samples say
-            self._told = sample.t
-        self._judge(self._estimate, run, False)
-        self._notes = (*self._notes, _CHANGING if self._watch.settling else _DOUBT)
+        self._published, run = sample.t, watch.run
+        phi, covariance = watch.track()
+        estimate = replace(run.last, t=sample.t, phi=phi, covariance=covariance)
+        self._judgement.follow(estimate)
+        if watch.settling or watch.likely[0] > 0.5:  # then phi follows what the samples say
+            self._judgement.newest = sample.t
+        self._judge(estimate, run)
+        self._judgement.notes = (*self._judgement.notes, CHANGING if watch.settling else LEFT_OUT)
 
-    def _counted(self, sample: Sample, run: Identifier) -> bool:
-        """Remember how old the answer is; whether what was seen lately told it nothing, as the arm stands."""
-        if not isinstance(run, PosteriorLeastSquares):
-            self._told = sample.t
-        elif run.fresh:
-            row = run.stream.row
-            if row is not None and row.h <= 0.0 and run is self._source and self._told > -np.inf:
-                return run.data_t - self._told > STANDS
-            self._told = run.data_t
-        elif run is self._source:
-            return False
-        else:
-            self._told = -np.inf
-        if self._stream.unseen:
-            self._stream.forget_pauses()
-        return False
-
-    def _noticed(self, now: float) -> None:
+    def _noticed(self, watch: PayloadWatch, now: float) -> None:
         """A change of payload, or what it was."""
-        assert self._watch is not None
-        assert self._watch.event is not None
-        event, shift, run = self._watch.event, self._stream.clock - now, self._watch.run
-        if self._watch.settling:
+        assert watch.event is not None
+        event, shift, run = watch.event, self._stream.clock - now, watch.run
+        if watch.settling:
             self._ended, self._since, self._published = run, self._stream.clock, -np.inf
             self._stream.forget_pauses()
         elif event.mass is None and self._ended is not None:
             event = replace(event, mass=mass_step(self._ended, run, float(self._weak[0])))
         self._event = replace(event, t=event.t + shift, began=event.began + shift)
 
-    def _nothing(self) -> Estimate:
-        """What is known beforehand."""
-        mean, std, _ = self._before
-        return Estimate(0.0, mean, np.diag(std**2), 0, str(self.arm.frame))
-
-    def _judge(self, estimate: Estimate, run: Identifier, stands: bool) -> None:
-        """What the data determine, and whether anything is there."""
-        std, before = estimate.std, self._before
-        self._determined = determined(std, before.std if before.used else None, run.weak_std, self._weak)
-        self._held = held(float(estimate.phi[0]), float(std[0]), bool(self._determined[0]))
-        self._p_held = held_probability(float(estimate.phi[0]), float(std[0]), float(self._weak[0]))
-        notes = []
-        if not self._moving:
-            notes.append("not moving: inertia undetermined" if not self._determined[4:].all() else "not moving")
-        if stands and self._stream.trouble is None:
-            motor = isinstance(run, PosteriorLeastSquares) and run.stream.posterior.torque == "motor"
-            notes.append(_STANDING_MOTOR if motor else _STANDING)
-        if (changed := change_of_arm(run, self.relative_to)) is not None:
-            notes.append(changed)
-        self._notes = tuple(notes)
+    def _judge(self, estimate: Estimate, run: Identifier, stands: bool = False) -> None:
+        stands = stands and self._stream.trouble is None
+        self._judgement.judge(estimate, run, self.relative_to, self._moving, stands)
 
     @property
     def _moving(self) -> bool:
         return self._internal + self._stream.ahead - self._moved < RECENT
 
-    def _said(self) -> OnlineEstimate:
-        engine, watch, stream = self.engine, self._watch, self._stream
+    def _present(self) -> OnlineEstimate:
+        engine, watch, stream, judged = self.engine, self._watch, self._stream, self._judgement
         change, contact, drift = (None, None, None) if watch is None else watch.likely
-        age = stream.unseen + stream.ahead + (self._internal - self._told if self._told > -np.inf else 0.0)
+        age = stream.unseen + stream.ahead + judged.age(self._internal)
         return OnlineEstimate.of(
             {
-                **vars(self._estimate),
+                **vars(judged.estimate),
                 "t": stream.clock,
                 "age": float(age),
                 "lag": 0.0,
                 "since": stream.clock if self._since is None else self._since,
                 "relative_to": self.relative_to,
                 "method": self.method,
-                "determined": self._determined,
-                "held": self._held,
-                "around": self._around,
-                "before": self._before,
-                "calibrated": engine.calibrated and not self._doubted and (watch is None or watch.sure),
-                "p_held": self._p_held,
+                "determined": judged.determined,
+                "held": judged.held,
+                "around": judged.around,
+                "before": judged.before,
+                "calibrated": engine.calibrated and not judged.doubted and (watch is None or watch.sure),
+                "p_held": judged.p_held,
                 "p_change": change,
                 "p_contact": contact,
                 "p_drift": drift,
@@ -355,6 +295,6 @@ class OnlineIdentifier:
                 "settling": watch is not None and watch.settling,
                 "event": self._event,
                 "health": self._gate.health,
-                "notes": self._notes if stream.trouble is None else (*self._notes, stream.trouble),
+                "notes": judged.notes if stream.trouble is None else (*judged.notes, stream.trouble),
             }
         )

@@ -4,25 +4,41 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from armload.errors import IdentificationError
-from armload.online.state import model_fingerprint
+from armload.online.state import load_state, model_fingerprint, save_state
 
 if TYPE_CHECKING:
     from armload.arms import Arm
     from armload.estimators import Identifier
 
 
-def known_parts(arm: Arm, engine: Identifier) -> dict[str, Any]:
+def save_identifier(state: Any, arm: Arm, method: str, engine: Identifier, path: str | PathLike[str]) -> Path:
+    """Write what a live identifier holds to a file, but for the arm and the trained model."""
+    return save_state(state, _known_parts(arm, engine), path, _origin(arm, method, engine))
+
+
+def load_identifier(path: str | PathLike[str], arm: Arm, method: str, engine: Identifier) -> Any:
+    """Read what `save_identifier` wrote, for an identifier with the same arm and trained model.
+
+    Raises:
+        IdentificationError: the file is none, or of another arm or trained model.
+    """
+    own = _origin(arm, method, engine)
+    return load_state(path, _known_parts(arm, engine), _same_origin(path, arm, own))
+
+
+def _known_parts(arm: Arm, engine: Identifier) -> dict[str, Any]:
     """What a new identifier for the same arm has already: the arm and the trained parts."""
     parts = {name: value for name in ("model", "_payloads", "profile") if (value := getattr(engine, name, None))}
     return {"arm": arm, **parts}
 
 
-def origin(arm: Arm, method: str, engine: Identifier) -> dict[str, Any]:
+def _origin(arm: Arm, method: str, engine: Identifier) -> dict[str, Any]:
     """What a state holds for: it refers to the arm and the trained model, and has neither in it."""
-    model = known_parts(arm, engine).get("model")
+    model = _known_parts(arm, engine).get("model")
     return {
         "arm": arm.fingerprint,
         "name": arm.name,
@@ -32,7 +48,7 @@ def origin(arm: Arm, method: str, engine: Identifier) -> dict[str, Any]:
     }
 
 
-def same_origin(path: str | PathLike[str], arm: Arm, own: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], None]:
+def _same_origin(path: str | PathLike[str], arm: Arm, own: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], None]:
     """A check of a saved origin against one's own.
 
     Raises (when called):

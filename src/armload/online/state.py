@@ -22,7 +22,7 @@ import numpy as np
 from armload.atomic import replacing
 from armload.errors import IdentificationError
 
-FORMAT = 9
+FORMAT = 10
 _PACKAGE = "armload."
 _NOT_SAVED = ("_worker", "_data", "_model")  # threads, and what Pinocchio makes anew
 _MADE_ANEW = (

@@ -14,13 +14,14 @@ if TYPE_CHECKING:
     from armload.posterior.evidence import TRAITS, Evidence
     from armload.posterior.hybrid import HybridIdentifier, shipped_model
     from armload.posterior.known_mass import KnownMass
-    from armload.posterior.map import PosteriorLeastSquares, SmoothPosteriorLeastSquares
+    from armload.posterior.map import PosteriorLeastSquares
     from armload.posterior.model_file import HybridModel, Training
     from armload.posterior.payload_prior import MixturePosterior, MixturePrior
     from armload.posterior.profile import Profile, SessionRecord
     from armload.posterior.profile_file import load_profile, save_profile
     from armload.posterior.profile_learning import learn_profile
     from armload.posterior.scales import Posterior
+    from armload.posterior.smooth import SmoothPosteriorLeastSquares
     from armload.posterior.torque_gain import with_known_weight
 
 __all__ = [

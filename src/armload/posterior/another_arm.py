@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.posterior.drift import ALLOWED
+from armload.posterior.elimination import eliminated
 from armload.posterior.problem import Problem, of_mounted
 from armload.posterior.scales import AnotherArm, Posterior, Scales
 from armload.posterior.solve import Solution, solve, solve_to_go_on, threads
@@ -71,14 +72,13 @@ def another_arm(
             others = other.improved(others, other.posterior(others))
         others = replace(others, noise=S[1:])
         together = Scales(S, scales.eta, scales.features, scales.payloads, same.drift_variance)
-        alone = Scales(S[:1], scales.eta, scales.features, scales.payloads[:10])
+        scales_before = Scales(S[:1], scales.eta, scales.features, scales.payloads[:10])
         rng = np.random.default_rng(0)
-        drawn = _drawn(before, alone, same, S, rng)
-        seen = [run.b[:, :, None] / s[:, None, None] for run, s in zip(own, S[1:], strict=True)]
-        vectors = [np.concatenate(both, axis=2) for both in zip(seen, drawn, strict=True)]
-        b0 = np.repeat(first.b[:, :, None] / S[0][:, None, None], _DRAWS + 1, axis=2)
+        drawn = _drawn(before, scales_before, same, S, rng)
+        vectors = [np.concatenate(both, axis=2) for both in zip([run.b[:, :, None] for run in own], drawn, strict=True)]
+        b0 = np.repeat(first.b[:, :, None], _DRAWS + 1, axis=2)
         B = _log_evidence(other, others, vectors) - _log_evidence(same, together, [b0, *vectors])
-        B += _log_evidence(before, alone, [b0])
+        B += _log_evidence(before, scales_before, [b0])
     expected, spread = float(B[1:].mean()), max(float(B[1:].std()), _NAT)
     surprise = (float(B[0]) - expected) / spread
     return AnotherArm(float(B[0]), expected, spread, surprise, surprise > SURPRISING and B[0] > LEAST)
@@ -131,7 +131,7 @@ def _of_session_0(run: RegressionData) -> RegressionData:
 
 
 def _drawn(before: Problem, scales: Scales, same: Problem, S: NDArray, rng: np.random.Generator) -> list[NDArray]:
-    """b (n, size, K) in units of the noise, of each later run, as the arm of the first one would show it."""
+    """∫ Xᵀr dt (n, size, K) of each later run, as the arm of the first one would show it."""
     found, E = before.posterior(scales), same.selections
     n, R = found.own.shape
     scale = np.sqrt(np.diag(found.covariance))
@@ -156,30 +156,26 @@ def _drawn(before: Problem, scales: Scales, same: Problem, S: NDArray, rng: np.r
             A = run.A[j] / s[j]
             x = np.concatenate([selection @ whole, weights[j]])
             jitter = _ROUNDING * np.abs(np.diag(A)).max() + np.finfo(float).tiny  # of a run without rows A is 0
-            b[j] = A @ x + np.linalg.cholesky(A + jitter * np.eye(len(A))) @ rng.normal(size=x.shape)
+            noise = np.linalg.cholesky(A + jitter * np.eye(len(A))) @ rng.normal(size=x.shape)
+            b[j] = s[j] * (A @ x + noise)
         out.append(b)
     return out
 
 
 def _log_evidence(problem: Problem, scales: Scales, vectors: list[NDArray]) -> NDArray[np.float64]:
-    """ln p (K,) of the runs with b (n, size, K) each, in units of the noise, but for what no hypothesis changes."""
-    n, c, R = len(problem.correction.effort), 10 + problem.correction.size, problem.features.size
-    S, count = scales.noise, vectors[0].shape[2]
-    A, b, total = np.zeros((problem.size, problem.size)), np.zeros((problem.size, count)), np.zeros(count)
-    for (squares, _), E, s, vector in zip(problem.parts, problem.selections, S, vectors, strict=True):
-        A += np.tensordot(1.0 / s, squares, 1)
-        b += E.T @ vector[:, :c].sum(axis=0)
-    for j in range(n if R else 0):
-        Agg = sum(run.A[j, c:, c:] / s[j] for run, s in zip(problem.runs, S, strict=True))
-        Agz = sum(crossed[j] / s[j] for crossed, s in zip(problem.crossed, S, strict=True))
-        root = np.sqrt(scales.features[j])
-        L = np.linalg.cholesky(root[:, None] * Agg * root + np.eye(R))
-        both = root[:, None] * np.concatenate([Agz, sum(vector[j, c:] for vector in vectors)], axis=1)  # type: ignore[list-item]
-        white = np.linalg.solve(L, both)
-        of_z, of_b = white[:, : problem.size], white[:, problem.size :]
-        total += 0.5 * (of_b**2).sum(axis=0) - np.log(np.diag(L)).sum()
-        A, b = A - of_z.T @ of_z, b - of_z.T @ of_b
+    """ln p (K,) of the runs with ∫ Xᵀr dt (n, size, K) each, but for what no hypothesis changes."""
+    c = 10 + problem.correction.size
+    runs = [
+        of_run._replace(b=E.T @ vector[:, :c], b_g=vector[:, c:])
+        for of_run, E, vector in zip(problem.information, problem.selections, vectors, strict=True)
+    ]
+    found = eliminated(runs, scales.noise, scales.features)
+    b_g = sum(run.b_g / s[:, None, None] for run, s in zip(runs, scales.noise, strict=True))
+    total = 0.5 * (b_g * found.own).sum(axis=(0, 1))
+    root = np.sqrt(scales.features)
+    for rest in found.rest / (root[:, :, None] * root[:, None]):
+        total += 0.5 * np.linalg.slogdet(rest)[1]
     root = np.sqrt(np.concatenate([scales.payloads, scales.eta, scales.drifts.ravel()]))
-    L = np.linalg.cholesky(root[:, None] * (0.5 * (A + A.T)) * root + np.eye(len(root)))
-    white = np.linalg.solve(L, root[:, None] * b)
+    L = np.linalg.cholesky(root[:, None] * found.A * root + np.eye(len(root)))
+    white = np.linalg.solve(L, root[:, None] * found.b)
     return total + 0.5 * (white**2).sum(axis=0) - np.log(np.diag(L)).sum()

@@ -52,8 +52,8 @@ class Calibration:
         """By which factor the physics overrates the evidence of a log with these traits (T,)."""
         if self.bag is None:
             return self.level
-        said = self.bag.row(traits)
-        return min(max(self.level * 10.0 ** float(said.sum() / said.size), _KAPPA[0]), _KAPPA[1])
+        leaves = self.bag.row(traits)
+        return min(max(self.level * 10.0 ** float(leaves.sum() / leaves.size), _KAPPA[0]), _KAPPA[1])
 
     def width(self, t: float, kind: int) -> NDArray[np.float64]:
         """c (10,) after t seconds: linear in log t, constant beyond the calibrated times."""

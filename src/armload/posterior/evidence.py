@@ -75,8 +75,8 @@ class Evidence:
         Λ = 0.5 * (information + information.T)
         ratios = np.array([posterior.ratios[name] for name in _RATIOS])
         motor, same = float(posterior.torque == "motor"), float(same_motion)
-        told = Λ if into_frame is None else into_frame.T @ Λ @ into_frame
-        traits = _traits(told, weak, ratios, float(t), float(tare_time), motor, speed, same)
+        information = Λ if into_frame is None else into_frame.T @ Λ @ into_frame
+        traits = _traits(information, weak, ratios, float(t), float(tare_time), motor, speed, same)
         kind = 2 if same_motion else int(tare_time > 0)
         return cls(Λ, vector, posterior.gain_std, traits, float(t), kind)
 

@@ -1,4 +1,4 @@
-"""MAP least squares as identifiers, for logs and live robots: with the arm's rigid mismatch, and with its smooth one.
+"""MAP least squares as an identifier, for logs and live robots; `smooth.py` adds the arm's smooth mismatch.
 
 A log is a stream that ends: both go through the same rows and the same posterior (`stream.StreamingPosterior`).
 `update` answers from the sequential posterior, in bounded time; `conclude` makes a last solution from all rows, and
@@ -26,7 +26,7 @@ from armload.recording import GAP, Recording, Sample
 from armload.regression import Correction, GaussianPrior, JointFeatures, payload_prior_std, solution_prior_std
 from armload.regression.information import SAME, RegressionData, Session
 from armload.regression.lag import GAIN
-from armload.regression.noise import RIGID, SMOOTH, NoiseModel
+from armload.regression.noise import RIGID, NoiseModel
 
 # [s] a live answer is at most so old, and judged so often: faster than a controller takes up a new payload
 # (test_an_answer_is_at_most_ten_milliseconds_old)
@@ -249,14 +249,14 @@ class PosteriorLeastSquares(Identifier):
     def evidence(self, elapsed: float | None = None) -> Evidence:
         """What the logs say as the stream stands, without a prior on the payload, `elapsed` [s] after the run began."""
         stream, now = self.stream, self._elapsed if elapsed is None else elapsed
-        said = stream if stream.difference is None else stream.difference
+        evidence = stream if stream.difference is None else stream.difference
         earlier = 0.0 if self.reference is None else self.reference.stream.seconds
         speed, weak = float(np.sqrt(self._squares / self._values)), self._weak
         difference = stream.difference is not None
         tare_time = self._tare_time + earlier
         if stream.without_tare:
             tare_time = sum(run.blocks.duration for run in stream.tares[1:])
-        log = (said.information, said.vector, stream.posterior, now, tare_time, speed, weak, difference)
+        log = (evidence.information, evidence.vector, stream.posterior, now, tare_time, speed, weak, difference)
         return Evidence.of(*log, self._traits_frame)
 
     # ------------------------------------------------------------------ beside a running robot
@@ -290,43 +290,3 @@ class PosteriorLeastSquares(Identifier):
         """Stop the thread that finds the scales; the identifier may go on."""
         if self._stream is not None:
             self._stream.close()
-
-
-class SmoothPosteriorLeastSquares(PosteriorLeastSquares):
-    """MAP least squares with the arm's rigid and its smooth mismatch as unknowns: the physics of the default method.
-
-    The smooth part (`JointFeatures`) is a Gaussian process over the pose and one over each joint's velocity. Only with
-    it is the rest of the residual small enough to be taken for noise.
-
-    >>> from armload.arms import arm
-    >>> SmoothPosteriorLeastSquares(arm("panda")).name
-    'map-gp'
-
-    Args:
-        arm, tare, gain, prior, profile: as for `PosteriorLeastSquares`.
-        features: of the smooth part; None: 128 of the pose, 12 of the velocity.
-        same_motion: whether a tare along the run's own motion takes the posterior's place in the `evidence`.
-    """
-
-    name = "map-gp"
-    _noise = SMOOTH
-    _iterations = 5
-
-    def __init__(
-        self,
-        arm: Arm,
-        tare: Recording | None = None,
-        gain: float = GAIN,
-        prior: GaussianPrior | None = None,
-        features: JointFeatures | None = None,
-        same_motion: bool = False,
-        profile: Profile | None = None,
-    ) -> None:
-        self.features = features or (JointFeatures(arm.n) if profile is None else profile.features)
-        if same_motion and tare is not None:
-            self._same_motion = SameMotion(arm, tare, gain)
-        super().__init__(arm, tare, gain, prior, profile)
-
-    @property
-    def _features(self) -> JointFeatures:
-        return self.features

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from armload.posterior.elimination import RunInformation, eliminated
 from armload.posterior.scales import Posterior, Scales
 from armload.posterior.sequential import SequentialPosterior
 from armload.regression import GaussianPrior
@@ -34,37 +34,12 @@ GAIN_STD = {"link": 0.005, "motor": 0.02}
 # [effort limits] prior rms of a joint's smooth functions of pose and of velocity: 0.2–0.6 % of two Pandas is left after
 # links, offsets and friction (`regression.features`); and the weight of these figures, in observations
 _POSE, _VELOCITY, _FEATURE_COUNT = 3e-3, 2e-3, 20.0
-_DIRECT = 20  # half the rows of a matrix that is inverted whole; changes no answer
 
 
 def of_mounted(prior: NDArray[np.float64], mass: float, variance: float) -> NDArray[np.float64]:
     """Prior variance (10,) of what was mounted at a tare, its mass being known to a variance: its moments follow."""
     heaviest = max(abs(mass) + 2.0 * np.sqrt(max(variance, 0.0)), _LIGHTEST)
     return np.r_[prior[:1], np.minimum(prior[1:], (heaviest * _REACH) ** 2)]
-
-
-def _inverse(A: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A⁻¹ of a positive definite A = [[P, Q], [Qᵀ, S]], by the Schur complement C = S − Qᵀ·P⁻¹·Q.
-
-        A⁻¹ = [[P⁻¹ + X·C⁻¹·Xᵀ, −X·C⁻¹], [−C⁻¹·Xᵀ, C⁻¹]],    X = P⁻¹·Q
-
-    It is symmetric, and most of the work are products: two thirds of what `numpy.linalg.inv` needs of A.
-    """
-    half = len(A) // 2
-    if half < _DIRECT:
-        inverse = np.linalg.inv(A)
-        if not (np.diag(inverse) > 0.0).all():
-            raise np.linalg.LinAlgError("not positive definite")
-        return 0.5 * (inverse + inverse.T)
-    P = _inverse(A[:half, :half])
-    X = P @ A[:half, half:]
-    inverse = np.empty_like(A)
-    inverse[half:, half:] = C = _inverse(A[half:, half:] - A[half:, :half] @ X)
-    inverse[:half, half:] = -X @ C
-    inverse[half:, :half] = inverse[:half, half:].T
-    whole = P - inverse[:half, half:] @ X.T
-    inverse[:half, :half] = 0.5 * (whole + whole.T)
-    return inverse
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,16 +66,6 @@ class _Gaussian:
         """Variance (B,) of X·[E·z, g_j], X (B, ·)."""
         shared, own = X[:, : len(E)] @ E - X[:, len(E) :] @ self.slope[j], X[:, len(E) :]
         return ((shared @ self.covariance) * shared).sum(axis=1) + ((own @ self.rest[j]) * own).sum(axis=1)
-
-
-class _Eliminated(NamedTuple):
-    """Information about z alone (A, b), and what it leaves of the joints' weights, as in `_Gaussian`."""
-
-    A: NDArray
-    b: NDArray
-    own: NDArray
-    slope: NDArray
-    rest: NDArray
 
 
 class Problem:
@@ -146,8 +111,7 @@ class Problem:
             if run.session in self.sessions:
                 E[10 : 10 + d, self._drift(self.sessions.index(run.session))] = np.eye(d)
             self.selections.append(E)
-        self.parts = [run.selected(E) for run, E in zip(runs, self.selections, strict=True)]
-        self.crossed = [run.A[:, 10 + p :, : 10 + p] @ E for run, E in zip(runs, self.selections, strict=True)]
+        self.information = [RunInformation.of(run, E) for run, E in zip(runs, self.selections, strict=True)]
         group = np.repeat([_POSE, _VELOCITY], [self.features.pose, self.features.velocity])
         self.feature_variance = (np.outer(self.correction.effort, group)) ** 2
 
@@ -169,7 +133,7 @@ class Problem:
 
     def posterior(self, scales: Scales) -> _Gaussian:
         """z and g given the scales."""
-        A, b, own, slope, rest = self._eliminated(scales)
+        A, b, own, slope, rest = eliminated(self.information, scales.noise, scales.features)
         root = np.diag(np.sqrt(np.concatenate([scales.payloads, scales.eta, scales.drifts.ravel()])))
         if self.root is not None:
             root[self.last, self.last] = self.root
@@ -177,28 +141,9 @@ class Problem:
         P = 0.5 * (P + P.T)
         return _Gaussian(self.mean + P @ (b - A @ self.mean), P, own, slope, rest)
 
-    def _eliminated(self, scales: Scales) -> _Eliminated:
-        """Each g_j is eliminated first: it occurs in the rows of joint j only."""
-        n, R, c = len(self.correction.effort), self.features.size, 10 + self.correction.size
-        S = scales.noise
-        A, b = np.zeros((self.size, self.size)), np.zeros(self.size)
-        for (squares, products), s in zip(self.parts, S, strict=True):
-            A += np.tensordot(1.0 / s, squares, 1)
-            b += (1.0 / s) @ products
-        own, slope, rest = np.zeros((n, R)), np.zeros((n, R, self.size)), np.zeros((n, R, R))
-        for j in range(n if R else 0):
-            Agg = sum(run.A[j, c:, c:] / s[j] for run, s in zip(self.runs, S, strict=True))
-            Agz = sum(crossed[j] / s[j] for crossed, s in zip(self.crossed, S, strict=True))
-            bg = sum(run.b[j, c:] / s[j] for run, s in zip(self.runs, S, strict=True))
-            root = np.sqrt(scales.features[j])
-            rest[j] = root[:, None] * _inverse(root[:, None] * Agg * root + np.eye(R)) * root
-            own[j], slope[j] = rest[j] @ bg, rest[j] @ Agz
-            A, b = A - Agz.T @ slope[j], b - Agz.T @ own[j]
-        return _Eliminated(0.5 * (A + A.T), b, own, slope, rest)
-
     def sequential(self, scales: Scales) -> SequentialPosterior:
         """The same posterior as a state that takes further rows of the last run: phi last to be integrated out."""
-        found = self._eliminated(scales)
+        found = eliminated(self.information, scales.noise, scales.features)
         first, last = self.last.start, self.last
         shared = np.r_[0:first, last.stop : self.size]
         order = np.r_[last.start : last.stop, shared]

@@ -1,27 +1,21 @@
 """The MAP posterior of a live stream: every row counts at once, the scales are found anew beside it.
 
-The rows of the last seconds go two ways. The sequential posterior takes each as it comes: its answer is never older
-than a row. A second thread adds them to the accumulated information and now and then makes a step of
-expectation–maximisation from it; the posterior at the new scales, brought up to date, replaces the running one a fixed
-number of rows later. What is adopted when depends on the samples alone, never on how fast the machine is: a replay at
-any speed gives the same numbers.
-
-The last rows join the accumulated information late: until then they can be taken back, as those of a payload that was
-there before anyone noticed. Were they kept, a cycle that returns to the same pose would teach them to the arm's model.
+Rows go two ways. The sequential posterior takes each as it comes: its answer is never older than a row. Beside it they
+are accumulated (`accumulation.py`), and now and then a step of expectation–maximisation is made of them on a second
+thread; the posterior at the new scales, brought up to date, replaces the running one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import deepcopy
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from armload.posterior.accumulation import Accumulation
 from armload.posterior.another_arm import FROM, another_arm, apart
 from armload.posterior.drift import ALLOWED, TESTED, Drift, drift_of, drift_since_tare
-from armload.posterior.handover import Handover, Result
 from armload.posterior.restless import RESTLESS, restlessness
 from armload.posterior.same_motion import Difference, SameMotion
 from armload.posterior.scales import AnotherArm, Posterior, Scales
@@ -33,14 +27,7 @@ from armload.regression import Correction, GaussianPrior, JointFeatures
 from armload.regression.information import SAME, RegressionData, Session
 from armload.regression.lag import GAIN
 from armload.regression.noise import MOMENT, NoiseModel, share_of_noise, whole_noise
-from armload.regression.rows import REGRESSOR_RATE, FilteredRegression, Row, Rows
-
-# [rows] after which the scales are found anew (0.1, 0.3, … 12 s): they change with the logarithm of the time. Then
-# every so many, 10 s: the second thread takes 2 % of a core
-_REFITS = (20, 60, 100, 150, 200, 300, 400, 600, 800, 1200, 1600, 2400)
-_REFIT_EVERY = 2000
-_CHUNK = 50  # [rows] handed over at once in between: one matrix product of 0.25 s
-_LATE = 100  # [rows] that can be taken back, 0.5 s: a slow hand-over begins so long before it is noticed
+from armload.regression.rows import REGRESSOR_RATE, FilteredRegression, Row
 
 
 class StreamingPosterior:
@@ -88,23 +75,18 @@ class StreamingPosterior:
         self._gaussian = mean, np.ascontiguousarray(root), np.ascontiguousarray(root.T)
         self.tares, self.gain, self.start = tuple(tares), gain, start
         self._regression = self.regression()
-        self._same_motion = same_motion
         self._whole = whole_noise(correction, noise)
         self._base: SequentialPosterior | None = None
-        self._handover = Handover()
+        self._accumulation = Accumulation(self._empty(), same_motion)
         self.reset()
 
     def reset(self) -> None:
         """Forget the run (not the tare); the next sample is the first."""
-        self._handover.abandon()
+        self._accumulation.reset(self._empty())
         self._regression.reset()
-        if self._same_motion is not None:
-            self._same_motion = self._same_motion.fresh()
-        self._run = self._empty()
         self._state: SequentialPosterior | None = None  # made when the first row asks for it
         self._early: list[Row] | None = []
         self._early_is_old = True
-        self._waiting: list[Row] = []
         self.rows, self.seconds, self.solutions = 0, 0.0, 0
         self.row: Row | None = None
         self.difference: Difference | None = None
@@ -141,7 +123,6 @@ class StreamingPosterior:
         self.rows += 1
         self.seconds += row.h
         self.row = row
-        self._waiting.append(row)
         if self._early is not None:
             self._early.append(row)
             self._early_is_old = True
@@ -151,17 +132,18 @@ class StreamingPosterior:
         else:
             assert self._state is not None
             self._state.take(row)
-        self._beside(row)
+        result = self._accumulation.take(row, self.rows, self.posterior.covariance, self._step)
+        if result is not None:
+            solution, self.difference = result
+            if solution is not None:
+                self._adopt(solution)
         return True
 
     def take_many(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
         """Take samples (N,), (N, n) of a log: their rows are accumulated, and count once the stream is concluded."""
         rows = self._regression.rows(t, q, dq, tau)
         if len(rows.t):
-            self._accumulate_waiting()
-            self._run.take(rows)
-            if self._same_motion is not None:
-                self._same_motion.take(rows)
+            self._accumulation.take_many(rows)
             self.rows += len(rows.t)
             self.seconds += float(rows.h.sum())
 
@@ -202,7 +184,7 @@ class StreamingPosterior:
     @property
     def information_of_known_arm(self) -> NDArray[np.float64]:
         """Λ (10, 10) of the run's accumulated rows, were nothing of the arm unknown: Σ_j ∫ W_jᵀ·W_j dt / S_j."""
-        return np.einsum("jab,j->ab", self._run.A[:, :10, :10], 1.0 / self.posterior.scales.noise[-1])
+        return np.einsum("jab,j->ab", self._accumulation.run.A[:, :10, :10], 1.0 / self.posterior.scales.noise[-1])
 
     @property
     def vector(self) -> NDArray[np.float64]:
@@ -234,16 +216,15 @@ class StreamingPosterior:
 
     def conclude(self) -> None:
         """A last solution from all rows so far, as no more will come; it begins with the scales found from the tare."""
-        self._handover.abandon()
-        self._accumulate_waiting()
-        runs = [*self.tares, self._run]
+        run = self._accumulation.conclude()
+        runs = [*self.tares, run]
         self.drift = self.another = None
         about = (self.prior_std, self.prior, self.noise)
         self._adopt(self._solved(runs, self.start, self.iterations - 1))
         if self.tares and self._test_tare and self.posterior.torque == "link":
             self.drift = drift_since_tare(runs, *about, self.posterior)
             if self.drift.changed:
-                self._run.session = replace(self.session, number=1, drift=max(ALLOWED, self.session.drift))
+                run.session = replace(self.session, number=1, drift=max(ALLOWED, self.session.drift))
                 self._adopt(self._solved(runs, self.start, self.iterations - 1))
             self.another = another_arm(runs, *about, self.posterior)
             if self.another.found:
@@ -256,58 +237,12 @@ class StreamingPosterior:
                     self._adopt(self._solved(runs, self.start, self.iterations - 1))
         if self._test_tare:
             self.tilt = tilt_of_base(runs, *about, self.posterior)
-        self._run.session = self.session
+        run.session = self.session
         changed = self.drift is not None and self.drift.changed  # then the difference is of two arms, too
-        self.difference = None if changed or self.without_tare else self._better(self.posterior.covariance)
+        self.difference = None if changed or self.without_tare else self._accumulation.better(self.posterior.covariance)
 
     def _solved(self, runs: list[RegressionData], start: Scales | None, steps: int) -> Solution:
         return solve_to_go_on(runs, self.prior_std, self.prior, self.noise, steps + 1, start)
-
-    def _better(self, covariance: NDArray) -> Difference | None:
-        return None if self._same_motion is None else self._same_motion.better(covariance)
-
-    def _accumulate(self, rows: Sequence[Row], covariance: NDArray | None = None) -> Difference | None:
-        """Add rows to what is accumulated; with a covariance to compare with, ask whether the tare shows the motion."""
-        if rows:
-            together = Rows.of(rows)
-            self._run.take(together)
-            if self._same_motion is not None:
-                self._same_motion.take(together)
-        return None if covariance is None else self._better(covariance)
-
-    def _accumulate_waiting(self) -> None:
-        rows, self._waiting = self._waiting, []
-        self._accumulate(rows)
-
-    def _beside(self, row: Row) -> None:
-        """Hand rows over, begin a solution, adopt one: each at fixed numbers of rows."""
-        work = self._handover
-        work.follow(row)
-        due = self.rows in _REFITS or self.rows % _REFIT_EVERY == 0
-        if work.pending:
-            if self.rows < work.adopt_at and not due:
-                return
-            solution, self.difference = work.take()
-            if solution is not None:
-                self._adopt(solution)
-                return
-        if due or len(self._waiting) >= _CHUNK + _LATE:
-            rows, self._waiting = self._waiting[:-_LATE], self._waiting[-_LATE:]
-            covariance = self.posterior.covariance
-            if due:
-                work.begin_solution(self.rows, self._refit, rows, self._waiting.copy(), covariance)
-            else:
-                work.begin(self.rows, self._handed_over, rows, covariance)
-
-    def _handed_over(self, rows: list[Row], covariance: NDArray) -> Result:
-        return None, self._accumulate(rows, covariance)
-
-    def _refit(self, rows: list[Row], late: list[Row], covariance: NDArray) -> Result:
-        difference = self._accumulate(rows, covariance)
-        run = deepcopy(self._run, {id(self.correction): self.correction})
-        if late:
-            run.take(Rows.of(late))
-        return self._step(run), difference
 
     def _step(self, run: RegressionData) -> Solution:
         """One step of expectation–maximisation from the last solution's scales."""
@@ -340,8 +275,8 @@ class StreamingPosterior:
             self._state = self._base.copy()
 
     def hold(self) -> None:
-        """Wait for what is done beside; nothing is from then on, until the next rows. What is adopted when stays."""
-        self._handover.hold()
+        """Wait for what the second thread does; nothing is done from then on, until the next rows."""
+        self._accumulation.hold()
 
     def finish(self, until: float = np.inf) -> RegressionData:
         """All rows so far, accumulated, for another run to take as its tare; this one may go on later.
@@ -349,24 +284,17 @@ class StreamingPosterior:
         Args:
             until: rows from this time on [s], as far as they are still to be had, never were.
         """
-        self._handover.abandon()
-        rows, self._waiting = self._waiting, []
-        kept = [row for row in rows if row.t < until]
-        self._accumulate(kept)
-        if len(kept) < len(rows):
-            self.rows -= len(rows) - len(kept)
-            self.seconds -= sum(row.h for row in rows[len(kept) :])
-            self._adopt(self._step(self._run))
-        return self._run
+        taken_back = self._accumulation.finish(until)
+        if taken_back:
+            self.rows -= len(taken_back)
+            self.seconds -= sum(row.h for row in taken_back)
+            self._adopt(self._step(self._accumulation.run))
+        return self._accumulation.run
 
     def accumulated(self) -> RegressionData:
         """All rows so far, accumulated in a copy; `hold` first."""
-        run = deepcopy(self._run, {id(self.correction): self.correction})
-        if self._waiting:
-            run.take(Rows.of(self._waiting))
-        return run
+        return self._accumulation.all_rows()
 
     def close(self) -> None:
         """Stop the second thread."""
-        self._handover.abandon()
-        self._handover.close()
+        self._accumulation.close()

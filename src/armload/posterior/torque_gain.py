@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from armload.arms import Arm, rated_effort
 from armload.errors import IdentificationError
 from armload.inertia import HELD, Z95
+from armload.posterior.elimination import RunInformation, eliminated
 from armload.posterior.problem import GAIN_STD, Problem
 from armload.posterior.profile import Profile
 from armload.posterior.profile_session import log_data
@@ -60,11 +61,11 @@ def with_known_weight(profile: Profile, arm: Arm, log: Recording, mass: float, s
     runs, wide = [profile.data(correction, GAIN, SMOOTH.block), data], solution_prior_std(arm)
     with threads().limit(limits=1):
         found = solve(runs, wide, None, SMOOTH, 3, profile.scales)
-        phi, alone = found.phi, float(np.sqrt(found.covariance[0, 0]))
+        phi, mass_std = found.phi, float(np.sqrt(found.covariance[0, 0]))
         side = GAIN_STD[found.torque]
-        if abs(phi[0] - mass) > HELD * np.hypot(alone, _WIDE * side * mass):
+        if abs(phi[0] - mass) > HELD * np.hypot(mass_std, _WIDE * side * mass):
             raise IdentificationError(
-                f"{log.source} carries {phi[0]:.4g} ± {Z95 * alone:.2g} kg by the profile: expected the weight of "
+                f"{log.source} carries {phi[0]:.4g} ± {Z95 * mass_std:.2g} kg by the profile: expected the weight of "
                 f"{mass:.4g} kg that is known; check what was hung on, and what was mounted in the profile's logs"
             )
         problem = Problem(runs, wide, None, SMOOTH)
@@ -86,24 +87,17 @@ def _solved(
 ) -> tuple[NDArray, NDArray, NDArray]:
     """phi (10,), gamma (n,) and its covariance (n, n), linear about phi."""
     n, size = problem.correction.arm.n, problem.size
-    c = 10 + problem.correction.size
-    whole = size + n
-    A, b = np.zeros((whole, whole)), np.zeros(whole)
-    for j in range(n):
-        Agg, bg = np.zeros((problem.features.size,) * 2), np.zeros(problem.features.size)
-        Agz = np.zeros((problem.features.size, whole))
-        for run, E, S in zip(problem.runs, problem.selections, scales.noise, strict=True):
-            T = np.zeros((c, whole))
-            T[:, :size] = E
-            if run is problem.runs[-1]:
-                T[:10, size + j] = phi
-            one, vector = run.A[j] / S[j], run.b[j] / S[j]
-            A += T.T @ one[:c, :c] @ T
-            b += T.T @ vector[:c]
-            Agg, Agz, bg = Agg + one[c:, c:], Agz + one[c:, :c] @ T, bg + vector[c:]
-        root = np.sqrt(scales.features[j])
-        rest = root[:, None] * np.linalg.inv(root[:, None] * Agg * root + np.eye(len(root))) * root
-        A, b = A - Agz.T @ rest @ Agz, b - Agz.T @ rest @ bg
+    c, whole = 10 + problem.correction.size, size + n
+    runs = []
+    for run, E in zip(problem.runs, problem.selections, strict=True):
+        T = np.zeros((n, c, whole))  # [payload, eta] of joint j = T_j·[z, gamma]
+        T[:, :, :size] = E
+        if run is problem.runs[-1]:
+            T[range(n), :10, range(size, whole)] = phi
+        A, b = np.swapaxes(T, 1, 2) @ run.A[:, :c, :c] @ T, np.einsum("jc,jcz->jz", run.b[:, :c], T)
+        runs.append(RunInformation(A, run.A[:, c:, :c] @ T, run.A[:, c:, c:], b, run.b[:, c:]))
+    found = eliminated(runs, scales.noise, scales.features)
+    A, b = found.A, found.b
     prior = np.concatenate([scales.payloads, scales.eta, scales.drifts.ravel(), np.full(n, wide**2)])
     mean = np.zeros(whole)
     weighed = problem.last.start

@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from armload.service.history import History
     from armload.service.reconnecting import Reconnecting
     from armload.service.service import Service
-    from armload.service.session import Entry, Session
+    from armload.service.session import Session
+    from armload.service.session_log import Entry
     from armload.service.settings import ArmSettings, ServiceSettings, read_settings
     from armload.service.unknown import Unknown
     from armload.service.webhook import Webhook

@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from armload.arms import Arm, arm
+from armload.arms import Arm
 from armload.devices import Detached
 from armload.errors import ArmloadError, IdentificationError
 from armload.kernels import COMPILING
@@ -131,16 +131,13 @@ class ArmProcess:
         return Detached(settings.source, self.arm, record=record, speed=1.0, loop=settings.loop, **more)
 
     def _made_arm(self) -> Arm:
-        settings = self.settings
-        gravity = {} if settings.gravity is None else {"gravity": settings.gravity}
-        made = arm(settings.robot, settings.frame, **gravity)
-        if settings.tool is None:
-            return made
+        bare = self.settings.bare_arm()
+        tool = self.settings.tool_on(bare)
+        if tool is None:
+            return bare
         from armload.identification import plausible_tool
-        from armload.payloads import hand_on, read_payload
 
-        tool = hand_on(made) if settings.tool == "franka-hand" else read_payload(settings.tool)
-        return made.with_payload(plausible_tool(made.in_frame(tool.parameters), made))
+        return bare.with_payload(plausible_tool(bare.in_frame(tool.parameters), bare))
 
     def _made_session(self) -> Session:
         settings = self.settings

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import math
 import threading
-from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from queue import SimpleQueue
 
@@ -20,30 +19,17 @@ from armload.arms import Arm
 from armload.devices import Source
 from armload.errors import IdentificationError, SourceError
 from armload.inertia import Z95, InertialParameters
-from armload.online import Event, OnlineEstimate, OnlineIdentifier
+from armload.online import OnlineEstimate, OnlineIdentifier
 from armload.online.learning import change_of_arm
 from armload.posterior import Profile
 from armload.recording import Recording, Sample
 from armload.service.history import History
 from armload.service.plausible import Plausibility
 from armload.service.recent import Recent
+from armload.service.session_log import SessionLog
 
-_AGAIN = 10.0  # [s] between two warnings of samples that cannot be used
 TICK = 0.1  # [s] between two looks at a silent source: as often as lines come
 _TARE_LONGEST, _TARE_SHORTEST = 30.0, 3.0  # [s] of what was just seen that a tare is made of
-
-
-@dataclass(frozen=True)
-class Entry:
-    """A line of the log: what happened, and when on the stream's clock [s]; `event`, if it was a change of payload.
-
-    warning: something is wrong.
-    """
-
-    t: float
-    text: str
-    event: Event | None = None
-    warning: bool = False
 
 
 class Session:
@@ -84,7 +70,6 @@ class Session:
         identifier: OnlineIdentifier | None = None,
     ) -> None:
         self.source, self.arm, self.tare, self.profile = source, arm, tare, profile
-        self._warn_too = warn or (lambda _: None)
         # what was held while the tare was recorded; None: nobody knows
         self._tared = InertialParameters.zero(arm.frame) if tare is None else None
         self._identifier = self._made(tare, method) if identifier is None else identifier
@@ -92,14 +77,12 @@ class Session:
         self.estimate: OnlineEstimate | None = None
         self._answered: OnlineEstimate | None = None  # the same when its sample had just arrived
         self.history = History(30)
-        self.log: deque[Entry] = deque(maxlen=200)
+        self.log = SessionLog(warn)
         self.ended = False
         self.error: Exception | None = None
         self._orders: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._recent = Recent(arm.n)
         self._plausibility = Plausibility(arm, source.name)
-        self._trouble = False  # whether unusable samples were reported
-        self._warned = -np.inf  # and when it last was, on the stream's clock
         self._thread: threading.Thread | None = None
         self._stop = False
 
@@ -166,7 +149,7 @@ class Session:
             self._doubted()
         if self.estimate is not None:
             self.estimate = self._plausibility.qualified(self._identifier.conclude()).behind(self.source.lag())
-        self._say("the source has ended")
+        self._write("the source has ended")
         self.ended = True
 
     def run(self, duration: float | None = None) -> None:
@@ -198,8 +181,10 @@ class Session:
     def _take(self, sample: Sample) -> OnlineEstimate:
         before, used = self.estimate, self._identifier.health.used
         estimate = self._identifier.update(*sample)
-        if estimate.event is not None and (before is None or estimate.event != before.event):
-            self._log_event(estimate.event)
+        event = estimate.event
+        if event is not None and (before is None or event != before.event) and self.log.write_event(event):
+            self._recent.clear()
+            self._plausibility.forget()
         usable = estimate.health.used > used
         if usable:
             self._recent.append(sample)
@@ -208,8 +193,7 @@ class Session:
         self._answered = self._plausibility.qualified(estimate)
         estimate = self._answered.behind(self.source.lag())
         self.sample, self.estimate = sample if usable else self.sample, estimate
-        if self._trouble or self._identifier.trouble is not None:
-            self._report_trouble(self._identifier.trouble)
+        self.log.report_trouble(estimate.t, self._identifier.trouble)
         if usable and self.history.due(estimate.t):
             truth = self.truth(estimate.t)
             known = np.full(10, np.nan) if truth is None else truth.phi
@@ -218,28 +202,7 @@ class Session:
 
     def _doubted(self) -> None:
         doubt = self._plausibility.doubt
-        self._say("the samples are plausible now") if doubt is None else self._warn(doubt)
-
-    def _report_trouble(self, trouble: str | None) -> None:
-        """Report that samples cannot be used, and that they can again; at most every 10 s."""
-        now = 0.0 if self.estimate is None else self.estimate.t
-        if trouble is None:
-            self._trouble = False
-            self._say("samples can be used again")
-        elif not self._trouble and not 0.0 <= now - self._warned < _AGAIN:
-            self._trouble, self._warned = True, now
-            self._warn(trouble)
-
-    def _log_event(self, event: Event) -> None:
-        """Add an event to the log; a later, better classification of the same event replaces the first."""
-        entry = Entry(event.t, str(event), event)
-        for k, known in enumerate(self.log):
-            if known.event is not None and known.event.t == event.t:
-                self.log[k] = entry
-                return
-        self._recent.clear()
-        self._plausibility.forget()
-        self.log.append(entry)
+        self._write("the samples are plausible now") if doubt is None else self._warn(doubt)
 
     def truth(self, t: float) -> InertialParameters | None:
         """What was added since the tare, or is held at all, at time t [s]; None where the source does not know."""
@@ -264,7 +227,7 @@ class Session:
             self._identifier.reset()
             self._recent.clear()
             self._plausibility.reset()
-            self._say("started anew")
+            self._write("started anew")
 
         self._orders.put(order)
 
@@ -295,7 +258,7 @@ class Session:
             self._identifier, self.tare, self._tared = identifier, tare, tared
             self._recent.clear()
             self._plausibility.forget()
-            self._say(text)
+            self._write(text)
 
         self._orders.put(order)
 
@@ -307,9 +270,12 @@ class Session:
         # an arm's model computes in a memory of its own, which two threads must not share
         return OnlineIdentifier(replace(self.arm), tare, method, self.profile)
 
-    def _say(self, text: str, warning: bool = False) -> None:
-        self.log.append(Entry(0.0 if self.estimate is None else self.estimate.t, text, warning=warning))
+    def _write(self, text: str) -> None:
+        self.log.write(self._t, text)
 
     def _warn(self, text: str) -> None:
-        self._say(text, warning=True)
-        self._warn_too(text)
+        self.log.warn(self._t, text)
+
+    @property
+    def _t(self) -> float:
+        return 0.0 if self.estimate is None else self.estimate.t

@@ -14,31 +14,25 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from armload.errors import UsageError
+from armload.identification.arm_options import ArmOptions
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 _PATHS = ("tare", "profile", "tool", "save", "record")
 _KINDS = {"str": str, "float": (int, float), "bool": bool, "int": int, "tuple": list, "dict": dict}
 
 
-@dataclass(frozen=True)
-class ArmSettings:
+@dataclass(frozen=True, kw_only=True)
+class ArmSettings(ArmOptions):
     """One arm.
 
-    name: in lines and addresses. source: see `open_source`. robot, frame, gravity, tare, profile, tool, method: as the
-    options of `armload live`. save: the folder of its state; None: nothing is kept. record: a `.csv` file that does not
-    exist yet. rating: the most it may hold [kg]; None: what the arm is rated for. com_range: the farthest its payload's
-    centre of mass may be [m]. loop: replay a log again and again. rate: of the simulator [Hz].
+    name: in lines and addresses. source: see `open_source`. save: the folder of its state; None: nothing is kept.
+    record: a `.csv` file that does not exist yet. rating: the most it may hold [kg]; None: what the arm is rated for.
+    com_range: the farthest its payload's centre of mass may be [m]. loop: replay a log again and again.
+    rate: of the simulator [Hz].
     """
 
     name: str
     source: str
-    robot: str
-    frame: str | None = None
-    gravity: tuple[float, float, float] | None = None
-    tare: str | None = None
-    profile: str | None = None
-    tool: str | None = None
-    method: str | None = None
     save: str | None = None
     record: str | None = None
     rating: float | None = None

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from armload.arms import Arm
-from armload.arms import arm as arm_named
 from armload.errors import UsageError
+from armload.identification.arm_options import ArmOptions
 from armload.lab.cells import key_of
-from armload.payloads import Payload, hand_on, read_payload
+from armload.payloads import Payload
 from armload.posterior import HybridModel, Profile, load_profile
 from armload.recording import ColumnSpec, Recording, read_long
 from armload.survey.logs import Log, file_hash
@@ -21,22 +21,14 @@ _ARM = "{arm}"
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(ArmOptions):
     """What is asked of every log.
 
-    robot, frame, gravity: the arm, as of `armload.arms.arm`.
     tare, profile: paths, in which `{arm}` stands for the arm's name (`Log.arm`); an arm without such a file is asked
-        without. tool: path of a mounted tool's file, or franka-hand. method: as of `identify`.
+        without.
     columns: as of `ColumnSpec.given`. topic: of bags.
     """
 
-    robot: str
-    frame: str | None = None
-    gravity: tuple[float, float, float] | None = None
-    tare: str | None = None
-    profile: str | None = None
-    tool: str | None = None
-    method: str | None = None
     columns: tuple[tuple[str, Any], ...] = ()
     topic: str | None = None
 
@@ -75,7 +67,7 @@ class Settings:
 
     def arm(self) -> Arm:
         """The arm, built once for each process."""
-        return _arm(self.robot, self.frame, self.gravity)
+        return _arm(self)
 
     def recording(self, log: Log, path: Path, episode: int | None = None) -> Recording:
         """Read a log, or one episode of it, from where it lies on this machine."""
@@ -88,7 +80,7 @@ class Settings:
 
     def mounted(self) -> Payload | None:
         """The tool that is mounted, read once for each process."""
-        return None if self.tool is None else _tool(self, self.tool)
+        return _tool(self)
 
     def tare_of(self, arm: str) -> Recording | None:
         """The arm's tare, read once for each process."""
@@ -107,13 +99,13 @@ def _hash_of(path: Path) -> str:
 
 
 @lru_cache(maxsize=2)
-def _arm(robot: str, frame: str | None, gravity: tuple[float, float, float] | None) -> Arm:
-    return arm_named(robot, frame, **({} if gravity is None else {"gravity": gravity}))
+def _arm(settings: Settings) -> Arm:
+    return settings.bare_arm()
 
 
 @lru_cache(maxsize=2)
-def _tool(settings: Settings, name: str) -> Payload:
-    return hand_on(settings.arm()) if name == "franka-hand" else read_payload(name)
+def _tool(settings: Settings) -> Payload | None:
+    return settings.tool_on(settings.arm())
 
 
 @lru_cache(maxsize=2)  # logs come sorted by arm

@@ -127,7 +127,7 @@ def settings_of(options: argparse.Namespace) -> ServiceSettings:
     arms = []
     for k, source in enumerate(options.sources):
         robot = options.robot or robot_of(source)
-        arms.append(ArmSettings(f"arm{k + 1}", source, robot, **more))
+        arms.append(ArmSettings(robot, name=f"arm{k + 1}", source=source, **more))
     return ServiceSettings(tuple(arms), **over)
 
 

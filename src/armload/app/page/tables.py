@@ -12,7 +12,7 @@ from armload.inertia import NAMES, UNITS, Z95, InertialParameters
 from armload.online import OnlineEstimate
 from armload.online.listening import UNUSED
 from armload.recording import GAP
-from armload.service.session import Entry
+from armload.service.session_log import Entry
 
 _DIM = "color:var(--mantine-color-dimmed)"
 _TEXT = "font-size:13px;line-height:1.45;font-variant-numeric:tabular-nums;padding:2px 8px"

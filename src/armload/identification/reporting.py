@@ -1,4 +1,4 @@
-"""What is said of what a method found: a body, its intervals, what the log does not tell, and every doubt."""
+"""What is reported of what a method found: a body, its intervals, what the log does not tell, and every doubt."""
 
 from __future__ import annotations
 
@@ -67,12 +67,14 @@ def answered(
         low, high = _with_any_inertia(low, high, unsure)
     found_of = intervals(phi, low, high, estimate.covariance, otherwise)
     doubts = _doubts(found, arm, determined[0], relative_to)
-    said = [*doubts, *notes]
+    every_note = [*doubts, *notes]
     if found.friction_found:
-        said.append("the torque holds the gears' friction, as that of motor currents does: the intervals allow for it")
+        every_note.append(
+            "the torque holds the gears' friction, as that of motor currents does: the intervals allow for it"
+        )
     if is_held or not determined[0]:  # an empty hand has no inertia to be determined
-        said += lacking(arm, tared, determined, found.known_arm_std, weak)
-        said += leaning_on_prior(leaning)
+        every_note += lacking(arm, tared, determined, found.known_arm_std, weak)
+        every_note += leaning_on_prior(leaning)
     consistent = is_consistent(phi)
     trusted = found.calibrated and not doubts and consistent and otherwise is None and unsure is None
     mass, com, inertia_com = about_com(phi)
@@ -94,7 +96,7 @@ def answered(
         **found_of._asdict(),
         rests_on_prior=~determined | leaning,
         torque_gain_std=found.gain_std,
-        notes=tuple(said),
+        notes=tuple(every_note),
         log=Path(recording.source).name,
         date=datetime.now(UTC).isoformat(timespec="seconds"),
         why=found.why,
