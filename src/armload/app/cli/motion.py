@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from armload.app.cli import motion_arguments, motion_design, motion_enrich, motion_show
+from armload.app.cli import motion_arguments, motion_design, motion_enrich, motion_export, motion_show
 from armload.app.cli.arguments import Parser, add_arm_arguments, add_column_arguments, at_least, file_name
 from armload.app.cli.named import arm_of, motion_of, payload_of
 from armload.app.cli.printing import print_json, print_note, working
@@ -28,6 +28,7 @@ examples:
   armload motion random --robot ur10e --seed 3 --out excite.json
   armload motion export excite.json --format ur --out excite.script
   armload motion export taie2024 --format ros2 --robot panda --out excite.yaml
+  armload motion export mine.json --format csv --robot panda --from 0,-0.4,0,-2,0,1.6,0.8 --out mine.csv
 
 MOTION is taie2024, a JSON file, or random:SEED. `check` says whether the arm may run a motion, exits with 3 if not, and
 says which parameters of a payload it can tell, and how well; it takes a log (CSV, Parquet, NPZ, HDF5, ROS bag) as well.
@@ -92,13 +93,10 @@ def parser() -> Parser:
     export = actions.add_parser(
         "export",
         help="a table (csv), a ROS 2 trajectory (ros2) or a program for UR robots (ur)",
-        description="Write a motion as a file that a robot's own tools read. Check it first, and run it slowly first.",
+        description="Write a motion as a file that a robot's own tools read. Check it first, and run it slowly first. "
+        "With --from the file begins at the present pose, with a slow straight way to the start.",
     )
-    export.add_argument("motion", metavar="MOTION", help="taie2024, a JSON file, or random:SEED")
-    add_arm_arguments(export, default="panda")
-    export.add_argument("--format", required=True, choices=("csv", "ros2", "ur"))
-    export.add_argument("--rate", type=at_least(1e-3, float, 1e4), metavar="HZ", help="samples per second")
-    export.add_argument("--out", type=file_name, metavar="FILE", help="file to write (default: standard output)")
+    motion_export.add_export_arguments(export)
 
     random = actions.add_parser(
         "random",
@@ -122,7 +120,7 @@ def run(options: argparse.Namespace) -> int:
         "enrich": motion_enrich.run_enrich,
         "show": motion_show.run_show,
         "check": _check,
-        "export": _export,
+        "export": motion_export.run_export,
         "random": _random,
     }[options.action](options)
 
@@ -184,20 +182,6 @@ def _limits(payload_name: str, arm: Arm, motion: Motion) -> tuple[MotionCheck, s
         payload = None if payload_name == "none" else arm.in_frame(payload_of(payload_name, arm))
         carried = "nothing" if payload is None else payload_name
     return check_motion(arm, motion, payload), carried
-
-
-def _export(options: argparse.Namespace) -> int:
-    from armload.motion import export_motion
-    from armload.motion.export import motion_text
-
-    arm = arm_of(options)
-    motion = motion_of(options.motion, arm)
-    if options.out is None:
-        print(motion_text(motion, options.format, options.rate, joint_names=arm.joint_names), end="")
-        return 0
-    export_motion(motion, options.out, options.format, options.rate, joint_names=arm.joint_names)
-    print_note(f"wrote {options.out}; check the motion before a robot runs it (armload motion check)")
-    return 0
 
 
 def _random(options: argparse.Namespace) -> int:
