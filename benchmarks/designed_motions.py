@@ -283,13 +283,13 @@ def _finite(x: float) -> float | None:
 
 def table(rows: dict[str, dict[str, Any]]) -> str:
     """A row for each candidate: errors, time to reach, predicted over given."""
-    columns = ["motion", *(f"{t:g} s" for t in TIMES), "centre [mm]", "median [s]", "90 % [s]", "predicted"]
+    columns = ["motion", *(f"{t:g} s" for t in TIMES), "median [s]", "90 % [s]", "predicted"]
     out = []
     for name, row in rows.items():
         errors = [" · ".join(f"{1e3 * x:.2g}" for x in row["error"][str(t)]) for t in TIMES]
         times = [f"{x:g}" if (x := row[key]) is not None else "> 6" for key in ("reached_median_s", "reached_90_s")]
         middle, low, high = row["predicted_over_given"]
-        out.append([NAMES[name], *errors, f"{1e3 * row['centre']:.2g}", *times, f"{middle:.2f} ({low:.2f}–{high:.2f})"])
+        out.append([NAMES[name], *errors, *times, f"{middle:.2f} ({low:.2f}–{high:.2f})"])
     return markdown_table(columns, "l" + "r" * (len(columns) - 1), out)
 
 

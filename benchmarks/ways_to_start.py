@@ -4,7 +4,7 @@
     nice -n 15 python benchmarks/ways_to_start.py [--ways 100] [--arms panda,ur10e] [--page]
 
 Poses at random, each joint up to 1 rad from the other end. Both ways are straight in joint space, from rest to rest,
-and keep to the same share of the limits of velocity, acceleration and jerk (what the maker does not give is assumed); where
+and keep to the same share of the limits of velocity, acceleration and jerk (what no maker gives is assumed); where
 the check with the rated payload refuses one, the next smaller share is tried, as `armload measure` does. Poses from
 which no way is allowed are told, and count for nothing else. Writes benchmarks/results/ways_to_start.json, and the
 table in docs/motion.md.
@@ -28,6 +28,7 @@ from armload.motion.random_fourier import filled_limits
 
 _FARTHEST = 1.0  # [rad] of a joint, as of `armload measure --approach`
 _CLEARANCES = 100.0  # [Hz] at which clearances are checked
+_STEP = 1e-6  # [s] of ruckig's jerk
 _WITHIN = 0.9  # of half the range, of the poses drawn
 
 
@@ -65,9 +66,10 @@ class TimeOptimal(Motion):
         return self.trajectory.duration
 
     def derivative(self, t: NDArray[np.float64], order: int) -> NDArray[np.float64]:
-        """Of the order 0 to 3."""
-        at = [self.trajectory.at_time(float(np.clip(x, 0.0, self.duration)), return_jerk=True) for x in np.ravel(t)]
-        return np.array([one[order] for one in at])
+        """Of the order 0 to 3; jerk is the difference quotient of acceleration, constant but where it jumps."""
+        if order == 3:
+            return (self.derivative(t + _STEP, 2) - self.derivative(t - _STEP, 2)) / (2 * _STEP)
+        return np.array([self.trajectory.at_time(float(np.clip(x, 0.0, self.duration)))[order] for x in np.ravel(t)])
 
 
 def found_way(robot: Arm, make: Any) -> tuple[Motion, MotionCheck, float] | None:

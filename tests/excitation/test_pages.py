@@ -38,3 +38,10 @@ def test_the_table_of_promises_is_that_of_the_committed_benchmark(monkeypatch):
     found = result("kept_promises")["rows"]
     assert {name.split(",")[0] for name in found} == {"panda", "ur10e"}
     assert table(found) in PAGE
+
+
+def test_the_table_of_ways_to_the_start_is_that_of_the_committed_benchmark(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    from ways_to_start import table
+
+    assert table(result("ways_to_start")["arms"]) in PAGE

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from armload.app.cli import motion_arguments, motion_design, motion_enrich, motion_export, motion_show
 from armload.app.cli.arguments import Parser, add_arm_arguments, add_column_arguments, at_least, file_name
-from armload.app.cli.named import arm_of, motion_of, payload_of
+from armload.app.cli.named import arm_of, payload_of
 from armload.app.cli.printing import print_json, print_note, working
 from armload.errors import UsageError
 
