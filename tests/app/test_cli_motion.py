@@ -137,3 +137,49 @@ def test_a_file_that_is_no_path_is_refused(name, text, words, tmp_path, capsys):
 
 def test_accuracies_and_joints_are_read_with_their_units():
     assert joints("7,1-2") == (1, 2, 7)
+
+
+def test_an_export_from_the_present_pose_begins_there_and_each_step_of_it_is_within_the_limits(designed, tmp_path):
+    _, said = designed
+    here = "0.2,-0.4,0.1,-2.1,0,1.5,0.9"
+    words = ["motion", "export", said["motion"], "--format", "csv", "--from", here, "--payload", "1"]
+    assert main([*words, "--out", str(tmp_path / "m.csv")]) == 0
+    table = np.loadtxt(tmp_path / "m.csv", delimiter=",", skiprows=1)
+    np.testing.assert_array_equal(table[0, 1:8], [float(x) for x in here.split(",")])
+    np.testing.assert_array_equal(table[-1, 1:8], [float(x) for x in READY.split(",")])
+    motion, h = load_motion(said["motion"]), np.diff(table[:, 0]).mean()
+    assert table[-1, 0] >= motion.duration + 1.0
+    limits, q = arm("panda").limits, table[:, 1:8]
+    for order, most in ((1, limits.velocity), (2, limits.acceleration), (3, limits.jerk)):
+        assert np.all(np.abs(np.diff(q, order, axis=0)) / h**order <= most)
+    led = np.searchsorted(table[:, 0], table[-1, 0] - motion.duration) + 50
+    np.testing.assert_allclose(q[led:], motion.position(table[led:, 0] - table[-1, 0] + motion.duration), atol=2e-9)
+
+
+def test_a_trajectory_from_the_present_pose_does_not_leave_the_way_there_to_the_controller(designed, capsys):
+    import yaml
+
+    _, said = designed
+    here = [0.2, -0.4, 0.1, -2.1, 0.0, 1.5, 0.9]
+    words = ["motion", "export", said["motion"], "--robot", "panda", "--format", "ros2", "--payload", "1"]
+    assert main([*words, "--from", ",".join(map(str, here))]) == 0
+    points = yaml.safe_load(capsys.readouterr().out)["points"]
+    assert points[0]["positions"] == here
+    assert points[0]["time_from_start"] == {"sec": 0, "nanosec": 500_000_000}
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("--from 0.2,-0.4,0.1,-2.1,0,1.5", "has 6 joint positions: panda has 7"),
+        ("--from 1.6,-0.4,0.1,-2.1,0,1.5,0.9", "more than the 1 rad of --approach"),
+        ("--from 0.8,-0.4,0.1,-2.1,0,1.5,0.9 --box 0.4,0.3,0.5,0.1,0.1,0.5", "because of the way to the start"),
+        ("--box 0.4,0.2,0.5,0.1,0.1,0.5", "give it with --from"),
+    ],
+)
+def test_a_way_from_the_present_pose_that_is_not_allowed_is_refused(designed, tmp_path, capsys, words, expected):
+    _, said = designed
+    out = tmp_path / "m.csv"
+    assert main(["motion", "export", said["motion"], "--format", "csv", "--out", str(out), *words.split()]) == 2
+    assert expected in capsys.readouterr().err
+    assert not out.exists()

@@ -21,9 +21,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from armload.app.page.motion_page import MotionPage
 from armload.app.page.page import Page
 from armload.arms import arm as arm_named
 from armload.devices import Replay, Simulator, read_load
+from armload.motion import taie2024
 from armload.payloads import test_payload
 from armload.recording import read_recording
 from armload.service import Session
@@ -238,6 +240,33 @@ def test_curves_are_drawn_of_a_source_that_knows_no_truth(panda, analytic_log, o
         server.join()
         session.close()
     assert complaints == []
+
+
+def test_in_a_browser_the_motion_runs_and_stands_still_when_it_is_told_to(panda, open_browser):
+    pytest.importorskip("viser", reason="the page needs viser")
+    page, complaints, strangers = MotionPage(taie2024(), panda, port=0), [], []
+    server = threading.Thread(target=page.serve)
+    server.start()
+    try:
+        with open_browser(page.url, complaints, strangers) as tab:
+            seen = {tab.locator("[data-armload=state]").inner_text()}
+            for _ in range(300):
+                seen.add(tab.locator("[data-armload=state]").inner_text())
+                if len(seen) > 2:
+                    break
+                tab.wait_for_timeout(100)
+            assert len(seen) > 2
+            tab.get_by_label("Run").click()
+            tab.wait_for_timeout(1000)
+            still = tab.locator("[data-armload=state]").inner_text()
+            tab.wait_for_timeout(1000)
+            assert tab.locator("[data-armload=state]").inner_text() == still
+            assert tab.locator("[data-armload=joint7]").count() == 1
+    finally:
+        page.close()
+        server.join(timeout=60)
+    assert complaints == []
+    assert strangers == []
 
 
 @pytest.mark.usefixtures("tab")

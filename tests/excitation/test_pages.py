@@ -38,3 +38,19 @@ def test_the_table_of_promises_is_that_of_the_committed_benchmark(monkeypatch):
     found = result("kept_promises")["rows"]
     assert {name.split(",")[0] for name in found} == {"panda", "ur10e"}
     assert table(found) in PAGE
+
+
+def test_the_table_of_ways_to_the_start_is_that_of_the_committed_benchmark(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    from ways_to_start import table
+
+    assert table(result("ways_to_start")["arms"]) in PAGE
+
+
+def test_what_an_enriched_path_tells_is_on_the_page_and_is_at_most_half_of_what_was_left_open(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    from designed_motions import enriched_sentence
+
+    found = result("enriched_path")["arms"]
+    assert enriched_sentence(found) in PAGE
+    assert all(max(one["ratio"]) <= 0.5 for one in found.values())

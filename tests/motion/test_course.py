@@ -1,11 +1,14 @@
 """Braking on the path, straight ways, motions as tables."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from armload.arms import arm
 from armload.errors import MotionError
-from armload.motion import Course, PathMotion, StraightMotion, export_motion, random_motion, taie2024
+from armload.motion import Course, JoinedMotion, PathMotion, StraightMotion, export_motion, random_motion, taie2024
 
 
 @pytest.fixture(scope="module", params=["panda", "ur10e"])
@@ -70,8 +73,32 @@ def test_a_slow_way_uses_at_most_its_share_of_each_limit(panda):
     q, dq, ddq = way(np.linspace(0.0, way.duration, 2001))
     used = np.concatenate([np.abs(dq) / panda.limits.velocity, np.abs(ddq) / panda.limits.acceleration]).max()
     assert used == pytest.approx(0.2, rel=1e-3)  # and no slower than it must be
+    assert np.all(np.abs(way.jerk(np.linspace(0.0, way.duration, 2001))) <= 0.2 * panda.limits.jerk)
     np.testing.assert_allclose(q[[0, -1]], [way.start, way.stop], atol=1e-12)
     assert np.abs(np.cross(q[700, :3] - q[0, :3], q[-1, :3] - q[0, :3])).max() < 1e-12
+
+
+def test_where_jerk_is_what_is_scarce_a_slow_way_takes_the_time_for_it(panda):
+    start = np.array([0.0, -0.5, 0.0, -2.0, 0.0, 1.5, 0.0])
+    gentle = replace(panda.limits, jerk=np.full(7, 5.0))
+    way = StraightMotion.slow(SimpleNamespace(limits=gentle), start, start + 0.5, 0.2)
+    assert np.abs(way.jerk([0.0, way.duration])).max() == pytest.approx(0.2 * 5.0, rel=1e-9)
+
+
+def test_joined_motions_are_each_of_them_in_turn(panda):
+    motion = taie2024()
+    begin = motion.position([0.0])[0]
+    way = StraightMotion.slow(panda, begin + 0.1, begin)
+    both = JoinedMotion((way, motion))
+    t = np.linspace(0.0, motion.duration, 301)
+    for order in range(4):
+        np.testing.assert_allclose(both._at(t[1:-1] + way.duration, order), motion._at(t[1:-1], order), atol=1e-6)
+    np.testing.assert_array_equal(both.position([0.0])[0], begin + 0.1)
+    np.testing.assert_array_equal(both.position([both.duration]), motion.position([motion.duration]))
+    with pytest.raises(MotionError, match="does not begin at rest where"):
+        JoinedMotion((motion, way))
+    with pytest.raises(MotionError, match="cannot be joined"):
+        JoinedMotion(())
 
 
 def test_a_table_of_a_motion_is_the_motion_and_comes_back_from_its_file(tmp_path):

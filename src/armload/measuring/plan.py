@@ -19,7 +19,7 @@ from armload.motion import Motion, MotionCheck, StraightMotion, check_motion, ra
 APPROACH = (
     1.0  # [rad] a joint may be from where the motion begins, unless more is allowed: further should be seen first
 )
-_SHARES = (0.2, 0.1, 0.05)  # of the limits of velocity and acceleration that a straight way uses, fastest first
+SHARES = (0.2, 0.1, 0.05)  # of the limits of velocity and acceleration that a straight way uses, fastest first
 _SAMPLES = 1000.0  # [Hz] at which a plan is checked, as fast as the fastest controller takes commands
 _CLEARANCES = 100.0  # [Hz] at which clearances are: at 2 m/s the tool goes 2 cm in between
 _TOO_MANY = 100_000  # samples of a check
@@ -206,7 +206,7 @@ class _Check:
 
 def _way(check: _Check, here: NDArray[np.float64], there: NDArray[np.float64], purpose: str) -> Leg:
     """The straight way between two poses, slower where the arm is not strong enough for it with its payload."""
-    for share in _SHARES:
+    for share in SHARES:
         leg = check(purpose, StraightMotion.slow(check.arm, here, there, share, "a straight line in joint space"))
         if not leg.check.problems:
             break

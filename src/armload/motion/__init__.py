@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from armload.motion.export import export_motion
     from armload.motion.fingerprint import MotionFingerprint
     from armload.motion.fourier import FourierMotion, start_and_stop_at_rest
+    from armload.motion.joined import JoinedMotion
     from armload.motion.motion import Motion
     from armload.motion.motion_file import load_motion, save_motion, taie2024
     from armload.motion.path import PathMotion
@@ -24,6 +25,7 @@ __all__ = [
     "Course",
     "EndlessMotion",
     "FourierMotion",
+    "JoinedMotion",
     "Motion",
     "MotionCheck",
     "MotionFingerprint",

@@ -2,8 +2,8 @@
 
     q(t) = a + b(t/T)·(z − a)        b(x) = 10·x³ − 15·x⁴ + 6·x⁵
 
-b' is at most 15/8 and |b''| at most 10/√3, so that a joint that goes d with at most the velocity v and the
-acceleration a needs T ≥ 15/8·d/v and T² ≥ 10/√3·d/a.
+b' is at most 15/8, |b''| at most 10/√3 and |b'''| at most 60, so that a joint that goes d with at most the velocity v,
+the acceleration a and the jerk j needs T ≥ 15/8·d/v, T² ≥ 10/√3·d/a and T³ ≥ 60·d/j.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from armload.motion.motion import Motion
 from armload.motion.random_fourier import filled_limits
 
 _QUINTIC = np.polynomial.Polynomial([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
-_FASTEST, _HARDEST = 15.0 / 8.0, 10.0 / np.sqrt(3.0)  # the largest |b'| and |b''|
+_FASTEST, _HARDEST, _SHARPEST = 15.0 / 8.0, 10.0 / np.sqrt(3.0), 60.0  # the largest |b'|, |b''| and |b'''|
 _SHORTEST = 1.0  # [s] also of a way of no length
 
 
@@ -59,7 +59,7 @@ class StraightMotion(Motion):
 
     @classmethod
     def slow(cls, arm: Arm, start: ArrayLike, stop: ArrayLike, share: float = 0.2, name: str = "straight") -> Self:
-        """The way with at most this share of the arm's limits of velocity and acceleration.
+        """The way with at most this share of the arm's limits of velocity, acceleration and jerk.
 
         Args:
             start, stop: (n,) [rad].
@@ -69,7 +69,8 @@ class StraightMotion(Motion):
         far = np.abs(np.asarray(stop, dtype=float) - np.asarray(start, dtype=float))
         by_speed = np.max(_FASTEST * far / (share * limits.velocity))
         by_push = np.sqrt(np.max(_HARDEST * far / (share * limits.acceleration)))
-        return cls(start, stop, max(float(by_speed), float(by_push), _SHORTEST), name)
+        by_jerk = np.cbrt(np.max(_SHARPEST * far / (share * limits.jerk)))
+        return cls(start, stop, max(float(by_speed), float(by_push), float(by_jerk), _SHORTEST), name)
 
     @property
     def n(self) -> int:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from armload.app.cli import motion_arguments, motion_design, motion_enrich
+from armload.app.cli import motion_arguments, motion_design, motion_enrich, motion_export, motion_show
 from armload.app.cli.arguments import Parser, add_arm_arguments, add_column_arguments, at_least, file_name
-from armload.app.cli.named import arm_of, motion_of, payload_of
-from armload.app.cli.printing import console, print_json, print_note, table, working
+from armload.app.cli.named import arm_of, payload_of
+from armload.app.cli.printing import print_json, print_note, working
 from armload.errors import UsageError
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ NOT_ALLOWED = 3  # exit code of a check that says no
 _EXAMPLES = """\
 examples:
   armload motion show taie2024 --figure taie2024.png
+  armload motion show mine.json --robot panda --page
   armload motion check mine.json --robot panda --payload tool.json
   armload motion check run.csv --robot ur10e --tare empty.csv
   armload motion design --robot panda --from 0,-0.5,0,-2,0,1.6,0.8 --time 3 --out mine.json
@@ -27,6 +28,7 @@ examples:
   armload motion random --robot ur10e --seed 3 --out excite.json
   armload motion export excite.json --format ur --out excite.script
   armload motion export taie2024 --format ros2 --robot panda --out excite.yaml
+  armload motion export mine.json --format csv --robot panda --from 0,-0.4,0,-2,0,1.6,0.8 --out mine.csv
 
 MOTION is taie2024, a JSON file, or random:SEED. `check` says whether the arm may run a motion, exits with 3 if not, and
 says which parameters of a payload it can tell, and how well; it takes a log (CSV, Parquet, NPZ, HDF5, ROS bag) as well.
@@ -57,10 +59,13 @@ def parser() -> Parser:
     )
     motion_enrich.add_enrich_arguments(enrich)
 
-    show = actions.add_parser("show", help="what each joint does", description="Show what each joint does.")
-    show.add_argument("motion", metavar="MOTION", help="taie2024, a JSON file, or random:SEED")
-    add_arm_arguments(show, default="panda")
-    show.add_argument("--figure", type=file_name, metavar="F.png", help="draw the joints against their limits")
+    show = actions.add_parser(
+        "show",
+        help="what each joint does",
+        description="Show what each joint does: in numbers, as a picture, "
+        "or on a page on which the arm runs the motion.",
+    )
+    motion_show.add_show_arguments(show)
 
     check = actions.add_parser(
         "check",
@@ -88,13 +93,10 @@ def parser() -> Parser:
     export = actions.add_parser(
         "export",
         help="a table (csv), a ROS 2 trajectory (ros2) or a program for UR robots (ur)",
-        description="Write a motion as a file that a robot's own tools read. Check it first, and run it slowly first.",
+        description="Write a motion as a file that a robot's own tools read. Check it first, and run it slowly first. "
+        "With --from the file begins at the present pose, with a slow straight way to the start.",
     )
-    export.add_argument("motion", metavar="MOTION", help="taie2024, a JSON file, or random:SEED")
-    add_arm_arguments(export, default="panda")
-    export.add_argument("--format", required=True, choices=("csv", "ros2", "ur"))
-    export.add_argument("--rate", type=at_least(1e-3, float, 1e4), metavar="HZ", help="samples per second")
-    export.add_argument("--out", type=file_name, metavar="FILE", help="file to write (default: standard output)")
+    motion_export.add_export_arguments(export)
 
     random = actions.add_parser(
         "random",
@@ -116,39 +118,11 @@ def run(options: argparse.Namespace) -> int:
     return {
         "design": motion_design.run_design,
         "enrich": motion_enrich.run_enrich,
-        "show": _show,
+        "show": motion_show.run_show,
         "check": _check,
-        "export": _export,
+        "export": motion_export.run_export,
         "random": _random,
     }[options.action](options)
-
-
-def _show(options: argparse.Namespace) -> int:
-    import numpy as np
-
-    arm = arm_of(options)
-    motion = motion_of(options.motion, arm)
-    q, dq, ddq = motion(np.linspace(0.0, motion.duration, 1001))
-    rows = table(
-        f"{motion.name}: {motion.n} joints, {motion.duration:g} s",
-        "joint",
-        "from [rad]",
-        "to [rad]",
-        "fastest [rad/s]",
-        "hardest [rad/s²]",
-    )
-    peaks = zip(q.min(axis=0), q.max(axis=0), abs(dq).max(axis=0), abs(ddq).max(axis=0), strict=True)
-    for k, values in enumerate(peaks, start=1):
-        rows.add_row(str(k), *(f"{value:.3f}" for value in values))
-    console().print(rows)
-    if note := getattr(motion, "note", ""):
-        print(note)
-    if options.figure is not None:
-        from armload.lab.report.motion_figure import write_motion_figure
-
-        write_motion_figure(motion, arm, options.figure)
-        print_note(f"wrote {options.figure}")
-    return 0
 
 
 def _check(options: argparse.Namespace) -> int:
@@ -208,20 +182,6 @@ def _limits(payload_name: str, arm: Arm, motion: Motion) -> tuple[MotionCheck, s
         payload = None if payload_name == "none" else arm.in_frame(payload_of(payload_name, arm))
         carried = "nothing" if payload is None else payload_name
     return check_motion(arm, motion, payload), carried
-
-
-def _export(options: argparse.Namespace) -> int:
-    from armload.motion import export_motion
-    from armload.motion.export import motion_text
-
-    arm = arm_of(options)
-    motion = motion_of(options.motion, arm)
-    if options.out is None:
-        print(motion_text(motion, options.format, options.rate, joint_names=arm.joint_names), end="")
-        return 0
-    export_motion(motion, options.out, options.format, options.rate, joint_names=arm.joint_names)
-    print_note(f"wrote {options.out}; check the motion before a robot runs it (armload motion check)")
-    return 0
 
 
 def _random(options: argparse.Namespace) -> int:

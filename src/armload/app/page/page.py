@@ -5,10 +5,6 @@ viser keeps its state, so that a page that is opened later shows the same.
 
 from __future__ import annotations
 
-import contextlib
-import importlib
-import io
-import socket
 import threading
 import time
 from typing import Any
@@ -17,9 +13,9 @@ from armload.app.page import tables
 from armload.app.page.curves import AXES, GROUPS, HEIGHT, PADDING, bands_of, data_of, legend_of, series_of
 from armload.app.page.download import ENDINGS, file_of
 from armload.app.page.scene import Scene
+from armload.app.page.server import look_at_arm, serve, stop, url_of
 from armload.arms import Arm
-from armload.errors import ArmloadError, ModelError, UsageError
-from armload.extras import install
+from armload.errors import ArmloadError, ModelError
 from armload.identification import METHODS, default_for
 from armload.service.session import Session
 
@@ -49,15 +45,12 @@ class Page:
 
     def __init__(self, session: Session, host: str = "127.0.0.1", port: int = 8080, period: float = 1 / 15) -> None:
         self.session, self.period = session, period
-        self._server = server = _serve(host, port, f"armload · {session.source.name}")
-        self.url = f"http://{'localhost' if host in ('', '0.0.0.0') else host}:{server.get_port()}"
+        self._server = server = serve(host, port, f"armload · {session.source.name}")
+        self.url = url_of(server, host)
         self._stop = threading.Event()
         self._ticks = 0
         self.scene = Scene(server.scene, session.arm)
-        reach = self.scene.reach
-        server.initial_camera.position = (0.85 * reach, -0.7 * reach, 0.6 * reach)
-        server.initial_camera.look_at = (0.15 * reach, 0.0, 0.32 * reach)
-        server.gui.configure_theme(show_logo=False, show_share_button=False)
+        look_at_arm(server, self.scene.reach)
         self._build_curves(server.gui)
         self._build_panel(server.gui)
 
@@ -94,8 +87,7 @@ class Page:
         """Stop serving; nothing happens the second time."""
         if not self._stop.is_set():
             self._stop.set()
-            with contextlib.redirect_stdout(io.StringIO()):  # viser says goodbye on stdout
-                self._server.stop()
+            stop(self._server)
 
     # ------------------------------------------------------------------ what is on it
 
@@ -185,20 +177,3 @@ def _done(client: Any, title: str, action: Any) -> bool:
         client.add_notification(title, str(error), color="red", auto_close_seconds=10.0)
         return False
     return True
-
-
-def _serve(host: str, port: int, label: str) -> Any:
-    try:
-        viser: Any = importlib.import_module("viser")
-    except ImportError:
-        raise UsageError(
-            f"the page needs viser, which is not installed: {install('viser')}; or use --headless"
-        ) from None
-    try:
-        socket.create_server((host, 0)).close()  # viser would try one port after another, for ever
-    except OSError as error:
-        raise UsageError(f"no page can be served at {host!r}: {error.strerror or error}; try 127.0.0.1") from None
-    with contextlib.redirect_stdout(io.StringIO()):
-        server = viser.ViserServer(host, port, label, verbose=False)
-    server.request_share_url = lambda *_, **__: None  # the page leaves this machine only if somebody forwards it
-    return server

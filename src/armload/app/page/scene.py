@@ -20,12 +20,15 @@ _THINNEST, _WIDEST = 0.004, 0.6  # [m] of a side of the payload as it is drawn
 _SMALLEST, _LARGEST = 0.005, 0.25  # [m] of a semi-axis of the centre of mass: smaller ones as a dot, larger ones not
 
 
-class Scene:
-    """Handles of everything drawn; `show` moves them.
+class DrawnArm:
+    """Handles of an arm on its floor; `stand` moves them.
 
     Args:
         scene: viser's scene.
         arm: copied, so that its model is not computed in two threads at once.
+
+    Attributes:
+        reach: length of all links [m].
     """
 
     def __init__(self, scene: Any, arm: Arm) -> None:
@@ -44,8 +47,8 @@ class Scene:
             section_color=(200, 203, 208),
             shadow_opacity=0.18,
         )
-        self._frames = [scene.add_frame(f"/arm/{k}", show_axes=False) for k in range(arm.n + 1)]
-        self._frames.append(
+        self.frames = [scene.add_frame(f"/arm/{k}", show_axes=False) for k in range(arm.n + 1)]
+        self.frames.append(
             scene.add_frame("/arm/flange", axes_length=0.03 * reach, axes_radius=0.003 * reach, origin_radius=0.0)
         )
         for number, part in enumerate(arm_parts(self._arm)):
@@ -55,6 +58,26 @@ class Scene:
                 part.mesh.faces,
                 color=LINK if part.kind == "link" else JOINT if part.frame else BASE,
             )
+
+    def stand(self, q: NDArray[np.float64]) -> None:
+        """Put the arm where its joints (n,) [rad] are; what is no pose leaves it where it was."""
+        if q.shape == (self._arm.n,) and np.all(np.isfinite(q)):
+            R, p = frame_poses(self._arm, q)
+            for frame, turn, place in zip(self.frames, _wxyz(R), p, strict=True):
+                frame.wxyz, frame.position = turn, place
+
+
+class Scene:
+    """Handles of everything drawn; `show` moves them.
+
+    Args:
+        scene: viser's scene.
+        arm: whose joints are streamed.
+    """
+
+    def __init__(self, scene: Any, arm: Arm) -> None:
+        self._arm = DrawnArm(scene, arm)
+        self.reach = self._arm.reach
         self._payload = scene.add_box("/arm/flange/payload", HELD, (0.1, 0.1, 0.1), opacity=0.6, visible=False)
         small = ellipsoid(np.full(3, 1e-3))
         self._region = scene.add_mesh_simple(
@@ -67,11 +90,7 @@ class Scene:
 
     def show(self, sample: Sample, estimate: OnlineEstimate, truth: InertialParameters | None) -> None:
         """Where the arm is, and what it holds."""
-        q = np.asarray(sample.q, dtype=float)
-        if q.shape == (self._arm.n,) and np.all(np.isfinite(q)):  # else it was left out: the arm stays where it was
-            R, p = frame_poses(self._arm, q)
-            for frame, turn, place in zip(self._frames, _wxyz(R), p, strict=True):
-                frame.wxyz, frame.position = turn, place
+        self._arm.stand(np.asarray(sample.q, dtype=float))  # a pose that was left out: the arm stays where it was
         self._show_payload(estimate)
         self._show_truth(truth)
 

@@ -1,0 +1,86 @@
+"""`armload motion export`: a motion as a file that a robot's own tools read, from where the arm stands, if told."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from armload.app.cli.arguments import add_arm_arguments, at_least, file_name
+from armload.app.cli.motion_arguments import box, floor, numbers
+from armload.app.cli.named import arm_of, motion_of
+from armload.app.cli.printing import print_note
+from armload.errors import MotionError, UsageError
+
+if TYPE_CHECKING:
+    from armload.arms import Arm
+    from armload.motion import Motion
+
+_LEAD = 0.5  # [s] until the first point of a ros2 trajectory from the present pose, where the arm is already
+
+
+def add_export_arguments(parser: argparse.ArgumentParser) -> None:
+    """All of `armload motion export`."""
+    add = parser.add_argument
+    add("motion", metavar="MOTION", help="taie2024, a JSON file, or random:SEED")
+    add_arm_arguments(parser, default="panda")
+    add("--format", required=True, choices=("csv", "ros2", "ur"))
+    add("--rate", type=at_least(1e-3, float, 1e4), metavar="HZ", help="samples per second")
+    add("--out", type=file_name, metavar="FILE", help="file to write (default: standard output)")
+    add = parser.add_argument_group("from the present pose").add_argument
+    add(
+        "--from",
+        dest="start",
+        type=numbers,
+        metavar="Q1,…,QN",
+        help="where the arm stands [rad]: the file begins there, with a slow straight way to the motion's start, and "
+        "both are checked",
+    )
+    add(
+        "--approach", type=at_least(0.0, float, 10.0), metavar="RAD", help="farthest of a joint from there (default: 1)"
+    )
+    add("--payload", type=at_least(0.0, float), metavar="KG", help="heaviest on the way (default: as rated)")
+    add("--floor", type=floor, default=0.0, metavar="Z", help="height of the floor [m], or none (default: 0)")
+    add("--box", type=box, action="append", default=[], metavar="X,Y,Z,SX,SY,SZ", help="an obstacle; repeat for more")
+
+
+def run_export(options: argparse.Namespace) -> int:
+    """Write the file, or print it."""
+    from armload.motion import export_motion
+    from armload.motion.export import motion_text
+
+    arm = arm_of(options)
+    motion, lead = motion_of(options.motion, arm), {}
+    if options.start is not None:
+        motion, lead = _led(motion, arm, options), {"lead": _LEAD}
+    elif options.approach is not None or options.payload is not None or options.box:
+        raise UsageError("--approach, --payload and --box are of the way from the present pose: give it with --from")
+    if options.out is None:
+        print(motion_text(motion, options.format, options.rate, joint_names=arm.joint_names, **lead), end="")
+        return 0
+    export_motion(motion, options.out, options.format, options.rate, joint_names=arm.joint_names, **lead)
+    checked = "run it slowly first" if lead else "check the motion before a robot runs it (armload motion check)"
+    print_note(f"wrote {options.out}; {checked}")
+    return 0
+
+
+def _led(motion: Motion, arm: Arm, options: argparse.Namespace) -> Motion:
+    """The motion with the way to its start before it, both checked.
+
+    Raises:
+        MotionError: another number of joints, or one of both is not allowed.
+    """
+    from armload.excitation import Obstacle
+    from armload.measuring.plan import APPROACH, plan_of
+    from armload.motion import JoinedMotion
+
+    if len(options.start) != arm.n:
+        raise MotionError(f"--from has {len(options.start)} joint positions: {arm.name} has {arm.n}")
+    boxes = tuple(Obstacle((b[0], b[1], b[2]), (b[3], b[4], b[5])) for b in options.box)
+    approach = APPROACH if options.approach is None else options.approach
+    about = {"floor": options.floor, "boxes": boxes, "heaviest": options.payload, "approach": approach}
+    plan = plan_of(arm, motion, options.start, empty_run=False, **about)
+    for leg in plan.legs:
+        if leg.check.problems:
+            which = motion.name if leg is plan.legs[-1] else f"the way {leg.purpose}"
+            raise MotionError(f"nothing was written, because of {which}: {'; '.join(leg.check.problems)}")
+    return JoinedMotion([leg.motion for leg in plan.legs], motion.name)

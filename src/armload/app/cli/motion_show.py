@@ -1,0 +1,80 @@
+"""`armload motion show`: what each joint does, as a table, a picture, or a page on which the arm runs the motion."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from armload.app.cli.arguments import add_arm_arguments, at_least, file_name
+from armload.app.cli.motion_arguments import box, floor, held
+from armload.app.cli.named import arm_of, motion_of
+from armload.app.cli.printing import console, print_note, table
+from armload.errors import UsageError
+
+if TYPE_CHECKING:
+    from armload.arms import Arm
+    from armload.motion import Motion
+
+
+def add_show_arguments(parser: argparse.ArgumentParser) -> None:
+    """All of `armload motion show`."""
+    add = parser.add_argument
+    add("motion", metavar="MOTION", help="taie2024, a JSON file, or random:SEED")
+    add_arm_arguments(parser, default="panda")
+    add("--figure", type=file_name, metavar="F.png", help="draw the joints against their limits")
+    add("--page", action="store_true", help="a page in the browser on which the arm runs the motion, until Ctrl-C")
+    add = parser.add_argument_group("with --page").add_argument
+    add("--host", metavar="H", help="interface of the page (127.0.0.1)")
+    add("--port", type=at_least(0, int, 65535), metavar="P", help="of the page (8080, or the next free one)")
+    add("--floor", type=floor, default=0.0, metavar="Z", help="height of the floor [m], or none (0)")
+    add("--box", type=box, action="append", default=[], metavar="X,Y,Z,SX,SY,SZ", help="an obstacle; repeat for more")
+    add("--held", type=held, default=0.15, metavar="R|SX,SY,SZ", help="what is held, as of `motion design` (0.15)")
+
+
+def run_show(options: argparse.Namespace) -> int:
+    """Print the table; draw, or serve, what is asked for."""
+    import numpy as np
+
+    if not options.page and (options.host is not None or options.port is not None or options.box):
+        raise UsageError("--host, --port and --box are of the page, but there is no --page")
+    arm = arm_of(options)
+    motion = motion_of(options.motion, arm)
+    q, dq, ddq = motion(np.linspace(0.0, motion.duration, 1001))
+    rows = table(
+        f"{motion.name}: {motion.n} joints, {motion.duration:g} s",
+        "joint",
+        "from [rad]",
+        "to [rad]",
+        "fastest [rad/s]",
+        "hardest [rad/s²]",
+    )
+    peaks = zip(q.min(axis=0), q.max(axis=0), abs(dq).max(axis=0), abs(ddq).max(axis=0), strict=True)
+    for k, values in enumerate(peaks, start=1):
+        rows.add_row(str(k), *(f"{value:.3f}" for value in values))
+    console().print(rows)
+    if note := getattr(motion, "note", ""):
+        print(note)
+    if options.figure is not None:
+        from armload.lab.report.motion_figure import write_motion_figure
+
+        write_motion_figure(motion, arm, options.figure)
+        print_note(f"wrote {options.figure}")
+    return _serve(motion, arm, options) if options.page else 0
+
+
+def _serve(motion: Motion, arm: Arm, options: argparse.Namespace) -> int:
+    from armload.app.page.motion_page import MotionPage
+    from armload.excitation import Obstacle, Surroundings
+
+    boxes = tuple(Obstacle((b[0], b[1], b[2]), (b[3], b[4], b[5])) for b in options.box)
+    around = Surroundings(arm, options.floor, boxes, options.held)
+    port = 8080 if options.port is None else options.port
+    page = MotionPage(motion, arm, around, options.host or "127.0.0.1", port)
+    print_note(f"{motion.name}: {page.url} (Ctrl-C ends it)")
+    try:
+        page.serve()
+    except KeyboardInterrupt:  # the only way to end it
+        pass
+    finally:
+        page.close()
+    return 0

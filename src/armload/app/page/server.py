@@ -1,0 +1,54 @@
+"""The server of a page (viser): on this machine only, silent, looking at the arm."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import io
+import socket
+from typing import Any
+
+from armload.errors import UsageError
+from armload.extras import install
+
+
+def serve(host: str, port: int, label: str, otherwise: str = "use --headless") -> Any:
+    """A viser server that listens at once.
+
+    Args:
+        host: the interface to listen on. port: if it is taken, the next free one; 0: any. label: title of the page.
+        otherwise: what whoever has no viser can do instead of installing it.
+
+    Raises:
+        UsageError: viser is not installed, or there is no such interface.
+    """
+    try:
+        viser: Any = importlib.import_module("viser")
+    except ImportError:
+        raise UsageError(f"the page needs viser, which is not installed: {install('viser')}; or {otherwise}") from None
+    try:
+        socket.create_server((host, 0)).close()  # viser would try one port after another, for ever
+    except OSError as error:
+        raise UsageError(f"no page can be served at {host!r}: {error.strerror or error}; try 127.0.0.1") from None
+    with contextlib.redirect_stdout(io.StringIO()):
+        server = viser.ViserServer(host, port, label, verbose=False)
+    server.request_share_url = lambda *_, **__: None  # the page leaves this machine only if somebody forwards it
+    return server
+
+
+def url_of(server: Any, host: str) -> str:
+    """Where to find the page."""
+    return f"http://{'localhost' if host in ('', '0.0.0.0') else host}:{server.get_port()}"
+
+
+def look_at_arm(server: Any, reach: float) -> None:
+    """Where whoever opens the page looks from: at an arm of a length [m], without the maker's logo."""
+    server.initial_camera.position = (0.85 * reach, -0.7 * reach, 0.6 * reach)
+    server.initial_camera.look_at = (0.15 * reach, 0.0, 0.32 * reach)
+    server.gui.configure_theme(show_logo=False, show_share_button=False)
+
+
+def stop(server: Any) -> None:
+    """Stop serving."""
+    with contextlib.redirect_stdout(io.StringIO()):  # viser says goodbye on stdout
+        server.stop()
