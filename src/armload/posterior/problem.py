@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from armload.posterior.scales import Posterior, Scales
 from armload.posterior.sequential import SequentialPosterior
 from armload.regression import GaussianPrior
-from armload.regression.information import RegressionData
+from armload.regression.information import RegressionData, columns_of
 from armload.regression.noise import NoiseModel, share_of_noise, whole_noise
 
 # [m, m²] standard deviation of first moments and inertia per kilogram of what was mounted at a tare, so that its
@@ -147,7 +147,8 @@ class Problem:
                 E[10 : 10 + d, self._drift(self.sessions.index(run.session))] = np.eye(d)
             self.selections.append(E)
         self.parts = [run.selected(E) for run, E in zip(runs, self.selections, strict=True)]
-        self.crossed = [run.A[:, 10 + p :, : 10 + p] @ E for run, E in zip(runs, self.selections, strict=True)]
+        crossed = [columns_of(run.A[:, 10 + p :, : 10 + p], E) for run, E in zip(runs, self.selections, strict=True)]
+        self.crossed = crossed
         group = np.repeat([_POSE, _VELOCITY], [self.features.pose, self.features.velocity])
         self.feature_variance = (np.outer(self.correction.effort, group)) ** 2
 
