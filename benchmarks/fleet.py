@@ -6,9 +6,10 @@
 make    logs by inverse dynamics (`simulate_inverse`) of arms that differ from their model as real ones do, with offsets
         and friction that differ from day to day by half of what `life.py` assumes. Each arm works four motions of its
         own, 12 s at 100 Hz, and takes up and puts down boxes of up to 2.5 kg, all at once; the first log of a day
-        is empty, 24 s. From the middle day on, one arm is another one (exchanged), one holds things loosely, so that they
-        slide by 5 mm either way along a horizontal axis of its flange (loose), and the offset of one arm's second joint walks by 0.3 N·m a day. 3 % of the logs are broken,
-        in eight ways. Of each arm there is a tare of 24 s of the day before the first.
+        is empty, 24 s. From the middle day on, one arm is another one (exchanged), one holds things loosely, so that
+        they slide by 5 mm either way along an axis across its flange (loose), and the offset of one arm's second joint
+        walks by 0.3 N·m a day. 3 % of the logs are broken, in eight ways. Of each arm there is a tare of 24 s of the
+        day before the first.
 survey  `armload survey` with these tares; it goes on where it was stopped.
 judge   against the truth: changes of payload (found within 0.5 s), masses and their intervals, arms, broken files.
 speed   1 and 2 processes and 2 Dask workers on the same logs, and what a long log costs in memory.

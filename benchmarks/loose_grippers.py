@@ -2,9 +2,9 @@
 
     python benchmarks/loose_grippers.py [--arms 8] [--logs 30] [--seed 31] [--gap 0.005]
 
-The arms, days, motions and boxes of `fleet.py`, two logs a day, and each log twice: with what is held fixed, and sliding
-by `gap` either way between two stops along an axis across the flange that belongs to the arm. Where the payload changes
-is known here. Asked is `armload.survey.looseness` of all logs of an arm. Printed, and written to
+The arms, days, motions and boxes of `fleet.py`, two logs a day, and each log twice: with what is held fixed, and
+sliding by `gap` either way between two stops along an axis across the flange that belongs to the arm. Where the payload
+changes is known here. Asked is `armload.survey.looseness` of all logs of an arm. Printed, and written to
 benchmarks/results/loose_grippers.json and a table of docs/survey.md.
 """
 
@@ -61,9 +61,8 @@ def main() -> None:
     for k in range(asked.arms):
         of = asked_of(panda, k, asked.logs, asked.seed, asked.gap)
         found.append([None if one is None else vars(one) | {"found": one.found} for one in of])
-        say(
-            f"arm {k}: {[None if x is None else (round(x['statistic'], 1), round(x['threshold'], 1)) for x in found[-1]]}"
-        )
+        said = [None if one is None else f"{one['statistic']:.1f} of {one['threshold']:.1f}" for one in found[-1]]
+        say(f"arm {k}: {said}")
     rows, counts = [], {}
     for name, column in zip(("firmly", "loosely"), zip(*found, strict=True), strict=True):
         hits = [one is not None and one["found"] for one in column]

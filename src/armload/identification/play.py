@@ -33,8 +33,8 @@ from armload.regression.noise import SMOOTH
 from armload.regression.rows import Rows
 from armload.regression.rows_of_log import RowsOfLog
 
-# u (9, 3): across the flange every 22.5°, and along its axis; what slides between the jaws of a gripper is never farther
-# than 11.25° from one of these. At 45° a row in six lay on the wrong side, and half of what was gained was not seen
+# u (9, 3): across the flange every 22.5°, and along its axis; what slides between the jaws of a gripper is never
+# farther than 11.25° from one of these
 _ANGLES = np.radians(22.5) * np.arange(8)
 AXES = np.vstack([np.stack([np.cos(_ANGLES), np.sin(_ANGLES), np.zeros(8)], axis=1), [[0.0, 0.0, 1.0]]])
 _POSE, _VELOCITY = 32, 12  # smooth functions of a joint: for one number, fewer than an answer has

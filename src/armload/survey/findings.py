@@ -36,8 +36,9 @@ class ArmFinding:
     logs, unusable: how many, and how many of them cannot be answered. payloads: rows with something held.
     mass: their median [kg], None where there are none.
     changed, moves: share of the last logs that say so; None: too few could tell.
-    retare, loose: whether that, the shift or the play is enough to act. since: date of the first log of the run that led to it [s since 1970],
-        or the log's name where logs have no date; of a sound arm None.
+    retare, loose: whether that, the shift or the play is enough to act.
+    since: date of the first log of the run that led to it [s since 1970], or the log's name where logs have no date; of
+        a sound arm, and of play, None.
     joint: that tells most of the change, from 1; 0: none does.
     shift: the most likely day since when the arm is another one, and how likely; None: it was seen on too few days.
     play: how loosely it holds things; None: too few of its logs can tell.
