@@ -51,7 +51,7 @@ from armload.regression.rows_of_log import RowsOfLog
 
 _ITERATIONS = 3  # of expectation–maximisation: the scales change little after
 _FINER = 4  # cuts on either side of the best one, twice
-_FEW = 32  # smooth functions of the pose with which cuts are compared; all of them tell the same cuts apart
+_FEW = 32  # smooth functions of the pose with which cuts are compared: T at the likeliest is of all of them
 _LIKELIEST = 2  # cuts of which T is found with the whole model
 # [kg·m, kg·m²] standard deviations of moments and inertia of something light, 0.2 kg within 8 cm of the frame: a stated
 # prior. What is heavier shows in all ten
@@ -114,7 +114,7 @@ class _Search:
     def __init__(self, physics: SmoothPosteriorLeastSquares, rows: RowsOfLog, kappa: float) -> None:
         self.physics, self.rows, self.kappa = physics, rows, kappa
         self.weak = solution_prior_std(physics.arm)
-        known = [without_payload(tare, physics.arm, physics.start) for tare in physics.stream.tares]
+        known = [_without_payload(tare, physics.arm, physics.start) for tare in physics.stream.tares]
         self.session = Session(1, TESTED) if physics.profile is None and known else physics.session
         self.few = replace(physics.features, pose=min(_FEW, physics.features.pose))
         self.whole = _Model(known, physics.start)
@@ -199,7 +199,7 @@ def of_mass(information: np.ndarray, vector: np.ndarray) -> float:
     return float((vector[0] - information[0, 1:] @ rest[:, 1]) ** 2 / own)
 
 
-def without_payload(data: RegressionData, arm: Arm, start: Scales | None) -> RegressionData:
+def _without_payload(data: RegressionData, arm: Arm, start: Scales | None) -> RegressionData:
     """What a tare or a profile says of the arm, less what it seems to carry, which is then known to be nothing."""
     found = solve([data], payload_prior_std(arm), None, SMOOTH, 1, start)
     out = copy(data)

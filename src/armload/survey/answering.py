@@ -12,7 +12,6 @@ from threadpoolctl import threadpool_limits
 
 from armload.errors import ArmloadError, EpisodesError, one_line
 from armload.identification import identify
-from armload.identification.play import Play, play_within
 from armload.survey.logs import Log, filesystem
 from armload.survey.rows import answered, unusable
 from armload.survey.settings import Settings
@@ -58,22 +57,18 @@ def _of_episode(log: Log, settings: Settings, path: Path, about: dict[str, Any])
 def _of_one(log: Log, settings: Settings, path: Path, about: dict[str, Any]) -> list[dict[str, Any]]:
     recording = settings.recording(log, path, about["episode"])
     about = about | {"date": recording.date}
-    arm, tare, profile = settings.arm(), settings.tare_of(log.arm), settings.profile_of(log.arm)
     try:
         found = identify(
             recording,
-            arm,
-            tare=tare,
-            profile=profile,
+            settings.arm(),
+            tare=settings.tare_of(log.arm),
+            profile=settings.profile_of(log.arm),
             tool=settings.mounted(),
             method=settings.method,
         )
     except ArmloadError as error:
         return [unusable(str(error), about)]
-    plays: list[Play] = []
-    if not arm.motor_torque and (tare is not None or profile is not None):  # else too little is known of the arm
-        plays = play_within(recording, arm, [(part.start, part.stop) for part in found.segments], tare, profile)
-    rows, lacking = answered(found, about, plays), settings.lacking(log.arm)
+    rows, lacking = answered(found, about), settings.lacking(log.arm)
     for row in rows:
         row["notes"] = " | ".join([*lacking, row["notes"]]) if lacking else row["notes"]
     return rows

@@ -12,8 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from armload.inertia import Z95
-from armload.survey.looseness import Looseness, looseness
 from armload.survey.rows import ANSWERED, UNUSABLE
 from armload.survey.shift import Shift, shifts
 
@@ -36,12 +34,10 @@ class ArmFinding:
     logs, unusable: how many, and how many of them cannot be answered. payloads: rows with something held.
     mass: their median [kg], None where there are none.
     changed, moves: share of the last logs that say so; None: too few could tell.
-    retare, loose: whether that, the shift or the play is enough to act.
-    since: date of the first log of the run that led to it [s since 1970], or the log's name where logs have no date; of
-        a sound arm, and of play, None.
+    retare, loose: whether that is enough to act. since: date of the first log of the run that led to it [s since 1970],
+        or the log's name where logs have no date; of a sound arm None.
     joint: that tells most of the change, from 1; 0: none does.
     shift: the most likely day since when the arm is another one, and how likely; None: it was seen on too few days.
-    play: how loosely it holds things; None: too few of its logs can tell.
     """
 
     arm: str
@@ -56,7 +52,6 @@ class ArmFinding:
     since: float | str | None = None
     joint: int = 0
     shift: Shift | None = None
-    play: Looseness | None = None
 
     @property
     def advice(self) -> str:
@@ -67,10 +62,7 @@ class ArmFinding:
                 f"is not as it was at its tare or in its profile, at joint {self.joint} most: record it empty, and "
                 "tare it or learn its profile anew; if it was exchanged, learn the new one from its own logs alone"
             )
-        if self.play is not None and self.play.found:
-            play = f"{1e3 * self.play.play:.1f} ± {1e3 * Z95 * self.play.std:.1f} mm"
-            said.append(f"holds things loosely, which slide by {play} either way: look at its gripper")
-        elif self.loose:
+        if self.loose:
             said.append("holds things that seem to move: look at its gripper")
         return f"{self.arm} {', and '.join(said)}" if said else ""
 
@@ -104,7 +96,6 @@ def _of_arm(arm: str, rows: Sequence[dict[str, Any]], shift: Shift | None) -> Ar
     changed, since = _lately([any(row["changed"] for row in of) for of in asked], asked, SHARE_CHANGED)
     moves, first = _lately([any(row["moves"] for row in of if row["held"]) for of in holding], holding, SHARE_MOVES)
     retare, loose = since is not None, first is not None
-    play = looseness([row for of in logs for row in of])
     joints = [row["misfit_joint"] for of in asked[-LAST:] for row in of if row["changed"]]
     joint = int(np.bincount(joints).argmax()) if retare and joints else 0
     if not retare and shift is not None and shift.found:
@@ -119,11 +110,10 @@ def _of_arm(arm: str, rows: Sequence[dict[str, Any]], shift: Shift | None) -> Ar
         changed,
         moves,
         retare,
-        loose or (play is not None and play.found),
+        loose,
         since if retare else first,
         joint,
         shift,
-        play,
     )
 
 

@@ -73,7 +73,6 @@ def _what_to_do(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) 
         "changed",
         "shift",
         "payload moves",
-        "play [mm]",
         "since",
     )
     cells = tuple(
@@ -85,16 +84,14 @@ def _what_to_do(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) 
             "" if f.mass is None else f"{f.mass:.3f}",
             _share(f.changed, (f.changed or 0.0) >= SHARE_CHANGED),
             "" if f.shift is None else f"{f.shift.z:.1f}{' !' if f.shift.found else ''}",
-            _share(f.moves, f.loose and not (f.play and f.play.found)),
-            "" if f.play is None else f"{1e3 * f.play.play:.1f}{' !' if f.play.found else ''}",
+            _share(f.moves, f.loose),
             _since(f),
         )
         for f in findings
     )
     note = (
         f"changed and payload moves: share of an arm's last {LAST} logs that say so; shift: z of its offsets and "
-        f"friction over the days, beyond {SHIFTED:g} it is another arm; play: by how much what is held slides either "
-        "way, as the last logs show it. ! asks for something to be done."
+        f"friction over the days, beyond {SHIFTED:g} it is another arm. ! asks for something to be done."
     )
     return Section("What to do", "\n\n".join(x for x in text if x), (Table("Arms", columns, cells, note),))
 

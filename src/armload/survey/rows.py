@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from armload.identification import ArmHealth, Identification
-from armload.identification.play import Play
 from armload.inertia import NAMES
 
 ANSWERED, UNUSABLE = "answered", "unusable"
 _AXES = ("x", "y", "z")
 _PRODUCTS = ("xx", "xy", "xz", "yy", "yz", "zz")
 SEPARATOR = " | "  # between notes, and between determined parameters: sentences have commas
-
-# the axes of `armload.identification.play`: across the flange every 22.5°, the ninth along it
-PLAY = tuple(range(1, 10))
 
 TEXT, WHOLE, FLAG, NUMBER = "text", "whole", "flag", "number"
 
@@ -44,17 +39,13 @@ def columns(n: int) -> dict[str, str]:
         **dict.fromkeys(("residual", "restlessness", "misfit"), NUMBER),
         "misfit_joint": WHOLE,
         "changed": FLAG,
-        **dict.fromkeys((f"play_{axis}{end}" for axis in PLAY for end in ("", "_std")), NUMBER),
         **dict.fromkeys(of_joints, NUMBER),
         **dict.fromkeys(("version", "key"), TEXT),
     }
 
 
-def answered(found: Identification, where: dict[str, Any], plays: Sequence[Play] = ()) -> list[dict[str, Any]]:
-    """The rows of a log, one for each part throughout which the payload is the same; `date` becomes the part's own.
-
-    plays: of each part, where somebody asked.
-    """
+def answered(found: Identification, where: dict[str, Any]) -> list[dict[str, Any]]:
+    """The rows of a log, one for each part throughout which the payload is the same; `date` becomes the part's own."""
     date = where.get("date")
     return [
         where
@@ -62,7 +53,6 @@ def answered(found: Identification, where: dict[str, Any], plays: Sequence[Play]
         | {"date": None if date is None else _number(date + part.start), "status": ANSWERED, "reason": ""}
         | _of_payload(part.answer)
         | _of_arm(part.answer.health)
-        | (of_play(plays[k]) if plays else {})
         for k, part in enumerate(found.segments)
     ]
 
@@ -108,13 +98,6 @@ def _of_arm(health: ArmHealth | None) -> dict[str, Any]:
         "changed": bool(health.changed),
         **{f"{name}_{j}": _number(x) for name, xs in of_joints.items() for j, x in enumerate(xs, start=1)},
     }
-
-
-def of_play(play: Play) -> dict[str, Any]:
-    """The columns of a part's play."""
-    values = {f"play_{axis}": x for axis, x in zip(PLAY, play.moment, strict=True)}
-    values |= {f"play_{axis}_std": x for axis, x in zip(PLAY, play.std, strict=True)}
-    return {name: _number(x) for name, x in values.items()}
 
 
 def _number(value: Any) -> float | None:
