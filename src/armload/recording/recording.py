@@ -18,9 +18,7 @@ CHANNELS = ("measured", "desired", "external")
 # September 2001
 _CLOCK = 1e9
 GAP = 0.1  # [s] a longer pause between samples ends whatever has a memory of those before it
-_MANY = (
-    1 << 18
-)  # samples whose steps say the rate of a longer log: a median of so many is known to 0.1 % of their spread
+_MANY = 1 << 18  # samples whose steps say the rate of a longer log: known to 0.3 % of their spread
 BLOCK = 4096  # samples that are worked on at a time: bounds the memory of what is made of them
 JITTERED = 0.9  # of a rate's sample time, after which the next sample of that rate is due: clocks jitter
 
