@@ -6,9 +6,10 @@
 make    logs by inverse dynamics (`simulate_inverse`) of arms that differ from their model as real ones do, with offsets
         and friction that differ from day to day by half of what `life.py` assumes. Each arm works four motions of its
         own, 12 s at 100 Hz, and takes up and puts down boxes of up to 2.5 kg, all at once; the first log of a day
-        is empty, 24 s. From the middle day on, one arm is another one (exchanged), one holds 30 % of what it holds by
-        a spring (loose), and the offset of one arm's second joint walks by 0.3 N·m a day. 3 % of the logs are broken,
-        in eight ways. Of each arm there is a tare of 24 s of the day before the first.
+        is empty, 24 s. From the middle day on, one arm is another one (exchanged), one holds things loosely, so that
+        they slide by 5 mm either way along an axis across its flange (loose), and the offset of one arm's second joint
+        walks by 0.3 N·m a day. 3 % of the logs are broken, in eight ways. Of each arm there is a tare of 24 s of the
+        day before the first.
 survey  `armload survey` with these tares; it goes on where it was stopped.
 judge   against the truth: changes of payload (found within 0.5 s), masses and their intervals, arms, broken files.
 speed   1 and 2 processes and 2 Dask workers on the same logs, and what a long log costs in memory.
@@ -34,7 +35,7 @@ import numpy as np
 from alarms import wilson
 from life import FRICTION, OFFSET
 from script import ROOT, markdown_table, options, say, write, write_table
-from wrong_cases import Part
+from wrong_cases import Play
 
 from armload import Recording, arm
 from armload.lab.episodes.motion_kinds import MotionSource
@@ -47,6 +48,7 @@ from armload.survey.findings import arm_findings
 RATE, EMPTY, WORK = 100.0, 24.0, 12.0  # [Hz], [s], [s]
 DRIFT = 0.5  # of a day, in what `life.py` assumes
 WALK = 0.3  # [N·m] a day
+GAP = 0.005  # [m] that a loose gripper lets things slide, either way
 BEGAN, DAY = 1_790_000_000.0, 86400.0  # [s since 1970], [s]
 BROKEN = 0.03
 NEAR = 0.5  # [s] between a change and where it is found
@@ -85,6 +87,8 @@ def make(folder: Path, arms: int, days: int, logs: int, seed: int) -> None:
         centre = source.centre(empty)
         kinds = ("long", "pick-and-place", "fast", "point-to-point")
         work = [source.draw(kind, rng, WORK, f"{kind}-{k}", centre, 0.5) for kind in kinds]
+        turn = np.random.default_rng([seed, k, 23]).uniform(0.0, 2.0 * np.pi)
+        axis = np.array([np.cos(turn), np.sin(turn), 0.0])  # of a loose gripper's jaws
         name = f"arm-{k:02d}"
         (folder / "logs" / name).mkdir(parents=True)
         (folder / "tares").mkdir(exist_ok=True)
@@ -104,7 +108,7 @@ def make(folder: Path, arms: int, days: int, logs: int, seed: int) -> None:
                 log = simulate_inverse(panda, motion, held, world=world, duration=seconds, seed=number, **how)
                 loose = role(k) == "loose" and day >= days // 2
                 if loose:
-                    log = with_loose_part(panda, motion, log, held, rng)
+                    log = with_play(panda, motion, log, held, axis)
                 broken = str(rng.choice(KINDS)) if i > 0 and rng.random() < BROKEN else None
                 suffix = str(rng.choice([".parquet", ".csv", ".npz"], p=[0.7, 0.2, 0.1]))
                 path = folder / "logs" / name / f"day-{day:02d}-{i:02d}{suffix}"
@@ -135,16 +139,15 @@ def drawn_payloads(rng: np.random.Generator) -> list[tuple[float, Any]]:
     return plans.get(int(kind), [(0.0, None), (early, payload), (late, None)])
 
 
-def with_loose_part(panda: Any, motion: Any, log: Recording, held: list, rng: np.random.Generator) -> Recording:
-    """30 % of what is held hangs on a spring of 1.5 to 4 Hz."""
+def with_play(panda: Any, motion: Any, log: Recording, held: list, axis: np.ndarray, gap: float = GAP) -> Recording:
+    """What is held sits loosely: it slides by `gap` [m] either way between two stops along an axis of the flange."""
     tau = log.tau.copy()
     for (since, payload), until in zip(held, [*(t for t, _ in held[1:]), np.inf], strict=True):
         if payload is None:
             continue
         phi = payload.parameters.phi
-        part = Part(0.3 * phi[0], 2.0 * np.pi * rng.uniform(1.5, 4.0), rng.uniform(0.03, 0.2), True)
         rows = (log.t >= since) & (log.t < until)
-        tau[rows] += part.beside(panda, motion, phi[1:4] / phi[0], log.t)[0][rows]
+        tau[rows] += Play(phi[0], gap, axis).beside(panda, motion, phi[1:4] / phi[0], log.t)[rows]
     return replace(log, tau=tau)
 
 

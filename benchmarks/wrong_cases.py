@@ -25,6 +25,7 @@ from armload.simulation.resolution import COARSE
 
 TILT = 5.0  # [°]
 RATE = 200.0  # [Hz]
+STEP = 1e-3  # [s] of what moves beside the arm
 
 
 class Wrong(NamedTuple):
@@ -155,7 +156,7 @@ class Part(NamedTuple):
         point; a spring's rest point is where it holds the part. A string pulls at `centre`, with no moment about it,
         and x is horizontal: the arm feels the part at the string's end, wherever it hangs.
         """
-        step = 1e-3
+        step = STEP
         clock = np.arange(0.0, t[-1] + step, step)
         q = motion.position(np.minimum(clock, motion.duration))
         R, p = robot.frame_pose(q)
@@ -167,16 +168,57 @@ class Part(NamedTuple):
             v = v + step * across * (-a - 2.0 * self.damping * self.omega * v - self.omega**2 * x)
             x = x + step * v
             shift[i] = x
-        relative = np.gradient(np.gradient(shift, step, axis=0), step, axis=0)
-        gravity = np.array([0.0, 0.0, -9.81])
-        force = -self.mass * relative  # on the arm, beyond what a part at rest exerts
-        moment = self.spring * np.cross(shift, self.mass * (gravity - acceleration - relative))
-        motions = robot.frame_motion(q)
-        turned = [np.einsum("nji,nj->ni", R, f) for f in (force, moment)]  # in the frame's axes
-        turned[1] = turned[1] + np.cross(centre, turned[0])
-        extra = -np.einsum("nij,ni->nj", motions.jacobian, np.hstack([turned[1], turned[0]]))
+        extra = torque_beside(robot, q, self.mass, centre, shift, acceleration, self.spring)
         at = np.clip(np.searchsorted(clock, t), 0, len(clock) - 1)
         return extra[at], self.spring * np.einsum("nji,nj->ni", R, shift)[at].mean(axis=0)
+
+
+def torque_beside(
+    robot: Arm, q: NDArray, mass: float, centre: NDArray, shift: NDArray, acceleration: NDArray, held: bool
+) -> NDArray[np.float64]:
+    """The torque (N, n) of a point mass beyond that at rest at `centre`, each millisecond.
+
+    shift: of it from there, in the base's axes (N, 3) [m]. acceleration: of the rest point (N, 3) [m/s²]. held: whether
+    the arm feels it where it is; if not, at `centre`.
+    """
+    relative = np.gradient(np.gradient(shift, STEP, axis=0), STEP, axis=0)
+    gravity, R = np.array([0.0, 0.0, -9.81]), robot.frame_pose(q)[0]
+    force = -mass * relative  # on the arm, beyond what a part at rest exerts
+    moment = held * np.cross(shift, mass * (gravity - acceleration - relative))
+    turned = [np.einsum("nji,nj->ni", R, f) for f in (force, moment)]  # in the frame's axes
+    turned[1] = turned[1] + np.cross(centre, turned[0])
+    jacobian = robot.frame_motion(q).jacobian
+    return -np.einsum("nij,ni->nj", jacobian, np.hstack([turned[1], turned[0]]))
+
+
+class Play(NamedTuple):
+    """A mass [kg] that slides without friction between two stops, `gap` [m] either way along an axis of the frame (3,).
+
+    x'' = u·(g − a) between the stops; beyond them, a spring of 30 Hz, damped by 30 %, holds it: a stiff finger.
+    """
+
+    mass: float
+    gap: float
+    axis: NDArray[np.float64]
+
+    def beside(self, robot: Arm, motion: Motion, centre: NDArray, t: NDArray) -> NDArray[np.float64]:
+        """The torque (N, n) beyond that of the same mass fixed midway between the stops."""
+        clock = np.arange(0.0, t[-1] + STEP, STEP)
+        q = motion.position(np.minimum(clock, motion.duration))
+        R, p = robot.frame_pose(q)
+        acceleration = np.gradient(np.gradient(p + R @ centre, STEP, axis=0), STEP, axis=0)
+        along = R @ self.axis
+        pull = np.einsum("ni,ni->n", along, np.array([0.0, 0.0, -9.81]) - acceleration)
+        omega, damping, gap = 2.0 * np.pi * 30.0, 0.3, self.gap
+        x, v, places = float(np.copysign(gap, pull[0])), 0.0, []
+        for a in pull.tolist():  # semi-implicit Euler
+            beyond = x - min(max(x, -gap), gap)
+            v += STEP * (a - omega**2 * beyond - (2.0 * damping * omega * v if beyond else 0.0))
+            x += STEP * v
+            places.append(x)
+        shift = np.array(places)[:, None] * along
+        extra = torque_beside(robot, q, self.mass, centre, shift, acceleration, True)
+        return extra[np.clip(np.searchsorted(clock, t), 0, len(clock) - 1)]
 
 
 # ---------------------------------------------------------------------- another simulator

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.regression.information import RegressionData
+from armload.regression.information import RegressionData, columns_of
 
 _DIRECT = 20  # half the rows of a matrix that is inverted whole; changes no answer
 
@@ -43,7 +43,7 @@ class RunInformation(NamedTuple):
         """Of a run's rows, whose payload and eta are E·z, E (10 + p, z)."""
         c = len(E)
         A, b = run.selected(E)
-        return cls(A, run.A[:, c:, :c] @ E, run.A[:, c:, c:], b, run.b[:, c:])
+        return cls(A, columns_of(run.A[:, c:, :c], E), run.A[:, c:, c:], b, run.b[:, c:])
 
 
 class Eliminated(NamedTuple):

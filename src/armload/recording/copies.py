@@ -37,7 +37,9 @@ def shared_samples(log: Recording, other: Recording) -> int:
     measured = set(_moving(other))
     if moving := sum(key in measured for key in _moving(log)):
         return moving
-    _, here, there = np.intersect1d(log.t, other.t, return_indices=True)
+    here = np.minimum(np.searchsorted(log.t, other.t), len(log) - 1)
+    there = np.flatnonzero(log.t[here] == other.t)
+    here = here[there]
     return len(here) if _keys(log, here) == _keys(other, there) else 0
 
 

@@ -70,10 +70,12 @@ class SpooledRecording(Recording):
 
     def select(self, rows: NDArray | slice) -> Recording:
         """The samples at the given rows: on disk where they follow each other, else in memory."""
-        index = np.arange(len(self))[rows]
-        if len(index) < 2 or np.any(np.diff(index) != 1):
-            return self._in_memory(index)
-        part = slice(int(index[0]), int(index[-1]) + 1)
+        part = slice(*rows.indices(len(self))) if isinstance(rows, slice) else None
+        if part is None or part.step != 1 or part.stop - part.start < 2:
+            index = np.arange(len(self))[rows]
+            if len(index) < 2 or np.any(np.diff(index) != 1):
+                return self._in_memory(index)
+            part = slice(int(index[0]), int(index[-1]) + 1)
         q, dq, tau = (getattr(self, name).within(part) for name in QUANTITIES)
         return replace(self, t=self.t[part], q=q, dq=dq, tau=tau)
 

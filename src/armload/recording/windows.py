@@ -24,15 +24,15 @@ class Windows(NamedTuple):
 
 def windows(recording: Recording) -> Windows:
     """The log cut into windows of a quarter of a second, or of one sample time where that is longer."""
-    t = recording.t
-    step = np.diff(t)
-    median = float(np.median(step))
+    t, median = recording.t, 1.0 / recording.rate
     width = max(_WIDTH, median)
     count = int(min((t[-1] - t[0]) / width, len(t) - 1))
     edges = np.unique(np.searchsorted(t, t[0] + width * np.arange(count + 1) - 0.5 * median))
     first, last = edges[:-1], edges[1:]
-    broken = np.r_[np.int32(0), np.cumsum(step > max(_GAP, 3.0 * median), dtype=np.int32)]  # gaps up to each row
-    whole = broken[first] == broken[last]
+    long = max(_GAP, 3.0 * median)
+    gaps = [rows.start + np.flatnonzero(np.diff(t[rows.start : rows.stop + 1]) > long) for rows in blocks(len(t))]
+    gaps = np.concatenate(gaps)  # the rows before them
+    whole = np.searchsorted(gaps, first) == np.searchsorted(gaps, last)
     return Windows(first[whole], last[whole])
 
 

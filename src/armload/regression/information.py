@@ -46,6 +46,11 @@ class Session:
 SAME = Session()
 
 
+def columns_of(A: NDArray[np.float64], E: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A·E (n, ·, z), where each column of E has a single 1, or none: no product is needed, and the sums are exact."""
+    return np.ascontiguousarray(A[..., E.argmax(axis=0)] * E.max(axis=0))
+
+
 class RegressionData:
     """What one recording says about x_j = [phi, eta, g_j]: information per joint and block sums.
 
@@ -117,6 +122,7 @@ class RegressionData:
     def of_features(self, features: JointFeatures) -> RegressionData:
         """The same with the first waves of the pose only, to be read and not to be added to."""
         out = RegressionData(self.correction, self.gain, features, self.blocks.block, self.session)
+        out.noise = self.noise
         keep, scale = self.features.first(features)
         shared = np.arange(10 + self.correction.size)
         rows = np.concatenate([shared, len(shared) + keep])
@@ -129,7 +135,8 @@ class RegressionData:
     def selected(self, E: NDArray) -> tuple[NDArray, NDArray]:
         """A and b over the unknowns z, where [phi, eta] = E·z; the features' weights stay out of it."""
         shared = slice(0, 10 + self.correction.size)
-        return E.T @ self.A[:, shared, shared] @ E, self.b[:, shared] @ E
+        squares = columns_of(self.A[:, shared, shared], E)
+        return columns_of(squares.swapaxes(1, 2), E), columns_of(self.b[:, None, shared], E)[:, 0]
 
     def residual_power(self, x: NDArray, weights: NDArray) -> NDArray[np.float64]:
         """Mean square (n,) [N²·m²] of what x (10 + p,), payload and eta, and the features' weights (n, R) leave.
