@@ -19,9 +19,11 @@ from armload.arms import Arm
 from armload.errors import IdentificationError
 from armload.estimators import Estimate, Identifier
 from armload.identification.answer import body_of
+from armload.identification.beside import know, told
 from armload.identification.choice import choose
 from armload.identification.intervals import Before
 from armload.inertia import determined, held, held_probability
+from armload.online.beside import denied_by, taken_by
 from armload.online.concluding import doubts_of
 from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
@@ -33,7 +35,7 @@ from armload.online.state import load_state, save_state
 from armload.online.step import mass_step
 from armload.online.thresholds import MOVING, RECENT, STANDS
 from armload.online.watch import PayloadWatch
-from armload.posterior import PosteriorLeastSquares, Profile
+from armload.posterior import Known, PosteriorLeastSquares, Profile
 from armload.posterior.map import PUBLISH
 from armload.recording import Recording, Sample
 from armload.regression import payload_prior_std
@@ -59,9 +61,12 @@ class OnlineIdentifier:
             added since.
         method: a name of the catalogue, or a trained model's file; None: the most trustworthy for the arm.
         profile: what many logs said of this arm; estimates are of what was added since.
+        known: of a payload, beside the stream; taken where something is held, and only while the samples do not deny
+            that this is it, which `notes` says then.
 
     Raises:
-        ArmloadError: an unknown method, a model of another arm, or a tare that is none of this arm.
+        ArmloadError: an unknown method, or one that cannot use what is known, a model of another arm, or a tare that is
+            none of this arm.
     """
 
     def __init__(
@@ -70,10 +75,12 @@ class OnlineIdentifier:
         tare: Recording | None = None,
         method: str | Path | None = None,
         profile: Profile | None = None,
+        known: Known | None = None,
     ) -> None:
         self.arm, self.tare, self.profile, self._tared = arm, tare, profile, tare is not None
         choice = choose(arm, tare, method, live=True, profile=profile)
         first = choice.identifier
+        know(first, known)
         self._watch = PayloadWatch(first) if isinstance(first, PosteriorLeastSquares) else None
         self._engine = first
         self.method = self.engine.name
@@ -218,16 +225,18 @@ class OnlineIdentifier:
         arm: Arm,
         method: str | Path | None = None,
         profile: Profile | None = None,
+        known: Known | None = None,
     ) -> Self:
         """An identifier in the state that was saved.
 
         Args:
             path: what `save` wrote. arm, method, profile: what the identifier was made with; a tare is in the state.
+            known: of payloads from now on.
 
         Raises:
             IdentificationError: the file is none, or of another arm or trained model.
         """
-        new = cls(arm, method=method, profile=profile)
+        new = cls(arm, method=method, profile=profile, known=known)
         try:
             own = origin(arm, new.method, new._engine)
             saved = load_state(path, known_parts(arm, new._engine), same_origin(path, arm, own))
@@ -235,6 +244,8 @@ class OnlineIdentifier:
             new.close()
         new.__dict__.update(saved["state"])
         new._tared = saved["tared"]
+        for run in [new._engine] if new._watch is None else new._watch.runs:
+            know(run, known)
         return new
 
     def _identify(self, sample: Sample) -> None:
@@ -312,7 +323,8 @@ class OnlineIdentifier:
     def _judge(self, estimate: Estimate, run: Identifier, stands: bool) -> None:
         """What the data determine, and whether anything is there."""
         std, before = estimate.std, self._before
-        self._determined = determined(std, before.std if before.used else None, run.weak_std, self._weak)
+        alone = determined(std, before.std if before.used else None, run.weak_std, self._weak)
+        self._determined = told(alone, taken_by(run), std, before)
         self._held = held(float(estimate.phi[0]), float(std[0]), bool(self._determined[0]))
         self._p_held = held_probability(float(estimate.phi[0]), float(std[0]), float(self._weak[0]))
         notes = []
@@ -323,6 +335,8 @@ class OnlineIdentifier:
             notes.append(_STANDING_MOTOR if motor else _STANDING)
         if (changed := change_of_arm(run, self.relative_to)) is not None:
             notes.append(changed)
+        if self._held and (denied := denied_by(run)) is not None:
+            notes.append(denied)
         self._notes = tuple(notes)
 
     @property
