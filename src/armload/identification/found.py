@@ -61,7 +61,8 @@ class Found(NamedTuple):
     restlessness: how restless the torques are, of what they were at the tare (`posterior.restless`).
     exchanged: whether the estimate is rather the difference of two bodies, one put on for another.
     kappa: by how much the physics overrates the log's evidence, of a method that knows.
-    gain_std: relative standard deviation of the torque's scale, of a method that allows for one.
+    gain_std: relative standard deviation of the torque's scale, of a method that allows for one. gain_known: whether a
+        known weight told it.
     known: of the payload beside the log. alone: mean (10,) and covariance (10, 10) of what the log alone says then.
     health: the arm itself, of a method that asks.
     """
@@ -88,6 +89,7 @@ class Found(NamedTuple):
     alone: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     kappa: float | None = None
     gain_std: float | None = None
+    gain_known: bool = False
     health: ArmHealth | None = None
 
     @property
@@ -100,6 +102,12 @@ class Found(NamedTuple):
         ):
             return True  # the nearest body is nearer still, and need not be found
         return distance_to_body(mean, covariance) <= MISFIT
+
+    def with_error(self, covariance: NDArray[np.float64]) -> Found:
+        """The same with one more error of phi, of that covariance (10, 10): of a tool that is not known exactly."""
+        said, alone = (x and (x[0], x[1] + covariance) for x in (self.unprojected, self.alone))
+        estimate = replace(self.estimate, covariance=self.estimate.covariance + covariance)
+        return self._replace(estimate=estimate, unprojected=said, alone=alone)
 
     def less(self, tool: NDArray[np.float64]) -> Found:
         """The same without a tool (10,)."""
@@ -164,6 +172,7 @@ def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Foun
         exchanged=posterior is not None and posterior.exchanged,
         kappa=identifier.kappa if isinstance(identifier, HybridIdentifier) else None,
         gain_std=None if posterior is None else posterior.posterior.gain_std,
+        gain_known=asked.profile is not None and asked.profile.gain_std is not None,
         known=asked.known,
         alone=None if posterior is None else posterior.alone,
         health=None if posterior is None else ArmHealth.of(posterior),

@@ -8,7 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm, rated_mass
 from armload.arms import arm as arm_named
@@ -118,17 +118,20 @@ def _of_one_payload(
         relative_to = without if tare is None else "tare"
         return answered(found_in(recording, arm, tare, asked), arm, recording, tared, relative_to, notes)
     known = plausible_tool(arm.in_frame(mounted.parameters if isinstance(mounted, Payload) else mounted), arm)
-    unsure = None
-    if isinstance(mounted, Payload) and not mounted.inertia_known:
-        notes = (*notes, f"tool {mounted.name}: {INERTIA_ASSUMED}; the intervals allow for any other")
-        unsure = known
+    unsure, error = None, np.zeros((10, 10))
+    if isinstance(mounted, Payload):
+        error = _in_frame(arm, mounted.uncertainty.covariance(mounted.parameters), mounted.parameters.frame)
+        if not mounted.inertia_known:
+            notes = (*notes, f"tool {mounted.name}: {INERTIA_ASSUMED}; the intervals allow for any other")
+            unsure = known
     if tare is None and asked.profile is None:
         arm = arm.with_payload(known)
-        return answered(found_in(recording, arm, None, asked), arm, recording, False, "tool", notes, unsure=unsure)
+        found = found_in(recording, arm, None, asked).with_error(error)
+        return answered(found, arm, recording, False, "tool", notes, unsure=unsure)
     carried, sure = _carries(arm, known, tare, asked.profile)
     before = "at the tare" if tare is not None else "in the profile's logs"
     since = "after the tare" if tare is not None else "after the profile's logs"
-    if carried:
+    if carried:  # what it weighs is in both logs, and its error in neither's difference
         if asked.profile is None:
             arm = arm.with_payload(known)  # a profile holds what was mounted already
         found, relative_to = found_in(recording, arm, tare, asked), "profile" if tare is None else "tare"
@@ -136,6 +139,7 @@ def _of_one_payload(
     else:
         both = asked.known and asked.known.with_tool(known.phi)  # what was added since the tare
         found, relative_to = found_in(recording, arm, tare, replace(asked, known=both)).less(known.phi), "tool"
+        found = found.with_error(error)
         note, otherwise = (
             f"the tool was mounted {since}: the answer is what was added since, less the tool",
             known.phi,
@@ -145,6 +149,12 @@ def _of_one_payload(
     who = "tare" if tare is not None else "profile"
     note = f"it seems that {note}; the {who} does not tell for sure, the intervals hold the other case, too"
     return answered(found, arm, recording, tared, relative_to, (*notes, note), otherwise, unsure)
+
+
+def _in_frame(arm: Arm, covariance: NDArray[np.float64], frame: str | None) -> NDArray[np.float64]:
+    """A covariance (10, 10) of phi about the arm's payload frame, from another."""
+    T = np.column_stack([arm.in_frame(InertialParameters(e, frame)).phi for e in np.eye(10)])
+    return T @ covariance @ T.T
 
 
 def plausible_tool(tool: InertialParameters, arm: Arm) -> InertialParameters:

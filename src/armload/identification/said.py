@@ -97,6 +97,7 @@ def answered(
         **found_of._asdict(),
         rests_on_prior=~determined | leaning,
         torque_gain_std=found.gain_std,
+        gain_known=found.gain_known,
         notes=tuple(said),
         log=Path(recording.source).name,
         date=datetime.now(UTC).isoformat(timespec="seconds"),
