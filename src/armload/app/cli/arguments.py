@@ -155,8 +155,9 @@ def centre(text: str) -> tuple[tuple[float, ...], float]:
     """
     parts = re.split("±|\\+/?-", text)
     try:
-        com, std = tuple(float(part) for part in parts[0].split(",")), float(*parts[1:])
-    except (ValueError, TypeError):
+        place, spread = parts
+        com, std = tuple(float(part) for part in place.split(",")), float(spread)
+    except ValueError:
         com, std = (), 0.0
     if len(com) != 3:
         raise argparse.ArgumentTypeError(
