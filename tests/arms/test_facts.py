@@ -18,6 +18,7 @@ from armload.motion import excitation
 from armload.motion.collision import capsule_arm
 from armload.payloads import draw_payload, hand_on
 from armload.payloads.hand import HAND
+from armload.posterior.problem import assumed_gain
 from armload.regression import payload_prior_std
 
 SHEET = """
@@ -39,6 +40,17 @@ source = "ours"
 spread = 1.0
 source = "ours"
 """
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_every_sheet_states_what_is_assumed_of_the_torques_scale_and_answers_allow_for_it(name):
+    facts, robot = ARMS[name], arm(name)
+    side, other = facts.torque_side, "link" if facts.torque_side == "motor" else "motor"
+    assert facts.gain_std == robot.torque_gain_std == assumed_gain(robot, side)
+    assert 0.0 < facts.gain_std < 0.1
+    calibrated = replace(robot, torque_gain_std=0.1 * facts.gain_std)
+    assert assumed_gain(calibrated, side) == 0.1 * facts.gain_std
+    assert assumed_gain(calibrated, other) == assumed_gain(replace(robot, torque_gain_std=None), other)
 
 
 @pytest.mark.parametrize("name", ARMS)

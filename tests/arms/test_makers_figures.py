@@ -167,6 +167,7 @@ def test_the_page_of_the_arms_says_what_their_sheets_say(name):
         f"`{facts.flange}`",
         f"{facts.rated_payload:g}",
         "joint torque sensors" if facts.torque_side == "link" else "motor currents",
+        f"± {100.0 * facts.gain_std:g} %",
         f"{robot.link_parameters[:, 0].sum():.1f} of {facts.weight:g}",
     ]
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in page.splitlines() if line.startswith("|")]

@@ -179,6 +179,19 @@ def test_a_weighed_mass_is_in_the_answer_and_one_that_the_log_contradicts_is_sai
     assert any("is not what the log says" in note for note in wrong["notes"])
 
 
+def test_a_known_centre_is_in_the_answer_and_one_that_the_log_contradicts_is_said(files, capsys):
+    r = draw_payload("boxes", 3, MASS).parameters.com
+    log, tare = files / "loaded.csv", files / "empty.csv"
+    plain = answer(capsys, log, "--tare", tare)
+    right = answer(capsys, log, "--tare", tare, "--com", ",".join(f"{x:.5f}" for x in r) + "±0.001")
+    assert right["com"] == pytest.approx(r, abs=2e-3)
+    widths = [np.array(x["com_high"]) - np.array(x["com_low"]) for x in (right, plain)]
+    assert np.all(widths[0] < widths[1])
+    wrong = answer(capsys, log, "--tare", tare, "--com", f"{r[0] - 0.1:.5f},{r[1]:.5f},{r[2]:.5f}+-0.001")
+    assert wrong["interval"] == "approximate"
+    assert any("the centre of mass given" in note and "is not what the log says" in note for note in wrong["notes"])
+
+
 def test_an_old_tare_widens_the_interval(files, capsys):
     log, tare = files / "loaded.csv", files / "empty.csv"
 
@@ -198,6 +211,10 @@ def test_an_old_tare_widens_the_interval(files, capsys):
         (["--mass", "1.2"], "is not a weighed mass"),
         (["--mass", "1.2±0"], "above zero"),
         (["--mass", "1.2±0.1", "--method", "rls"], "cannot use a known mass"),
+        (["--com", "0,0,0.1"], "is not a centre of mass"),
+        (["--com", "0,0.1±0.01"], "is not a centre of mass"),
+        (["--com", "0,0,0.1±0"], "above zero"),
+        (["--com", "0,0,0.1±0.01", "--method", "rls"], "cannot use a known mass or centre"),
     ],
 )
 def test_what_makes_no_sense_is_one_sentence(files, capsys, arguments, said):

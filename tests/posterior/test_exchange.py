@@ -9,10 +9,11 @@ import pytest
 
 from armload import arm
 from armload.identification import identify
-from armload.inertia import InertialParameters
+from armload.inertia import Z95, InertialParameters
 from armload.lab.episodes import draw_episodes, simulate_episodes
-from armload.payloads import franka_hand
-from armload.posterior import HybridIdentifier, MixturePosterior, MixturePrior, shipped_model
+from armload.payloads import draw_payload, franka_hand
+from armload.posterior import TRAITS, Evidence, HybridIdentifier, MixturePosterior, MixturePrior, shipped_model
+from armload.posterior.hybrid import answer, holding_both
 from armload.simulation import simulate
 
 
@@ -53,6 +54,34 @@ def test_two_hypotheses_are_weighed_by_bayes_rule():
     draws = np.where(rng.random((N, 1)) < share, mean + rng.normal(size=(N, 10)) @ root, rng.normal(size=(N, 10)))
     np.testing.assert_allclose(found.mean, draws.mean(axis=0), atol=0.02)
     np.testing.assert_allclose(found.covariance, np.cov(draws.T), atol=0.02)
+
+
+def test_intervals_that_hold_two_answers_hold_each_and_are_no_wider_than_that():
+    rng = np.random.default_rng(1)
+    root, other = rng.normal(size=(10, 10)), np.diag(rng.uniform(0.01, 30.0, 10))
+    own, aside = root @ root.T, 2.0 * rng.normal(size=10)
+    both = holding_both(own, aside, other)
+    half, first, second = (Z95 * np.sqrt(np.diag(x)) for x in (both, own, other))
+    np.testing.assert_allclose(half, np.maximum(first, np.abs(aside) + second))
+    np.testing.assert_allclose(both / np.outer(half, half), own / np.outer(first, first))
+
+
+@pytest.mark.parametrize(("kind", "held"), [(1, True), (0, False)])
+def test_intervals_hold_an_exchange_that_the_log_does_not_exclude(panda, kind, held):
+    """Evidence of a box, beside a tare, on which something else may have been, and without one."""
+    model = shipped_model(panda)
+    payloads, std = model.prior_for(panda), np.array([5e-3] + [1e-3] * 3 + [2e-3] * 6)
+    truth = draw_payload("boxes", 3, 3.0).parameters.phi
+    information = np.diag(std**-2.0)
+    evidence = Evidence(information, information @ truth, 0.0, np.zeros(len(TRAITS)), 6.0, kind)
+    found = answer(evidence, model.calibration, payloads, False)
+    other = payloads.differences.posterior(information, information @ truth)
+    body = payloads.posterior(information, information @ truth)
+    assert np.log(0.05) < other.log_evidence - body.log_evidence < 0.0
+    low, high = (other.mean + s * Z95 * np.sqrt(np.diag(model.calibration.widened(other, evidence))) for s in (-1, 1))
+    half = Z95 * np.sqrt(np.diag(found.covariance))
+    inside = (found.phi - half <= low + 1e-12) & (high <= found.phi + half + 1e-12)
+    assert inside.all() == held
 
 
 @pytest.mark.full  # some seconds

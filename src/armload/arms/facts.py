@@ -51,6 +51,7 @@ class ArmFacts:
     hand: str | None = _fact("flange", "hand", None)  # the built-in tool that sits on it
     rated_payload: float = _fact("payload", "rated [kg]")
     torque_side: str = _fact("torque", "side")  # of the gear on which torque is measured: "link" or "motor"
+    gain_std: float | None = _fact("gain", "std [1]", None)  # of the torque's scale, before a known weight was hung on
     link_spread: float = _fact("links", "spread")  # see `Arm`
     acceleration: tuple[float, ...] | None = _fact("limits", "acceleration [rad/s²]", None)
     jerk: tuple[float, ...] | None = _fact("limits", "jerk [rad/s³]", None)
@@ -96,6 +97,7 @@ class ArmFacts:
             "acceleration": self.acceleration,
             "jerk": self.jerk,
             "link_spread": self.link_spread,
+            "torque_gain_std": self.gain_std,
             "motor_torque": self.torque_side == "motor",
             "known_as": self.name,
         }

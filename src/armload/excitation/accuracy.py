@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from armload.errors import UsageError
 from armload.estimators import Estimate
 from armload.inertia import Z95
-from armload.posterior import KnownMass
+from armload.posterior import Known
 
 # what each word of `Accuracy.read` may be given in, in SI units
 _UNITS = {
@@ -71,11 +71,10 @@ class Accuracy:
             given[name] = number * scale
         return cls(**given)
 
-    def reached(self, estimate: Estimate, known: KnownMass | None = None) -> bool:
-        """Whether an estimate is so good, together with a mass that was weighed."""
-        covariance = estimate.covariance
-        if known is not None:
-            covariance = known.given(estimate.phi, covariance)[1]
+    def reached(self, estimate: Estimate, known: Known | None = None) -> bool:
+        """Whether an estimate is so good, together with what is known beside the log."""
+        given = None if known is None else known.given(estimate.phi, estimate.covariance)
+        covariance = estimate.covariance if given is None else given[1]
         return self.holds(Z95 * np.sqrt(np.maximum(np.diag(covariance), 0.0)))
 
     def holds(self, half_width: NDArray[np.float64]) -> bool:

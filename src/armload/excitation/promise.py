@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from armload.excitation.criterion import Criterion
 from armload.excitation.payload_range import PayloadRange
 from armload.inertia import Z95
-from armload.posterior.problem import GAIN_STD
+from armload.posterior.problem import assumed_gain
 
 # [1] f of mass, moments and inertias, by the side of the torque, and whether the empty run is designed with the
 # loaded one, at the same place, or is another log (or there is none). Stated priors, see above
@@ -54,4 +54,5 @@ def of_gain(criterion: Criterion, payload: PayloadRange) -> NDArray[np.float64]:
 
 def gain_std(criterion: Criterion) -> float:
     """Relative standard deviation of the torque's calibration: a profile's, or what is expected of the sensor."""
-    return criterion.correction.gain_std or GAIN_STD["motor" if criterion.arm.motor_torque else "link"]
+    side = "motor" if criterion.arm.motor_torque else "link"
+    return criterion.correction.gain_std or assumed_gain(criterion.arm, side)

@@ -83,8 +83,8 @@ class Identification:
         wide as they are where they are not.
     rests_on_prior: for each parameter (10,), whether its interval comes from what was known before more than from the
         log; always so of what is not determined.
-    torque_gain_std: relative standard deviation of the torque's scale that the intervals allow for: assumed for the
-        kind of sensor, or as a known weight showed it (`armload profile --mass`); None: the method knows nothing of it.
+    torque_gain_std: relative standard deviation of the torque's scale that the intervals allow for: assumed on the
+        arm's sheet, or as a known weight showed it (`armload profile --mass`); None: the method knows nothing of it.
     notes: what else the user should know, a sentence each.
     segments: the log's parts, throughout each of which the payload is the same, with their answers; one where it never
         changes. All else is of the last.
@@ -94,6 +94,7 @@ class Identification:
     moves: whether no rigid body explains the torques; not in the JSON. another: whether the arm is another one than at
         its tare, or than the profile's; not in the JSON.
     health: the arm itself, as the log shows it, of a method that asks; not in the JSON.
+    gain_known: whether a known weight told the torque's scale; not in the JSON.
     """
 
     method: str
@@ -128,6 +129,7 @@ class Identification:
     moves: bool = field(default=False, metadata={"json": False})
     another: bool = field(default=False, metadata={"json": False})
     health: ArmHealth | None = field(default=None, metadata={"json": False})
+    gain_known: bool = field(default=False, metadata={"json": False})
 
     def __post_init__(self) -> None:
         for name, shape in _ARRAYS.items():

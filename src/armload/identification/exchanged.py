@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, pairwise
+
+import numpy as np
 
 from armload.arms import Arm
 from armload.errors import RecordingError
@@ -25,17 +27,35 @@ def check_for_exchanged_torques(recording: Recording, arm: Arm, seen: TorqueScal
         return
     found = []
     for i, j in combinations(range(recording.n), 2):
-        order = list(range(recording.n))
-        order[i], order[j] = j, i
-        fit = torque_scale(replace(recording, tau=recording.tau[:, order]), arm)
+        fit = torque_scale(_exchanged(recording, i, j), arm)
         if fit is not None and not fit.is_wrong:
             found.append((fit.misfit, i, j))
     if not found:
         return
     misfit, i, j = min(found)
-    if misfit < min(SWAPPED_MISFIT, SWAPPED_SHARE * seen.misfit):
+    if misfit < min(SWAPPED_MISFIT, SWAPPED_SHARE * seen.misfit) and _throughout(recording, arm, i, j):
         raise RecordingError(
             f"{recording.source}: tau{i + 1} and tau{j + 1} seem to be exchanged (misfit {seen.misfit:.1f} times a "
             f"sound robot's, {misfit:.1f} with these two columns the other way round): expected the torques in the "
             f"order of {arm.name}'s joints; exchange them"
         )
+
+
+def _exchanged(recording: Recording, i: int, j: int) -> Recording:
+    order = list(range(recording.n))
+    order[i], order[j] = j, i
+    return replace(recording, tau=recording.tau[:, order])
+
+
+def _throughout(recording: Recording, arm: Arm, i: int, j: int) -> bool:
+    """Whether each third of a log fits better with two columns exchanged.
+
+    A payload that changes within a log leaves a misfit, too, but not in the parts before and after.
+    """
+    edges = np.linspace(recording.t[0], recording.t[-1], 4)
+    for begin, end in pairwise(edges):
+        part = recording.between(begin, end)
+        fits = torque_scale(part, arm), torque_scale(_exchanged(part, i, j), arm)
+        if fits[0] is not None and fits[1] is not None and fits[1].misfit >= fits[0].misfit:
+            return False
+    return True

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
-from armload.errors import IdentificationError
 from armload.estimators import ArmMismatch, Estimate
 from armload.identification.arm_health import ArmHealth
+from armload.identification.beside import know
 from armload.identification.choice import Choice, choose
 from armload.identification.intervals import Before
 from armload.identification.thresholds import LARGEST_OFFSETS, MISFIT, MOVES
 from armload.inertia import distance_to_body, is_consistent
-from armload.posterior import HybridIdentifier, KnownMass, PosteriorLeastSquares, Profile
+from armload.posterior import HybridIdentifier, Known, PosteriorLeastSquares, Profile
 from armload.posterior.drift import Drift
 from armload.posterior.scales import AnotherArm
 from armload.posterior.tilt import TURNED, TURNS, Tilt
@@ -34,12 +34,12 @@ class Asked:
     """How a log is to be identified.
 
     method: as of `identify`. drift: by how many daily deviations the arm may differ from what it was at its tare.
-    mass: the payload's, where it was weighed. profile: what many logs said of the arm.
+    known: what is known of the payload beside the log. profile: what many logs said of the arm.
     """
 
     method: str | Path | None = None
     drift: float = 0.0
-    mass: KnownMass | None = None
+    known: Known | None = None
     profile: Profile | None = None
 
 
@@ -61,8 +61,9 @@ class Found(NamedTuple):
     restlessness: how restless the torques are, of what they were at the tare (`posterior.restless`).
     exchanged: whether the estimate is rather the difference of two bodies, one put on for another.
     kappa: by how much the physics overrates the log's evidence, of a method that knows.
-    gain_std: relative standard deviation of the torque's scale, of a method that allows for one.
-    mass: that was given. mass_alone: what the log alone says of it, and its standard deviation [kg].
+    gain_std: relative standard deviation of the torque's scale, of a method that allows for one. gain_known: whether a
+        known weight told it.
+    known: of the payload beside the log. alone: mean (10,) and covariance (10, 10) of what the log alone says then.
     health: the arm itself, of a method that asks.
     """
 
@@ -84,10 +85,11 @@ class Found(NamedTuple):
     gravity: tuple[float, float, float] | None = None
     restlessness: float = 0.0
     exchanged: bool = False
-    mass: KnownMass | None = None
-    mass_alone: tuple[float, float] | None = None
+    known: Known | None = None
+    alone: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     kappa: float | None = None
     gain_std: float | None = None
+    gain_known: bool = False
     health: ArmHealth | None = None
 
     @property
@@ -101,13 +103,18 @@ class Found(NamedTuple):
             return True  # the nearest body is nearer still, and need not be found
         return distance_to_body(mean, covariance) <= MISFIT
 
+    def with_error(self, covariance: NDArray[np.float64]) -> Found:
+        """The same with one more error of phi, of that covariance (10, 10): of a tool that is not known exactly."""
+        unprojected, alone = (x and (x[0], x[1] + covariance) for x in (self.unprojected, self.alone))
+        estimate = replace(self.estimate, covariance=self.estimate.covariance + covariance)
+        return self._replace(estimate=estimate, unprojected=unprojected, alone=alone)
+
     def less(self, tool: NDArray[np.float64]) -> Found:
         """The same without a tool (10,)."""
-        unprojected = None if self.unprojected is None else (self.unprojected[0] - tool, self.unprojected[1])
-        mass = self.mass and KnownMass(self.mass.mass - float(tool[0]), self.mass.std)
-        alone = self.mass_alone and (self.mass_alone[0] - float(tool[0]), self.mass_alone[1])
+        unprojected, alone = (x and (x[0] - tool, x[1]) for x in (self.unprojected, self.alone))
+        known = self.known and self.known.with_tool(np.zeros(10))
         estimate = replace(self.estimate, phi=self.estimate.phi - tool)
-        return self._replace(estimate=estimate, unprojected=unprojected, mass=mass, mass_alone=alone)
+        return self._replace(estimate=estimate, unprojected=unprojected, known=known, alone=alone)
 
 
 def found_in(recording: Recording, arm: Arm, tare: Recording | None, asked: Asked) -> Found:
@@ -136,13 +143,9 @@ def _found_on_side(recording: Recording, arm: Arm, tare: Recording | None, asked
 def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Found:
     identifier = choice.identifier
     posterior = identifier if isinstance(identifier, PosteriorLeastSquares) else None
+    know(identifier, asked.known)
     if posterior is not None:
         posterior.allow_for(asked.drift)
-        posterior.known_mass = asked.mass
-    elif asked.mass is not None:
-        raise IdentificationError(
-            f"the method {choice.name} cannot use a known mass: leave --mass out, or use hybrid, map-gp or map"
-        )
     estimate = identifier.run(recording)
     mean, std = identifier.payload_prior or (np.zeros(10), payload_prior_std(arm))
     if not choice.error_known:
@@ -169,8 +172,9 @@ def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Foun
         exchanged=posterior is not None and posterior.exchanged,
         kappa=identifier.kappa if isinstance(identifier, HybridIdentifier) else None,
         gain_std=None if posterior is None else posterior.posterior.gain_std,
-        mass=asked.mass,
-        mass_alone=None if posterior is None else posterior.mass_alone,
+        gain_known=asked.profile is not None and asked.profile.gain_std is not None,
+        known=asked.known,
+        alone=None if posterior is None else posterior.alone,
         health=None if posterior is None else ArmHealth.of(posterior),
     )
 

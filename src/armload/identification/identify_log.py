@@ -8,6 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm, rated_mass
 from armload.arms import arm as arm_named
@@ -23,7 +24,7 @@ from armload.identification.tare_age import drift_since
 from armload.identification.thresholds import DECISIVE, HEAVIEST, LOWEST_RATE, PAYLOAD_MAY_CHANGE, SETTLED
 from armload.inertia import HELD, Z95, InertialParameters
 from armload.payloads import INERTIA_ASSUMED, Payload, read_payload
-from armload.posterior import KnownMass, Profile, load_profile
+from armload.posterior import Known, KnownCentre, KnownMass, Profile, load_profile
 from armload.recording import Recording, check_own_measurements, read_recording
 
 
@@ -35,6 +36,7 @@ def identify(
     tare_age: float | None = None,
     tool: InertialParameters | Payload | str | Path | None = None,
     mass: KnownMass | tuple[float, float] | None = None,
+    com: KnownCentre | tuple[ArrayLike, float] | None = None,
     profile: Profile | str | Path | None = None,
     method: str | Path | None = None,
     progress: Callable[[str], None] | None = None,
@@ -52,6 +54,8 @@ def identify(
         tool: a tool mounted in the recording whose parameters are known, or the path of its file; the answer is what it
             carries. Whether it was mounted at the tare too is found from the tare.
         mass: of what is identified, where it was weighed, and its standard deviation [kg].
+        com: its centre of mass (3,), where that is known, in the arm's payload frame, and its standard deviation along
+            each axis [m].
         profile: what many logs said of this arm (`armload.posterior.learn_profile`), or the path of its file; the
             answer is what was added since. With a tare beside, that is of the recording's own day.
         method: a name in `armload.METHODS`, or the path of a trained model; None: the most trustworthy for the arm,
@@ -72,21 +76,20 @@ def identify(
     if tare is not None:
         check_own_measurements(recording, tare)
     drift, aged = (0.0, ()) if tare is None else drift_since(tare, recording, tare_age)
-    known_mass = mass if mass is None or isinstance(mass, KnownMass) else KnownMass(*mass)
-    known = load_profile(profile) if isinstance(profile, str | Path) else profile
-    asked, notes = Asked(method, drift, known_mass, known), (*notes, *aged)
-    if tare is not None and known is not None:
-        _check_same_mounted(tare, arm, known, asked)
+    profile = load_profile(profile) if isinstance(profile, str | Path) else profile
+    asked, notes = Asked(method, drift, Known.of(mass, com), profile), (*notes, *aged)
+    if tare is not None and profile is not None:
+        _check_same_mounted(tare, arm, profile, asked)
     mounted = read_payload(tool) if isinstance(tool, str | Path) else tool
     say("identifying")
     whole = _of_one_payload(recording, arm, tare, mounted, asked, notes)
-    of_arm = (None, None) if whole.another else (tare, known)
+    of_arm = (None, None) if whole.another else (tare, profile)
     times, statistic, of_mass = changes_of_payload(recording, arm, *of_arm, whole.kappa)
     edges, answers = [recording.t[0], *times, recording.t[-1]], [whole]
     if times:
         parts = [recording.between(a + SETTLED * (k > 0), b) for k, (a, b) in enumerate(pairwise(edges))]
         notes = (*notes, changed_within([t - recording.t[0] for t in times], len(parts)))
-        others = replace(asked, mass=None)  # what was weighed is what is held at the end
+        others = replace(asked, known=None)  # what is known is what is held at the end
         answers = [_of_one_payload(part, arm, tare, mounted, others, notes) for part in parts[:-1]]
         answers.append(_of_one_payload(parts[-1], arm, tare, mounted, asked, notes))
         if whole.moves and 2 * sum(answer.moves for answer in answers) > len(answers):
@@ -115,24 +118,28 @@ def _of_one_payload(
         relative_to = without if tare is None else "tare"
         return answered(found_in(recording, arm, tare, asked), arm, recording, tared, relative_to, notes)
     known = plausible_tool(arm.in_frame(mounted.parameters if isinstance(mounted, Payload) else mounted), arm)
-    unsure = None
-    if isinstance(mounted, Payload) and not mounted.inertia_known:
-        notes = (*notes, f"tool {mounted.name}: {INERTIA_ASSUMED}; the intervals allow for any other")
-        unsure = known
+    unsure, error = None, np.zeros((10, 10))
+    if isinstance(mounted, Payload):
+        error = _in_frame(arm, mounted.uncertainty.covariance(mounted.parameters), mounted.parameters.frame)
+        if not mounted.inertia_known:
+            notes = (*notes, f"tool {mounted.name}: {INERTIA_ASSUMED}; the intervals allow for any other")
+            unsure = known
     if tare is None and asked.profile is None:
         arm = arm.with_payload(known)
-        return answered(found_in(recording, arm, None, asked), arm, recording, False, "tool", notes, unsure=unsure)
+        found = found_in(recording, arm, None, asked).with_error(error)
+        return answered(found, arm, recording, False, "tool", notes, unsure=unsure)
     carried, sure = _carries(arm, known, tare, asked.profile)
     before = "at the tare" if tare is not None else "in the profile's logs"
     since = "after the tare" if tare is not None else "after the profile's logs"
-    if carried:
+    if carried:  # what it weighs is in both logs, and its error in neither's difference
         if asked.profile is None:
             arm = arm.with_payload(known)  # a profile holds what was mounted already
         found, relative_to = found_in(recording, arm, tare, asked), "profile" if tare is None else "tare"
         note, otherwise = f"the tool was mounted {before} already", -known.phi
     else:
-        both = asked.mass and KnownMass(asked.mass.mass + known.mass, asked.mass.std)  # what was added since the tare
-        found, relative_to = found_in(recording, arm, tare, replace(asked, mass=both)).less(known.phi), "tool"
+        both = asked.known and asked.known.with_tool(known.phi)  # what was added since the tare
+        found, relative_to = found_in(recording, arm, tare, replace(asked, known=both)).less(known.phi), "tool"
+        found = found.with_error(error)
         note, otherwise = (
             f"the tool was mounted {since}: the answer is what was added since, less the tool",
             known.phi,
@@ -142,6 +149,12 @@ def _of_one_payload(
     who = "tare" if tare is not None else "profile"
     note = f"it seems that {note}; the {who} does not tell for sure, the intervals hold the other case, too"
     return answered(found, arm, recording, tared, relative_to, (*notes, note), otherwise, unsure)
+
+
+def _in_frame(arm: Arm, covariance: NDArray[np.float64], frame: str | None) -> NDArray[np.float64]:
+    """A covariance (10, 10) of phi about the arm's payload frame, from another."""
+    T = np.column_stack([arm.in_frame(InertialParameters(e, frame)).phi for e in np.eye(10)])
+    return T @ covariance @ T.T
 
 
 def plausible_tool(tool: InertialParameters, arm: Arm) -> InertialParameters:
@@ -182,7 +195,7 @@ def _check_same_mounted(tare: Recording, arm: Arm, profile: Profile, asked: Aske
     Raises:
         IdentificationError: it carries something else.
     """
-    seen = found_in(tare, arm, None, replace(asked, mass=None, drift=0.0, profile=profile)).estimate
+    seen = found_in(tare, arm, None, replace(asked, known=None, drift=0.0, profile=profile)).estimate
     mass, std = float(seen.phi[0]), float(seen.std[0])
     if abs(mass) > HELD * std:
         raise IdentificationError(

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from armload.arms import Arm
 from armload.identification.thresholds import KNOWN, NOMINAL
 from armload.inertia import NAMES, SHRINK, Z95
-from armload.posterior import KnownMass
+from armload.posterior import KnownCentre, KnownMass
 from armload.posterior.drift import Drift
 from armload.posterior.scales import AnotherArm
 from armload.posterior.tilt import MAY_LEAN, Tilt
@@ -161,11 +161,20 @@ def not_rigid(restlessness: float) -> str:
     )
 
 
-def other_than_weighed(mass: KnownMass, found: float, std: float) -> str:
-    """That the log does not bear the mass that was given."""
+def other_than_given(given: KnownMass | KnownCentre, mean: NDArray[np.float64], covariance: NDArray[np.float64]) -> str:
+    """That the log, which says phi ~ N(mean, covariance), does not bear the mass or the centre that was given."""
+    if isinstance(given, KnownMass):
+        return (
+            f"the mass given, {given.mass:.4g} ± {Z95 * given.std:.2g} kg (95 %), is not what the log says, "
+            f"{mean[0]:.4g} ± {Z95 * np.sqrt(covariance[0, 0]):.2g} kg: check what was weighed and what was mounted at "
+            "the tare"
+        )
+    r = np.array([given.com, mean[1:4] / mean[0]])
+    (x, y, z), (a, b, c) = (1e3 * r).tolist()
     return (
-        f"the mass given, {mass.mass:.4g} ± {Z95 * mass.std:.2g} kg (95 %), is not what the log says, "
-        f"{found:.4g} ± {Z95 * std:.2g} kg: check what was weighed and what was mounted at the tare"
+        f"the centre of mass given, ({x:.0f}, {y:.0f}, {z:.0f}) ± {1e3 * Z95 * given.std:.2g} mm (95 %), is not what "
+        f"the log says, ({a:.0f}, {b:.0f}, {c:.0f}) mm: check the frame that it is given in, what is held, and what "
+        "was mounted at the tare"
     )
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.identification.answer import Identification, body_of, is_removal
+from armload.identification.beside import told
 from armload.identification.found import Found
 from armload.identification.intervals import about_com, intervals, phi_interval
 from armload.identification.notes import (
@@ -20,10 +21,10 @@ from armload.identification.notes import (
     lacking,
     leaning_on_prior,
     not_rigid,
-    other_than_weighed,
+    other_than_given,
 )
 from armload.identification.thresholds import LEANS
-from armload.inertia import HELD, InertialParameters, held, is_consistent, vech
+from armload.inertia import InertialParameters, held, is_consistent, vech
 from armload.inertia import determined as determined_by
 from armload.posterior.restless import RESTLESS
 from armload.recording import Recording
@@ -56,11 +57,13 @@ def answered(
     """
     estimate, before, weak = found.estimate, found.before, payload_prior_std(arm)
     determined = determined_by(estimate.std, before.std if before.used else None, found.weak_std, weak)
-    is_held = held(estimate.phi[0], estimate.std[0], determined[0])
+    alone = found.alone or (estimate.phi, estimate.covariance)  # what is given does not tell whether anything is held
+    is_held = held(float(alone[0][0]), float(np.sqrt(alone[1][0, 0])), bool(determined[0]))
     leaning = np.zeros(10, dtype=bool)
     if found.weak_std is not None:
         leaning = determined & (found.weak_std > LEANS * estimate.std)
-        leaning[0] = leaning[0] and found.mass is None  # what was weighed rests on the scale
+    if found.known is not None:  # what was given is known, whatever the log tells, and does not rest on the prior
+        determined, leaning = told(determined, found.known, estimate.std, before), leaning & ~found.known.which
     phi = body_of(estimate, determined[0], found.exchanged)
     low, high = phi_interval(phi, estimate.phi, estimate.std, determined, before, otherwise)
     if unsure is not None:
@@ -96,6 +99,7 @@ def answered(
         **found_of._asdict(),
         rests_on_prior=~determined | leaning,
         torque_gain_std=found.gain_std,
+        gain_known=found.gain_known,
         notes=tuple(every_note),
         log=Path(recording.source).name,
         date=datetime.now(UTC).isoformat(timespec="seconds"),
@@ -139,10 +143,10 @@ def _doubt(found: Found, arm: Arm, mass_determined: bool, relative_to: str) -> s
         return changed
     if found.restlessness > RESTLESS:
         return not_rigid(found.restlessness)
-    if found.mass is not None and found.mass_alone is not None:
-        mean, std = found.mass_alone
-        if abs(found.mass.mass - mean) > HELD * np.hypot(found.mass.std, std):
-            return other_than_weighed(found.mass, mean, std)
+    if found.known is not None and found.alone is not None:
+        denied = found.known.denied(*found.alone)
+        if denied is not None:
+            return other_than_given(denied, *found.alone)
     if found.strange_links and relative_to in ("arm", "tool"):  # a tare tells what the links are
         return another_model(arm.name, found.strange_links)
     if found.offset_ratio:

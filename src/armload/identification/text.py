@@ -125,7 +125,8 @@ def rests_on(result: Identification) -> str:
     """What ± means, the method, and how much of a log it saw."""
     why = f" ({result.why})" if result.why else ""
     scale = result.torque_gain_std
-    known = "" if scale is None else f" for a torque scale known to {100 * scale:.1g} %"
+    how = "known" if result.gain_known else "assumed to be right"
+    known = "" if scale is None else f" for a torque scale {how} to {100 * scale:.1g} %"
     return (
         f"± is half of the 95 % interval, {result.interval}{known}; method {result.method}{why}, "
         f"{result.n_samples} samples, {result.duration:.2f} s"

@@ -24,7 +24,7 @@ from armload.measuring.interruption import held_back
 from armload.measuring.plan import APPROACH, BACK, EMPTY, LOADED, TO_START, Plan, plan_of
 from armload.motion import Motion
 from armload.online import OnlineIdentifier
-from armload.posterior import KnownMass, Profile
+from armload.posterior import Known, KnownCentre, KnownMass, Profile
 from armload.recording import Recording, Sample, read_recording
 
 ENOUGH = "the accuracy asked for is reached"
@@ -68,6 +68,7 @@ class Procedure:
         tare_age: how old that is [s]; None: by the logs' clocks.
         profile: what many logs said of this arm.
         mass: of the payload, where it was weighed: 3 sigma more is what the movements are checked with.
+        com: its centre of mass, where that is known.
         method: of the identification.
         accuracy: the loaded run ends when it is reached; None: with the motion.
         floor, boxes, approach: see `plan_of`.
@@ -92,6 +93,7 @@ class Procedure:
         tare_age: float | None = None,
         profile: Profile | None = None,
         mass: KnownMass | None = None,
+        com: KnownCentre | None = None,
         method: str | Path | None = None,
         accuracy: Accuracy | None = None,
         floor: float | None = 0.0,
@@ -101,7 +103,9 @@ class Procedure:
         say: Callable[[str], None] = lambda _: None,
     ) -> None:
         self.mover, self.arm, self.motion, self.empty_motion = mover, arm, motion, empty_motion
-        self.folder, self.tare, self.tare_age, self.mass, self.method = Path(folder), tare, tare_age, mass, method
+        self.folder, self.tare, self.tare_age, self.method = Path(folder), tare, tare_age, method
+        self.mass, self.com = mass, com
+        self._known = Known.of(mass, com)
         self.accuracy, self.thresholds, self._say = accuracy, thresholds or Thresholds(), say
         self.profile = profile
         heaviest = None if mass is None else mass.mass + 3.0 * mass.std
@@ -147,7 +151,7 @@ class Procedure:
         finally:
             identifier.close()
         self._say("identifying")
-        known = {"mass": self.mass, "profile": self.profile, "method": self.method}
+        known = {"mass": self.mass, "com": self.com, "profile": self.profile, "method": self.method}
         answer = identify(loaded, self.arm, tare=tare, tare_age=self.tare_age, **known)
         reached = None
         if self.accuracy is not None:
@@ -230,7 +234,7 @@ class Procedure:
         estimate = identifier.update(*sample)
         if not look or self.accuracy is None or estimate.settling or estimate.n_samples == 0:
             return False
-        return self.accuracy.reached(estimate, self.mass)
+        return self.accuracy.reached(estimate, self._known)
 
 
 def _kept(log: Path | None) -> str:

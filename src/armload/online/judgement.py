@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 from armload.arms import Arm
 from armload.estimators import Estimate, Identifier
 from armload.identification.answer import body_of
+from armload.identification.beside import told
 from armload.identification.intervals import Before
 from armload.inertia import determined, held, held_probability
+from armload.online.beside import denied_by, taken_by
 from armload.online.concluding import doubts_of
 from armload.online.learning import change_of_arm
 from armload.online.thresholds import STANDS
@@ -94,7 +96,8 @@ class Judgement:
             moving: whether the arm moves. stands: whether what was seen lately says nothing new, as it stands.
         """
         std, before = estimate.std, self.before
-        self.determined = determined(std, before.std if before.used else None, run.weak_std, self._weak)
+        by_samples = determined(std, before.std if before.used else None, run.weak_std, self._weak)
+        self.determined = told(by_samples, taken_by(run), std, before)
         self.held = held(float(estimate.phi[0]), float(std[0]), bool(self.determined[0]))
         self.p_held = held_probability(float(estimate.phi[0]), float(std[0]), float(self._weak[0]))
         notes = []
@@ -105,4 +108,6 @@ class Judgement:
             notes.append(_STANDING_MOTOR if motor else _STANDING)
         if (changed := change_of_arm(run, relative_to)) is not None:
             notes.append(changed)
+        if self.held and (denied := denied_by(run)) is not None:
+            notes.append(denied)
         self.notes = tuple(notes)

@@ -18,6 +18,7 @@ import numpy as np
 from armload.arms import Arm
 from armload.errors import IdentificationError
 from armload.estimators import Estimate, Identifier
+from armload.identification.beside import know
 from armload.identification.choice import choose
 from armload.identification.intervals import Before
 from armload.online.estimate import OnlineEstimate
@@ -30,7 +31,7 @@ from armload.online.restoring import load_identifier, save_identifier
 from armload.online.step import mass_step
 from armload.online.thresholds import MOVING, RECENT
 from armload.online.watch import PayloadWatch
-from armload.posterior import PosteriorLeastSquares, Profile
+from armload.posterior import Known, PosteriorLeastSquares, Profile
 from armload.posterior.map import PUBLISH
 from armload.recording import Recording, Sample
 from armload.regression import payload_prior_std
@@ -51,9 +52,12 @@ class OnlineIdentifier:
             added since.
         method: a name of the catalogue, or a trained model's file; None: the most trustworthy for the arm.
         profile: what many logs said of this arm; estimates are of what was added since.
+        known: of a payload, beside the stream; taken where something is held, and only while the samples do not deny
+            that this is it, which `notes` says then.
 
     Raises:
-        ArmloadError: an unknown method, a model of another arm, or a tare that is none of this arm.
+        ArmloadError: an unknown method, or one that cannot use what is known, a model of another arm, or a tare that is
+            none of this arm.
     """
 
     def __init__(
@@ -62,10 +66,12 @@ class OnlineIdentifier:
         tare: Recording | None = None,
         method: str | Path | None = None,
         profile: Profile | None = None,
+        known: Known | None = None,
     ) -> None:
         self.arm, self.tare, self.profile, self._tared = arm, tare, profile, tare is not None
         choice = choose(arm, tare, method, live=True, profile=profile)
         self._engine = first = choice.identifier
+        know(first, known)
         self._watch = PayloadWatch(first) if isinstance(first, PosteriorLeastSquares) else None
         self.method = self.engine.name
         self._gate = Gate(arm)
@@ -195,21 +201,25 @@ class OnlineIdentifier:
         arm: Arm,
         method: str | Path | None = None,
         profile: Profile | None = None,
+        known: Known | None = None,
     ) -> Self:
         """An identifier in the state that was saved.
 
         Args:
             path: what `save` wrote. arm, method, profile: what the identifier was made with; a tare is in the state.
+            known: of payloads from now on.
 
         Raises:
             IdentificationError: the file is none, or of another arm or trained model.
         """
-        new = cls(arm, method=method, profile=profile)
+        new = cls(arm, method=method, profile=profile, known=known)
         try:
             saved = load_identifier(path, arm, new.method, new._engine)
         finally:
             new.close()
         new.__dict__.update(saved)
+        for run in [new._engine] if new._watch is None else new._watch.runs:
+            know(run, known)
         return new
 
     def _identify(self, sample: Sample) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from armload.errors import PayloadError
 from armload.inertia import InertialParameters, is_consistent
 from armload.payloads import solids
+from armload.payloads.uncertainty import Uncertainty
 
 _WATER = 1000.0  # [kg/m³]
 INERTIA_ASSUMED = "the inertia is not given: that of a ball as dense as water about the centre of mass is taken"
@@ -69,6 +70,7 @@ class Payload:
         parameters: phi about the origin and in the axes of the arm's payload frame.
         boxes: what it looks like, if known; pictures only, the parameters are what counts.
         inertia_known: False where only mass and centre of mass are known, and the inertia is `without_inertia`'s.
+        uncertainty: how well the rest is known.
 
     Raises:
         PayloadError: no body can have these parameters.
@@ -78,6 +80,7 @@ class Payload:
     parameters: InertialParameters
     boxes: tuple[Box, ...] = ()
     inertia_known: bool = True
+    uncertainty: Uncertainty = field(default_factory=Uncertainty)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "boxes", tuple(self.boxes))

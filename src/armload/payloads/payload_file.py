@@ -3,18 +3,19 @@
     {"format": "armload-payload/1", "name": "hand", "frame": "panda_link8",
      "phi": [m, m·rx, m·ry, m·rz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz],
      "mass": 0.73, "com": [x, y, z], "inertia_com": [[...], [...], [...]],
-     "boxes": [{"size": [x, y, z], "centre": [x, y, z], "mass": 0.73}]}
+     "boxes": [{"size": [x, y, z], "centre": [x, y, z], "mass": 0.73}],
+     "std": {"mass": 0.01, "com": 0.002, "inertia": 0.1}}
 
 phi or the three (mass, com, inertia_com) are enough, SI units; phi is about the frame's origin, inertia_com about the
-centre of mass. Of what only mass and com are known, the inertia is assumed (`Payload.without_inertia`), and users of it
-say so. Everything else is optional and unknown keys are ignored, so that the JSON result of an identification
-reads as the payload it found.
+centre of mass. std says how well they are known (`Uncertainty`): a drawing is never quite what was built. Of what only
+mass and com are known, the inertia is assumed (`Payload.without_inertia`), and users of it say so. Everything else is
+optional and unknown keys are ignored, so that the JSON result of an identification reads as the payload it found.
 """
 
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from armload.atomic import replacing
 from armload.errors import ArmloadError, PayloadError
 from armload.inertia import NAMES, InertialParameters
 from armload.payloads.payload import Box, Payload, require_consistent
+from armload.payloads.uncertainty import Uncertainty
 
 FORMAT = "armload-payload/1"
 _TRIPLE = ("mass", "com", "inertia_com")
@@ -59,7 +61,8 @@ def payload_from(content: dict[str, Any], path: str | Path) -> Payload:
                 f"payload file {path} has the inertia of a body {reach:.3g} m wide about its centre of mass (radius of "
                 f"gyration): expected at most {_WIDEST:g} m; is it in kg·m²?"
             )
-        return Payload(_text(content, "name", path) or path.stem, parameters, _boxes(content, path))
+        name, std = _text(content, "name", path) or path.stem, _uncertainty(content, path)
+        return Payload(name, parameters, _boxes(content, path), uncertainty=std)
     except PayloadError:
         raise
     except ArmloadError as error:  # a matrix that is not symmetric, say: name the file
@@ -74,7 +77,7 @@ def _without_inertia(content: dict[str, Any], path: Path) -> Payload:
     made = Payload.without_inertia(
         _text(content, "name", path) or path.stem, float(mass), com, _text(content, "frame", path)
     )
-    return replace(made, boxes=_boxes(content, path))
+    return replace(made, boxes=_boxes(content, path), uncertainty=_uncertainty(content, path))
 
 
 def write_payload(path: str | Path, payload: Payload) -> None:
@@ -97,6 +100,8 @@ def write_payload(path: str | Path, payload: Payload) -> None:
         content |= {"com": p.com.tolist(), "inertia_com": p.inertia_com.tolist()}
     if not payload.inertia_known:
         del content["phi"], content["inertia_com"]
+    if payload.uncertainty != Uncertainty():
+        content["std"] = asdict(payload.uncertainty)
     if payload.boxes:
         content["boxes"] = [{"size": b.size, "centre": b.centre, "mass": b.mass} for b in payload.boxes]
     try:
@@ -217,6 +222,19 @@ def _text(content: dict[str, Any], key: str, path: Path) -> str | None:
     if value is not None and not isinstance(value, str):
         raise PayloadError(f"payload file {path}: {key} is {json.dumps(value)[:80]}, expected text")
     return value
+
+
+def _uncertainty(content: dict[str, Any], path: Path) -> Uncertainty:
+    said = content.get("std")
+    if said is None:
+        return Uncertainty()
+    names = {"mass", "com", "inertia"}
+    if not isinstance(said, dict) or not set(said) <= names:
+        raise PayloadError(
+            f"payload file {path}: std is {json.dumps(said)[:80]}, expected an object with some of mass [kg], com [m] "
+            "and inertia (a share)"
+        )
+    return Uncertainty(**{key: float(_numbers(value, (), f"std of {key}", path)) for key, value in said.items()})
 
 
 def _boxes(content: dict[str, Any], path: Path) -> tuple[Box, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from armload.inertia.cholesky import inverse
 from armload.kernels import kernel
 from armload.posterior.calibration import Calibration
 from armload.posterior.evidence import Evidence
-from armload.posterior.known_mass import KnownMass
+from armload.posterior.known import Known
 from armload.posterior.map import PosteriorLeastSquares
 from armload.posterior.model_file import HybridModel
 from armload.posterior.payload_prior import MixturePrior
@@ -31,6 +32,9 @@ _REMOVED = 0.1
 # how likely it is, beforehand, that something was taken off and something else put on: as likely. The difference is no
 # body. Sound logs leave it at 0.03 (median), and below 0.5 (`benchmarks/wrong_logs.py`)
 _EXCHANGED = 0.1
+# of the density of the log, were it a body: an exchange that is likelier than that is not excluded by the log, whatever
+# was likely beforehand, and the intervals hold it, too. Odds of 20 to 1, as of an interval of 95 %, a convention
+_EXCLUDED = 0.05
 
 
 class HybridIdentifier(PosteriorLeastSquares):
@@ -110,12 +114,25 @@ class HybridIdentifier(PosteriorLeastSquares):
     def _answer(self, elapsed: float, concluded: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         self._trusted = self.model.calibration.trusted(self.evidence(elapsed))
         tool = self.arm.attached is not None or self.stream.without_tare
-        how = (self._trusted, self.model.calibration, self._payloads, tool, not concluded)
-        phi, covariance, self.exchanged = answer(*how)
-        if self.known_mass is None:
-            return phi, covariance
-        self.mass_alone = float(phi[0]), float(np.sqrt(covariance[0, 0]))
-        return answer(*how, self.known_mass)[:2]
+        found = answer(self._trusted, self.model.calibration, self._payloads, tool, not concluded, self.known)
+        self.exchanged, self.alone, self.taken = found.exchanged, found.alone, found.taken
+        return found.phi, found.covariance
+
+
+class Answer(NamedTuple):
+    """phi (10,), a body that can exist or what such a body left behind, and its covariance with calibrated widths.
+
+    exchanged: whether one body was rather exchanged for another: then phi is the difference of two, and need be no
+        body.
+    alone: mean and covariance of what the log alone says, where something is known beside. taken: whether phi rests on
+        that, too.
+    """
+
+    phi: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    exchanged: bool
+    alone: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    taken: bool = False
 
 
 def answer(
@@ -124,15 +141,14 @@ def answer(
     payloads: MixturePrior,
     tool: bool,
     quick: bool = False,
-    known: KnownMass | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], bool]:
-    """phi (10,), a body that can exist or what such a body left behind, its covariance with calibrated widths, and
-    whether one body was rather exchanged for another: then phi is the difference of two, and need be no body.
+    known: Known | None = None,
+) -> Answer:
+    """What evidence and prior say together.
 
     `trusted`: evidence as far as it can be trusted (`Calibration.trusted`). `tool`: whether the arm counts with one,
     which may not be there, as something may have been taken off since a tare. `quick`: the body is found in bounded
-    time, to a hundredth of a standard deviation, and nobody asks about an exchange. `known`: the mass, where it was
-    weighed.
+    time, to a hundredth of a standard deviation, and nobody asks about an exchange. `known`: what is known of the
+    payload beside the log.
     """
     vectors = np.array([trusted.vector, -trusted.vector] if trusted.kind > 0 or tool else [trusted.vector])
     found, *removed = payloads.posteriors(trusted.information, vectors)
@@ -140,23 +156,34 @@ def answer(
     if removed and removed[0].log_evidence + np.log(_REMOVED) > found.log_evidence:
         found, sign = removed[0], -1.0
     differences, exchanged = None if quick or trusted.kind == 0 else payloads.differences, 0.0
+    other = None
     if differences is not None:
         other = differences.posterior(trusted.information, sign * trusted.vector)
+        excluded = other.log_evidence - found.log_evidence < np.log(_EXCLUDED)
         found, exchanged = found.or_else(other, _EXCHANGED)
+        other = None if excluded else (other.mean, calibration.widened(other, trusted))
     mean, covariance = found.mean, calibration.widened(found, trusted)
     if not quick:
         covariance = holding(covariance, 0, found.mass_if_any - found.mean[0])
+    alone = given = None
     if known is not None:
-        mean, covariance = known.given(sign * mean, covariance)
-        mean = sign * mean
+        alone = sign * mean, covariance
+        given = known.given(*alone)
+        if given is not None:
+            mean, covariance = sign * given[0], given[1]
+            told = other and known.given(sign * other[0], other[1])
+            other = told and (sign * told[0], told[1])
+    beside = alone, given is not None
     if quick:
-        return sign * near_consistent(mean, inverse(covariance)), covariance, False
+        return Answer(sign * near_consistent(mean, inverse(covariance)), covariance, False, *beside)
     if exchanged > 0.5:
-        return sign * mean, covariance, True
+        return Answer(sign * mean, covariance, True, *beside)
     body = nearest_body(mean, covariance)
     if exchanged > _EXCHANGED:  # likelier than before the log: it may be no body, and its interval holds what was found
         covariance = covariance + np.outer(mean - body, mean - body)
-    return sign * body, covariance, False
+    if other is not None:
+        covariance = holding_both(covariance, other[0] - body, other[1])
+    return Answer(sign * body, covariance, False, *beside)
 
 
 def holding(covariance: NDArray[np.float64], i: int, aside: float) -> NDArray[np.float64]:
@@ -168,6 +195,19 @@ def holding(covariance: NDArray[np.float64], i: int, aside: float) -> NDArray[np
     half = Z95 * float(np.sqrt(covariance[i, i]))
     by = np.ones(len(covariance))
     by[i] = 1.0 + abs(aside) / half
+    return covariance * np.outer(by, by)
+
+
+def holding_both(
+    covariance: NDArray[np.float64], aside: NDArray[np.float64], other: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """A covariance (10, 10) whose 95 % intervals hold those of another answer, too, `aside` (10,) of this one.
+
+    other: the covariance (10, 10) of that answer. Each interval reaches |aside| + 1.96 of its standard deviations at
+    least; the correlations stay.
+    """
+    own, reach = np.sqrt(np.diag(covariance)), np.abs(aside) / Z95 + np.sqrt(np.diag(other))
+    by = np.maximum(reach / own, 1.0)
     return covariance * np.outer(by, by)
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from armload.arms import Arm, rated_effort
 from armload.estimators import ArmMismatch, Estimate, Identifier
 from armload.posterior.evidence import Evidence
-from armload.posterior.known_mass import KnownMass
+from armload.posterior.known import Known
 from armload.posterior.profile import Profile
 from armload.posterior.same_motion import SameMotion
 from armload.posterior.scales import Posterior, Scales
@@ -63,8 +63,9 @@ class PosteriorLeastSquares(Identifier):
     test_tare = (
         True  # whether an answer asks if arm and gravity are as they were said to be; episodes of a training do not
     )
-    known_mass: KnownMass | None = None  # of the payload, where it was weighed
-    mass_alone: tuple[float, float] | None = None  # what the log alone says of it then, and its standard deviation [kg]
+    known: Known | None = None  # of the payload, beside the log
+    alone: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None  # what the log alone says then
+    taken = False  # whether the last answer rests on what is known, too
     exchanged = False  # whether the last answer is rather the difference of two bodies, one put on for another
     _traits_frame: NDArray[np.float64] | None = None  # see `Evidence.of`: they are about the estimate's own frame
 
@@ -179,10 +180,11 @@ class PosteriorLeastSquares(Identifier):
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """phi and covariance from the stream as it stands, `elapsed` seconds after the run began."""
         phi, covariance = self.stream.answer()
-        if self.known_mass is None:
+        if self.known is None:
             return phi, covariance
-        self.mass_alone = float(phi[0]), float(np.sqrt(covariance[0, 0]))
-        return self.known_mass.given(phi, covariance)
+        self.alone, given = (phi, covariance), self.known.given(phi, covariance)
+        self.taken = given is not None
+        return given or self.alone
 
     # ------------------------------------------------------------------ what the answer rests on
 

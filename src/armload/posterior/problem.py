@@ -13,6 +13,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from armload.arms import Arm
 from armload.posterior.elimination import RunInformation, eliminated
 from armload.posterior.scales import Posterior, Scales
 from armload.posterior.sequential import SequentialPosterior
@@ -34,6 +35,15 @@ GAIN_STD = {"link": 0.005, "motor": 0.02}
 # [effort limits] prior rms of a joint's smooth functions of pose and of velocity: 0.2–0.6 % of two Pandas is left after
 # links, offsets and friction (`regression.features`); and the weight of these figures, in observations
 _POSE, _VELOCITY, _FEATURE_COUNT = 3e-3, 2e-3, 20.0
+
+
+def assumed_gain(arm: Arm, torque: str) -> float:
+    """Relative standard deviation of the torque's scale, before a known weight tells it (`torque_gain`).
+
+    torque: the side it seems to be measured on, "link" or "motor"; the arm's own figure is of the side of its sensors.
+    """
+    own = torque == ("motor" if arm.motor_torque else "link")
+    return arm.torque_gain_std if own and arm.torque_gain_std is not None else GAIN_STD[torque]
 
 
 def of_mounted(prior: NDArray[np.float64], mass: float, variance: float) -> NDArray[np.float64]:
@@ -221,7 +231,7 @@ class Problem:
         else:
             before = np.linalg.inv(self.root @ self.root.T)
             pull = before @ self.mean[self.last]
-        gain = self.correction.gain_std or GAIN_STD[torque]
+        gain = self.correction.gain_std or assumed_gain(self.correction.arm, torque)
         return Posterior(
             phi=phi,
             covariance=self.noise_model.overrated * covariance + gain**2 * np.outer(phi, phi),

@@ -22,7 +22,7 @@ from armload.arms import Arm, rated_effort
 from armload.errors import IdentificationError
 from armload.inertia import HELD, Z95
 from armload.posterior.elimination import RunInformation, eliminated
-from armload.posterior.problem import GAIN_STD, Problem
+from armload.posterior.problem import Problem, assumed_gain
 from armload.posterior.profile import Profile
 from armload.posterior.profile_session import log_data
 from armload.posterior.scales import Scales
@@ -32,7 +32,7 @@ from armload.regression import Correction, payload_prior_std, solution_prior_std
 from armload.regression.lag import GAIN
 from armload.regression.noise import SMOOTH
 
-# times what is expected of a sensor of its side (`GAIN_STD`) that a joint's gain may be off, 1 sigma: a joint whose
+# times what is expected of a sensor of its side (`assumed_gain`) that a joint's gain may be off, 1 sigma: a joint whose
 # sensor is far off is what a known weight is hung on for. A stated prior
 _WIDE = 6.0
 _STEPS = 3
@@ -62,7 +62,7 @@ def with_known_weight(profile: Profile, arm: Arm, log: Recording, mass: float, s
     with threads().limit(limits=1):
         found = solve(runs, wide, None, SMOOTH, 3, profile.scales)
         phi, mass_std = found.phi, float(np.sqrt(found.covariance[0, 0]))
-        side = GAIN_STD[found.torque]
+        side = assumed_gain(arm, found.torque)
         if abs(phi[0] - mass) > HELD * np.hypot(mass_std, _WIDE * side * mass):
             raise IdentificationError(
                 f"{log.source} carries {phi[0]:.4g} ± {Z95 * mass_std:.2g} kg by the profile: expected the weight of "

@@ -21,7 +21,7 @@ from armload.errors import IdentificationError, SourceError
 from armload.inertia import Z95, InertialParameters
 from armload.online import OnlineEstimate, OnlineIdentifier
 from armload.online.learning import change_of_arm
-from armload.posterior import Profile
+from armload.posterior import Known, Profile
 from armload.recording import Recording, Sample
 from armload.service.history import History
 from armload.service.plausible import Plausibility
@@ -45,7 +45,7 @@ class Session:
 
     Args:
         source: closed with the session.
-        arm: the bare arm, or with a tool that is known. tare: an earlier log of it. method, profile: see
+        arm: the bare arm, or with a tool that is known. tare: an earlier log of it. method, profile, known: see
             `OnlineIdentifier`. identifier: one that goes on, made with these.
         warn: called with each warning on the stream, also with the error it ended with in a thread (`start`).
 
@@ -68,8 +68,9 @@ class Session:
         warn: Callable[[str], None] | None = None,
         profile: Profile | None = None,
         identifier: OnlineIdentifier | None = None,
+        known: Known | None = None,
     ) -> None:
-        self.source, self.arm, self.tare, self.profile = source, arm, tare, profile
+        self.source, self.arm, self.tare, self.profile, self._known = source, arm, tare, profile, known
         # what was held while the tare was recorded; None: nobody knows
         self._tared = InertialParameters.zero(arm.frame) if tare is None else None
         self._identifier = self._made(tare, method) if identifier is None else identifier
@@ -268,7 +269,7 @@ class Session:
 
     def _made(self, tare: Recording | None, method: str | Path | None) -> OnlineIdentifier:
         # an arm's model computes in a memory of its own, which two threads must not share
-        return OnlineIdentifier(replace(self.arm), tare, method, self.profile)
+        return OnlineIdentifier(replace(self.arm), tare, method, self.profile, self._known)
 
     def _write(self, text: str) -> None:
         self.log.write(self._t, text)

@@ -10,7 +10,7 @@ from typing import NoReturn
 from armload.errors import UsageError
 
 # options whose value may begin with a minus sign: argparse would take "-1,0,-9.7" for an option
-_SIGNED = ("--gravity", "--from", "--box", "--floor", "--centre")
+_SIGNED = ("--gravity", "--from", "--box", "--floor", "--centre", "--com")
 COLUMNS = 'names and units of columns, such as "t=time,q=joint_pos_{i},t_unit=ms", or a TOML file'
 AS_NAMED = "none"  # as SPEC: nothing is said of the columns
 
@@ -147,16 +147,46 @@ def weighed(text: str) -> tuple[float, float]:
     return mass, std
 
 
-def add_tare_and_mass_arguments(parser: argparse.ArgumentParser) -> None:
-    """`--tare-age` and `--mass`."""
+def centre(text: str) -> tuple[tuple[float, ...], float]:
+    """A centre of mass and its standard deviation along each axis [m].
+
+    >>> centre("0,-0.012,0.06±0.002"), centre("0,0,0.1+-0.01")
+    (((0.0, -0.012, 0.06), 0.002), ((0.0, 0.0, 0.1), 0.01))
+    """
+    parts = re.split("±|\\+/?-", text)
+    try:
+        place, spread = parts
+        com, std = tuple(float(part) for part in place.split(",")), float(spread)
+    except ValueError:
+        com, std = (), 0.0
+    if len(com) != 3:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a centre of mass: expected x,y,z in metres and their standard deviation, such as "
+            "0,0,0.060±0.002 (or 0,0,0.060+-0.002)"
+        )
+    return com, std
+
+
+def add_tare_age_argument(parser: argparse.ArgumentParser) -> None:
+    """`--tare-age`."""
     parser.add_argument(
         "--tare-age",
         type=duration,
         metavar="TIME",
         help="how old the tare is, such as 1d or 8h: the arm may have changed (default: by the logs' clocks)",
     )
+
+
+def add_known_arguments(parser: argparse.ArgumentParser) -> None:
+    """`--mass` and `--com`."""
     parser.add_argument(
         "--mass", type=weighed, metavar="M±S", help="of the payload, where it was weighed [kg], with its 1 sigma"
+    )
+    parser.add_argument(
+        "--com",
+        type=centre,
+        metavar="X,Y,Z±S",
+        help="its centre of mass, where that is known [m], about the payload frame, with the 1 sigma of each axis",
     )
 
 

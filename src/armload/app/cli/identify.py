@@ -9,7 +9,8 @@ from armload.app.cli.arguments import (
     add_arm_arguments,
     add_column_arguments,
     add_identifier_arguments,
-    add_tare_and_mass_arguments,
+    add_known_arguments,
+    add_tare_age_argument,
     add_tool_and_topic_arguments,
     file_name,
 )
@@ -26,6 +27,7 @@ examples:
   armload identify run.csv --robot panda --tare yesterday.csv --tare-age 1d
   armload identify run.csv --robot panda --profile arm.profile       (an arm that knows itself: armload profile)
   armload identify run.csv --robot panda --mass 1.200±0.002         (weighed: what is left is found better)
+  armload identify run.csv --robot panda --com 0,0,0.06±0.003       (the centre of mass of a drawing, [m])
   armload identify bag/ --robot ur10e --tare empty/ --compensated set.json   (torque without gravity)
   armload identify run.csv --robot panda --out payload.json         (the answer as JSON, usable as --tool later)
   armload identify run.csv --robot panda --tool franka-hand --to franka    (what the controller reads)
@@ -48,7 +50,8 @@ def parser() -> Parser:
     parser.add_argument("log", type=file_name, metavar="LOG", help="log of a motion with the payload")
     add_arm_arguments(parser)
     add_identifier_arguments(parser)
-    add_tare_and_mass_arguments(parser)
+    add_tare_age_argument(parser)
+    add_known_arguments(parser)
     add_tool_and_topic_arguments(parser)
     parser.add_argument("--tare-topic", metavar="T", help="that of the tare's bag, where it is another one")
     parser.add_argument(
@@ -101,6 +104,7 @@ def run(options: argparse.Namespace) -> None:
             tare_age=options.tare_age,
             tool=tool,
             mass=options.mass,
+            com=options.com,
             profile=options.profile,
             method=options.method,
             progress=say,

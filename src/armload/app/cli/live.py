@@ -10,6 +10,7 @@ from armload.app.cli.arguments import (
     add_arm_arguments,
     add_column_arguments,
     add_identifier_arguments,
+    add_known_arguments,
     add_tool_and_topic_arguments,
     at_least,
     file_name,
@@ -31,6 +32,7 @@ examples:
   armload live panda://172.16.0.2 --tare empty.csv --headless | tee estimates.jsonl
   armload live panda://172.16.0.2 --profile arm.profile --learn
   armload live panda://172.16.0.2 --tool franka-hand
+  armload live panda://172.16.0.2 --mass 1.200±0.002      (taken where something is held that may be it)
   armload live 'ur://192.168.0.10?torque_constants=12,12,10,11,11,11' --robot ur10e
   armload live ros2:///joint_states --robot my_arm.urdf --frame tool0
 
@@ -61,6 +63,7 @@ def parser() -> Parser:
     )
     add_arm_arguments(parser, required=False)
     add_identifier_arguments(parser)
+    add_known_arguments(parser)
     add_tool_and_topic_arguments(parser)
     add_column_arguments(parser)
     add("--headless", action="store_true", help="no page: one JSON object per line on stdout")
@@ -101,7 +104,7 @@ def run(options: argparse.Namespace) -> int | None:
     """Identify until the source ends (--headless) or somebody interrupts; 2 after an error."""
     from armload.app.cli.headless import lines
     from armload.devices import Detached, open_source
-    from armload.posterior import load_profile
+    from armload.posterior import Known, load_profile
     from armload.recording import ColumnSpec, check_own_measurements, has_topics
     from armload.service.session import Session
 
@@ -131,7 +134,9 @@ def run(options: argparse.Namespace) -> int | None:
     if isinstance(source, Detached) and "://" in options.source:
         source = _reopened(source, options, arm)
     with source:
-        session = Session(source, arm, tare, options.method, _warn, profile)
+        session = Session(
+            source, arm, tare, options.method, _warn, profile, known=Known.of(options.mass, options.com, if_held=True)
+        )
         try:
             if not options.headless:
                 return _serve(session, options)

@@ -36,7 +36,7 @@ def run(options: argparse.Namespace) -> int | None:
     from armload.excitation import Accuracy
     from armload.measuring import Procedure
     from armload.measuring.plan import APPROACH
-    from armload.posterior import KnownMass, load_profile
+    from armload.posterior import KnownCentre, KnownMass, load_profile
 
     options.robot = options.robot or robot_of(options.source)
     bare = arm_of(options)
@@ -48,6 +48,7 @@ def run(options: argparse.Namespace) -> int | None:
     motion = None if options.motion is None else _motion(options.motion, arm)
     accuracy = None if options.until is None else Accuracy.read(options.until)
     mass = None if options.mass is None else KnownMass(*options.mass)
+    com = None if options.com is None else KnownCentre(*options.com)
     mounted = tool if options.mounted in (None, "nothing") else payload_of(options.mounted, arm)
     if tool is not None and options.mounted is not None:
         raise UsageError("--tool is what is on at the empty run, and so is --mounted: give one of them")
@@ -70,6 +71,7 @@ def run(options: argparse.Namespace) -> int | None:
             tare_age=options.tare_age,
             profile=profile,
             mass=mass,
+            com=com,
             method=options.method,
             accuracy=accuracy,
             floor=options.floor,

@@ -8,7 +8,8 @@ from armload.app.cli.arguments import (
     Parser,
     add_arm_arguments,
     add_column_arguments,
-    add_tare_and_mass_arguments,
+    add_known_arguments,
+    add_tare_age_argument,
     at_least,
     file_name,
 )
@@ -64,7 +65,8 @@ def parser() -> Parser:
     add(
         "--tare", type=file_name, metavar="LOG0", help="a log of the empty arm: no empty run, the payload is on already"
     )
-    add_tare_and_mass_arguments(parser)
+    add_tare_age_argument(parser)
+    add_known_arguments(parser)
     add("--profile", type=file_name, metavar="P", help="what many logs said of this arm (armload profile)")
     add(
         "--tool",

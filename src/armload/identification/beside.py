@@ -1,0 +1,43 @@
+"""What is known of a payload beside the log, and what that makes of an answer; for logs and streams."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.errors import IdentificationError
+from armload.estimators import Identifier
+from armload.identification.intervals import Before
+from armload.inertia import determined as determined_by
+from armload.posterior import Known, PosteriorLeastSquares
+
+
+def know(identifier: Identifier, known: Known | None) -> None:
+    """Tell an identifier what is known of the payload.
+
+    Raises:
+        IdentificationError: its method can use nothing of the kind.
+    """
+    if isinstance(identifier, PosteriorLeastSquares):
+        identifier.known = known
+    elif known is not None:
+        raise IdentificationError(
+            f"the method {identifier.name} cannot use a known mass or centre: leave --mass and --com out, or use "
+            "hybrid, map-gp or map"
+        )
+
+
+def told(
+    determined: NDArray[np.bool_], known: Known | None, std: NDArray[np.float64], before: Before
+) -> NDArray[np.bool_]:
+    """Which parameters (10,) the log or what is known determines.
+
+    Args:
+        determined: by the log alone (10,). known: what an answer rests on, too. std: of the answer (10,).
+        before: what was known of any payload.
+    """
+    if known is None:
+        return determined
+    given = determined_by(std, before.std if before.used else None) & known.which
+    given[1:4] &= given[0] | determined[0]
+    return determined | given

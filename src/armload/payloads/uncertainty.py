@@ -1,0 +1,62 @@
+"""How well a tool is known: a covariance of phi from what is said of its mass, its centre and its inertia.
+
+To first order, with m, r, I_c independent and δ their errors,
+
+    δ(m·r) = r·δm + m·δr,    δI = δI_c + ([r]²_×)·δm + m·δ([r]²_×),    [r]²_× = rᵀ·r·1 − r·rᵀ
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.errors import PayloadError
+from armload.inertia import InertialParameters, vech
+
+_STEP = 1e-6  # of a difference quotient: phi is of second degree in r, so that a central one is exact but for rounding
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Standard deviations of what is known of a body; 0: exactly.
+
+    Args:
+        mass: [kg]. com: of each coordinate of the centre of mass [m].
+        inertia: of each moment and product about the centre of mass, as a share of the mean principal moment.
+
+    Raises:
+        PayloadError: a number below zero, or none.
+    """
+
+    mass: float = 0.0
+    com: float = 0.0
+    inertia: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not all(np.isfinite(x) and x >= 0.0 for x in (self.mass, self.com, self.inertia)):
+            raise PayloadError(
+                f"an uncertainty of {self.mass:g} kg, {self.com:g} m and {self.inertia:g} of the inertia: expected "
+                "numbers of 0 or more"
+            )
+
+    def covariance(self, body: InertialParameters) -> NDArray[np.float64]:
+        """Of phi (10, 10), about the frame of the body."""
+        if self == Uncertainty():
+            return np.zeros((10, 10))
+        x = np.r_[body.mass, body.com, vech(body.inertia_com)]
+        std = np.r_[self.mass, [self.com] * 3, [self.inertia * np.trace(body.inertia_com) / 3.0] * 6]
+        columns = []
+        for k, size in enumerate(std):
+            step = np.where(np.arange(10) == k, _STEP, 0.0)
+            columns.append(size * (_phi(x + step) - _phi(x - step)) / (2.0 * _STEP))
+        J = np.column_stack(columns)
+        return J @ J.T
+
+
+def _phi(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """phi (10,) of mass, centre and inertia about it, (10,)."""
+    m, r, (xx, xy, xz, yy, yz, zz) = x[0], x[1:4], x[4:]
+    about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) + m * (r @ r * np.eye(3) - np.outer(r, r))
+    return np.r_[m, m * r, vech(about)]

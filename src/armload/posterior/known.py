@@ -1,0 +1,190 @@
+"""What is known of a payload beside the log: it was weighed, or its centre of mass is that of a drawing.
+
+Each is one more measurement of phi ~ N(mean, C), H·phi = z + N(0, R), so that with S = H·C·Hᵀ + R and K = C·Hᵀ·S⁻¹
+
+    phi given it ~ N(mean + K·(z − H·mean), C − K·S·Kᵀ)
+
+    a mass M ± s [kg]       H = (1, 0 …),          z = M,  R = s²
+    a centre r ± s [m]      H = (−r, 1, 0 …),      z = 0,  R = s²·E[m²]·1      m·(com − r) ~ N(0, (s·m)²) on each axis
+
+An error of the torque's scale, which mass and moments have in common, goes with the error of the mass, and leaves the
+centre alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armload.errors import IdentificationError
+from armload.inertia import HELD
+from armload.inertia.determinacy import LIGHTEST_HELD
+
+# [standard deviations] of a centre's three coordinates: as unlikely of the truth as `HELD` of a mass, 0.27 %
+# (test_three_coordinates_are_as_seldom_denied_as_one_mass)
+FAR = 3.7625
+_FARTHEST = 5.0  # [m] from the frame's origin, of anything an arm holds: beyond, the unit is another
+
+Gaussian = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
+@dataclass(frozen=True)
+class KnownMass:
+    """A weighed mass.
+
+    Args:
+        mass: [kg]. std: its standard deviation [kg].
+
+    Raises:
+        IdentificationError: not finite, or a standard deviation that is not above zero.
+    """
+
+    mass: float
+    std: float
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.mass) and np.isfinite(self.std) and self.std > 0.0):
+            raise IdentificationError(
+                f"a known mass of {self.mass:g} ± {self.std:g} kg: expected a number and a standard deviation above "
+                "zero"
+            )
+
+    def given(self, mean: NDArray[np.float64], covariance: NDArray[np.float64]) -> Gaussian:
+        """phi ~ N(mean, covariance), (10,), (10, 10), given the mass M ± s."""
+        return _given(mean, covariance, np.eye(1, 10), np.array([self.mass]), self.std**2)
+
+    def away(self, mean: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
+        """Standard deviations between it and the mass of phi ~ N(mean, covariance)."""
+        return float(abs(self.mass - mean[0]) / np.hypot(self.std, np.sqrt(covariance[0, 0])))
+
+
+@dataclass(frozen=True)
+class KnownCentre:
+    """A known centre of mass.
+
+    Args:
+        com: (3,) [m] in the payload frame that is asked for. std: its standard deviation along each axis [m].
+
+    Raises:
+        IdentificationError: not three finite numbers in metres, or a standard deviation that is not above zero.
+    """
+
+    com: tuple[float, float, float]
+    std: float
+
+    def __post_init__(self) -> None:
+        com = np.asarray(self.com, dtype=float)
+        if com.shape != (3,) or not (np.all(np.isfinite(com)) and np.isfinite(self.std) and self.std > 0.0):
+            raise IdentificationError(
+                f"a known centre of mass of {self.com} ± {self.std:g} m: expected three numbers and a standard "
+                "deviation above zero"
+            )
+        if np.linalg.norm(com) > _FARTHEST:
+            raise IdentificationError(
+                f"a known centre of mass {np.linalg.norm(com):.3g} m from the payload frame: expected metres; is it in "
+                "millimetres?"
+            )
+        object.__setattr__(self, "com", tuple(com.tolist()))
+
+    @property
+    def _rows(self) -> NDArray[np.float64]:
+        """H (3, 10): H·phi = m·(com − r)."""
+        return np.hstack([-np.array(self.com)[:, None], np.eye(3), np.zeros((3, 6))])
+
+    def _variance(self, mean: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
+        return self.std**2 * float(mean[0] ** 2 + covariance[0, 0])
+
+    def given(self, mean: NDArray[np.float64], covariance: NDArray[np.float64]) -> Gaussian:
+        """phi ~ N(mean, covariance), (10,), (10, 10), given the centre r ± s."""
+        return _given(mean, covariance, self._rows, np.zeros(3), self._variance(mean, covariance))
+
+    def away(self, mean: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
+        """Standard deviations between it and the centre of phi ~ N(mean, covariance), of three degrees of freedom."""
+        H = self._rows
+        between, S = H @ mean, H @ covariance @ H.T + self._variance(mean, covariance) * np.eye(3)
+        return float(np.sqrt(between @ np.linalg.solve(S, between)))
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """All that is known of a payload beside the log.
+
+    Args:
+        mass, com: None: not known.
+        beside: phi (10,) of what is held beside it, a tool say, in an estimate of both.
+        if_held: whether it is taken only where an estimate holds something, and does not deny that this is it: a stream
+            goes on when the payload was put down, or another one taken up.
+    """
+
+    mass: KnownMass | None = None
+    com: KnownCentre | None = None
+    beside: NDArray[np.float64] | None = None
+    if_held: bool = False
+
+    @classmethod
+    def of(
+        cls,
+        mass: KnownMass | tuple[float, float] | None,
+        com: KnownCentre | tuple[ArrayLike, float] | None,
+        if_held: bool = False,
+    ) -> Self | None:
+        """What a caller knows: (mass [kg], its standard deviation), (centre (3,) [m], its standard deviation).
+
+        None: nothing.
+
+        Raises:
+            IdentificationError: see `KnownMass` and `KnownCentre`.
+        """
+        weighed = mass if mass is None or isinstance(mass, KnownMass) else KnownMass(*mass)
+        centre = com if com is None or isinstance(com, KnownCentre) else KnownCentre(*com)  # type: ignore[arg-type]
+        return None if weighed is None and centre is None else cls(weighed, centre, None, if_held)
+
+    def with_tool(self, tool: NDArray[np.float64]) -> Self:
+        """The same of an estimate that holds a tool (10,), too."""
+        return replace(self, beside=tool)
+
+    @property
+    def which(self) -> NDArray[np.bool_]:
+        """Which parameters (10,) it is about; moments are known where centre and mass are."""
+        return np.r_[self.mass is not None, [self.com is not None] * 3, [False] * 6]
+
+    def denied(self, mean: NDArray[np.float64], covariance: NDArray[np.float64]) -> KnownMass | KnownCentre | None:
+        """Which of them phi ~ N(mean, covariance) denies, beyond `HELD` and `FAR`; None: none."""
+        own = self._own(mean)
+        if self.mass is not None and self.mass.away(own, covariance) > HELD:
+            return self.mass
+        return self.com if self.com is not None and self.com.away(own, covariance) > FAR else None
+
+    def given(self, mean: NDArray[np.float64], covariance: NDArray[np.float64]) -> Gaussian | None:
+        """phi ~ N(mean, covariance), (10,), (10, 10), given it; None where that is not taken (`if_held`)."""
+        own = self._own(mean)
+        if self.if_held:
+            least = max(HELD * float(np.sqrt(covariance[0, 0])), LIGHTEST_HELD)
+            if own[0] <= least or self.denied(mean, covariance) is not None:
+                return None
+        for one in (self.mass, self.com):
+            if one is not None:
+                own, covariance = one.given(own, covariance)
+        return mean - self._own(mean) + own, covariance
+
+    def _own(self, mean: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Less what is beside."""
+        return mean if self.beside is None else mean - self.beside
+
+
+def _given(
+    mean: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+    rows: NDArray[np.float64],
+    z: NDArray[np.float64],
+    variance: float,
+) -> Gaussian:
+    """phi ~ N(mean, covariance) given rows·phi = z + N(0, variance·1)."""
+    told = rows @ covariance
+    S = told @ rows.T + variance * np.eye(len(z))
+    K = np.linalg.solve(S, told).T
+    rest = covariance - K @ told
+    return mean + K @ (z - rows @ mean), 0.5 * (rest + rest.T)

@@ -1,0 +1,163 @@
+"""What is known beside a log narrows what is left to be found, and is never taken against the log without a word."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import chi, norm
+
+from armload import arm, identify
+from armload.app.cli.arguments import centre
+from armload.errors import IdentificationError
+from armload.inertia import HELD, Z95
+from armload.lab.episodes import draw_episodes, simulate_episodes
+from armload.posterior import HybridIdentifier
+from armload.posterior.known import FAR, Known, KnownCentre, KnownMass
+
+PHI = np.array([1.2, 0.02, -0.03, 0.1, 8e-3, 1e-4, -2e-4, 9e-3, 1e-4, 3e-3])  # a payload
+COM = (0.02, -0.02, 0.08)
+
+
+def gaussian(seed, scale=1.0):
+    """phi about `PHI`: all ten correlated, the mass known to 2 %."""
+    rng = np.random.default_rng(seed)
+    units = scale * np.array([0.02] + [4e-3] * 3 + [1e-3] * 6)
+    root = rng.normal(size=(10, 10)) * units[:, None] / np.sqrt(10.0)
+    C = root @ root.T
+    return rng.multivariate_normal(PHI, C), C
+
+
+def test_a_gaussian_given_one_of_its_coordinates_is_what_many_draws_near_it_show():
+    rng = np.random.default_rng(5)
+    root = rng.normal(size=(10, 10))
+    mean, C = rng.normal(size=10), root @ root.T
+    known = KnownMass(float(mean[0] + 1.5), 0.3)
+    found, covariance = known.given(mean, C)
+    draws = rng.multivariate_normal(mean, C, size=400_000)
+    weight = np.exp(-0.5 * ((draws[:, 0] - known.mass) / known.std) ** 2)
+    seen = weight @ draws / weight.sum()
+    assert found == pytest.approx(seen, abs=0.05 * np.sqrt(np.diag(C)).max())
+    spread = (weight[:, None] * (draws - seen)).T @ (draws - seen) / weight.sum()
+    assert covariance == pytest.approx(spread, abs=0.05 * np.diag(C).max())
+
+
+def test_phi_given_mass_and_centre_is_the_joint_gaussian_conditioned():
+    """The joint Gaussian of phi, a reading of the scale and three of the drawing, conditioned in information form."""
+    mean, C = gaussian(1)
+    known = Known(KnownMass(1.21, 0.01), KnownCentre(COM, 2e-3))
+    weighed, after = KnownMass(1.21, 0.01).given(mean, C)
+    noise = np.diag([0.01**2] + [2e-3**2 * (weighed[0] ** 2 + after[0, 0])] * 3)
+    H = np.zeros((4, 10))
+    H[0, 0], H[1:, 0], H[1:, 1:4] = 1.0, -np.array(COM), np.eye(3)
+    information = np.linalg.inv(C) + H.T @ np.linalg.inv(noise) @ H
+    read = np.array([1.21, 0.0, 0.0, 0.0])
+    expected = np.linalg.solve(information, np.linalg.solve(C, mean) + H.T @ np.linalg.solve(noise, read))
+    found, covariance = known.given(mean, C)
+    assert found == pytest.approx(expected, rel=1e-8, abs=1e-12)
+    assert covariance == pytest.approx(np.linalg.inv(information), rel=1e-6, abs=1e-14)
+
+
+def test_phi_given_a_centre_is_what_draws_with_that_centre_show():
+    mean, C = gaussian(2)
+    known = KnownCentre(COM, 3e-3)
+    found, covariance = known.given(mean, C)
+    draws = np.random.default_rng(0).multivariate_normal(mean, C, size=400_000)
+    away = draws[:, 1:4] / draws[:, :1] - np.array(COM)
+    weight = np.exp(-0.5 * np.sum((away / known.std) ** 2, axis=1))
+    seen = weight @ draws / weight.sum()
+    std = np.sqrt(np.diag(C))
+    assert np.abs(found - seen).max() < 0.05 * std.max()
+    assert np.all(np.abs(found - seen) < 0.1 * std)
+    spread = (weight[:, None] * (draws - seen)).T @ (draws - seen) / weight.sum()
+    assert np.sqrt(np.diag(covariance)) == pytest.approx(np.sqrt(np.diag(spread)), rel=0.05)
+
+
+def test_an_error_of_the_torques_scale_leaves_a_known_centre_alone():
+    mean, C = gaussian(3, 1e-3)
+    _, covariance = KnownCentre(tuple(mean[1:4] / mean[0]), 1e-3).given(mean, C + 0.05**2 * np.outer(mean, mean))
+    assert np.sqrt(covariance[0, 0]) == pytest.approx(0.05 * mean[0], rel=0.01)
+
+
+def test_what_is_known_is_of_the_payload_and_not_of_the_tool_beside():
+    mean, C = gaussian(4)
+    tool, known = 0.5 * PHI[::-1], Known(KnownMass(1.2, 2e-3), KnownCentre(COM, 1e-3))
+    alone, beside = known.given(mean, C), known.with_tool(tool).given(mean + tool, C)
+    assert beside[0] - tool == pytest.approx(alone[0])
+    assert beside[1] == pytest.approx(alone[1])
+
+
+def test_three_coordinates_are_as_seldom_denied_as_one_mass():
+    assert chi.sf(FAR, 3) == pytest.approx(2.0 * norm.sf(HELD), rel=1e-3)
+
+
+def test_on_a_stream_nothing_is_claimed_of_an_empty_hand_nor_of_another_payload():
+    mean, C = gaussian(5)
+    known = Known(KnownMass(1.2, 2e-3), KnownCentre(COM, 3e-3), if_held=True)
+    assert known.given(mean, C) is not None
+    assert known.given(np.zeros(10), C) is None  # nothing
+    assert known.given(np.zeros(10), 100.0 * C) is None  # nobody knows
+    assert known.given(2.0 * mean, C) is None  # something else
+    elsewhere = mean + np.r_[0.0, 0.1, np.zeros(8)]
+    assert known.given(elsewhere, C) is None
+    assert isinstance(known.denied(2.0 * mean, C), KnownMass)
+    assert isinstance(known.denied(elsewhere, C), KnownCentre)
+
+
+@pytest.mark.full
+def test_a_known_mass_makes_the_moments_better_and_their_intervals_narrower_and_they_hold():
+    panda = arm("panda")
+    better, inside = [], []
+    for log in simulate_episodes(draw_episodes(panda, "untared", 8, seed=17, motions=6)):
+        plain, weighed = HybridIdentifier(panda), HybridIdentifier(panda)
+        weighed.known = Known(KnownMass(log.truth.mass, 1e-3))
+        before, after = plain.run(log.run), weighed.run(log.run)
+        assert abs(after.phi[0] - log.truth.mass) < 5e-3
+        assert np.all(after.std <= before.std * (1 + 1e-9))
+        better.append(np.abs(before.phi - log.truth.phi)[1:4].sum() - np.abs(after.phi - log.truth.phi)[1:4].sum())
+        inside.append(np.abs(after.phi - log.truth.phi)[1:] <= Z95 * after.std[1:])
+    assert np.mean(better) > 0.0
+    assert np.mean(inside) > 0.85
+
+
+@pytest.mark.full
+def test_a_known_centre_makes_the_moments_better_and_their_intervals_narrower_and_they_hold():
+    panda = arm("panda")
+    narrower, better, inside = [], [], []
+    for k, log in enumerate(simulate_episodes(draw_episodes(panda, "untared", 8, seed=18, motions=6))):
+        r = log.truth.com + 2e-3 * np.random.default_rng(k).normal(size=3)
+        before, after = identify(log.run, panda), identify(log.run, panda, com=(r, 2e-3))
+        assert not any("is not what the log says" in note for note in after.notes)
+        half = [0.5 * (x.phi_high - x.phi_low)[1:4] for x in (before, after)]
+        narrower.append(half[1].mean() / half[0].mean())
+        error = [np.abs(x.phi - log.truth.phi)[1:4].mean() for x in (before, after)]
+        better.append(error[0] - error[1])
+        inside.append((after.com_low <= log.truth.com) & (log.truth.com <= after.com_high))
+        inside.append((after.phi_low <= log.truth.phi)[:3] & (log.truth.phi <= after.phi_high)[:3])
+    assert np.median(narrower) < 0.8
+    assert np.mean(better) > 0.0
+    assert np.mean(inside) > 0.85
+
+
+@pytest.mark.parametrize(("mass", "std"), [(np.nan, 0.1), (1.0, 0.0), (1.0, -1.0), (np.inf, 1.0)])
+def test_a_mass_that_is_none_is_refused(mass, std):
+    with pytest.raises(IdentificationError, match="expected a number and a standard deviation above zero"):
+        KnownMass(mass, std)
+
+
+@pytest.mark.parametrize(
+    ("com", "std", "said"),
+    [
+        ((0.0, np.nan, 0.0), 1e-3, "expected three numbers"),
+        ((0.0, 0.0), 1e-3, "expected three numbers"),
+        (COM, 0.0, "above zero"),
+        ((20.0, -20.0, 80.0), 2.0, "is it in millimetres"),
+    ],
+)
+def test_a_centre_that_is_none_is_refused(com, std, said):
+    with pytest.raises(IdentificationError, match=said):
+        KnownCentre(com, std)
+
+
+def test_a_centre_is_read_as_it_is_typed():
+    assert centre("0.02,-0.02,0.08±0.002") == (COM, 0.002)
+    assert centre("-1e-2,0,0.08+-0.01") == ((-0.01, 0.0, 0.08), 0.01)
