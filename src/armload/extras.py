@@ -27,6 +27,7 @@ MODULES = {
     "viser": ("viser", "live"),
     "numba": ("numba", "jit"),
     "rosbags": ("rosbags", "bags"),
+    "mcap": ("mcap", "bags"),
     "ruamel": ("rosbags", "bags"),  # which brings it: YAML
     "pylibfranka": ("pylibfranka", "franka"),
     "panda_py": ("panda-python", "panda"),

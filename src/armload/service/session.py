@@ -17,7 +17,7 @@ from queue import SimpleQueue
 import numpy as np
 
 from armload.arms import Arm
-from armload.devices import Source
+from armload.devices import Recorder, Source
 from armload.errors import IdentificationError, SourceError
 from armload.inertia import Z95, InertialParameters
 from armload.online import Event, OnlineEstimate, OnlineIdentifier
@@ -29,6 +29,7 @@ from armload.service.plausible import Plausibility
 from armload.service.recent import Recent
 
 _AGAIN = 10.0  # [s] between two warnings of samples that cannot be used
+_KEPT = 0.1  # [s] between two estimates of a record: as often as lines come
 TICK = 0.1  # [s] between two looks at a silent source: as often as lines come
 _TARE_LONGEST, _TARE_SHORTEST = 30.0, 3.0  # [s] of what was just seen that a tare is made of
 
@@ -62,6 +63,7 @@ class Session:
         arm: the bare arm, or with a tool that is known. tare: an earlier log of it. method, profile: see
             `OnlineIdentifier`. identifier: one that goes on, made with these.
         warn: called with each warning on the stream, also with the error it ended with in a thread (`start`).
+        recorder: keeps every sample that was taken and what was said of it; closed with the session.
 
     Attributes:
         sample: the newest that could be used. estimate: the newest. None before the first.
@@ -82,9 +84,11 @@ class Session:
         warn: Callable[[str], None] | None = None,
         profile: Profile | None = None,
         identifier: OnlineIdentifier | None = None,
+        recorder: Recorder | None = None,
     ) -> None:
         self.source, self.arm, self.tare, self.profile = source, arm, tare, profile
         self._warn_too = warn or (lambda _: None)
+        self._recorder, self._kept = recorder, -math.inf  # and when it last kept an estimate, on the stream's clock
         # what was held while the tare was recorded; None: nobody knows
         self._tared = InertialParameters.zero(arm.frame) if tare is None else None
         self._identifier = self._made(tare, method) if identifier is None else identifier
@@ -166,6 +170,7 @@ class Session:
             self._doubted()
         if self.estimate is not None:
             self.estimate = self._plausibility.qualified(self._identifier.conclude()).behind(self.source.lag())
+            self._keep(self.estimate, True)
         self._say("the source has ended")
         self.ended = True
 
@@ -194,11 +199,16 @@ class Session:
         if self._thread is not None:
             self._thread.join(5.0)
         self._identifier.close()
+        if self._recorder is not None:
+            self._recorder.close()
 
     def _take(self, sample: Sample) -> OnlineEstimate:
+        if self._recorder is not None:
+            self._recorder.append(sample)
         before, used = self.estimate, self._identifier.health.used
         estimate = self._identifier.update(*sample)
-        if estimate.event is not None and (before is None or estimate.event != before.event):
+        changed = estimate.event is not None and (before is None or estimate.event != before.event)
+        if estimate.event is not None and changed:
             self._log_event(estimate.event)
         usable = estimate.health.used > used
         if usable:
@@ -208,6 +218,7 @@ class Session:
         self._answered = self._plausibility.qualified(estimate)
         estimate = self._answered.behind(self.source.lag())
         self.sample, self.estimate = sample if usable else self.sample, estimate
+        self._keep(estimate, changed)
         if self._trouble or self._identifier.trouble is not None:
             self._report_trouble(self._identifier.trouble)
         if usable and self.history.due(estimate.t):
@@ -215,6 +226,11 @@ class Session:
             known = np.full(10, np.nan) if truth is None else truth.phi
             self.history.append(estimate.t, np.concatenate([estimate.phi, Z95 * estimate.std, known]))
         return estimate
+
+    def _keep(self, estimate: OnlineEstimate, at_once: bool) -> None:
+        if self._recorder is not None and (at_once or abs(estimate.t - self._kept) >= 0.999 * _KEPT):
+            self._recorder.keep(estimate)
+            self._kept = estimate.t
 
     def _doubted(self) -> None:
         doubt = self._plausibility.doubt
@@ -232,6 +248,8 @@ class Session:
 
     def _log_event(self, event: Event) -> None:
         """Add an event to the log; a later, better classification of the same event replaces the first."""
+        if self._recorder is not None:
+            self._recorder.say(str(event))
         entry = Entry(event.t, str(event), event)
         for k, known in enumerate(self.log):
             if known.event is not None and known.event.t == event.t:
@@ -309,6 +327,8 @@ class Session:
 
     def _say(self, text: str, warning: bool = False) -> None:
         self.log.append(Entry(0.0 if self.estimate is None else self.estimate.t, text, warning=warning))
+        if self._recorder is not None and self.error is None:  # the error may be that nothing more can be written
+            self._recorder.say(text, warning)
 
     def _warn(self, text: str) -> None:
         self._say(text, warning=True)
