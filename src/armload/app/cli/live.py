@@ -124,7 +124,8 @@ def run(options: argparse.Namespace) -> int | None:
         check_own_measurements(log, tare)
     # the page takes time from its own process: what runs on the clock is read in another one
     detached = True if not options.headless and options.speed is not None and options.speed <= 1.0 else None
-    told = options.record is not None and options.record.lower().endswith(".mcap")  # with what is said of the samples
+    written = options.record or ""
+    told = written if written.lower().endswith(".mcap") else None  # with what is said of the samples
     source = open_source(
         options.source,
         arm,
@@ -138,7 +139,7 @@ def run(options: argparse.Namespace) -> int | None:
     if isinstance(source, Detached) and "://" in options.source:
         source = _reopened(source, options, arm, None if told else options.record)
     with source:
-        recorder = Recorder(options.record, arm.n, arm.joint_names) if told else None
+        recorder = Recorder(told, arm.n, arm.joint_names) if told else None
         session = Session(source, arm, tare, options.method, _warn, profile, recorder=recorder)
         try:
             if not options.headless:
