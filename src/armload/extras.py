@@ -23,6 +23,7 @@ MODULES = {
     "jinja2": ("jinja2", "lab"),
     "pyarrow": ("pyarrow", "parquet"),
     "distributed": ("distributed", "cluster"),
+    "aiohttp": ("aiohttp", "cluster"),  # logs behind HTTP, through fsspec
     "h5py": ("h5py", "hdf5"),
     "viser": ("viser", "live"),
     "numba": ("numba", "jit"),
