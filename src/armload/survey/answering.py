@@ -10,7 +10,7 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from armload.errors import ArmloadError, EpisodesError, one_line
+from armload.errors import ArmloadError, EpisodesError, RecordingError, one_line
 from armload.identification import identify
 from armload.survey.logs import Log, filesystem
 from armload.survey.rows import UNUSABLE, answered, unusable
@@ -38,7 +38,7 @@ def lost_log(log: Log, key: str) -> dict[str, Any]:
     return _anew(unusable(reason, about))
 
 
-class _Unread(Exception):
+class _Unread(RecordingError):
     """A log that could not be fetched just now, which says nothing of its content."""
 
 
