@@ -22,6 +22,7 @@ OWNERS = {
     "clarabel": set(),  # the tests' oracle
     "trimesh": {"payloads", "app"},
     "rosbags": {"recording"},
+    "mcap": {"recording"},
     "rclpy": {"devices"},
     "sensor_msgs": {"devices"},
     "geometry_msgs": {"devices"},

@@ -62,6 +62,10 @@ class SinkError(ArmloadError, ValueError):
     """A payload that cannot be exported, or must not be written to a robot."""
 
 
+class ClusterError(ArmloadError, ConnectionError):
+    """A cluster that is gone, or that has no worker."""
+
+
 class UsageError(ArmloadError):
     """A command line that cannot be understood."""
 

@@ -23,10 +23,12 @@ MODULES = {
     "jinja2": ("jinja2", "lab"),
     "pyarrow": ("pyarrow", "parquet"),
     "distributed": ("distributed", "cluster"),
+    "aiohttp": ("aiohttp", "cluster"),  # logs behind HTTP, through fsspec
     "h5py": ("h5py", "hdf5"),
     "viser": ("viser", "live"),
     "numba": ("numba", "jit"),
     "rosbags": ("rosbags", "bags"),
+    "mcap": ("mcap", "bags"),
     "ruamel": ("rosbags", "bags"),  # which brings it: YAML
     "pylibfranka": ("pylibfranka", "franka"),
     "panda_py": ("panda-python", "panda"),

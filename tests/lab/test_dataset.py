@@ -13,7 +13,7 @@ from armload.inertia import InertialParameters
 from armload.lab.dataset import build, build_dataset, open_dataset, table_columns
 from armload.motion import random_motion
 from armload.payloads import Payload, container_loadings, random_payloads
-from armload.simulation import Sensors, World, simulate
+from armload.simulation import Sensors, World, simulate, simulate_inverse
 
 ROWS = 40
 PAPER = ["t", "m", "mrx", "mry", "mrz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"]
@@ -92,6 +92,27 @@ def test_every_run_is_what_simulate_gives_for_it(dataset, request_, panda):
         np.testing.assert_array_equal(dataset.y[rows], np.tile(payload.parameters.phi, (ROWS, 1)))
         seen.add((p, m, w))
     assert len(seen) == 12
+
+
+def test_runs_of_the_fast_sampler_are_what_it_gives_and_the_provenance_says_so(dataset, request_, panda, tmp_path):
+    fast = build_dataset(tmp_path / "set", **request_, sampler="inverse")
+    for run in (0, 11):
+        (p,), (m,), (w,) = (np.unique(getattr(fast, name)[fast.run == run]) for name in ("payload", "motion", "world"))
+        payload, motion, world = request_["payloads"][p], request_["motions"][m], request_["worlds"][w]
+        noise = int(np.random.SeedSequence([11, run]).generate_state(1)[0])
+        how = {"world": world, "sensors": request_["sensors"].evenly(), "rate": ROWS / motion.duration, "seed": noise}
+        log = simulate_inverse(panda, motion, [(0.0, payload)], **how)
+        for name in ("t", "q", "dq", "tau"):
+            np.testing.assert_array_equal(getattr(fast.recording(run), name), getattr(log, name))
+    one, other = fast.provenance, dataset.provenance
+    assert {k: v for k, v in one.items() if k not in other} == {"sampler": "inverse", "tracking": 1e-4}
+    assert {k for k in other if one[k] != other[k]} == {"sha256"}
+    np.testing.assert_array_equal(fast.y, dataset.y)
+    assert fast.hash != dataset.hash
+    with pytest.raises(DatasetError, match="made with other sampler"):
+        build_dataset(fast.path, **request_)
+    with pytest.raises(DatasetError, match="no sampler 'mujco': expected mujoco or inverse"):
+        build_dataset(tmp_path / "other", **request_, sampler="mujco")
 
 
 def test_rows_are_evenly_spaced_over_one_period(dataset, request_):

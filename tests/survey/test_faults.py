@@ -12,10 +12,13 @@ from pathlib import Path
 
 import pytest
 
+from armload.lab.cells import load_cells, save_cell
 from armload.motion import random_motion
 from armload.recording import write_recording
 from armload.simulation import simulate_inverse
-from armload.survey import Settings, read_rows, survey
+from armload.survey import Settings, find_logs, read_rows, survey
+from armload.survey.answering import answer_log, lost_log
+from armload.survey.run import cells_of
 
 SETTINGS = Settings("panda", method="map")
 
@@ -61,25 +64,90 @@ def test_logs_in_an_object_store_are_answered_as_those_on_disk_and_once(logs, wh
         store.rm("/cell", recursive=True)
 
 
-def test_logs_behind_a_web_server_are_answered_as_those_on_disk(logs, whole, tmp_path):
+class Web(SimpleHTTPRequestHandler):
+    """Files of a folder; `silent`: says neither when one was changed nor how long it is; `broken`: answers 500."""
+
+    silent = broken = False
+
+    def do_GET(self):
+        if self.broken:
+            self.send_error(500)
+        elif self.silent:
+            self.send_response(200)
+            self.end_headers()
+            self.wfile.write(Path(self.translate_path(self.path)).read_bytes())
+        else:
+            super().do_GET()
+
+    def do_HEAD(self):
+        if self.silent:
+            self.send_response(200)
+            self.end_headers()
+        else:
+            super().do_HEAD()
+
+    def log_message(self, *_):
+        pass
+
+
+@pytest.fixture
+def web(share):
+    """The addresses of the logs behind a web server, and its handler."""
     pytest.importorskip("fsspec")
     pytest.importorskip("aiohttp")
-
-    class Quiet(SimpleHTTPRequestHandler):
-        def log_message(self, *_):
-            pass
-
-    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=str(logs.parent)))
-    thread = threading.Thread(target=server.serve_forever)
+    handler = type("Handler", (Web,), {})
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(handler, directory=str(share.parent)))
+    thread = threading.Thread(target=server.serve_forever, daemon=True)
     thread.start()
     try:
-        urls = [f"http://127.0.0.1:{server.server_port}/arm/{k}.csv" for k in range(3)]
-        found = survey(urls, SETTINGS, tmp_path / "survey.json", jobs=1)
+        yield [f"http://127.0.0.1:{server.server_port}/arm/{k}.csv" for k in range(3)], handler
     finally:
         server.shutdown()
-        thread.join()
         server.server_close()
+        thread.join(30.0)
+
+
+@pytest.mark.parametrize("silent", [False, True], ids=["that says what changed", "that says nothing"])
+def test_logs_behind_a_web_server_are_answered_as_those_on_disk_and_once(web, share, whole, tmp_path, silent):
+    urls, handler = web
+    handler.silent = silent
+    out = tmp_path / "survey.json"
+    found = survey(urls, SETTINGS, out, jobs=1)
     assert answers(found.rows) == answers(whole)
+    assert survey(urls, SETTINGS, out, jobs=1).anew == 0
+    shutil.copy(share / "0.csv", share / "1.csv")
+    again = survey(urls, SETTINGS, out, jobs=1)
+    assert (again.logs, again.anew) == (3, 1)
+    assert answers(again.rows)[1] == answers(whole)[0] | {"date": answers(again.rows)[1]["date"]}
+
+
+def test_a_web_server_that_was_broken_is_asked_again(web, whole, tmp_path):
+    urls, handler = web
+    handler.broken = True
+    found = survey(urls, SETTINGS, tmp_path / "survey.json", jobs=1)
+    assert all("cannot be fetched (ClientResponseError: 500" in row["reason"] for row in found.rows)
+    handler.broken = False
+    again = survey(urls, SETTINGS, tmp_path / "survey.json", jobs=1)
+    assert answers(again.rows) == answers(whole)
+
+
+def test_a_log_whose_process_was_killed_is_asked_again(share, whole, tmp_path):
+    out = tmp_path / "survey.json"
+    survey([str(share)], SETTINGS, out, jobs=1)
+    cell = load_cells(cells_of(out)).popitem()[1]
+    log = next(log for log in find_logs([str(share)]) if log.name == cell["rows"][0]["log"])
+    save_cell(cells_of(out), cell | lost_log(log, cell["key"]))
+    again = survey([str(share)], SETTINGS, out, jobs=1)
+    assert again.anew == 1
+    assert answers(again.rows) == answers(whole)
+
+
+def test_a_log_that_vanishes_before_it_is_read_leaves_no_key(share):
+    log = find_logs([str(share)])[0]
+    stamp, content = log.stamp(), log.content()
+    assert answer_log(log, SETTINGS, "key", stamp, content).get("key") is None
+    Path(log.name).unlink()
+    assert answer_log(log, SETTINGS, "key", stamp, content)["key"] == ""
 
 
 def test_a_full_disk_is_said_and_the_survey_goes_on_from_there(share, whole, tmp_path):

@@ -54,7 +54,7 @@ class Detached(Source):
     Args:
         spec: what to open, see `open_source`.
         arm: whose samples they are.
-        record: a `.csv` file to keep every sample in (`Recorder`), written by the reader's process.
+        record: a `.csv` or `.mcap` file to keep every sample in (`Recorder`), written by the reader's process.
         capacity: samples the ring holds.
         twin: the same source, opened here and never run, where it knows the truth (a simulator).
         options: of `open_source`, as JSON can hold them.

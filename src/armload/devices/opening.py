@@ -65,7 +65,7 @@ def open_source(
     Args:
         spec: see the table.
         arm: whose samples they are.
-        record: a `.csv` file to keep every sample in (`Recorder`).
+        record: a `.csv` or `.mcap` file to keep every sample in (`Recorder`).
         detached: read in a process of its own (`Detached`); None: Franka and UR robots are.
         speed: of a replay or the simulator: 1 real time, None as fast as possible.
         loop: replay again and again.
@@ -118,7 +118,7 @@ def open_source(
     if record is None:
         return source
     try:
-        return Recorded(source, record)
+        return Recorded(source, record, arm.joint_names)
     except BaseException:
         source.close()
         raise

@@ -76,7 +76,9 @@ class _Reader:
                     source = opens(order["spec"], arm, **options)
                 stack.enter_context(source)
                 record = order["record"]
-                recorder = None if record is None else stack.enter_context(Recorder(record, source.n))
+                recorder = None
+                if record is not None:
+                    recorder = stack.enter_context(Recorder(record, source.n, arm.joint_names))
                 threading.Thread(target=self.listen, args=(source, lines), daemon=True).start()
                 self.report(event="ready", name=source.name, n=source.n, rate=source.rate, speed=source.speed)
                 self.pass_on(source, recorder)

@@ -1,8 +1,9 @@
-"""A record of all samples: each goes to the operating system before the next one comes.
+"""A record of all samples, which can be read whatever becomes of the process that writes it.
 
-A record is an ordinary CSV log (`read_recording` reads it) that only ever grows by whole lines. Each line is handed
+As CSV it is an ordinary log (`read_recording` reads it) that only ever grows by whole lines. Each line is handed
 over by itself, so that a process killed at any moment loses nothing that it had seen; a machine that loses its power
-loses what its disk had not written, and the reader drops a last line that was cut off.
+loses what its disk had not written, and the reader drops a last line that was cut off. As MCAP (`mcap_part`) it grows
+by chunks of a second, has room for what is said of the samples, and is read by ROS 2 and Foxglove, too.
 
 A log must be finite and strictly increasing in time. What is not goes to a file beside it: `run.csv` keeps its bad
 samples in `run.bad.jsonl`, one JSON object per line: `why`, and t, q, dq and tau as they came. JSON has no numbers that
@@ -15,25 +16,30 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
+from armload.devices.mcap_part import McapPart
 from armload.devices.source import Source
 from armload.errors import RecordingError
 from armload.inertia import InertialParameters
+from armload.online import OnlineEstimate
 from armload.recording import Sample
 from armload.recording.columns import column_names
+
+RECORDS = (".csv", ".mcap")
 
 
 class Recorder:
     """A log that can be read at any moment, whatever becomes of the process that writes it.
 
     Args:
-        path: a `.csv` file that does not exist yet, nor what may come beside it: nothing is ever written over.
-        n: joints.
+        path: a `.csv` or `.mcap` file that does not exist yet, nor what may come beside it: nothing is ever written
+            over.
+        n: joints. joint_names: of an MCAP.
 
     Attributes:
         kept: samples in the log, all its parts together.
@@ -41,14 +47,18 @@ class Recorder:
         paths: the parts of the log, the first one as named.
 
     Raises:
-        RecordingError: the file exists, is no .csv, or cannot be written.
+        RecordingError: the file exists, is neither, or cannot be written.
     """
 
-    def __init__(self, path: str | Path, n: int) -> None:
+    def __init__(self, path: str | Path, n: int, joint_names: Sequence[str] = ()) -> None:
         self.path = Path(path)
-        if self.path.suffix.lower() != ".csv":
-            raise RecordingError(f"a record is written as CSV: expected a name that ends in .csv, found {self.path}")
-        self.n = n
+        if self.path.suffix.lower() not in RECORDS:
+            raise RecordingError(
+                f"a record is written as CSV or MCAP: expected a name that ends in .csv or .mcap, found {self.path}"
+            )
+        if self.path.suffix.lower() == ".mcap" and len(joint_names) != n:
+            raise RecordingError(f"{self.path}: an MCAP knows joints by name: expected {n}, found {len(joint_names)}")
+        self.n, self._names = n, joint_names
         self.kept = 0
         self.bad = 0
         self.paths: list[Path] = []
@@ -58,7 +68,7 @@ class Recorder:
         for other in (self._path_of_part(2), self._path_of_bad()):  # refused now, not when it is needed
             if other.exists():
                 raise RecordingError(f"{other} exists, and belongs to another record: choose another name than {path}")
-        self._lines = self._next_part()
+        self._part = self._next_part()
 
     def append(self, sample: Sample) -> None:
         """Keep one sample.
@@ -76,16 +86,26 @@ class Recorder:
             anew, self._late = row[0] > self._late, row[0]
             if not anew:
                 return self._refuse(sample, f"not after t = {self._last!r} s")
-            self._lines.close()
-            self._lines = self._next_part()
-        self._lines.append(",".join(map(repr, row)))
+            self._part.close()
+            self._part = self._next_part()
+        self._part.append(row)
         self._last, self._late = row[0], math.inf
         self.kept += 1
         return None
 
+    def keep(self, estimate: OnlineEstimate) -> None:
+        """Keep what is said of the payload; a CSV has no place for it. Raises as `append`."""
+        if isinstance(self._part, McapPart) and self.kept:
+            self._part.keep(estimate)
+
+    def say(self, text: str, warning: bool = False) -> None:
+        """Keep what happened; a CSV has no place for it. Raises as `append`."""
+        if isinstance(self._part, McapPart):
+            self._part.say(text, warning)
+
     def close(self) -> None:
         """Close the files; nothing happens the second time."""
-        self._lines.close()
+        self._part.close()
         if self._bad_lines is not None:
             self._bad_lines.close()
 
@@ -95,12 +115,11 @@ class Recorder:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _next_part(self) -> _Lines:
+    def _next_part(self) -> _CsvPart | McapPart:
         path = self._path_of_part(len(self.paths) + 1)
-        lines = _Lines(path)
-        lines.append(",".join(column_names(self.n)))
+        part = McapPart(path, self._names) if path.suffix.lower() == ".mcap" else _CsvPart(path, self.n)
         self.paths.append(path)
-        return lines
+        return part
 
     def _path_of_part(self, part: int) -> Path:
         return self.path if part == 1 else self.path.with_name(f"{self.path.stem}.{part}{self.path.suffix}")
@@ -121,11 +140,11 @@ class Recorded(Source):
 
     Args:
         source: any source; closed with this one.
-        path: of the log, see `Recorder`.
+        path, joint_names: of the log, see `Recorder`.
     """
 
-    def __init__(self, source: Source, path: str | Path) -> None:
-        self.recorder = Recorder(path, source.n)
+    def __init__(self, source: Source, path: str | Path, joint_names: Sequence[str] = ()) -> None:
+        self.recorder = Recorder(path, source.n, joint_names)
         self.source = source
         self.name, self.n, self.rate, self.speed = source.name, source.n, source.rate, source.speed
 
@@ -155,6 +174,20 @@ def _strict(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
     return value
+
+
+class _CsvPart:
+    """One CSV log of a record."""
+
+    def __init__(self, path: Path, n: int) -> None:
+        self._lines = _Lines(path)
+        self._lines.append(",".join(column_names(n)))
+
+    def append(self, row: list[float]) -> None:
+        self._lines.append(",".join(map(repr, row)))
+
+    def close(self) -> None:
+        self._lines.close()
 
 
 class _Lines:

@@ -21,6 +21,7 @@ from armload.arms import Arm, names_among
 from armload.errors import RecordingError, one_line
 from armload.extras import missing
 from armload.recording.checked import Chunks
+from armload.recording.mcap_file import is_cut_off, mended
 from armload.recording.recording import Recording
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
@@ -49,7 +50,8 @@ def bag_chunks(
     """
     try:
         with ExitStack() as stack:
-            bag = _Bag([stack.enter_context(reader) for reader in _readers(path, where, stack)])
+            notes: list[str] = []
+            bag = _Bag([stack.enter_context(reader) for reader in _readers(path, where, stack, notes)], notes)
             yield from _recordings(bag, _choose(bag, where, arm, topic), where, arm, size)
     except RecordingError:
         raise
@@ -64,11 +66,11 @@ def bag_chunks(
 class _Bag:
     """The JointState topics of a bag, whichever ROS wrote it."""
 
-    def __init__(self, readers: list[Any]) -> None:
+    def __init__(self, readers: list[Any], notes: list[str]) -> None:
         from rosbags.rosbag1 import Reader as Reader1
         from rosbags.typesys import Stores, get_typestore
 
-        self._readers = readers
+        self._readers, self.notes = readers, notes
         connections = [connection for reader in readers for connection in reader.connections]
         self.types = {connection.topic: connection.msgtype for connection in connections}
         self.topics = sorted({c.topic for c in connections if c.msgtype == JOINT_STATE})
@@ -90,7 +92,7 @@ class _Bag:
                 yield _Message(log_time, stamp, tuple(m.name), (m.position, m.velocity, m.effort))
 
 
-def _readers(path: Path, where: str, stack: ExitStack) -> list[Any]:
+def _readers(path: Path, where: str, stack: ExitStack, notes: list[str]) -> list[Any]:
     from rosbags.rosbag1 import Reader as Reader1
     from rosbags.rosbag2 import Reader as Reader2
 
@@ -107,7 +109,18 @@ def _readers(path: Path, where: str, stack: ExitStack) -> list[Any]:
             f"{where} is a folder without metadata.yaml, .db3, .mcap or meta/info.json: expected a log file, or the "
             "folder of a ROS 2 bag or of a LeRobot data set"
         )
-    return [Reader2(_plain_name(part, stack)) for part in parts]
+    return [Reader2(_plain_name(_whole(part, stack, notes), stack)) for part in parts]
+
+
+def _whole(part: Path, stack: ExitStack, notes: list[str]) -> Path:
+    """A file as it is or, of an MCAP whose writer was killed, a copy of all that is whole in it."""
+    if part.suffix.lower() != ".mcap" or not is_cut_off(part):
+        return part
+    copy = mended(part, Path(stack.enter_context(tempfile.TemporaryDirectory())))
+    if copy is None:
+        return part
+    notes.append(f"{part} is cut off: it was read up to the end of its last whole chunk, {copy[1]} messages")
+    return copy[0]
 
 
 def _check_length(path: Path) -> None:
@@ -190,7 +203,7 @@ def _recordings(bag: _Bag, topic: str, where: str, arm: Arm | None, size: int | 
             _refuse_joints(where, f"topic {topic}", arm, sorted({name for names in columns for name in names}))
     if messages:
         yield from chunks.take(*tables.of(messages), joint_names=wanted, epoch=tables.epoch)
-    yield chunks.last(tables.notes)
+    yield chunks.last((*bag.notes, *tables.notes))
 
 
 class _Tables:

@@ -16,7 +16,7 @@ from queue import SimpleQueue
 import numpy as np
 
 from armload.arms import Arm
-from armload.devices import Source
+from armload.devices import Recorder, Source
 from armload.errors import IdentificationError, SourceError
 from armload.inertia import Z95, InertialParameters
 from armload.online import OnlineEstimate, OnlineIdentifier
@@ -28,6 +28,7 @@ from armload.service.plausible import Plausibility
 from armload.service.recent import Recent
 from armload.service.session_log import SessionLog
 
+_KEPT = 0.1  # [s] between two estimates of a record: as often as lines come
 TICK = 0.1  # [s] between two looks at a silent source: as often as lines come
 _TARE_LONGEST, _TARE_SHORTEST = 30.0, 3.0  # [s] of what was just seen that a tare is made of
 
@@ -48,6 +49,7 @@ class Session:
         arm: the bare arm, or with a tool that is known. tare: an earlier log of it. method, profile, known: see
             `OnlineIdentifier`. identifier: one that goes on, made with these.
         warn: called with each warning on the stream, also with the error it ended with in a thread (`start`).
+        recorder: keeps every sample that was taken and what was said of it; closed with the session.
 
     Attributes:
         sample: the newest that could be used. estimate: the newest. None before the first.
@@ -69,8 +71,10 @@ class Session:
         profile: Profile | None = None,
         identifier: OnlineIdentifier | None = None,
         known: Known | None = None,
+        recorder: Recorder | None = None,
     ) -> None:
         self.source, self.arm, self.tare, self.profile, self._known = source, arm, tare, profile, known
+        self._recorder, self._kept = recorder, -math.inf  # and when it last kept an estimate, on the stream's clock
         # what was held while the tare was recorded; None: nobody knows
         self._tared = InertialParameters.zero(arm.frame) if tare is None else None
         self._identifier = self._made(tare, method) if identifier is None else identifier
@@ -78,7 +82,7 @@ class Session:
         self.estimate: OnlineEstimate | None = None
         self._answered: OnlineEstimate | None = None  # the same when its sample had just arrived
         self.history = History(30)
-        self.log = SessionLog(warn)
+        self.log = SessionLog(warn, self._recorded)
         self.ended = False
         self.error: Exception | None = None
         self._orders: SimpleQueue[Callable[[], None]] = SimpleQueue()
@@ -150,6 +154,7 @@ class Session:
             self._doubted()
         if self.estimate is not None:
             self.estimate = self._plausibility.qualified(self._identifier.conclude()).behind(self.source.lag())
+            self._keep(self.estimate, True)
         self._write("the source has ended")
         self.ended = True
 
@@ -178,12 +183,17 @@ class Session:
         if self._thread is not None:
             self._thread.join(5.0)
         self._identifier.close()
+        if self._recorder is not None:
+            self._recorder.close()
 
     def _take(self, sample: Sample) -> OnlineEstimate:
+        if self._recorder is not None:
+            self._recorder.append(sample)
         before, used = self.estimate, self._identifier.health.used
         estimate = self._identifier.update(*sample)
         event = estimate.event
-        if event is not None and (before is None or event != before.event) and self.log.write_event(event):
+        changed = event is not None and (before is None or event != before.event)
+        if event is not None and changed and self.log.write_event(event):
             self._recent.clear()
             self._plausibility.forget()
         usable = estimate.health.used > used
@@ -194,12 +204,22 @@ class Session:
         self._answered = self._plausibility.qualified(estimate)
         estimate = self._answered.behind(self.source.lag())
         self.sample, self.estimate = sample if usable else self.sample, estimate
+        self._keep(estimate, changed)
         self.log.report_trouble(estimate.t, self._identifier.trouble)
         if usable and self.history.due(estimate.t):
             truth = self.truth(estimate.t)
             known = np.full(10, np.nan) if truth is None else truth.phi
             self.history.append(estimate.t, np.concatenate([estimate.phi, Z95 * estimate.std, known]))
         return estimate
+
+    def _keep(self, estimate: OnlineEstimate, at_once: bool) -> None:
+        if self._recorder is not None and (at_once or abs(estimate.t - self._kept) >= 0.999 * _KEPT):
+            self._recorder.keep(estimate)
+            self._kept = estimate.t
+
+    def _recorded(self, text: str, warning: bool) -> None:
+        if self._recorder is not None and self.error is None:  # the error may be that nothing more can be written
+            self._recorder.say(text, warning)
 
     def _doubted(self) -> None:
         doubt = self._plausibility.doubt

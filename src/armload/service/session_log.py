@@ -34,12 +34,15 @@ class SessionLog:
     ['method map']
 
     Args:
-        warn: called with each warning.
+        warn: called with each warning. record: called with each entry's text, and whether it is a warning.
     """
 
-    def __init__(self, warn: Callable[[str], None] | None = None) -> None:
+    def __init__(
+        self, warn: Callable[[str], None] | None = None, record: Callable[[str, bool], None] | None = None
+    ) -> None:
         self._entries: deque[Entry] = deque(maxlen=_KEPT)
         self._warn_too = warn or (lambda _: None)
+        self._record = record or (lambda _, __: None)
         self._in_trouble = False  # whether unusable samples were reported
         self._warned = -float("inf")  # and when it last was, on the stream's clock
 
@@ -55,15 +58,18 @@ class SessionLog:
     def write(self, t: float, text: str) -> None:
         """Something happened at t [s]."""
         self._entries.append(Entry(t, text))
+        self._record(text, False)
 
     def warn(self, t: float, text: str) -> None:
         """Something is wrong at t [s]."""
         self._entries.append(Entry(t, text, warning=True))
+        self._record(text, True)
         self._warn_too(text)
 
     def write_event(self, event: Event) -> bool:
         """A change of payload; whether it is new: a better classification of the same event replaces the first."""
         entry = Entry(event.t, str(event), event)
+        self._record(entry.text, False)
         for k, known in enumerate(self._entries):
             if known.event is not None and known.event.t == event.t:
                 self._entries[k] = entry

@@ -10,10 +10,10 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from armload.errors import ArmloadError, EpisodesError, one_line
+from armload.errors import ArmloadError, EpisodesError, RecordingError, one_line
 from armload.identification import identify
 from armload.survey.logs import Log, filesystem
-from armload.survey.rows import answered, unusable
+from armload.survey.rows import UNUSABLE, answered, unusable
 from armload.survey.settings import Settings
 from armload.version import __version__
 
@@ -22,15 +22,37 @@ def answer_log(log: Log, settings: Settings, key: str, stamp: str, content: str)
     """The cell of a log: its rows, and what is known of its content (`Log.stamp`, `Log.content`)."""
     about = {"log": log.name, "arm": log.arm, "episode": log.episode, "version": __version__, "key": key}
     with threadpool_limits(limits=1):  # sums of several threads have another order: the same numbers on any machine
-        rows = _rows(log, settings, about)
+        try:
+            rows = _rows(log, settings, about)
+        except _Unread as error:
+            return _anew(unusable(str(error), about))
+    if stamp and len(rows) == 1 and rows[0]["status"] == UNUSABLE and not _stayed(log, stamp):
+        return _anew(rows[0])
     return {"rows": rows, "stamp": stamp, "content": content}
 
 
 def lost_log(log: Log, key: str) -> dict[str, Any]:
-    """The cell of a log whose worker ended again and again; without a stamp, so that it is tried anew next time."""
+    """The cell of a log whose worker ended again and again; it is tried anew next time."""
     about = {"log": log.name, "arm": log.arm, "episode": log.episode, "version": __version__, "key": key}
     reason = f"{log.name}: the process that worked on it was killed each time: too little memory for so large a log?"
-    return {"rows": [unusable(reason, about)], "stamp": "", "content": ""}
+    return _anew(unusable(reason, about))
+
+
+class _Unread(RecordingError):
+    """A log that could not be fetched just now, which says nothing of its content."""
+
+
+def _stayed(log: Log, stamp: str) -> bool:
+    """Whether a log is there still, and as it was."""
+    try:
+        return log.stamp() == stamp
+    except (OSError, ValueError):
+        return False
+
+
+def _anew(row: dict[str, Any]) -> dict[str, Any]:
+    """The cell of a log that is tried again next time: no key is this one."""
+    return {"rows": [row], "key": "", "stamp": "", "content": ""}
 
 
 def _rows(log: Log, settings: Settings, about: dict[str, Any]) -> list[dict[str, Any]]:
@@ -43,6 +65,8 @@ def _rows(log: Log, settings: Settings, about: dict[str, Any]) -> list[dict[str,
                 for episode in error.episodes:
                     of_each += _of_episode(log, settings, path, about | {"episode": episode})
                 return of_each
+    except _Unread:
+        raise
     except Exception as error:
         return [unusable(_reason(error), about)]
 
@@ -91,5 +115,9 @@ def _here(log: Log) -> Iterator[Path]:
     fs, path = filesystem(log.name)
     with tempfile.TemporaryDirectory() as folder:
         local = Path(folder) / PurePosixPath(path).name
-        fs.get_file(path, str(local))
+        try:
+            fs.get_file(path, str(local))
+        except Exception as error:  # each store's package has its own
+            why = f"{type(error).__name__}: {one_line(error)}"
+            raise _Unread(f"{log.name} cannot be fetched ({why}): the next run of the survey tries it again") from None
         yield local

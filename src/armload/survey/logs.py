@@ -10,16 +10,18 @@ import glob
 import hashlib
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import IO, Any
 
 from armload.errors import ArmloadError, UsageError
 from armload.recording import LOG_SUFFIXES, data_set_episodes, is_data_set
 
 _URL = re.compile(r"[a-z][a-z0-9+.-]*://")
 _WILD = re.compile(r"[*?\[]")
+_VALIDATORS = ("ETag", "Content-MD5", "Digest", "Last-Modified")  # of a file behind HTTP: all that fsspec keeps
 _BLOCK = 1 << 20  # bytes that are hashed at a time
 
 
@@ -42,10 +44,14 @@ class Log:
         return is_url(self.name)
 
     def stamp(self) -> str:
-        """What changes with the content and is known without reading it: sizes and times, or the store's own key."""
+        """What changes with the content and is known without reading it: sizes and times, or the store's own key.
+
+        Raises:
+            OSError: a file or an object is not there, or its store does not answer.
+        """
         if self.remote:
             fs, path = filesystem(self.name)
-            return str(fs.ukey(path))
+            return _of_web(fs, path) if _is_web(fs) else str(fs.ukey(path))
         seen = [(str(file), (about := file.stat()).st_size, about.st_mtime_ns) for file in self.files]
         return hashlib.sha256(repr(seen).encode()).hexdigest()
 
@@ -78,10 +84,33 @@ def filesystem(url: str) -> tuple[Any, str]:
     except ImportError as error:
         raise UsageError(
             f"{url}: object stores are read through fsspec, and {error.name or 'a package of the store'} is missing: "
-            "pip install fsspec, and the store's package (s3fs, gcsfs, adlfs)"
+            "pip install fsspec, and the store's package (aiohttp of a web server, s3fs, gcsfs, adlfs)"
         ) from None
     except ValueError as error:
         raise UsageError(f"{url}: {error}") from None
+
+
+def _is_web(fs: Any) -> bool:
+    return "http" in ((fs.protocol,) if isinstance(fs.protocol, str) else fs.protocol)
+
+
+def _of_web(fs: Any, url: str) -> str:
+    """What a web server says of a file's content (RFC 9110, 8.8), as fsspec takes it to stay for ever (`ukey`).
+
+    From a server that says nothing, the file is read.
+    """
+    about = fs.info(url)
+    if said := {name: about[name] for name in _VALIDATORS if about.get(name)}:
+        return hashlib.sha256(repr((url, about["size"], said)).encode()).hexdigest()
+    with fs.open(url, block_size=0) as stream:  # as it comes: such a server may know no ranges
+        return _digest(stream)
+
+
+def _digest(stream: IO[bytes]) -> str:
+    digest = hashlib.sha256()
+    while block := stream.read(_BLOCK):
+        digest.update(block)
+    return digest.hexdigest()
 
 
 def file_hash(file: Path) -> str:
@@ -92,11 +121,8 @@ def file_hash(file: Path) -> str:
 
 @lru_cache(maxsize=4096)
 def _hash(file: Path, _size: int, _time: int) -> str:
-    digest = hashlib.sha256()
     with file.open("rb") as stream:
-        while block := stream.read(_BLOCK):
-            digest.update(block)
-    return digest.hexdigest()
+        return _digest(stream)
 
 
 def find_logs(paths: Sequence[str], arm_of: str | None = None, without: Sequence[Path] = ()) -> list[Log]:
@@ -155,14 +181,22 @@ def _expanded(paths: Sequence[str]) -> Iterator[str]:
                 raise UsageError(f"the list {path[1:]} cannot be read: {error}") from None
             yield from _expanded([line.strip() for line in lines if line.strip() and not line.startswith("#")])
         elif is_url(path):
-            fs, inside = filesystem(path)
-            there = fs.glob(inside) if _WILD.search(inside) else fs.find(inside) if fs.isdir(inside) else [inside]
-            suffixes = tuple(LOG_SUFFIXES)
-            yield from (fs.unstrip_protocol(one) for one in there if one == inside or one.lower().endswith(suffixes))
+            yield from _of_store(*filesystem(path))
         elif _WILD.search(path) and not Path(path).exists():
             yield from sorted(glob.glob(path, recursive=True))
         else:
             yield path
+
+
+def _of_store(fs: Any, inside: str) -> Iterator[str]:
+    suffixes = tuple(LOG_SUFFIXES)
+    there = [inside]
+    if _WILD.search(inside):
+        there = fs.glob(inside)
+    elif not inside.lower().endswith(suffixes):  # to ask a web server whether it is a folder fetches it
+        with suppress(Exception):  # of the store's package: the row of what is named will say why
+            there = fs.find(inside) if fs.isdir(inside) else there
+    yield from (fs.unstrip_protocol(one) for one in there if one == inside or one.lower().endswith(suffixes))
 
 
 def _units(path: str, hidden: set[Path]) -> Iterator[tuple[str, int | None, tuple[Path, ...]]]:

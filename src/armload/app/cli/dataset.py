@@ -51,6 +51,13 @@ def parser() -> Parser:
         default=True,
         help="sensors as measured on real robots, or ideal ones (default: --noise)",
     )
+    add(
+        "--sampler",
+        choices=("mujoco", "inverse"),
+        default="mujoco",
+        help="how runs come about: simulated under a controller, or by inverse dynamics with a drawn tracking error, "
+        "a hundred times faster (default: mujoco)",
+    )
     add_cluster_argument(parser)
     add("--seed", type=at_least(0), default=0, metavar="N", help="of noise and random payloads")
     return parser
@@ -82,5 +89,6 @@ def run(options: argparse.Namespace) -> None:
         seed=options.seed,
         progress=sys.stderr.isatty(),
         cluster=options.cluster,
+        sampler=options.sampler,
     )
     print(f"{options.out}: {dataset}")

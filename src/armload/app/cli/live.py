@@ -29,6 +29,7 @@ examples:
   armload live                                            (a simulated Panda whose payload comes and goes)
   armload live run.csv --robot panda --speed 2 --loop
   armload live fr3://172.16.0.2 --record today.csv
+  armload live panda://172.16.0.2 --headless --record today.mcap          (samples, estimates, events: for Foxglove)
   armload live panda://172.16.0.2 --tare empty.csv --headless | tee estimates.jsonl
   armload live panda://172.16.0.2 --profile arm.profile --learn
   armload live panda://172.16.0.2 --tool franka-hand
@@ -79,7 +80,12 @@ def parser() -> Parser:
         action="store_true",
         help="add what the stream shows of the empty arm to the file of --profile, when it ends",
     )
-    add("--record", type=file_name, metavar="FILE.csv", help="keep every sample in a log that does not exist yet")
+    add(
+        "--record",
+        type=file_name,
+        metavar="FILE.csv|.mcap",
+        help="keep every sample in a log that does not exist yet; as MCAP with the estimates and events",
+    )
     add(
         "--speed",
         type=lambda text: None if text == "max" else at_least(0.01, float)(text),
@@ -103,7 +109,7 @@ def parser() -> Parser:
 def run(options: argparse.Namespace) -> int | None:
     """Identify until the source ends (--headless) or somebody interrupts; 2 after an error."""
     from armload.app.cli.headless import lines
-    from armload.devices import Detached, open_source
+    from armload.devices import Detached, Recorder, open_source
     from armload.posterior import Known, load_profile
     from armload.recording import ColumnSpec, check_own_measurements, has_topics
     from armload.service.session import Session
@@ -121,10 +127,12 @@ def run(options: argparse.Namespace) -> int | None:
         check_own_measurements(log, tare)
     # the page takes time from its own process: what runs on the clock is read in another one
     detached = True if not options.headless and options.speed is not None and options.speed <= 1.0 else None
+    written = options.record or ""
+    told = written if written.lower().endswith(".mcap") else None  # with what is said of the samples
     source = open_source(
         options.source,
         arm,
-        record=options.record,
+        record=None if told else options.record,
         detached=detached,
         speed=options.speed,
         loop=options.loop,
@@ -132,11 +140,11 @@ def run(options: argparse.Namespace) -> int | None:
         columns=columns if of_log and not (has_topics(options.source) and options.tare is not None) else None,
     )
     if isinstance(source, Detached) and "://" in options.source:
-        source = _reopened(source, options, arm)
+        source = _reopened(source, options, arm, None if told else options.record)
     with source:
-        session = Session(
-            source, arm, tare, options.method, _warn, profile, known=Known.of(options.mass, options.com, if_held=True)
-        )
+        recorder = Recorder(told, arm.n, arm.joint_names) if told else None
+        known = Known.of(options.mass, options.com, if_held=True)
+        session = Session(source, arm, tare, options.method, _warn, profile, known=known, recorder=recorder)
         try:
             if not options.headless:
                 return _serve(session, options)
@@ -149,14 +157,14 @@ def run(options: argparse.Namespace) -> int | None:
                 _learn(session, options.profile)
 
 
-def _reopened(first: Detached, options: argparse.Namespace, arm: Arm) -> Reconnecting:
+def _reopened(first: Detached, options: argparse.Namespace, arm: Arm, kept: str | None) -> Reconnecting:
     """A robot that is opened again when it is lost; each connection has a record of its own."""
     from armload.devices import Detached
     from armload.service import Reconnecting
     from armload.service.arm_process import next_free
 
     def opens() -> Detached:
-        record = None if options.record is None else next_free(options.record)
+        record = None if kept is None else next_free(kept)
         return Detached(options.source, arm, record=record)
 
     return Reconnecting(opens, first, _warn)

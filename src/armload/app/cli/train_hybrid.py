@@ -46,7 +46,7 @@ def run(options: argparse.Namespace) -> None:
     began = time.perf_counter()
     with episodes_shown() as progress, engine(jobs, options.cluster) as on:
         model, coverage = train_hybrid(
-            robot, episodes=episodes, seed=options.seed, folder=work, jobs=on.jobs, progress=progress
+            robot, episodes=episodes, seed=options.seed, folder=work, progress=progress, on=on
         )
     model.save(out)
     report = {

@@ -16,9 +16,11 @@ from armload.errors import DatasetError
 from armload.motion import Motion, MotionFingerprint
 from armload.payloads import Payload
 from armload.simulation import Sensors, World
+from armload.simulation.inverse import TRACKING
 from armload.version import package_versions
 
 FORMAT = "armload data set 1"
+SAMPLERS = ("mujoco", "inverse")  # how runs come about: `simulate`, `simulate_inverse`
 PROVENANCE_FILE = "provenance.json"
 TABLE_FILE = "table.parquet"
 _PACKAGES = ("armload", "mujoco", "numpy", "pin", "scipy")  # whose versions can change a simulated number
@@ -32,8 +34,10 @@ def provenance_of(
     sensors: Sensors | None,
     rows_per_run: int,
     seed: int,
+    sampler: str = SAMPLERS[0],
 ) -> dict[str, Any]:
     """The provenance of a data set to be built; `sha256` is None until it is finished."""
+    how = {} if sampler == SAMPLERS[0] else {"sampler": sampler, "tracking": TRACKING}  # those of before say nothing
     return {
         "format": FORMAT,
         "arm": {
@@ -55,6 +59,7 @@ def provenance_of(
         "worlds": [{"name": world.name, "seed": world.seed, "fingerprint": world.fingerprint} for world in worlds],
         "sensors": None if sensors is None else {f.name: _plain(getattr(sensors, f.name)) for f in fields(sensors)},
         "rows_per_run": rows_per_run,
+        **how,
         "seed": seed,
         "versions": package_versions(*_PACKAGES),
         "sha256": None,

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from armload.arms import Arm, link_fingerprint, rated_mass
 from armload.errors import ModelError
 from armload.lab.cells import key_of
+from armload.lab.engine import Engine
 from armload.lab.episodes import LIGHTEST, POPULATIONS, TOOL_SHARE, Episode, draw_episodes
 from armload.lab.training.calibrating import fit_calibration
 from armload.lab.training.coverage import FOLDS, Coverage, cross_validated
@@ -51,6 +52,7 @@ def train_hybrid(
     jobs: int = 1,
     population: str = "broad",
     progress: Callable[[int, int], None] | None = None,
+    on: Engine | None = None,
 ) -> tuple[HybridModel, Coverage]:
     """Train the learned parts for an arm on simulated episodes only.
 
@@ -62,6 +64,7 @@ def train_hybrid(
         jobs: processes; the model does not depend on it.
         population: that the episodes are drawn from.
         progress: called as progress(done, total).
+        on: where else episodes are simulated, as of `armload.lab.engine.engine`.
 
     Returns:
         the model, with all that its file says of it, and the coverage of its kind on episodes held out
@@ -72,7 +75,7 @@ def train_hybrid(
     """
     if episodes < 8 * FOLDS:
         raise ModelError(f"{episodes} episodes asked for: expected at least {8 * FOLDS}")
-    records = episode_records(arm, population, episodes, seed, Path(folder) if folder else None, jobs, progress)
+    records = episode_records(arm, population, episodes, seed, Path(folder) if folder else None, jobs, progress, on)
     prior = payload_mixture(arm, seed)
     checked = cross_validated(records, prior, seed)
     model = HybridModel(
@@ -122,6 +125,7 @@ def episode_records(
     folder: Path | None = None,
     jobs: int = 1,
     progress: Callable[[int, int], None] | None = None,
+    on: Engine | None = None,
 ) -> Records:
     """What a training rests on: evidence and truth of its episodes. Arguments as of `train_hybrid`."""
     parts: list[Records] = []
@@ -137,7 +141,7 @@ def episode_records(
                 if progress is not None:
                     progress(first + done, episodes)
 
-            part = measure_episodes(drawn, jobs=jobs, progress=tell)
+            part = measure_episodes(drawn, jobs=jobs, on=on, progress=tell)
             if path is not None:
                 part.save(path)
         parts.append(replace(part, episode=part.episode + first))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from armload.atomic import replacing
 from armload.errors import ModelError
+from armload.lab.engine import Engine
 from armload.lab.episodes import Episode, simulate_episodes
 from armload.posterior import Evidence, SmoothPosteriorLeastSquares
 from armload.recording import Recording
@@ -88,31 +90,39 @@ def measure_episodes(
     *,
     times: Sequence[float] = TIMES,
     jobs: int = 1,
+    on: Engine | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Records:
     """Simulate episodes and put each through the physics, with its tare and, as if there were none, without.
 
     Args:
         times: [s] since a run began, at which evidence is taken.
-        jobs: processes; the records do not depend on it.
+        jobs: processes; the records do not depend on it. on: where else they run, as of `armload.lab.engine.engine`.
         progress: called as progress(done, total).
+
+    Raises:
+        ModelError: the process of some episodes was killed each time.
     """
-    from joblib import Parallel, delayed
+    firsts = range(0, len(episodes), _BATCH)
+    parts: dict[int, Records] = {}
 
-    batches = [(k, episodes[k : k + _BATCH]) for k in range(0, len(episodes), _BATCH)]
-    parallel: Any = Parallel  # its annotations are narrower than what it takes
-    run = parallel(n_jobs=jobs, batch_size=1, return_as="generator")
-    parts: list[Records] = []
-    done = 0
-    for part, count in run(delayed(_measured)(first, batch, tuple(times)) for first, batch in batches):
-        parts.append(part)
-        done += count
+    def missing() -> Iterator[tuple[int, Sequence[Episode]]]:
+        return ((k, episodes[k : k + _BATCH]) for k in firsts if k not in parts)
+
+    for (first, _), part in (on or Engine(jobs)).each(partial(_measured, times=tuple(times)), missing):
+        if part is None:
+            raise ModelError(
+                f"the process that simulated episodes {first} and following was killed each time: expected it to end; "
+                "run it with fewer --jobs, or on workers with more memory"
+            )
+        parts[first] = part
         if progress is not None:
-            progress(done, len(episodes))
-    return Records.joined(parts)
+            progress(min(_BATCH * len(parts), len(episodes)), len(episodes))
+    return Records.joined([parts[first] for first in firsts])
 
 
-def _measured(first: int, batch: Sequence[Episode], times: tuple[float, ...]) -> tuple[Records, int]:
+def _measured(item: tuple[int, Sequence[Episode]], times: tuple[float, ...]) -> Records:
+    first, batch = item
     rows: list[tuple[Evidence, NDArray, int, str]] = []
     for k, (episode, logs) in enumerate(zip(batch, simulate_episodes(batch), strict=True), start=first):
         tool = 0.0 if episode.tool is None else episode.tool.parameters.phi
@@ -124,7 +134,7 @@ def _measured(first: int, batch: Sequence[Episode], times: tuple[float, ...]) ->
     evidence = [row[0] for row in rows]
     columns = {f.name: np.array([getattr(e, f.name) for e in evidence]) for f in fields(Evidence)}
     truth, number, group = (np.array([row[k] for row in rows]) for k in (1, 2, 3))
-    return Records(**columns, truth=truth, episode=number, group=group), len(batch)
+    return Records(**columns, truth=truth, episode=number, group=group)
 
 
 def evidence_over_time(arm: Any, run: Recording, tare: Recording | None, times: Sequence[float]) -> list[Evidence]:
