@@ -49,6 +49,7 @@ class ArmProcess:
         self.settings, self.every, self._reader = settings, every, None
         self._told = self._saved = -float("inf")
         self._kept: float | None = None  # when the state was last saved or taken up, by the wall's clock
+        self._continued = False  # whether it goes on from a state
         self._failed: str | None = None  # why it could not be saved
         self._line = threading.Lock()
         self.arm = self._made_arm()
@@ -103,7 +104,8 @@ class ArmProcess:
     def _tell(self, session: Session, now: float) -> None:
         self._told = now
         source, estimate = self.source, session.estimate
-        link = Link(source.state, source.why, source.connections, source.resumed, source.heard)
+        connections = source.connections + self._continued  # since it was saved the payload may have been exchanged
+        link = Link(source.state, source.why, connections, source.resumed, source.heard)
         why = why_unknown(estimate, link, now, session.trouble, session.doubt)
         if estimate is None and _compiling.is_set() and source.state == "streaming":
             why = Why(Unknown.COMPILING, COMPILING)
@@ -159,7 +161,7 @@ class ArmProcess:
         if kept is not None and kept.exists():
             try:
                 identifier = OnlineIdentifier.restore(kept, self.arm, settings.method, profile)
-                self._kept = kept.stat().st_mtime
+                self._kept, self._continued = kept.stat().st_mtime, True
                 self.note(f"continued from {kept}, saved {time.time() - self._kept:.0f} s ago")
             except (IdentificationError, OSError) as error:
                 self.note(f"{error}: begun anew")
