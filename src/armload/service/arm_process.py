@@ -160,13 +160,13 @@ class ArmProcess:
         kept, identifier = settings.state, None
         if kept is not None and kept.exists():
             try:
-                identifier = OnlineIdentifier.restore(kept, self.arm, settings.method, profile)
+                identifier = OnlineIdentifier.restore(kept, self.arm, settings.method, profile, every=self.every)
                 self._kept, self._continued = kept.stat().st_mtime, True
                 self.note(f"continued from {kept}, saved {time.time() - self._kept:.0f} s ago")
             except (IdentificationError, OSError) as error:
                 self.note(f"{error}: begun anew")
         tare = None if settings.tare is None else read_recording(settings.tare, self.arm)
-        return Session(self.source, self.arm, tare, settings.method, self.note, profile, identifier)
+        return Session(self.source, self.arm, tare, settings.method, self.note, profile, identifier, every=self.every)
 
     def _save(self, session: Session) -> None:
         self._saved, path = time.monotonic(), self.settings.state
