@@ -88,7 +88,9 @@ class Serving:
 
     def _hear(self):
         for line in self.process.stdout:
-            self.lines.put(json.loads(line))
+            said = json.loads(line)
+            if "alarm" not in said:
+                self.lines.put(said)
 
     def until(self, condition):
         end = time.monotonic() + PATIENCE
@@ -107,8 +109,8 @@ class Serving:
             self.process.wait()
 
 
-def _streams_after(kills):
-    return lambda line: line["restarts"] > kills and line["unknown"] != "starting"
+def _streams_after(restarts):
+    return lambda line: line["restarts"] > restarts and line["unknown"] != "starting"
 
 
 def measure(folder, kills, spare):
@@ -120,24 +122,26 @@ def measure(folder, kills, spare):
     rows = []
     first = Serving(cell)
     try:
-        first.until(lambda line: line.get("known"))
+        first.until(lambda line: line["known"])
         time.sleep(5.0)
     finally:
         first.end()  # the state is saved
     serving = Serving(cell)
     try:
         for _ in range(kills):
-            serving.until(lambda line: line.get("known"))
-            time.sleep(10.0)  # a spare process gets ready
+            serving.until(lambda line: line["known"])
+            time.sleep(8.0)  # a spare process gets ready
+            earlier = spent(below(serving.process.pid))
+            time.sleep(2.0)
             while not serving.lines.empty():
-                serving.lines.get()
+                said = serving.lines.get()
             family = below(serving.process.pid)
             before, processes = spent(family), arm_processes(serving.process.pid)
-            working = min(processes) if not rows else rows[-1]["pid"]
+            working = max(processes, key=lambda p: before.get(p, 0.0) - earlier.get(p, 0.0))
             shares = {pid == working: memory(pid) for pid in processes}
             began = time.monotonic()
             os.kill(working, signal.SIGKILL)
-            answered = serving.until(_streams_after(len(rows)))
+            answered = serving.until(_streams_after(said["restarts"]))
             to_answer = time.monotonic() - began
             known = answered if answered["known"] else serving.until(lambda line: line["known"])
             to_known = time.monotonic() - began
@@ -156,14 +160,11 @@ def measure(folder, kills, spare):
                     "PSS of arm's and spare process [MB]": [
                         None if key not in shares else round(shares[key]) for key in (True, False)
                     ],
-                    "pid": now,
                 }
             )
             print(spare, rows[-1], flush=True)
     finally:
         serving.end()
-    for row in rows:
-        del row["pid"]
     return rows
 
 
