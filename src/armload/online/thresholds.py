@@ -63,9 +63,6 @@ LEVEL_OUTLIER = 8.0
 # probability of a payload that changes or has changed, from which it is an event: one in a thousand may be none, and
 # friction of gears is not what the hypotheses know (test_a_real_arm_that_breaks_away_from_rest_is_no_change_of_payload)
 SURE = 0.999
-# [s] between two answers of a run whose kind is told, at most: as often as a service speaks
-# (test_fewer_answers_find_the_same_changes_at_the_same_times)
-SELDOM = 0.1
 # [s] for which it has to be so sure: one lag of the regression, as gears that break away look like a payload for less
 HOLDS = 1.0 / GAIN
 # probability of what is taken for so: of a steady arm whose intervals are the calibrated ones, of a payload that stays
@@ -130,6 +127,9 @@ SILENT = 0.1
 BAD_IN_A_ROW = 50
 # [pauses] in a row, no two samples between them that belong together: one or two are a robot's, five are a wrong unit
 PAUSES_IN_A_ROW = 5
+# [s] between two answers of a run whose kind is told, at most: as often as a service speaks
+# (test_fewer_answers_find_the_same_changes_at_the_same_times)
+SELDOM = 0.1
 
 # ---------------------------------------------------------------------- what a profile learns, `learning.py`
 
