@@ -18,7 +18,7 @@ PATIENCE = 120.0  # [s]
 def test_what_a_saved_state_holds_is_unconfirmed_until_a_second_has_told(panda, analytic_log, tmp_path):
     held, path = test_payload().parameters, tmp_path / "run.csv"
     write_recording(path, analytic_log(panda, held, duration=4.0))
-    settings = ArmSettings("left", str(path), "panda", method="map", loop=True, save=str(tmp_path))
+    settings = ArmSettings(name="left", source=str(path), robot="panda", method="map", loop=True, save=str(tmp_path))
     identifier = OnlineIdentifier(panda, method="map")
     for sample in analytic_log(panda, held, duration=4.0, start=1000.0):
         identifier.update(*sample)

@@ -58,7 +58,7 @@ def test_a_reader_that_was_started_ahead_serves_the_source_it_is_given(panda, lo
 
 
 def test_a_spare_process_is_given_out_once_and_another_is_started_where_it_has_died(log):
-    arm = ArmSettings("left", str(log), "panda", method="map", loop=True)
+    arm = ArmSettings(name="left", source=str(log), robot="panda", method="map", loop=True)
     spare, taken = Spare([arm]), []
     try:
         spare.prepare()
@@ -87,7 +87,9 @@ def test_a_spare_process_is_given_out_once_and_another_is_started_where_it_has_d
 
 @pytest.mark.full
 def test_the_spare_process_takes_over_from_one_that_is_killed_and_goes_on_from_its_state(log, tmp_path):
-    arm = ArmSettings("left", str(log), "panda", method="map", loop=True, save=str(tmp_path / "state"))
+    arm = ArmSettings(
+        name="left", source=str(log), robot="panda", method="map", loop=True, save=str(tmp_path / "state")
+    )
     notes: list[str] = []
     service = Service(ServiceSettings((arm,)), notes.append)
     for thread in service._threads:
