@@ -44,9 +44,9 @@ def stream(seed, payloads, seconds, rate=200.0, motion=None):
     return Recording(*map(np.array, zip(*source, strict=True)))  # type: ignore[arg-type]
 
 
-def said(log, method=None, pause=None):
+def said(log, method=None, pause=None, **more):
     """All estimates of a new identifier, and its events in order, each as it was called in the end."""
-    identifier = OnlineIdentifier(arm("panda"), method=method)
+    identifier = OnlineIdentifier(arm("panda"), method=method, **more)
     estimates, events = [], {}
     for k, sample in enumerate(log):
         if pause is not None and k % 97 == 0:
@@ -79,6 +79,19 @@ def test_half_a_kilo_is_noticed_in_a_third_of_a_second_and_its_mass_known_in_one
     assert after.held
     assert abs(after.phi[0] - 0.5) <= 1.96 * after.std[0] < 0.15
     assert after.since > 5.0
+
+
+def test_fewer_answers_find_the_same_changes_at_the_same_times():
+    log = stream(1, [(4.0, HALF_KILO), (6.0, None)], 9.0)
+    estimates, events = said(log)
+    seldom, same = said(log, every=0.1)
+    assert [(event.kind, event.t, event.began) for event in same] == [(e.kind, e.t, e.began) for e in events]
+    assert [event.kind for event in same] == ["grasp", "return"]
+    assert [event.mass for event in same] == pytest.approx([event.mass for event in events], abs=0.02)
+    often, rarely = (len({one.phi.tobytes() for one in es if 3.0 < one.t < 4.0}) for es in (estimates, seldom))
+    assert (often, rarely) == (pytest.approx(100, abs=5), pytest.approx(10, abs=1))
+    assert max(one.age for one in seldom if 3.0 < one.t < 4.0) < 0.11
+    assert seldom[-1].phi == pytest.approx(estimates[-1].phi, abs=1e-3)
 
 
 def test_while_a_change_settles_the_answer_follows_it_and_is_not_called_calibrated():

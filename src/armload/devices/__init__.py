@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from armload.devices.mover import Mover, StreamedMover, samples_of_movement
     from armload.devices.opening import open_source
     from armload.devices.opening_movers import open_mover
+    from armload.devices.reader import Reader
     from armload.devices.recorder import Recorded, Recorder
     from armload.devices.ring import Ring, RingReader
     from armload.devices.ros2.connection import Ros2Connection
@@ -37,6 +38,7 @@ __all__ = [
     "FrankaSource",
     "Load",
     "Mover",
+    "Reader",
     "Recorded",
     "Recorder",
     "Replay",

@@ -9,13 +9,10 @@ standard input ends with this process. The shared memory has no name and needs n
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import select
-import signal
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -28,7 +25,8 @@ from numpy.typing import ArrayLike, NDArray
 from armload.arms import Arm
 from armload.devices.franka.source import FrankaStatus
 from armload.devices.order import arm_to_json, payloads_to_json
-from armload.devices.ring import Ring, RingReader
+from armload.devices.reader import Reader, columns_of
+from armload.devices.ring import RingReader
 from armload.devices.source import Source
 from armload.errors import SourceError
 from armload.inertia import InertialParameters
@@ -57,6 +55,7 @@ class Detached(Source):
         record: a `.csv` or `.mcap` file to keep every sample in (`Recorder`), written by the reader's process.
         capacity: samples the ring holds.
         twin: the same source, opened here and never run, where it knows the truth (a simulator).
+        reader: one that was started ahead; None, or one that does not fit: another is started.
         options: of `open_source`, as JSON can hold them.
 
     Attributes:
@@ -76,6 +75,7 @@ class Detached(Source):
         record: str | Path | None = None,
         capacity: int = 8192,
         twin: Source | None = None,
+        reader: Reader | None = None,
         **options: Any,
     ) -> None:
         if options.get("speed", 1.0) is None:
@@ -87,38 +87,22 @@ class Detached(Source):
         self._closed = False
         self._twin = twin
         self._waiting = threading.Lock()  # held while the ring and the pipes are in use
-        # beside the sample: when it arrived, and of a mover how many movements have ended
-        self._ring = Ring.create(2 + 3 * arm.n + self._moves, capacity)
-        self._reader = RingReader(self._ring)
-        self._wake, wake = os.pipe()
-        self._status, status = os.pipe()
+        columns = columns_of(arm.n, self._moves)
+        if reader is None or not reader.fits(columns, capacity):
+            reader = Reader(columns, capacity)
+        self._spawned, self._ring, self._wake, self._status = reader, reader.ring, reader.wake, reader.status
+        self._reader = RingReader(reader.ring)
         self._received = b""
         self._listening = threading.Lock()  # held while events are read
         self._arrived: float | None = None
         self._left, self._leaves = 0, False  # samples left out because newer ones were asked for; whether that is asked
         self._last: dict[str, Any] | None = None  # how it ended
         self._calls = 0
-        command = [sys.executable, "-P", "-m", "armload.devices.reader_process"]
-        theirs = (self._ring.descriptor, wake, status)
-        # Ctrl-C goes to the whole group, and the one who started the reader decides: it is blocked for the reader, even
-        # before its first line. A signal that comes meanwhile is ours when the mask is taken off
-        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        try:
-            self.process = subprocess.Popen(
-                [*command, *map(str, theirs)],
-                stdin=subprocess.PIPE,
-                stdout=2,  # what a vendor's client prints must not mix with our own output
-                pass_fds=theirs,
-            )
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-            os.close(wake)
-            os.close(status)
         if options.get("payloads"):
             options["payloads"] = payloads_to_json(options["payloads"])
         kept = None if record is None else str(record)
         order = {"spec": spec, "arm": arm_to_json(arm), "options": options, "record": kept, "moves": self._moves}
-        self._send(order)
+        self._spawned.send(order, self.name)
         connecting = False
         try:
             event = self._event(_TO_START)
@@ -132,6 +116,11 @@ class Detached(Source):
             self.close()
             raise
         self.name, self.n, self.rate, self.speed = event["name"], event["n"], event["rate"], event["speed"]
+
+    @property
+    def process(self) -> subprocess.Popen[bytes]:
+        """The reader's process."""
+        return self._spawned.process
 
     @property
     def lost(self) -> int:
@@ -207,19 +196,9 @@ class Detached(Source):
         if self._closed:
             return
         self._closed = True
-        stdin = self.process.stdin
-        assert stdin is not None
-        with contextlib.suppress(OSError):
-            stdin.close()
-        try:
-            self.process.wait(_TO_END + self._moves * TO_REST)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
+        self._spawned.end(_TO_END + self._moves * TO_REST)
         with self._waiting:  # whoever waited for a sample has seen the pipe end
-            os.close(self._wake)
-            os.close(self._status)
-            self._ring.close()
+            self._spawned.release()
 
     def _raise_error_of_end(self) -> None:
         """Read events up to the last; SourceError if that is an error."""
@@ -236,22 +215,13 @@ class Detached(Source):
     def _call(self, method: str, *arguments: Any) -> Any:
         self._calls += 1
         number = self._calls
-        self._send({"call": method, "number": number, "arguments": arguments})
+        self._spawned.send({"call": method, "number": number, "arguments": arguments}, self.name)
         event = self._event(_TO_OBEY)
         while event is not self._last and event.get("number") != number:  # a call that was given up is answered late
             event = self._event(_TO_OBEY)
         if event["event"] != "answer":
             raise SourceError(event.get("message", f"{self.name} ended before it answered"))
         return event["value"]
-
-    def _send(self, order: dict[str, Any]) -> None:
-        stdin = self.process.stdin
-        assert stdin is not None
-        try:
-            stdin.write((json.dumps(order) + "\n").encode())
-            stdin.flush()
-        except (OSError, ValueError):
-            raise SourceError(f"the reader of {self.name} has ended: open the source again") from None
 
     def _event(self, seconds: float, silent: str | None = None) -> dict[str, Any]:
         """The reader's next event; after the last one, the last one again. silent: the error if none comes."""

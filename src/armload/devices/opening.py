@@ -16,14 +16,11 @@ from armload.devices.franka import source as franka
 from armload.devices.franka.source import FrankaSource
 from armload.devices.recorder import Recorded
 from armload.devices.ros2.source import Ros2Source
-from armload.devices.simulator.source import Simulator
 from armload.devices.source import Source
 from armload.devices.ur import source as ur
 from armload.devices.ur.source import URSource
 from armload.errors import SourceError
-from armload.payloads import draw_payload
 from armload.recording import ColumnSpec
-from armload.simulation import Sensors, World
 
 SCHEMES = ("fr3", "panda", "ur", "ros2")
 _DETACHED = ("fr3", "panda", "ur")  # read in a process of their own by default
@@ -187,6 +184,10 @@ def _robot(name: str, arm: Arm, torque_constants: Sequence[float] | None) -> Sou
 def _simulator(
     arm: Arm, payloads: Sequence[tuple[float, Any]] | None, world: str, sensors: bool, seed: int, **more: Any
 ) -> Source:
+    from armload.devices.simulator.source import Simulator  # a robot's reader starts without a simulator
+    from armload.payloads import draw_payload
+    from armload.simulation import Sensors, World
+
     worlds = {"nominal": World.nominal, "real-like": partial(World.real_like, seed=seed)}
     worlds["beyond"] = partial(World.beyond, seed=seed)
     if world not in worlds:

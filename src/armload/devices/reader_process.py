@@ -24,14 +24,13 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from armload.devices.opening import open_source, prepare
-from armload.devices.opening_movers import moved_here
 from armload.devices.order import arm_from_json, payloads_from_json
 from armload.devices.recorder import Recorder
 from armload.devices.remote_mover import RemoteMover
@@ -62,7 +61,9 @@ class _Reader:
 
     def run(self) -> None:
         lines = _lines(sys.stdin.fileno())
-        order = json.loads(next(lines))
+        if (line := next(lines, None)) is None:  # nobody needed it
+            return
+        order = json.loads(line)
         arm, options = arm_from_json(order["arm"]), order["options"]
         if options.get("payloads"):
             options["payloads"] = payloads_from_json(options["payloads"])
@@ -72,8 +73,7 @@ class _Reader:
                 if silent is not None:
                     self.report(event="connecting", message=silent)
                 with contextlib.nullcontext() if silent is None else _ended_with_its_starter():
-                    opens = moved_here if order["moves"] else partial(open_source, detached=False)
-                    source = opens(order["spec"], arm, **options)
+                    source = _opening(order["moves"])(order["spec"], arm, **options)
                 stack.enter_context(source)
                 record = order["record"]
                 recorder = None
@@ -130,6 +130,15 @@ class _Reader:
         watch.start()
         with contextlib.suppress(SourceError):
             source.close()
+
+
+def _opening(moves: bool) -> Callable[..., Source]:
+    """What opens a source, or a mover as one."""
+    if not moves:
+        return partial(open_source, detached=False)
+    from armload.devices.opening_movers import moved_here  # a reader starts without all that movements need
+
+    return moved_here
 
 
 @contextlib.contextmanager

@@ -138,7 +138,7 @@ class DetachedMover(Detached, Mover):
         if self.moving and not self._stopping:
             self._stopping = True
             self._calls += 1
-            self._send({"call": "stop", "number": self._calls, "arguments": [why]})
+            self._spawned.send({"call": "stop", "number": self._calls, "arguments": [why]}, self.name)
 
     def write(self, load: Load, *, allow_undetermined_inertia: bool = False) -> Any:
         """Tell the controller the load, guarded, and return what was sent."""

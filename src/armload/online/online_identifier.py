@@ -29,7 +29,7 @@ from armload.online.learning import learned_from
 from armload.online.listening import Listening
 from armload.online.restoring import load_identifier, save_identifier
 from armload.online.step import mass_step
-from armload.online.thresholds import MOVING, RECENT
+from armload.online.thresholds import KIND_LATEST, MOVING, RECENT, SELDOM
 from armload.online.watch import PayloadWatch
 from armload.posterior import Known, PosteriorLeastSquares, Profile
 from armload.posterior.map import PUBLISH
@@ -54,6 +54,8 @@ class OnlineIdentifier:
         profile: what many logs said of this arm; estimates are of what was added since.
         known: of a payload, beside the stream; taken where something is held, and only while the samples do not deny
             that this is it, which `notes` says then.
+        every: [s] between two new answers of a payload whose run has begun 1.5 s ago, at most 0.1; changes are looked
+            for in each row all the same.
 
     Raises:
         ArmloadError: an unknown method, or one that cannot use what is known, a model of another arm, or a tare that is
@@ -67,12 +69,14 @@ class OnlineIdentifier:
         method: str | Path | None = None,
         profile: Profile | None = None,
         known: Known | None = None,
+        every: float = PUBLISH,
     ) -> None:
         self.arm, self.tare, self.profile, self._tared = arm, tare, profile, tare is not None
         choice = choose(arm, tare, method, live=True, profile=profile)
         self._engine = first = choice.identifier
         know(first, known)
         self._watch = PayloadWatch(first) if isinstance(first, PosteriorLeastSquares) else None
+        self._every = min(max(every, PUBLISH), SELDOM)
         self.method = self.engine.name
         self._gate = Gate(arm)
         self._stream = Listening()
@@ -191,7 +195,7 @@ class OnlineIdentifier:
         """
         if self._watch is not None:
             self._watch.hold()
-        state = {k: v for k, v in vars(self).items() if k not in ("arm", "tare", "profile")}
+        state = {k: v for k, v in vars(self).items() if k not in ("arm", "tare", "profile", "_every")}
         return save_identifier(state, self.arm, self.method, self._engine, path)
 
     @classmethod
@@ -202,17 +206,18 @@ class OnlineIdentifier:
         method: str | Path | None = None,
         profile: Profile | None = None,
         known: Known | None = None,
+        every: float = PUBLISH,
     ) -> Self:
         """An identifier in the state that was saved.
 
         Args:
             path: what `save` wrote. arm, method, profile: what the identifier was made with; a tare is in the state.
-            known: of payloads from now on.
+            known: of payloads from now on. every: as for the constructor.
 
         Raises:
             IdentificationError: the file is none, or of another arm or trained model.
         """
-        new = cls(arm, method=method, profile=profile, known=known)
+        new = cls(arm, method=method, profile=profile, known=known, every=every)
         try:
             saved = load_identifier(path, arm, new.method, new._engine)
         finally:
@@ -225,9 +230,10 @@ class OnlineIdentifier:
     def _identify(self, sample: Sample) -> None:
         run: Identifier = self._engine
         if self._watch is None:
-            estimate, fresh = run.update(sample), not 0.0 <= sample.t - self._published < PUBLISH
+            estimate, fresh = run.update(sample), not 0.0 <= sample.t - self._published < self._every
         else:
-            known = self._watch.event
+            known, now = self._watch.event, self._watch.run
+            now.publish = self._every if now.stream.seconds > KIND_LATEST else PUBLISH
             estimate = self._watch.update(sample, self._judgement.held)
             if self._watch.event is not known:
                 self._noticed(self._watch, sample.t)

@@ -127,6 +127,9 @@ SILENT = 0.1
 BAD_IN_A_ROW = 50
 # [pauses] in a row, no two samples between them that belong together: one or two are a robot's, five are a wrong unit
 PAUSES_IN_A_ROW = 5
+# [s] between two answers of a run whose kind is told, at most: as often as a service speaks
+# (test_fewer_answers_find_the_same_changes_at_the_same_times)
+SELDOM = 0.1
 
 # ---------------------------------------------------------------------- what a profile learns, `learning.py`
 

@@ -63,6 +63,7 @@ class PosteriorLeastSquares(Identifier):
     test_tare = (
         True  # whether an answer asks if arm and gravity are as they were said to be; episodes of a training do not
     )
+    publish = PUBLISH  # [s] between two live answers; a service that speaks ten times a second asks for fewer
     known: Known | None = None  # of the payload, beside the log
     alone: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None  # what the log alone says then
     taken = False  # whether the last answer rests on what is known, too
@@ -125,7 +126,7 @@ class PosteriorLeastSquares(Identifier):
         self._phi, self._covariance = self._before()
 
     def update(self, sample: Sample) -> Estimate:
-        """Take one sample (t, q, dq, tau) and return the estimate so far, at most `PUBLISH` old."""
+        """Take one sample (t, q, dq, tau) and return the estimate so far, at most `publish` old."""
         stream, step = self.stream, sample.t - self._now
         self._now, slow = sample.t, step > FAST
         self._elapsed += step if step <= GAP else 0.0
@@ -135,7 +136,7 @@ class PosteriorLeastSquares(Identifier):
         new = stream.take(*sample)
         self.fresh = self._due and (slow or not new)  # of a fast stream, a row and an answer share no sample
         if new:  # it is due if it would be too old by the next row
-            self._due = self._due or 2.0 * sample.t - self.data_t - self._row_t > 1.05 * PUBLISH
+            self._due = self._due or 2.0 * sample.t - self.data_t - self._row_t > 1.05 * self.publish
             self._row_t, self._row_elapsed = sample.t, self._elapsed
             self.fresh = self._due and slow
         if self.fresh:

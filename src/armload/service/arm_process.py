@@ -1,8 +1,9 @@
 """One arm's own process: reads its source, identifies, saves its state, and says every tenth of a second what it knows.
 
-Started by `Service` as `python -m armload.service.arm_process`. The first line of standard input says what to do; when
-standard input ends, the process saves and ends, however whoever started it has ended. Standard output has one JSON
-object per line: an answer (with "told", when it was made on the monotonic clock), or {"note": …}.
+Started by `Service` as `python -m armload.service.arm_process`. The first line of standard input says what to do, or
+what to be ready for ({"ready": …}, see `ready`; a later line then says what to do). When standard input ends, the
+process saves and ends, however whoever started it has ended. Standard output has one JSON object per line: an answer
+(with "told", when it was made on the monotonic clock), or {"note": …}.
 """
 
 from __future__ import annotations
@@ -15,18 +16,20 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from armload.arms import Arm
-from armload.devices import Detached
+from armload.devices import Detached, Reader
+from armload.devices.reader import columns_of
 from armload.errors import ArmloadError, IdentificationError
 from armload.kernels import COMPILING
 from armload.online import OnlineEstimate, OnlineIdentifier
 from armload.posterior import load_profile
 from armload.recording import read_recording
 from armload.service.finite import finite
+from armload.service.ready import ready
 from armload.service.reconnecting import Reconnecting
 from armload.service.session import TICK, Session
 from armload.service.settings import ArmSettings
@@ -36,15 +39,25 @@ SAVE_EVERY = 60.0  # [s] of what a kill may cost; saving takes the stream a tent
 
 
 class ArmProcess:
-    """The run of one process."""
+    """The run of one process.
 
-    def __init__(self, settings: ArmSettings, every: float) -> None:
-        self.settings, self.every = settings, every
+    Args:
+        settings: of the arm. every: [s] between two lines. readers: that were started ahead.
+    """
+
+    def __init__(self, settings: ArmSettings, every: float, readers: Sequence[Reader] = ()) -> None:
+        self.settings, self.every, self._reader = settings, every, None
         self._told = self._saved = -float("inf")
         self._kept: float | None = None  # when the state was last saved or taken up, by the wall's clock
+        self._continued = False  # whether it goes on from a state
         self._failed: str | None = None  # why it could not be saved
         self._line = threading.Lock()
         self.arm = self._made_arm()
+        for reader in readers:
+            if reader.ring.columns == columns_of(self.arm.n):
+                self._reader = reader
+            else:
+                reader.end(0.0)
         self.source = Reconnecting(self._opens, said=self.note, name=settings.source, n=self.arm.n)
         self.session: Session | None = None
 
@@ -91,7 +104,8 @@ class ArmProcess:
     def _tell(self, session: Session, now: float) -> None:
         self._told = now
         source, estimate = self.source, session.estimate
-        link = Link(source.state, source.why, source.connections, source.resumed, source.heard)
+        connections = source.connections + self._continued  # since it was saved the payload may have been exchanged
+        link = Link(source.state, source.why, connections, source.resumed, source.heard)
         why = why_unknown(estimate, link, now, session.trouble, session.doubt)
         if estimate is None and _compiling.is_set() and source.state == "streaming":
             why = Why(Unknown.COMPILING, COMPILING)
@@ -128,7 +142,8 @@ class ArmProcess:
         settings = self.settings
         record = None if settings.record is None else next_free(settings.record)
         more: dict[str, Any] = {"rate": settings.rate} if settings.source == "sim" else {}
-        return Detached(settings.source, self.arm, record=record, speed=1.0, loop=settings.loop, **more)
+        reader, self._reader = self._reader, None
+        return Detached(settings.source, self.arm, record=record, speed=1.0, loop=settings.loop, reader=reader, **more)
 
     def _made_arm(self) -> Arm:
         bare = self.settings.bare_arm()
@@ -145,13 +160,13 @@ class ArmProcess:
         kept, identifier = settings.state, None
         if kept is not None and kept.exists():
             try:
-                identifier = OnlineIdentifier.restore(kept, self.arm, settings.method, profile)
-                self._kept = kept.stat().st_mtime
+                identifier = OnlineIdentifier.restore(kept, self.arm, settings.method, profile, every=self.every)
+                self._kept, self._continued = kept.stat().st_mtime, True
                 self.note(f"continued from {kept}, saved {time.time() - self._kept:.0f} s ago")
             except (IdentificationError, OSError) as error:
                 self.note(f"{error}: begun anew")
         tare = None if settings.tare is None else read_recording(settings.tare, self.arm)
-        return Session(self.source, self.arm, tare, settings.method, self.note, profile, identifier)
+        return Session(self.source, self.arm, tare, settings.method, self.note, profile, identifier, every=self.every)
 
     def _save(self, session: Session) -> None:
         self._saved, path = time.monotonic(), self.settings.state
@@ -194,11 +209,19 @@ def main() -> None:
     logger = logging.getLogger("armload")
     logger.addHandler(_Compiling())
     logger.setLevel(logging.INFO)
-    order = json.loads(_line())
-    facts = order["arm"]
-    facts["gravity"] = None if facts["gravity"] is None else tuple(facts["gravity"])
+    readers: Sequence[Reader] = ()
     try:
-        process = ArmProcess(ArmSettings(**facts), order["every"])
+        if not (line := _line()):
+            return
+        order = json.loads(line)
+        if "ready" in order:
+            readers = ready(order["ready"])
+            if not (line := _line()):  # nobody needed it
+                return
+            order = json.loads(line)
+        facts = order["arm"]
+        facts["gravity"] = None if facts["gravity"] is None else tuple(facts["gravity"])
+        process = ArmProcess(ArmSettings(**facts), order["every"], readers)
 
         def listen() -> None:
             while os.read(0, 1 << 12):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -17,12 +16,14 @@ from armload.errors import ArmloadError
 from armload.service.alarms import Alarm, Alarms
 from armload.service.backoff import Backoff
 from armload.service.settings import ArmSettings, ServiceSettings
+from armload.service.spare import Spare, order
 from armload.service.unknown import Unknown
 from armload.service.webhook import Webhook
 
 HUNG = 10.0  # [s] without a line after which an arm's process is killed: it speaks ten times a second
 HUNG_COMPILING = 300.0  # [s] the same until its first answer: on a slow machine compiling takes minutes
 _LOOK = 0.1  # [s] between two looks at the processes
+_BEGINNING = (Unknown.STARTING, Unknown.COMPILING)  # of an arm whose start a spare process would slow down
 _TO_END = 6.0  # [s] a process may take to save and end: its reader may take three
 
 Listener = Callable[[dict[str, Any]], None]
@@ -52,6 +53,7 @@ class Service:
         self._heard = dict.fromkeys(self.names, time.monotonic())
         self._restarts = dict.fromkeys(self.names, 0)
         self._ended: set[str] = set()
+        self._spare = Spare(settings.arms, settings.spare)
         self._listeners: list[Listener] = []
         self._state, self._gone = threading.RLock(), threading.Event()
         self._webhook = None if settings.webhook is None else Webhook(settings.webhook, settings.headers)
@@ -68,6 +70,8 @@ class Service:
             if self.error is not None or (until is not None and time.monotonic() > until):
                 break
             self._look()
+            if all(self.answer(name)["unknown"] not in _BEGINNING for name in self.names):
+                self._spare.prepare()
 
     def stop(self) -> None:
         """Make `run` return; from any thread."""
@@ -76,10 +80,9 @@ class Service:
     def close(self) -> None:
         """Let all processes save and end."""
         self._gone.set()
+        self._spare.close()
         for process in list(self.processes.values()):
-            with contextlib.suppress(OSError):
-                assert process.stdin is not None
-                process.stdin.close()
+            _hang_up(process)
         until = time.monotonic() + _TO_END
         for thread in self._threads:
             if thread.is_alive():
@@ -119,6 +122,7 @@ class Service:
                 error = self._listen(process, name)
             finally:
                 code = process.wait()
+                _hang_up(process)
                 self.processes.pop(name, None)
             if error is not None or code == 0 or self._gone.is_set():
                 if error is not None:
@@ -134,17 +138,10 @@ class Service:
         self._ended.add(name)
 
     def _started(self, settings: ArmSettings) -> subprocess.Popen[bytes]:
-        process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "armload.service.arm_process"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-        )
-        self.processes[settings.name] = process
-        assert process.stdin is not None
-        with contextlib.suppress(OSError):
-            order = {"arm": settings.to_dict(), "every": self.settings.every}
-            process.stdin.write((json.dumps(order) + "\n").encode())
-            process.stdin.flush()
+        process = self.processes[settings.name] = self._spare.take()
+        order(process, {"arm": settings.to_dict(), "every": self.settings.every})
         if self._gone.is_set():
-            process.stdin.close()
+            _hang_up(process)
         return process
 
     def _listen(self, process: subprocess.Popen[bytes], name: str) -> str | None:
@@ -210,6 +207,13 @@ class Service:
             if silent > (HUNG_COMPILING if first else HUNG) and process is not None:
                 self._note(f"{name}: its process has said nothing for {silent:.0f} s and is ended")
                 process.kill()
+
+
+def _hang_up(process: subprocess.Popen[bytes]) -> None:
+    """End a process's standard input, at which it saves and ends."""
+    assert process.stdin is not None
+    with contextlib.suppress(OSError):
+        process.stdin.close()
 
 
 def _rating(settings: ArmSettings) -> float:

@@ -22,6 +22,7 @@ from armload.inertia import Z95, InertialParameters
 from armload.online import OnlineEstimate, OnlineIdentifier
 from armload.online.learning import change_of_arm
 from armload.posterior import Known, Profile
+from armload.posterior.map import PUBLISH
 from armload.recording import Recording, Sample
 from armload.service.history import History
 from armload.service.plausible import Plausibility
@@ -46,7 +47,7 @@ class Session:
 
     Args:
         source: closed with the session.
-        arm: the bare arm, or with a tool that is known. tare: an earlier log of it. method, profile, known: see
+        arm: the bare arm, or with a tool that is known. tare: an earlier log of it. method, profile, known, every: see
             `OnlineIdentifier`. identifier: one that goes on, made with these.
         warn: called with each warning on the stream, also with the error it ended with in a thread (`start`).
         recorder: keeps every sample that was taken and what was said of it; closed with the session.
@@ -71,9 +72,11 @@ class Session:
         profile: Profile | None = None,
         identifier: OnlineIdentifier | None = None,
         known: Known | None = None,
+        every: float = PUBLISH,
         recorder: Recorder | None = None,
     ) -> None:
-        self.source, self.arm, self.tare, self.profile, self._known = source, arm, tare, profile, known
+        self.source, self.arm, self.tare, self.profile = source, arm, tare, profile
+        self._known, self._every = known, every
         self._recorder, self._kept = recorder, -math.inf  # and when it last kept an estimate, on the stream's clock
         # what was held while the tare was recorded; None: nobody knows
         self._tared = InertialParameters.zero(arm.frame) if tare is None else None
@@ -289,7 +292,7 @@ class Session:
 
     def _made(self, tare: Recording | None, method: str | Path | None) -> OnlineIdentifier:
         # an arm's model computes in a memory of its own, which two threads must not share
-        return OnlineIdentifier(replace(self.arm), tare, method, self.profile, self._known)
+        return OnlineIdentifier(replace(self.arm), tare, method, self.profile, self._known, self._every)
 
     def _write(self, text: str) -> None:
         self.log.write(self._t, text)

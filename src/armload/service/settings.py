@@ -65,7 +65,7 @@ class ServiceSettings:
 
     arms: one process each. every: [s] between two lines of an arm. host, port: of the endpoint; port None: there is
     none. token: what a request must bring; required beyond loopback. webhook: where alarms go. headers: sent with them.
-    duration: end after so long [s].
+    duration: end after so long [s]. spare: whether a process is kept ready for the arm whose process ends next.
     """
 
     arms: tuple[ArmSettings, ...]
@@ -76,6 +76,7 @@ class ServiceSettings:
     webhook: str | None = None
     headers: dict[str, str] = field(default_factory=dict)
     duration: float | None = None
+    spare: bool = True
 
     def __post_init__(self) -> None:
         names = [arm.name for arm in self.arms]

@@ -1,0 +1,29 @@
+"""What the page says of recovery, memory and processor time is what was measured."""
+
+import json
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+RESULTS = ROOT / "benchmarks" / "results"
+PAGE = " ".join((ROOT / "docs" / "service.md").read_text(encoding="utf-8").split())
+
+
+def test_the_table_of_recovery_is_the_committed_result():
+    found = json.loads((RESULTS / "recovery.json").read_text())
+    for told, name in (("with a process ahead", "with a spare process"), ("without (`spare = false`)", "without")):
+        answer, known, spent = (
+            found[f"median {what} [s], {name}"]
+            for what in ("to an answer", "to a known answer", "processor time until it is known")
+        )
+        assert f"| {told} | {answer:.2f} s | {known:.2f} s | {spent:.2f} s |" in PAGE
+
+
+def test_memory_and_processor_time_are_the_committed_results():
+    changing, steady = (json.loads((RESULTS / f"{name}.json").read_text()) for name in ("soak", "soak_steady"))
+    first, *_ = changing["resident [MB]"].values()
+    slope, half = changing["slope after the first quarter [MB/h]"], changing["half-width of its 95 % interval [MB/h]"]
+    assert f"{changing['hours']:.1f} simulated hours" in PAGE
+    assert f"{first:.0f} MB after the first minute and {changing['last [MB]']:.0f} MB after the last" in PAGE
+    assert f"{slope:+.1f} ± {half:.1f} MB an hour" in PAGE
+    assert f"{changing['share of a core']:.1%} of a core".replace("%", " %") in PAGE
+    assert f"{steady['share of a core']:.1%} where it stays the same".replace("%", " %") in PAGE
