@@ -1,8 +1,9 @@
 """Functions in machine code: compiled with the package where it was installed from a wheel, else when first called.
 
-A wheel holds two libraries made by `compile_kernels.py`, one for processors of the last ten years and one for any:
-nothing is compiled then, and numba, which brings a whole LLVM, is not needed. In a checkout `kernel` is numba's `njit`,
-which keeps on disk what it compiled; whoever waits for it is told.
+A wheel holds two libraries made by `hatch_build.py`, one for processors of the last ten years and one for any: nothing
+is compiled then, and numba, which brings a whole LLVM, is not needed. In a checkout `kernel` is numba's `njit`, which
+keeps on disk what it compiled; whoever waits for it is told. Where ARMLOAD_KERNELS names a folder, a library is looked
+for there too: `make test` compiles one of the sources as they are, and each process of the tests starts the sooner.
 
 All kernels divide as numpy does (x/0 is ±inf or nan: a test of each divisor costs branches) and leave the interpreter
 alone. Compiling takes seconds, so they do without what numba compiles slowly: an assignment to a slice (`a[:] = b`)
@@ -15,6 +16,8 @@ from __future__ import annotations
 import inspect
 import json
 import logging
+import os
+import sys
 from collections.abc import Callable
 from functools import cache, cached_property
 from importlib import import_module
@@ -25,6 +28,7 @@ from typing import Any
 import numpy as np
 
 COMPILING = "compiling for this machine, which is done once and takes a while"
+FOLDER = "ARMLOAD_KERNELS"  # the environment's: where else a library is looked for
 SIGNATURES = Path(__file__).with_name("kernels.json")  # of each kernel, what it is compiled for ahead
 LIBRARIES = {  # name: what the compiler calls the processor, and what /proc/cpuinfo must list for it; the best first
     "_kernels_v3": ("x86-64-v3", frozenset({"avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe"})),
@@ -127,7 +131,9 @@ def signatures() -> dict[str, list[list[Any]]]:
 
 @cache
 def _library() -> Any:
-    """The best library that this processor can run, None where the package holds none."""
+    """The best library that this processor can run, None where there is none."""
+    if os.environ.get(FOLDER):
+        sys.modules["armload"].__path__.append(os.environ[FOLDER])
     for name, (_, needed) in LIBRARIES.items():
         if find_spec(f"armload.{name}") is not None and needed <= _processor():
             return import_module(f"armload.{name}")
