@@ -46,12 +46,12 @@ class Engine:
             try:
                 yield from self._run(work, items(), self.jobs)
                 return
-            except _killed():
+            except self._killed():
                 continue
         for item in items():  # each alone, in a process that it shares with no other
             try:
                 yield from self._run(work, [item], 2)
-            except _killed():
+            except self._killed():
                 yield item, None
 
     def _run(self, work: Callable[[T], R], items: Iterable[T], jobs: int) -> Iterator[tuple[T, R]]:
@@ -64,6 +64,16 @@ class Engine:
             # joblib says so when a process of its pool has ended; what was lost is given out again
             warnings.filterwarnings("ignore", message=".*A worker stopped while some jobs were given.*")
             yield from parallel(n_jobs=jobs, **how)(delayed(_with_item)(work, item) for item in items)
+
+    def _killed(self) -> type[BaseException]:
+        """What is raised where the process of a task was killed."""
+        if self.cluster is None:
+            from joblib.externals.loky.process_executor import TerminatedWorkerError
+
+            return TerminatedWorkerError
+        from distributed.scheduler import KilledWorker  # type: ignore[import-not-found]
+
+        return KilledWorker
 
 
 @contextmanager
@@ -110,14 +120,3 @@ def engine(jobs: int = 1, cluster: str | None = None) -> Iterator[Engine]:
 
 def _with_item(work: Callable[[T], R], item: T) -> tuple[T, R]:
     return item, work(item)
-
-
-def _killed() -> tuple[type[BaseException], ...]:
-    """What is raised where the process of a task was killed."""
-    from joblib.externals.loky.process_executor import TerminatedWorkerError
-
-    try:
-        from distributed.scheduler import KilledWorker  # type: ignore[import-not-found]
-    except ImportError:
-        return (TerminatedWorkerError,)
-    return TerminatedWorkerError, KilledWorker
