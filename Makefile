@@ -11,6 +11,9 @@ AHEAD = ARMLOAD_KERNELS="$$($(BIN)/python hatch_build.py --here)"
 # One worker for each file: what its tests share (a study, a demo) is made once. The order is that of tests/conftest.py.
 PYTEST = $(AHEAD) $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
+# What Python compiled is kept, whatever the caller's environment says: the tests start a hundred processes.
+unexport PYTHONDONTWRITEBYTECODE
+
 # One thread for each test worker: nested BLAS threads fight over the cores and make a test slower, never faster.
 .tests test-all test-full: export OMP_NUM_THREADS = 1
 .tests test-all test-full: export OPENBLAS_NUM_THREADS = 1
