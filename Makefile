@@ -6,8 +6,13 @@ VENV_ROS := .venv-ros
 BIN := $(VENV)/bin
 WORKERS ?= 2
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+# The kernels compiled once for the sources as they are, in place of numba in each process that a test starts.
+AHEAD = ARMLOAD_KERNELS="$$($(BIN)/python hatch_build.py --here)"
 # One worker for each file: what its tests share (a study, a demo) is made once. The order is that of tests/conftest.py.
-PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
+PYTEST = $(AHEAD) $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
+
+# What Python compiled is kept, whatever the caller's environment says: the tests start a hundred processes.
+unexport PYTHONDONTWRITEBYTECODE
 
 # One thread for each test worker: nested BLAS threads fight over the cores and make a test slower, never faster.
 .tests test-all test-full: export OMP_NUM_THREADS = 1
@@ -15,7 +20,7 @@ PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-r
 .tests test-all test-full: export MPLBACKEND = agg
 
 .DEFAULT_GOAL := help
-.PHONY: help demo docs test .tests .kernels test-all test-full parts lint format lock clean
+.PHONY: help demo docs test .tests test-all test-full parts lint format lock clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -29,17 +34,14 @@ docs: $(VENV)/.stamp ## the pages as a site, strictly: build/site/index.html
 test: $(VENV)/.stamp ## lint, types and every test that needs nothing but Python, side by side (this is what CI runs)
 	@$(MAKE) --no-print-directory --jobs 2 lint .tests
 
-.tests: .kernels
+.tests: $(VENV)/.stamp
 	$(PYTEST) -m "not full"
-
-.kernels: $(VENV)/.stamp
-	@$(BIN)/python hatch_build.py --here
 
 test-all: lint parts ## as test, and the tests marked full too (skipped with a reason where their program is missing)
 	$(PYTEST) -m ""
 
 test-full: $(VENV)/.stamp parts ## only the tests marked full: the site, the wheel, and clients, ROS 2 and a browser if to be had
-	$(BIN)/python -m pytest -m full
+	$(AHEAD) $(BIN)/python -m pytest -m full
 
 parts: $(VENV)/.stamp
 	@$(MAKE) --no-print-directory $(VENV)/.vendors || echo "no makers' clients: their tests will be skipped" >&2

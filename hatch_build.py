@@ -5,8 +5,8 @@
 compiles the libraries named in `armload.kernels.LIBRARIES` for the signatures in `src/armload/kernels.json`, which
 `tests/record_kernels.py` writes. The compiler is numba's (`numba.pycc`), told what `kernels.settings` tells it in a
 checkout; linking needs a C++ compiler. Where ARMLOAD_PURE_WHEEL is set, a wheel without libraries is built, which needs
-numba where it is installed. `--here` has numba compile the same into its own cache, for this machine and checkout: the
-tests do so once, where two of their processes would do it side by side.
+numba where it is installed. `--here` compiles the library for this processor alone and prints its folder, whose name
+changes with any source: what the tests take for ARMLOAD_KERNELS.
 """
 
 from __future__ import annotations
@@ -44,35 +44,35 @@ class Kernels(BuildHookInterface):
         build_data["pure_python"], build_data["infer_tag"] = False, True
 
 
-def kept(folder: Path) -> list[Path]:
+def kept(folder: Path, names: list[str] | None = None) -> list[Path]:
     """The libraries of this source and Python, compiled where they are not there: pip asks for a wheel twice."""
     sources = [Path(__file__), *sorted((ROOT / "src" / "armload").rglob("*.py")), ROOT / "src/armload/kernels.json"]
-    key = hashlib.sha256(repr((sys.version, platform.machine(), version("numba"))).encode())
+    key = hashlib.sha256(repr((sys.version, platform.machine(), version("numba"), names)).encode())
     for path in sources:
         key.update(path.read_bytes())
     place = folder / f"kernels-{key.hexdigest()[:16]}"
     if not place.is_dir():
         folder.mkdir(exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder, prefix="compiling-") as name:
-            compile_all(Path(name))
+            compile_all(Path(name), names)
             Path(name).rename(place)
             Path(name).mkdir()  # which is removed now
     return sorted(place.glob("_kernels_*.so"))
 
 
-def compile_all(folder: Path) -> list[Path]:
-    """Compile each library in a process of its own, for its processor."""
+def compile_all(folder: Path, names: list[str] | None = None) -> list[Path]:
+    """Compile each library in a process of its own, for its processor: all that a wheel holds where none is named."""
     sys.path.insert(0, str(ROOT / "src"))
-    from armload.kernels import LIBRARIES
+    from armload.kernels import FOLDER, LIBRARIES
 
-    names = LIBRARIES if platform.machine() == "x86_64" else ["_kernels_any"]
+    names = names or (list(LIBRARIES) if platform.machine() == "x86_64" else ["_kernels_any"])
     running = []
     for name in names:
         cpu = LIBRARIES[name][0] or "generic"
         settings = {"NUMBA_CPU_NAME": cpu, "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": str(folder / name)}
         path = os.pathsep.join([str(ROOT / "src"), os.environ.get("PYTHONPATH", "")])
         command = [sys.executable, str(Path(__file__).resolve()), "--one", name, str(folder)]
-        running.append(subprocess.Popen(command, env=os.environ | settings | {"PYTHONPATH": path}))
+        running.append(subprocess.Popen(command, env=os.environ | settings | {"PYTHONPATH": path, FOLDER: ""}))
     if any(process.wait() for process in running):
         raise RuntimeError(f"the kernels could not be compiled (is there a C++ compiler?); {PURE}=1 does without them")
     return sorted(folder.glob("_kernels_*.so"))
@@ -108,11 +108,12 @@ def compile_one(name: str, folder: Path) -> None:
     library.compile()
 
 
-def compile_here() -> None:
-    """Have numba compile and keep what the libraries hold."""
-    for dispatcher, signatures in _wanted():
-        for types in signatures:
-            dispatcher.compile(types)
+def for_this_processor() -> str:
+    """The library that this processor runs."""
+    sys.path.insert(0, str(ROOT / "src"))
+    from armload import kernels
+
+    return next(name for name, (_, needed) in kernels.LIBRARIES.items() if needed <= kernels._processor())
 
 
 def _wanted() -> Iterator[tuple[Any, list[tuple[Any, ...]]]]:
@@ -140,6 +141,9 @@ if __name__ == "__main__":
     if sys.argv[1] == "--one":
         compile_one(sys.argv[2], Path(sys.argv[3]))
     elif sys.argv[1] == "--here":
-        compile_here()
+        try:
+            print(kept(ROOT / "build", [for_this_processor()])[0].parent)
+        except RuntimeError as error:
+            sys.exit(f"{error}: each process waits for numba")
     else:
         print(*compile_all(Path(sys.argv[1])), sep="\n")

@@ -17,7 +17,7 @@ import armload
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
 MODULES = ["armload", *sorted(m.name for m in pkgutil.walk_packages(armload.__path__, "armload."))]
-MODULES = [name for name in MODULES if not name.endswith("__main__")]
+MODULES = [name for name in MODULES if not name.endswith("__main__") and "._kernels_" not in name]
 PACKAGES = [name for name in MODULES if hasattr(importlib.import_module(name), "__path__")]
 BLOCK = re.compile(r"^```([^\n]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"(?<!!)\[[^\]]*\]\(([^)\s]+)\)|!\[[^\]]*\]\(([^)\s]+)\)|(?:href|src)=\"([^\"]+)\"")

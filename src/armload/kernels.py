@@ -1,8 +1,9 @@
 """Functions in machine code: compiled with the package where it was installed from a wheel, else when first called.
 
-A wheel holds two libraries made by `compile_kernels.py`, one for processors of the last ten years and one for any:
-nothing is compiled then, and numba, which brings a whole LLVM, is not needed. In a checkout `kernel` is numba's `njit`,
-which keeps on disk what it compiled; whoever waits for it is told.
+A wheel holds two libraries made by `hatch_build.py`, one for processors of the last ten years and one for any: nothing
+is compiled then, and numba, which brings a whole LLVM, is not needed. In a checkout `kernel` is numba's `njit`, which
+keeps on disk what it compiled; whoever waits for it is told. Where ARMLOAD_KERNELS names a folder, a library is looked
+for there too: `make test` compiles one of the sources as they are, and each process of the tests starts the sooner.
 
 All kernels divide as numpy does (x/0 is ±inf or nan: a test of each divisor costs branches) and leave the interpreter
 alone. Compiling takes seconds, so they do without what numba compiles slowly: an assignment to a slice (`a[:] = b`)
@@ -15,6 +16,8 @@ from __future__ import annotations
 import inspect
 import json
 import logging
+import os
+import sys
 from collections.abc import Callable
 from functools import cache, cached_property
 from importlib import import_module
@@ -25,12 +28,13 @@ from typing import Any
 import numpy as np
 
 COMPILING = "compiling for this machine, which is done once and takes a while"
+FOLDER = "ARMLOAD_KERNELS"  # the environment's: where else a library is looked for
 SIGNATURES = Path(__file__).with_name("kernels.json")  # of each kernel, what it is compiled for ahead
 LIBRARIES = {  # name: what the compiler calls the processor, and what /proc/cpuinfo must list for it; the best first
     "_kernels_v3": ("x86-64-v3", frozenset({"avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe"})),
     "_kernels_any": ("", frozenset[str]()),
 }
-_TYPES = {"float64": float, "float32": np.float32, "int64": np.int64, "int32": np.int32, "bool": bool}
+_NUMBERS = {"float64": (float, int), "bool": (bool, np.bool_)}  # what Python may give; else any integer
 
 
 def kernel(function: Any = None, **options: Any) -> Any:
@@ -69,7 +73,7 @@ class _Ahead:
         self.py_func, self._options = function, options
         self.__doc__, self.__name__ = function.__doc__, function.__name__
         known = signatures().get(name_of(function), ())
-        self._calls = [(_kind(kinds), getattr(library, symbol(function, k))) for k, kinds in enumerate(known)]
+        self._calls = [(_check(kinds), getattr(library, symbol(function, k))) for k, kinds in enumerate(known)]
         self._signature = inspect.signature(function)
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
@@ -77,8 +81,8 @@ class _Ahead:
             bound = self._signature.bind(*arguments, **named)
             bound.apply_defaults()
             arguments = bound.args
-        for kinds, call in self._calls:
-            if _fit(kinds, arguments):
+        for fit, call in self._calls:
+            if fit(*arguments):
                 return call(*arguments)
         return self._compiled(*arguments)
 
@@ -92,31 +96,24 @@ class _Ahead:
         return self._compiled._numba_type_
 
 
-def _kind(one: Any) -> Any:
-    """What an argument must be: (type, dimensions) of an array, a type of a number, a list for a tuple."""
-    if isinstance(one, list):
-        return [_kind(part) for part in one]
-    name, _, axes = one.partition("[")
-    return (np.dtype(_TYPES[name]), axes.count(":")) if axes else _TYPES[name]
+def _check(kinds: list[Any]) -> Callable[..., bool]:
+    """Whether arguments are of these kinds: one expression of them all costs a fifth of a loop, in each call."""
+    known: dict[str, Any] = {"ndarray": np.ndarray}
 
+    def one(x: str, kind: Any) -> str:
+        if isinstance(kind, list):
+            parts = [one(f"{x}[{k}]", part) for k, part in enumerate(kind)]
+            return " and ".join([f"type({x}) is tuple and len({x}) == {len(kind)}", *parts])
+        name, _, axes = kind.partition("[")
+        if not axes:
+            known[name] = _NUMBERS.get(name, (int, np.integer))
+            return f"isinstance({x}, {name})"
+        known[f"{name}_"] = np.dtype(name)
+        shape = f"{x}.ndim == {axes.count(':')} and {x}.flags.c_contiguous"
+        return f"type({x}) is ndarray and {x}.dtype == {name}_ and {shape}"
 
-def _fit(kinds: list[Any], arguments: tuple[Any, ...]) -> bool:
-    for kind, x in zip(kinds, arguments, strict=True):
-        if type(kind) is tuple:
-            if type(x) is not np.ndarray or x.dtype != kind[0] or x.ndim != kind[1] or not x.flags.c_contiguous:
-                return False
-        elif type(kind) is list:
-            if type(x) is not tuple or len(x) != len(kind) or not _fit(kind, x):
-                return False
-        elif kind is float:
-            if not isinstance(x, float | int):
-                return False
-        elif kind is bool:
-            if type(x) is not bool and type(x) is not np.bool_:
-                return False
-        elif not isinstance(x, int | np.integer):
-            return False
-    return True
+    names = [f"x{k}" for k in range(len(kinds))]
+    return eval(f"lambda {', '.join(names)}: {' and '.join(map(one, names, kinds))}", known)
 
 
 @cache
@@ -127,7 +124,9 @@ def signatures() -> dict[str, list[list[Any]]]:
 
 @cache
 def _library() -> Any:
-    """The best library that this processor can run, None where the package holds none."""
+    """The best library that this processor can run, None where there is none."""
+    if os.environ.get(FOLDER):
+        sys.modules["armload"].__path__.append(os.environ[FOLDER])
     for name, (_, needed) in LIBRARIES.items():
         if find_spec(f"armload.{name}") is not None and needed <= _processor():
             return import_module(f"armload.{name}")

@@ -15,7 +15,13 @@ PROMISED = {
 }
 
 
-@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+SLOW = {"learn_and_refuse"}  # trains
+
+
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(path, marks=[pytest.mark.full] if path.stem in SLOW else [], id=path.stem) for path in EXAMPLES],
+)
 def test_an_example_runs_and_keeps_its_promise(path, tmp_path):
     done = subprocess.run([sys.executable, "-W", "error", str(path)], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -18,7 +18,8 @@ from armload.payloads import Payload
 from armload.recording import Recording
 from armload.simulation import World
 
-METHODS = (None, "map-gp", "map")
+# the default in the quick tests, and its physics alone where another arm would have it: in the full ones
+METHODS = (None, *(pytest.param(name, marks=pytest.mark.full) for name in ("map-gp", "map")))
 TARED = pytest.mark.parametrize("tared", [True, False], ids=["tare", "no tare"])
 RUN, TARE = 6.0, 8.0  # [s]
 HEAVY = Payload("heavy", InertialParameters.from_com(2.5, (0.03, -0.02, 0.08), np.diag([8e-3, 9e-3, 6e-3])))
@@ -97,9 +98,11 @@ FOUND = {
 
 
 # the default method with and without a tare; its physics alone mostly with one
-TRIED = [(name, tared, None) for name in FOUND for tared in (True, False)]
-OTHERS = [(name, True, method) for name in FOUND for method in METHODS[1:]]
-OTHERS += [(name, False, method) for name in ("irregular", "torque 20 ms late") for method in METHODS[1:]]
+BETWEEN = ("torque 5 ms late", "torque 10 ms late")  # what is told by none and by 20 ms
+TRIED = [(name, tared, None) for name in FOUND if name not in BETWEEN for tared in (True, False)]
+OTHERS = [(name, tared, None) for name in BETWEEN for tared in (True, False)]
+OTHERS += [(name, True, method) for name in FOUND for method in ("map-gp", "map")]
+OTHERS += [(name, False, method) for name in ("irregular", "torque 20 ms late") for method in ("map-gp", "map")]
 TRIED += [pytest.param(*other, marks=pytest.mark.full) for other in OTHERS]  # some seconds
 
 
@@ -205,7 +208,7 @@ def motor_logs(panda, drawn):
     return list(simulate_episodes(motor))
 
 
-@pytest.mark.parametrize("method", [None, "map-gp"])
+@pytest.mark.parametrize("method", METHODS[:2])
 @TARED
 def test_torque_from_motor_currents_has_its_friction_found_and_wider_intervals(panda, motor_logs, tared, method):
     for run, tare, truth in motor_logs:

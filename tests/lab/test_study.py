@@ -12,7 +12,7 @@ from armload.estimators import Estimate, Identifier
 from armload.inertia import InertialParameters
 from armload.lab import load_cells, save_cell
 from armload.lab.evaluation import EvaluationRun
-from armload.lab.study import FULL, QUICK, Basis, Size, Spec, plan, run_study, write_results
+from armload.lab.study import FULL, QUICK, Basis, Size, Spec, plan, run_study, study_run, write_results
 from armload.lab.study.claims import VERDICTS, evaluate
 from armload.lab.study.protocols import measure_learned, measure_stream
 from armload.lab.study.readings import reading_specs
@@ -125,53 +125,75 @@ def test_a_stream_s_error_is_that_of_its_last_estimate(runs, panda):
 # ---------------------------------------------------------------------------- the run
 
 
-@pytest.fixture(scope="module")
-def small(tmp_path_factory):
-    """A small study, stopped at once and then run to the end."""
-    folder = tmp_path_factory.mktemp("study")
-    basis = Basis(folder, SMALL)
-    messages = []
-    first = run_study(basis, folder / "cells", until=0.0, say=messages.append)
-    cells = run_study(basis, folder / "cells", say=messages.append)
-    return folder, first, cells, messages
+def some(size):
+    """Of the plan what is cheap and differs in more than a setting: least squares, a baseline, trees, one network."""
+    cells, first = [], set()
+    for spec in plan(size):
+        kind = (spec.kind, spec.method, spec.stages, spec.split if spec.kind == "tree" else "")
+        dear = spec.kind == "mixed" or (spec.kind == "network" and spec.stages == 2) or "hybrid" in spec.method
+        if kind not in first and spec.sensors == "ideal" and not dear:
+            first.add(kind)
+            cells.append(spec)
+    return cells
+
+
+def measure(folder, cells_of, **options):
+    """The cells of a small study, measured where they are not there; rivals and readings beside the whole plan only."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(study_run, "plan", cells_of)
+        if cells_of is some:
+            patch.setattr(study_run, "rival_tasks", lambda _: [])
+            patch.setattr(study_run, "reading_tasks", lambda _: [])
+        return run_study(Basis(folder, SMALL), folder / "cells", **options)
+
+
+@pytest.fixture(scope="module", params=[pytest.param(plan, marks=pytest.mark.full, id="all"), some])
+def small(tmp_path_factory, request):
+    """A small study, stopped at once and then run to the end: its folder, cells by both, and messages."""
+    folder, messages = tmp_path_factory.mktemp("study"), []
+    first = measure(folder, request.param, until=0.0, say=messages.append)
+    cells = measure(folder, request.param, say=messages.append)
+    return folder, request.param, first, cells, messages
 
 
 @pytest.fixture(scope="module")
 def written(small):
     """The files of that study."""
-    folder, _, cells, _ = small
+    folder, _, _, cells, _ = small
     at = folder / "written"
     return write_results(cells, at / "a" / "s.json", at / "p.md", at / "r.html")
 
 
 @pytest.mark.full  # some seconds
 def test_a_study_that_was_stopped_goes_on_and_measures_nothing_twice(small):
-    folder, first, cells, messages = small
-    assert len(first) < len(cells) == len(plan(SMALL)) + len(reading_specs(SMALL)) + len(rivals(SMALL))
-    tasks = len(plan(SMALL)) + len(reading_specs(SMALL)) + 1  # the rivals of one rate and noise are one
+    folder, cells_of, first, cells, messages = small
+    tasks = len(cells_of(SMALL)) + (0 if cells_of is some else len(reading_specs(SMALL)) + 1)
+    # the rivals of one rate and noise are one task
+    assert len(first) < len(cells) == tasks + (0 if cells_of is some else len(rivals(SMALL)) - 1)
     assert len([line for line in messages if line.startswith("cell")]) == tasks
     again = []
-    assert run_study(Basis(folder, SMALL), folder / "cells", say=again.append) == cells
+    assert measure(folder, cells_of, say=again.append) == cells
     assert again == []
 
 
 @pytest.mark.full
 def test_the_same_seed_gives_the_same_numbers(small):
-    folder, _, cells, _ = small
+    folder, cells_of, _, cells, _ = small
     name = next(name for name in cells if name.startswith("tree-2stage"))
     (folder / "cells" / f"{name}.json").unlink()
-    assert run_study(Basis(folder, SMALL), folder / "cells")[name]["protocols"] == cells[name]["protocols"]
+    assert measure(folder, cells_of)[name]["protocols"] == cells[name]["protocols"]
 
 
+@pytest.mark.full  # each process simulates the runs anew; the runner's own test is quick
 def test_the_numbers_do_not_depend_on_how_many_cells_are_measured_at_once(small):
-    folder, _, cells, _ = small
+    folder, cells_of, _, cells, _ = small
     # none that JAX trains: each worker would import and compile it
-    left = ("benchmark-rls-s0", "tree-1stage-raw-row-ideal-s0", "tree-2stage-raw-payload-ideal-s1")
+    left = ("benchmark-rls-s0", "tree-1stage-raw-row-ideal", "tree-2stage-raw-payload-ideal")
     names = [next(name for name in cells if name.startswith(start)) for start in left]
     for name in names:
         (folder / "cells" / f"{name}.json").unlink()
     messages = []
-    again = run_study(Basis(folder, SMALL), folder / "cells", jobs=2, say=messages.append)
+    again = measure(folder, cells_of, jobs=2, say=messages.append)
     assert len(messages) == len(names)
     for name in names:
         for field in ("key", "spec", "epochs", "file_bytes", "protocols", "izz"):
@@ -180,17 +202,15 @@ def test_the_numbers_do_not_depend_on_how_many_cells_are_measured_at_once(small)
 
 
 def test_a_cell_of_another_size_is_measured_again(small):
-    folder, _, cells, _ = small
+    folder, cells_of, _, cells, _ = small
     name = "benchmark-training-mean-row-s0"
     path = folder / "cells" / f"{name}.json"
     path.write_text(json.dumps({**cells[name], "key": "of another basis", "protocols": {}}))
-    assert run_study(Basis(folder, SMALL), folder / "cells")[name] == cells[name] | {
-        "wall_s": json.loads(path.read_text())["wall_s"]
-    }
+    assert measure(folder, cells_of)[name] == cells[name] | {"wall_s": json.loads(path.read_text())["wall_s"]}
 
 
 def test_every_learned_cell_has_all_protocols_and_finite_errors(small):
-    _, _, cells, _ = small
+    _, _, _, cells, _ = small
     for name, cell in cells.items():
         if name.startswith("reading"):
             held_out = cell["protocols"]["held_out"]
@@ -207,6 +227,7 @@ def test_every_learned_cell_has_all_protocols_and_finite_errors(small):
             assert all(np.isfinite(p["single"]).all() for p in cell["protocols"].values())
 
 
+@pytest.mark.full  # those of the committed cells are quick
 def test_page_summary_and_report_are_written_from_the_cells(written):
     files = written
     summary = json.loads(files["summary"].read_text(encoding="utf-8"))

@@ -176,7 +176,7 @@ def engine(jobs: int = 1, cluster: str | None = None) -> Iterator[Engine]:
     import distributed  # type: ignore[import-not-found]
 
     if cluster == "local":
-        settings = {"n_workers": jobs, "threads_per_worker": 1, "dashboard_address": None}
+        settings = {"n_workers": jobs, "threads_per_worker": 1, "dashboard_address": "127.0.0.1:0"}
         made: Any = distributed.LocalCluster(**settings)
     else:
         made = cluster
