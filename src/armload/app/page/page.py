@@ -14,6 +14,7 @@ from armload.app.page.curves import AXES, GROUPS, HEIGHT, PADDING, bands_of, dat
 from armload.app.page.download import ENDINGS, file_of
 from armload.app.page.scene import Scene
 from armload.app.page.server import look_at_arm, serve, stop, url_of
+from armload.app.page.status import Status, Watcher
 from armload.arms import Arm
 from armload.errors import ArmloadError, ModelError
 from armload.identification import METHODS, default_for
@@ -48,7 +49,7 @@ class Page:
         self._server = server = serve(host, port, f"armload · {session.source.name}")
         self.url = url_of(server, host)
         self._stop = threading.Event()
-        self._ticks = 0
+        self._ticks, self._watcher = 0, Watcher(session)
         self.scene = Scene(server.scene, session.arm)
         look_at_arm(server, self.scene.reach)
         self._build_curves(server.gui)
@@ -58,13 +59,19 @@ class Page:
         """Show the session until `close` or Ctrl-C."""
         due = time.monotonic()
         while not self._stop.is_set():
+            status = self._watcher.look()  # also while nobody looks on: what is old then is old
             if self._server.get_clients():
-                self.show()
+                self.show(status)
             due = max(due + self.period, time.monotonic())
             self._stop.wait(due - time.monotonic())
 
-    def show(self) -> None:
-        """Bring what is seen up to date."""
+    def show(self, status: Status | None = None) -> None:
+        """Bring what is seen up to date.
+
+        Args:
+            status: how the answer is to be taken; None: look.
+        """
+        status = self._watcher.look() if status is None else status
         session = self.session
         sample, estimate = session.sample, session.estimate
         numbers, curves = self._ticks % _NUMBERS == 0, self._ticks % _CURVES == 0
@@ -74,7 +81,8 @@ class Page:
             if sample is not None and estimate is not None:
                 self.scene.show(sample, estimate, truth)
             if numbers:
-                self._headline.content = tables.headline(estimate, truth)
+                self._headline.content = tables.headline(estimate, truth, status.misfit)
+                self._status.content = tables.status(estimate, status)
                 self._table.content = tables.parameters(estimate, truth)
                 self._events.content = tables.events(session.log)
                 self._stream.content = tables.stream(session.source.name, estimate, session.lost)
@@ -116,6 +124,7 @@ class Page:
     def _build_panel(self, gui: Any) -> None:
         session = self.session
         self._headline = gui.add_html(tables.headline(None))
+        self._status = gui.add_html("")
         self._table = gui.add_html("")
         methods = methods_for(session)
         with gui.add_folder("Identification"):
