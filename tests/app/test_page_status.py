@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from armload.app.page import tables
+from armload.app.page.page import Page
 from armload.app.page.status import Watcher, waits_for
 from armload.devices import Replay, Simulator, Source
 from armload.errors import SourceError
@@ -129,3 +130,45 @@ def test_the_age_of_a_tare_is_counted_from_when_it_was_taken_or_recorded(panda, 
     assert watcher.look(75.0).tare == "taken 15.0 s ago"
     assert "does not say when" in Watcher(session).look().tare
     session.close()
+
+
+@pytest.fixture
+def page_of():
+    """The page of a session, as nobody looks at it."""
+    pytest.importorskip("viser", reason="the page needs viser")
+    pages = []
+
+    def made(session):
+        pages.append(Page(session, port=0))
+        pages[-1].show()
+        return pages[-1]
+
+    yield made
+    for page in pages:
+        page.close()
+
+
+def test_after_a_loss_nothing_old_is_shown_as_if_it_were_so(lost, page_of):
+    page = page_of(lost)
+    assert lost.estimate.held
+    assert lost.estimate.determined[:4].all()
+    assert 'data-armload="mass">—<' in page._headline.content
+    assert "the robot was unplugged" in page._headline.content
+    assert "kg" not in page._headline.content
+    assert page._table.content == ""
+    assert not page.scene._payload.visible
+    assert not page.scene._region.visible
+
+
+def test_a_payload_is_drawn_only_where_its_centre_of_mass_is_determined(seen, page_of):
+    page = page_of(seen)
+    assert f"{seen.estimate.phi[0]:.3f} ± " in page._headline.content  # a log that has ended keeps its answer
+    assert page.scene._payload.visible
+    assert page.scene._region.visible
+    some = np.arange(10) != 2
+    for estimate in (replace(seen.estimate, determined=some), replace(seen.estimate, held=False)):
+        page.scene.show(seen.sample, estimate, None)
+        assert not page.scene._payload.visible
+        assert not page.scene._region.visible
+        assert " mm<" not in tables.headline(estimate)
+    assert "no centre of mass: nothing is held" in tables.headline(replace(seen.estimate, held=False))

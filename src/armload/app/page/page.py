@@ -77,13 +77,16 @@ class Page:
         numbers, curves = self._ticks % _NUMBERS == 0, self._ticks % _CURVES == 0
         self._ticks += 1
         with self._server.atomic():
-            truth = None if estimate is None else session.truth(estimate.t)
-            if sample is not None and estimate is not None:
-                self.scene.show(sample, estimate, truth)
+            now = None if status.gone else estimate  # what may be shown as being so at present
+            truth = None if now is None else session.truth(now.t)
+            if sample is not None:
+                self.scene.show(sample, now, truth)
             if numbers:
-                self._headline.content = tables.headline(estimate, truth, status.misfit)
+                self._headline.content = (
+                    tables.gone(status) if status.gone else tables.headline(now, truth, status.misfit)
+                )
                 self._status.content = tables.status(estimate, status)
-                self._table.content = tables.parameters(estimate, truth)
+                self._table.content = tables.parameters(now, truth)
                 self._events.content = tables.events(session.log)
                 self._stream.content = tables.stream(session.source.name, estimate, session.lost)
             if curves:

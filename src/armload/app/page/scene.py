@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.app.page.drawing import Box, arm_parts, com_region, edges, ellipsoid, equivalent_box, frame_poses
+from armload.app.page.drawing import Box, arm_parts, com_region, edges, ellipsoid, equivalent_box, frame_poses, has_com
 from armload.arms import Arm
 from armload.inertia import InertialParameters
 from armload.online import OnlineEstimate
@@ -88,27 +88,27 @@ class Scene:
         )
         self._outlined: NDArray | None = None
 
-    def show(self, sample: Sample, estimate: OnlineEstimate, truth: InertialParameters | None) -> None:
-        """Where the arm is, and what it holds."""
+    def show(self, sample: Sample, estimate: OnlineEstimate | None, truth: InertialParameters | None) -> None:
+        """Where the arm is, and what it holds; None: the last answer says nothing of the present."""
         self._arm.stand(np.asarray(sample.q, dtype=float))  # a pose that was left out: the arm stays where it was
         self._show_payload(estimate)
         self._show_truth(truth)
 
-    def _show_payload(self, estimate: OnlineEstimate) -> None:
-        there = estimate.held and estimate.phi[0] > 0
+    def _show_payload(self, estimate: OnlineEstimate | None) -> None:
+        there = estimate is not None and has_com(estimate)
         self._payload.visible = there
-        if there:
+        drawn = False
+        if estimate is not None and there:
             box = equivalent_box(estimate.parameters)
             _place(self._payload, box)
             self._payload.dimensions = tuple(np.clip(box.lengths, _THINNEST, _WIDEST).tolist())
             known = bool(estimate.determined.all())
             self._payload.color, self._payload.opacity = (HELD, 0.6) if known else (VAGUE, 0.35)
-        region = com_region(estimate.phi, estimate.covariance) if there and _finite(estimate) else None
-        drawn = region is not None and float(region.lengths.max()) < _LARGEST
+            region = com_region(estimate.phi, estimate.covariance)
+            if drawn := float(region.lengths.max()) < _LARGEST:
+                _place(self._region, region)
+                self._region.vertices = ellipsoid(np.maximum(region.lengths, _SMALLEST)).vertices.astype(np.float32)
         self._region.visible = drawn
-        if drawn and region is not None:
-            _place(self._region, region)
-            self._region.vertices = ellipsoid(np.maximum(region.lengths, _SMALLEST)).vertices.astype(np.float32)
 
     def _show_truth(self, truth: InertialParameters | None) -> None:
         self._truth.visible = truth is not None and truth.mass > 0
@@ -133,7 +133,3 @@ def _wxyz(R: NDArray[np.float64]) -> NDArray[np.float64]:
     from viser.transforms import SO3
 
     return np.asarray(SO3.from_matrix(R).wxyz, dtype=np.float64)
-
-
-def _finite(estimate: OnlineEstimate) -> bool:
-    return bool(np.all(np.isfinite(estimate.covariance[:4, :4])))

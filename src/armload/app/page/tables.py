@@ -7,7 +7,7 @@ from html import escape
 
 import numpy as np
 
-from armload.app.page.drawing import CHI2_95, com_region
+from armload.app.page.drawing import CHI2_95, com_region, has_com
 from armload.app.page.status import Status, in_words
 from armload.inertia import NAMES, UNITS, Z95, InertialParameters
 from armload.online import OnlineEstimate
@@ -42,6 +42,15 @@ def headline(
         f'<div style="{_DIM}">{escape(rests_on(estimate))}</div>',
     ]
     return f'<div style="{_TEXT}">{"".join(lines)}</div>'
+
+
+def gone(status: Status) -> str:
+    """In the place of the headline while the last answer says nothing of the present."""
+    why = "" if status.why is None else status.why.text
+    return (
+        f'<div style="{_TEXT}"><div style="font-size:22px;font-weight:600" data-armload="mass">—</div>'
+        f'<div data-armload="state"{_WARNING}>{escape(why)}</div></div>'
+    )
 
 
 def state_of(estimate: OnlineEstimate, misfit: str | None = None) -> str:
@@ -152,7 +161,9 @@ def stream(name: str, estimate: OnlineEstimate | None, lost: int = 0) -> str:
 
 
 def _com(estimate: OnlineEstimate) -> str:
-    if not estimate.determined[:4].all() or estimate.phi[0] <= 0 or not np.isfinite(estimate.covariance[:4, :4]).all():
+    if estimate.determined[0] and not estimate.held:
+        return f'<span style="{_DIM}">no centre of mass: nothing is held</span>'
+    if not has_com(estimate):
         return f'<span style="{_DIM}">centre of mass undetermined</span>'
     r = 1000 * estimate.phi[1:4] / estimate.phi[0]
     half = 1000 * com_std(estimate) * Z95
