@@ -89,6 +89,7 @@ def test_a_log_that_has_ended_is_not_lost_and_waits_for_nothing(seen):
     assert status.why.reason is Unknown.SOURCE_ENDED
     assert not status.gone
     assert status.waits is None
+    assert "the source has ended" in tables.status(seen.estimate, status)
 
 
 def test_a_robot_that_is_lost_is_waited_for_and_why_is_said(lost):
@@ -172,3 +173,16 @@ def test_a_payload_is_drawn_only_where_its_centre_of_mass_is_determined(seen, pa
         assert not page.scene._region.visible
         assert " mm<" not in tables.headline(estimate)
     assert "no centre of mass: nothing is held" in tables.headline(replace(seen.estimate, held=False))
+
+
+def test_the_flange_stays_in_the_middle_of_the_picture_or_the_base_where_it_is(seen, page_of):
+    scene, poses = page_of(seen).scene, np.linspace(-0.5, 0.5, 3)[:, None] * np.ones(7) + [0, 0, 0, -1.5, 0, 1.5, 0]
+    for close, (fixed, moved) in {True: ("flange", "base"), False: ("base", "flange")}.items():
+        scene.close, seen_at = close, {"flange": [], "base": []}
+        for q in poses:
+            scene.show(seen.sample._replace(q=q), seen.estimate, None)
+            seen_at["base"].append(np.array(scene._arm._whole.position))
+            seen_at["flange"].append(seen_at["base"][-1] + seen.arm.frame_pose(q)[1][0])
+        assert np.allclose(seen_at[fixed], seen_at[fixed][0], atol=1e-9)
+        assert np.ptp(seen_at[moved], axis=0).max() > 0.1
+        assert np.allclose(seen_at["flange"], 0.0, atol=1e-9) == close

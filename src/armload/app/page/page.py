@@ -13,7 +13,7 @@ from armload.app.page import tables
 from armload.app.page.curves import AXES, GROUPS, HEIGHT, PADDING, bands_of, data_of, legend_of, series_of
 from armload.app.page.download import ENDINGS, file_of
 from armload.app.page.scene import Scene
-from armload.app.page.server import look_at_arm, serve, stop, url_of
+from armload.app.page.server import look_at_middle, serve, stop, url_of, view_of
 from armload.app.page.status import Status, Watcher
 from armload.arms import Arm
 from armload.errors import ArmloadError, ModelError
@@ -22,6 +22,7 @@ from armload.service.session import Session
 
 _NUMBERS, _CURVES = 3, 8  # pictures from which on numbers and curves follow
 SPANS = {"last 30 s": 30.0, "last 2 min": 120.0, "last 10 min": 600.0, "last hour": 3600.0, "everything": float("inf")}
+_VIEWS = ("payload", "whole arm")
 _KEY = (
     '<div style="font-size:12px;padding:2px 8px;color:var(--mantine-color-dimmed)">line: estimate, shaded: 95 % '
     "interval, dashed: truth where it is known. In the picture: box of the same mass and inertia (grey: not all "
@@ -51,7 +52,7 @@ class Page:
         self._stop = threading.Event()
         self._ticks, self._watcher = 0, Watcher(session)
         self.scene = Scene(server.scene, session.arm)
-        look_at_arm(server, self.scene.reach)
+        look_at_middle(server, self.scene.reach)
         self._build_curves(server.gui)
         self._build_panel(server.gui)
 
@@ -123,6 +124,7 @@ class Page:
             gui.add_html(_KEY)
         panel.dock_left()
         panel.set_width(400)
+        panel.expand()  # on a phone panels are sections of one sheet, closed at first
 
     def _build_panel(self, gui: Any) -> None:
         session = self.session
@@ -130,6 +132,7 @@ class Page:
         self._status = gui.add_html("")
         self._table = gui.add_html("")
         methods = methods_for(session)
+        self._view = gui.add_dropdown("View", _VIEWS, hint="Payload: it stays in the middle while the arm moves")
         with gui.add_folder("Identification"):
             self._method = gui.add_dropdown("Method", methods, initial_value=session.method)
             again = gui.add_button_group(" ", ("Start anew", "Tare"), hint="Tare: what is held now counts as nothing")
@@ -148,6 +151,13 @@ class Page:
                 return  # we set it ourselves
             if not _done(event.client, "Method", lambda: session.use(event.target.value)):
                 self._method.value = session.method
+
+        @self._view.on_update
+        def _(_: Any) -> None:
+            self.scene.close = self._view.value == _VIEWS[0]
+            for client in self._server.get_clients().values():
+                client.camera.position = view_of(self.scene.reach, self.scene.close)
+                client.camera.look_at = (0.0, 0.0, 0.0)
 
         @again.on_click
         def _(event: Any) -> None:

@@ -11,6 +11,9 @@ from typing import Any
 from armload.errors import UsageError
 from armload.extras import install
 
+# [length of all links] from what is looked at to the eye: the whole arm is seen, or the payload and the wrist
+_FROM_AFAR, _FROM_CLOSE = (0.7, -0.7, 0.28), (0.3, -0.3, 0.12)
+
 
 def serve(host: str, port: int, label: str, otherwise: str = "use --headless") -> Any:
     """A viser server that listens at once.
@@ -46,6 +49,19 @@ def look_at_arm(server: Any, reach: float) -> None:
     server.initial_camera.position = (0.85 * reach, -0.7 * reach, 0.6 * reach)
     server.initial_camera.look_at = (0.15 * reach, 0.0, 0.32 * reach)
     server.gui.configure_theme(show_logo=False, show_share_button=False)
+
+
+def look_at_middle(server: Any, reach: float) -> None:
+    """The same at a payload that stays at the origin, close to it: of the arm there is what it hangs on."""
+    server.initial_camera.position = view_of(reach, True)
+    server.initial_camera.look_at = (0.0, 0.0, 0.0)
+    server.gui.configure_theme(show_logo=False, show_share_button=False)
+
+
+def view_of(reach: float, close: bool) -> tuple[float, float, float]:
+    """From where the origin is looked at [m], if the payload is there, or else the middle of an arm of a length [m]."""
+    x, y, z = _FROM_CLOSE if close else _FROM_AFAR
+    return x * reach, y * reach, z * reach
 
 
 def stop(server: Any) -> None:

@@ -14,6 +14,7 @@ from armload.online import OnlineEstimate
 from armload.online.listening import UNUSED
 from armload.recording import GAP
 from armload.service.session_log import Entry
+from armload.service.unknown import Unknown
 
 _DIM = "color:var(--mantine-color-dimmed)"
 _TEXT = "font-size:13px;line-height:1.45;font-variant-numeric:tabular-nums;padding:2px 8px"
@@ -87,6 +88,7 @@ def status(estimate: OnlineEstimate | None, status: Status) -> str:
     if status.misfit is not None:
         lines.append(f'<div data-armload="misfit"{_WARNING}><b>does not fit:</b> {escape(status.misfit)}</div>')
     ages = [] if status.age is None else [f"answer {in_words(status.age)} old"]
+    ages += [status.why.text] if status.why is not None and status.why.reason is Unknown.SOURCE_ENDED else []
     ages += [] if status.tare is None else [f"tare {status.tare}"]
     lines.append(f'<div style="{_DIM}" data-armload="age">{escape("; ".join(ages))}</div>')
     return f'<div style="{_TEXT}">{"".join(lines)}</div>'
