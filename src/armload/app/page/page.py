@@ -10,10 +10,10 @@ import time
 from typing import Any
 
 from armload.app.page import tables
-from armload.app.page.curves import AXES, GROUPS, HEIGHT, PADDING, bands_of, data_of, legend_of, series_of
+from armload.app.page.curves import AXES, GROUPS, HEIGHT, PADDING, Group, bands_of, data_of, legend_of, series_of
 from armload.app.page.download import ENDINGS, file_of
 from armload.app.page.scene import Scene
-from armload.app.page.server import look_at_middle, serve, stop, url_of, view_of
+from armload.app.page.server import look_at_middle, look_from, serve, stop, url_of
 from armload.app.page.status import Status, Watcher
 from armload.arms import Arm
 from armload.errors import ArmloadError, ModelError
@@ -53,8 +53,9 @@ class Page:
         self._ticks, self._watcher = 0, Watcher(session)
         self.scene = Scene(server.scene, session.arm)
         look_at_middle(server, self.scene.reach)
-        self._build_curves(server.gui)
+        self._plots: list[Any] = []  # as GROUPS
         self._build_panel(server.gui)
+        self._build_curves(server.gui)
 
     def serve(self) -> None:
         """Show the session until `close` or Ctrl-C."""
@@ -105,31 +106,34 @@ class Page:
 
     def _build_curves(self, gui: Any) -> None:
         panel = gui.add_panel()
-        self._plots = []
-        with panel.add_tab("Ten parameters over time"):
+        with panel.add_tab("Parameters over time"):
             self._span = gui.add_dropdown("Time [s]", tuple(SPANS), initial_value="last 30 s")
-            for group in GROUPS:
-                gui.add_html(f'<div style="font-size:13px;padding:2px 8px 0">{legend_of(group)}</div>')
-                plot = gui.add_uplot(
-                    data_of(group, *self.session.history.last(1.0)),
-                    series_of(group),
-                    bands=bands_of(group),
-                    scales={"x": {"time": False}, "y": {"auto": True}},
-                    axes=AXES,
-                    legend={"show": False},
-                    padding=PADDING,
-                    height=HEIGHT,
-                )
-                self._plots.append(plot)
+            for group in GROUPS[1:]:
+                self._add_curves(gui, group)
             gui.add_html(_KEY)
         panel.dock_left()
         panel.set_width(400)
         panel.expand()  # on a phone panels are sections of one sheet, closed at first
 
+    def _add_curves(self, gui: Any, group: Group) -> None:
+        gui.add_html(f'<div style="font-size:13px;padding:2px 8px 0">{legend_of(group)}</div>')
+        plot = gui.add_uplot(
+            data_of(group, *self.session.history.last(1.0)),
+            series_of(group),
+            bands=bands_of(group),
+            scales={"x": {"time": False}, "y": {"auto": True}},
+            axes=AXES,
+            legend={"show": False},
+            padding=PADDING,
+            height=HEIGHT,
+        )
+        self._plots.append(plot)
+
     def _build_panel(self, gui: Any) -> None:
         session = self.session
         self._headline = gui.add_html(tables.headline(None))
         self._status = gui.add_html("")
+        self._add_curves(gui, GROUPS[0])  # where a phone shows it without scrolling
         self._table = gui.add_html("")
         methods = methods_for(session)
         self._view = gui.add_dropdown("View", _VIEWS, hint="Payload: it stays in the middle while the arm moves")
@@ -156,8 +160,7 @@ class Page:
         def _(_: Any) -> None:
             self.scene.close = self._view.value == _VIEWS[0]
             for client in self._server.get_clients().values():
-                client.camera.position = view_of(self.scene.reach, self.scene.close)
-                client.camera.look_at = (0.0, 0.0, 0.0)
+                look_from(client.camera, self.scene.reach, self.scene.close)
 
         @again.on_click
         def _(event: Any) -> None:
