@@ -185,7 +185,8 @@ def test_a_phone_shows_mass_and_its_curve_without_scrolling(holding):
     until(lambda: mass(holding))
     width, height = PHONE
     for part in ("[data-armload=mass]", ".uplot"):
-        box = holding.locator(part).first.bounding_box()
+        place = holding.locator(part).first
+        box = until(place.bounding_box)  # None before it is drawn
         assert box["x"] >= 0.0
         assert box["x"] + box["width"] <= width
         assert box["y"] + box["height"] <= height

@@ -132,8 +132,8 @@ class Page:
     def _build_panel(self, gui: Any) -> None:
         session = self.session
         self._headline = gui.add_html(tables.headline(None))
-        self._status = gui.add_html("")
         self._add_curves(gui, GROUPS[0])  # where a phone shows it without scrolling
+        self._status = gui.add_html("")
         self._table = gui.add_html("")
         methods = methods_for(session)
         self._view = gui.add_dropdown("View", _VIEWS, hint="Payload: it stays in the middle while the arm moves")
