@@ -43,6 +43,7 @@ FLAGS = (
 )
 PATIENCE = 120_000  # [ms] drawing without a GPU is slow
 LARGE, SMALL = (1360, 860), (960, 600)  # [px] of the picture to keep, and where nothing but text is looked at
+PHONE = (390, 844)  # [px]
 
 
 @pytest.fixture(scope="module")
@@ -177,6 +178,18 @@ def test_the_picture_shows_the_arm_and_what_it_holds(holding, tmp_path):
     folder = Path(os.environ.get("ARMLOAD_PICTURES") or tmp_path)
     image.save(folder / "live.jpg", quality=80, optimize=True)
     assert (folder / "live.jpg").stat().st_size < 150_000
+
+
+@pytest.mark.parametrize("tab", [PHONE], indirect=True, ids=["phone"])
+def test_a_phone_shows_mass_and_its_curve_without_scrolling(holding):
+    until(lambda: mass(holding))
+    width, height = PHONE
+    for part in ("[data-armload=mass]", ".uplot"):
+        place = holding.locator(part).first
+        box = until(place.bounding_box)  # None before it is drawn
+        assert box["x"] >= 0.0
+        assert box["x"] + box["width"] <= width
+        assert box["y"] + box["height"] <= height
 
 
 def test_downloads_read_back(holding, tmp_path):

@@ -17,6 +17,8 @@ from armload.inertia import InertialParameters, phi_to_com
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
+    from armload.online import OnlineEstimate
+
 CHI2_95 = 7.814727903251179  # 95 % quantile of chi² with three degrees of freedom
 _THICK, _THIN = 0.042, 0.026  # radius of the first and the last link, in units of the length of all links
 _SHORT = 1e-3  # [m] a link shorter than this shows its joint only
@@ -131,6 +133,16 @@ def com_region(phi: NDArray[np.float64], covariance: NDArray[np.float64]) -> Box
     spread, axes = np.linalg.eigh(G @ covariance[:4, :4] @ G.T)
     axes[:, 2] *= np.sign(np.linalg.det(axes))
     return Box(axes, r, np.sqrt(CHI2_95 * np.maximum(spread, 0.0)))
+
+
+def has_com(estimate: OnlineEstimate) -> bool:
+    """Whether something is held whose mass and centre of mass the samples determine."""
+    return bool(
+        estimate.held
+        and estimate.phi[0] > 0.0
+        and estimate.determined[:4].all()
+        and np.isfinite(estimate.covariance[:4, :4]).all()
+    )
 
 
 def edges(lengths: ArrayLike) -> NDArray[np.float64]:

@@ -10,10 +10,11 @@ import time
 from typing import Any
 
 from armload.app.page import tables
-from armload.app.page.curves import AXES, GROUPS, HEIGHT, PADDING, bands_of, data_of, legend_of, series_of
+from armload.app.page.curves import AXES, GROUPS, HEIGHT, PADDING, Group, bands_of, data_of, legend_of, series_of
 from armload.app.page.download import ENDINGS, file_of
 from armload.app.page.scene import Scene
-from armload.app.page.server import look_at_arm, serve, stop, url_of
+from armload.app.page.server import look_at_middle, look_from, serve, stop, url_of
+from armload.app.page.status import Status, Watcher
 from armload.arms import Arm
 from armload.errors import ArmloadError, ModelError
 from armload.identification import METHODS, default_for
@@ -21,6 +22,7 @@ from armload.service.session import Session
 
 _NUMBERS, _CURVES = 3, 8  # pictures from which on numbers and curves follow
 SPANS = {"last 30 s": 30.0, "last 2 min": 120.0, "last 10 min": 600.0, "last hour": 3600.0, "everything": float("inf")}
+_VIEWS = ("payload", "whole arm")
 _KEY = (
     '<div style="font-size:12px;padding:2px 8px;color:var(--mantine-color-dimmed)">line: estimate, shaded: 95 % '
     "interval, dashed: truth where it is known. In the picture: box of the same mass and inertia (grey: not all "
@@ -48,34 +50,45 @@ class Page:
         self._server = server = serve(host, port, f"armload · {session.source.name}")
         self.url = url_of(server, host)
         self._stop = threading.Event()
-        self._ticks = 0
+        self._ticks, self._watcher = 0, Watcher(session)
         self.scene = Scene(server.scene, session.arm)
-        look_at_arm(server, self.scene.reach)
-        self._build_curves(server.gui)
+        look_at_middle(server, self.scene.reach)
+        self._plots: list[Any] = []  # as GROUPS
         self._build_panel(server.gui)
+        self._build_curves(server.gui)
 
     def serve(self) -> None:
         """Show the session until `close` or Ctrl-C."""
         due = time.monotonic()
         while not self._stop.is_set():
+            status = self._watcher.look()  # also while nobody looks on: what is old then is old
             if self._server.get_clients():
-                self.show()
+                self.show(status)
             due = max(due + self.period, time.monotonic())
             self._stop.wait(due - time.monotonic())
 
-    def show(self) -> None:
-        """Bring what is seen up to date."""
+    def show(self, status: Status | None = None) -> None:
+        """Bring what is seen up to date.
+
+        Args:
+            status: how the answer is to be taken; None: look.
+        """
+        status = self._watcher.look() if status is None else status
         session = self.session
         sample, estimate = session.sample, session.estimate
         numbers, curves = self._ticks % _NUMBERS == 0, self._ticks % _CURVES == 0
         self._ticks += 1
         with self._server.atomic():
-            truth = None if estimate is None else session.truth(estimate.t)
-            if sample is not None and estimate is not None:
-                self.scene.show(sample, estimate, truth)
+            now = None if status.gone else estimate  # what may be shown as being so at present
+            truth = None if now is None else session.truth(now.t)
+            if sample is not None:
+                self.scene.show(sample, now, truth)
             if numbers:
-                self._headline.content = tables.headline(estimate, truth)
-                self._table.content = tables.parameters(estimate, truth)
+                self._headline.content = (
+                    tables.gone(status) if status.gone else tables.headline(now, truth, status.misfit)
+                )
+                self._status.content = tables.status(estimate, status)
+                self._table.content = tables.parameters(now, truth)
                 self._events.content = tables.events(session.log)
                 self._stream.content = tables.stream(session.source.name, estimate, session.lost)
             if curves:
@@ -93,31 +106,37 @@ class Page:
 
     def _build_curves(self, gui: Any) -> None:
         panel = gui.add_panel()
-        self._plots = []
-        with panel.add_tab("Ten parameters over time"):
+        with panel.add_tab("Parameters over time"):
             self._span = gui.add_dropdown("Time [s]", tuple(SPANS), initial_value="last 30 s")
-            for group in GROUPS:
-                gui.add_html(f'<div style="font-size:13px;padding:2px 8px 0">{legend_of(group)}</div>')
-                plot = gui.add_uplot(
-                    data_of(group, *self.session.history.last(1.0)),
-                    series_of(group),
-                    bands=bands_of(group),
-                    scales={"x": {"time": False}, "y": {"auto": True}},
-                    axes=AXES,
-                    legend={"show": False},
-                    padding=PADDING,
-                    height=HEIGHT,
-                )
-                self._plots.append(plot)
+            for group in GROUPS[1:]:
+                self._add_curves(gui, group)
             gui.add_html(_KEY)
         panel.dock_left()
         panel.set_width(400)
+        panel.expand()  # on a phone panels are sections of one sheet, closed at first
+
+    def _add_curves(self, gui: Any, group: Group) -> None:
+        gui.add_html(f'<div style="font-size:13px;padding:2px 8px 0">{legend_of(group)}</div>')
+        plot = gui.add_uplot(
+            data_of(group, *self.session.history.last(1.0)),
+            series_of(group),
+            bands=bands_of(group),
+            scales={"x": {"time": False}, "y": {"auto": True}},
+            axes=AXES,
+            legend={"show": False},
+            padding=PADDING,
+            height=HEIGHT,
+        )
+        self._plots.append(plot)
 
     def _build_panel(self, gui: Any) -> None:
         session = self.session
         self._headline = gui.add_html(tables.headline(None))
+        self._add_curves(gui, GROUPS[0])  # where a phone shows it without scrolling
+        self._status = gui.add_html("")
         self._table = gui.add_html("")
         methods = methods_for(session)
+        self._view = gui.add_dropdown("View", _VIEWS, hint="Payload: it stays in the middle while the arm moves")
         with gui.add_folder("Identification"):
             self._method = gui.add_dropdown("Method", methods, initial_value=session.method)
             again = gui.add_button_group(" ", ("Start anew", "Tare"), hint="Tare: what is held now counts as nothing")
@@ -136,6 +155,12 @@ class Page:
                 return  # we set it ourselves
             if not _done(event.client, "Method", lambda: session.use(event.target.value)):
                 self._method.value = session.method
+
+        @self._view.on_update
+        def _(_: Any) -> None:
+            self.scene.close = self._view.value == _VIEWS[0]
+            for client in self._server.get_clients().values():
+                look_from(client.camera, self.scene.reach, self.scene.close)
 
         @again.on_click
         def _(event: Any) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.app.page.drawing import Box, arm_parts, com_region, edges, ellipsoid, equivalent_box, frame_poses
+from armload.app.page.drawing import Box, arm_parts, com_region, edges, ellipsoid, equivalent_box, frame_poses, has_com
 from armload.arms import Arm
 from armload.inertia import InertialParameters
 from armload.online import OnlineEstimate
@@ -16,12 +16,13 @@ from armload.recording import Sample
 
 LINK, JOINT, BASE = (221, 224, 229), (112, 121, 135), (70, 76, 86)
 HELD, VAGUE, TRUTH, REGION = (230, 159, 0), (150, 150, 150), (0, 128, 96), (190, 20, 20)
+ARM_MIDDLE = np.array([0.15, 0.0, 0.32])  # [length of all links] of what is looked at if that is the whole arm
 _THINNEST, _WIDEST = 0.004, 0.6  # [m] of a side of the payload as it is drawn
 _SMALLEST, _LARGEST = 0.005, 0.25  # [m] of a semi-axis of the centre of mass: smaller ones as a dot, larger ones not
 
 
 class DrawnArm:
-    """Handles of an arm on its floor; `stand` moves them.
+    """Handles of an arm on its floor; `stand` moves its joints, `shift` arm and floor.
 
     Args:
         scene: viser's scene.
@@ -37,7 +38,7 @@ class DrawnArm:
             np.linalg.norm(np.diff(frame_poses(self._arm, np.zeros(arm.n))[1], axis=0), axis=1).sum()
         )
         scene.configure_default_lights(cast_shadow=False)  # a shadow costs more than all the rest without a GPU
-        scene.add_grid(
+        self._floor = scene.add_grid(
             "/floor",
             width=4.0 * reach,
             height=4.0 * reach,
@@ -47,6 +48,7 @@ class DrawnArm:
             section_color=(200, 203, 208),
             shadow_opacity=0.18,
         )
+        self._whole = scene.add_frame("/arm", show_axes=False)
         self.frames = [scene.add_frame(f"/arm/{k}", show_axes=False) for k in range(arm.n + 1)]
         self.frames.append(
             scene.add_frame("/arm/flange", axes_length=0.03 * reach, axes_radius=0.003 * reach, origin_radius=0.0)
@@ -66,6 +68,15 @@ class DrawnArm:
             for frame, turn, place in zip(self.frames, _wxyz(R), p, strict=True):
                 frame.wxyz, frame.position = turn, place
 
+    def shift(self, point: NDArray[np.float64]) -> None:
+        """Bring a point (3,) [m] of the arm's base frame to the middle of the picture."""
+        self._whole.position = self._floor.position = -point
+
+    @property
+    def flange(self) -> NDArray[np.float64]:
+        """Where the payload frame is (3,) [m], in the base."""
+        return np.asarray(self.frames[-1].position, dtype=float)
+
 
 class Scene:
     """Handles of everything drawn; `show` moves them.
@@ -73,11 +84,14 @@ class Scene:
     Args:
         scene: viser's scene.
         arm: whose joints are streamed.
+
+    Attributes:
+        reach: length of all links [m]. close: whether the flange stays in the middle, or the base where it is.
     """
 
     def __init__(self, scene: Any, arm: Arm) -> None:
         self._arm = DrawnArm(scene, arm)
-        self.reach = self._arm.reach
+        self.reach, self.close = self._arm.reach, True
         self._payload = scene.add_box("/arm/flange/payload", HELD, (0.1, 0.1, 0.1), opacity=0.6, visible=False)
         small = ellipsoid(np.full(3, 1e-3))
         self._region = scene.add_mesh_simple(
@@ -88,27 +102,28 @@ class Scene:
         )
         self._outlined: NDArray | None = None
 
-    def show(self, sample: Sample, estimate: OnlineEstimate, truth: InertialParameters | None) -> None:
-        """Where the arm is, and what it holds."""
+    def show(self, sample: Sample, estimate: OnlineEstimate | None, truth: InertialParameters | None) -> None:
+        """Where the arm is, and what it holds; None: the last answer says nothing of the present."""
         self._arm.stand(np.asarray(sample.q, dtype=float))  # a pose that was left out: the arm stays where it was
+        self._arm.shift(self._arm.flange if self.close else ARM_MIDDLE * self.reach)
         self._show_payload(estimate)
         self._show_truth(truth)
 
-    def _show_payload(self, estimate: OnlineEstimate) -> None:
-        there = estimate.held and estimate.phi[0] > 0
+    def _show_payload(self, estimate: OnlineEstimate | None) -> None:
+        there = estimate is not None and has_com(estimate)
         self._payload.visible = there
-        if there:
+        drawn = False
+        if estimate is not None and there:
             box = equivalent_box(estimate.parameters)
             _place(self._payload, box)
             self._payload.dimensions = tuple(np.clip(box.lengths, _THINNEST, _WIDEST).tolist())
             known = bool(estimate.determined.all())
             self._payload.color, self._payload.opacity = (HELD, 0.6) if known else (VAGUE, 0.35)
-        region = com_region(estimate.phi, estimate.covariance) if there and _finite(estimate) else None
-        drawn = region is not None and float(region.lengths.max()) < _LARGEST
+            region = com_region(estimate.phi, estimate.covariance)
+            if drawn := float(region.lengths.max()) < _LARGEST:
+                _place(self._region, region)
+                self._region.vertices = ellipsoid(np.maximum(region.lengths, _SMALLEST)).vertices.astype(np.float32)
         self._region.visible = drawn
-        if drawn and region is not None:
-            _place(self._region, region)
-            self._region.vertices = ellipsoid(np.maximum(region.lengths, _SMALLEST)).vertices.astype(np.float32)
 
     def _show_truth(self, truth: InertialParameters | None) -> None:
         self._truth.visible = truth is not None and truth.mass > 0
@@ -133,7 +148,3 @@ def _wxyz(R: NDArray[np.float64]) -> NDArray[np.float64]:
     from viser.transforms import SO3
 
     return np.asarray(SO3.from_matrix(R).wxyz, dtype=np.float64)
-
-
-def _finite(estimate: OnlineEstimate) -> bool:
-    return bool(np.all(np.isfinite(estimate.covariance[:4, :4])))

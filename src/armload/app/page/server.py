@@ -5,11 +5,17 @@ from __future__ import annotations
 import contextlib
 import importlib
 import io
+import math
 import socket
 from typing import Any
 
 from armload.errors import UsageError
 from armload.extras import install
+
+# [length of all links] from what is looked at to the eye: the whole arm is seen, or the payload and the wrist
+_FROM_AFAR, _FROM_CLOSE = (0.7, -0.7, 0.28), (0.3, -0.3, 0.12)
+_PHONE = 576  # [px] of width below which viser shows all panels as one sheet, over the lower 60 % of the picture
+_HIGHER = 0.3  # of the picture's height above its middle: the middle of what the sheet leaves
 
 
 def serve(host: str, port: int, label: str, otherwise: str = "use --headless") -> Any:
@@ -46,6 +52,29 @@ def look_at_arm(server: Any, reach: float) -> None:
     server.initial_camera.position = (0.85 * reach, -0.7 * reach, 0.6 * reach)
     server.initial_camera.look_at = (0.15 * reach, 0.0, 0.32 * reach)
     server.gui.configure_theme(show_logo=False, show_share_button=False)
+
+
+def look_at_middle(server: Any, reach: float) -> None:
+    """The same at a payload that stays at the origin, close to it: of the arm there is what it hangs on."""
+    server.initial_camera.position = tuple(reach * x for x in _FROM_CLOSE)
+    server.initial_camera.look_at = (0.0, 0.0, 0.0)
+    server.gui.configure_theme(show_logo=False, show_share_button=False)
+
+    @server.on_client_connect
+    def _(client: Any) -> None:
+        if client.camera.image_width < _PHONE:
+            look_from(client.camera, reach, True)
+
+
+def look_from(camera: Any, reach: float, close: bool) -> None:
+    """Look at the origin: close if the payload is there, or else from as far as the whole arm of a length [m] needs.
+
+    On a phone, whose lower part shows the numbers, at a point below: what is at the origin is in the upper part then.
+    """
+    x, y, z = (reach * x for x in (_FROM_CLOSE if close else _FROM_AFAR))
+    seen = 2.0 * math.hypot(x, y, z) * math.tan(0.5 * camera.fov)  # [m] from the lower edge to the upper one
+    below = _HIGHER * seen if camera.image_width < _PHONE else 0.0
+    camera.position, camera.look_at = (x, y, z - below), (0.0, 0.0, -below)
 
 
 def stop(server: Any) -> None:

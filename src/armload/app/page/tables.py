@@ -7,12 +7,14 @@ from html import escape
 
 import numpy as np
 
-from armload.app.page.drawing import CHI2_95, com_region
+from armload.app.page.drawing import CHI2_95, com_region, has_com
+from armload.app.page.status import Status, in_words
 from armload.inertia import NAMES, UNITS, Z95, InertialParameters
 from armload.online import OnlineEstimate
 from armload.online.listening import UNUSED
 from armload.recording import GAP
 from armload.service.session_log import Entry
+from armload.service.unknown import Unknown
 
 _DIM = "color:var(--mantine-color-dimmed)"
 _TEXT = "font-size:13px;line-height:1.45;font-variant-numeric:tabular-nums;padding:2px 8px"
@@ -20,8 +22,14 @@ _WARNING = ' style="color:var(--mantine-color-red-text)"'
 _DECIMALS = (3, 4, 4, 4, 5, 5, 5, 5, 5, 5)
 
 
-def headline(estimate: OnlineEstimate | None, truth: InertialParameters | None = None) -> str:
-    """Mass and centre of mass, large, and the state of the identification."""
+def headline(
+    estimate: OnlineEstimate | None, truth: InertialParameters | None = None, misfit: str | None = None
+) -> str:
+    """Mass and centre of mass, large, and the state of the identification.
+
+    Args:
+        misfit: a note that is told elsewhere.
+    """
     if estimate is None:
         return f'<div style="{_TEXT}" data-armload="state">waiting for the first sample</div>'
     mass = "—"
@@ -31,14 +39,27 @@ def headline(estimate: OnlineEstimate | None, truth: InertialParameters | None =
         f'<div style="font-size:22px;font-weight:600" data-armload="mass">{mass}</div>',
         f'<div data-armload="com">{_com(estimate)}</div>',
         f'<div style="{_DIM}" data-armload="truth">{_truth(truth)}</div>' if truth is not None else "",
-        f'<div data-armload="state">{escape(state_of(estimate))}</div>',
+        f'<div data-armload="state">{escape(state_of(estimate, misfit))}</div>',
         f'<div style="{_DIM}">{escape(rests_on(estimate))}</div>',
     ]
     return f'<div style="{_TEXT}">{"".join(lines)}</div>'
 
 
-def state_of(estimate: OnlineEstimate) -> str:
-    """In a few words: whether anything is held, and what keeps it from being known better."""
+def gone(status: Status) -> str:
+    """In the place of the headline while the last answer says nothing of the present."""
+    why = "" if status.why is None else status.why.text
+    return (
+        f'<div style="{_TEXT}"><div style="font-size:22px;font-weight:600" data-armload="mass">—</div>'
+        f'<div data-armload="state"{_WARNING}>{escape(why)}</div></div>'
+    )
+
+
+def state_of(estimate: OnlineEstimate, misfit: str | None = None) -> str:
+    """In a few words: whether anything is held, and what keeps it from being known better.
+
+    Args:
+        misfit: a note that is told elsewhere.
+    """
     if estimate.settling:
         words = ["the payload has just changed"]
     elif estimate.determined[0]:
@@ -49,8 +70,32 @@ def state_of(estimate: OnlineEstimate) -> str:
     noted = any(note.startswith((UNUSED, "standing")) for note in estimate.notes)
     if estimate.determined[0] and not (estimate.moving or noted):
         words.append("the arm stands still")
-    words += [note for note in estimate.notes if "moving" not in note and "has changed" not in note]
+    words += [n for n in estimate.notes if "moving" not in n and "has changed" not in n and n != misfit]
     return "; ".join(words)
+
+
+def status(estimate: OnlineEstimate | None, status: Status) -> str:
+    """Probabilities, what is waited for and why, what does not fit, and how old answer and tare are."""
+    lines = []
+    if estimate is not None and not status.gone:
+        said = (("held", estimate.p_held), ("change", estimate.p_change), ("contact", estimate.p_contact))
+        judged = [(what, p) for what, p in said if p is not None and estimate.p_held > 0.0]  # 0.0: nobody judged yet
+        if judged:
+            words = "&ensp;".join(f"P({what}) {_probability(p)}" for what, p in judged)
+            lines.append(f'<div data-armload="probabilities">{words}</div>')
+    if status.waits is not None:
+        lines.append(f'<div data-armload="waits"><b>waits for</b> {escape(status.waits)}</div>')
+    if status.misfit is not None:
+        lines.append(f'<div data-armload="misfit"{_WARNING}><b>does not fit:</b> {escape(status.misfit)}</div>')
+    ages = [] if status.age is None else [f"answer {in_words(status.age)} old"]
+    ages += [status.why.text] if status.why is not None and status.why.reason is Unknown.SOURCE_ENDED else []
+    ages += [] if status.tare is None else [f"tare {status.tare}"]
+    lines.append(f'<div style="{_DIM}" data-armload="age">{escape("; ".join(ages))}</div>')
+    return f'<div style="{_TEXT}">{"".join(lines)}</div>'
+
+
+def _probability(p: float) -> str:
+    return "&gt;&#8239;0.99" if p > 0.99 else "&lt;&#8239;0.01" if p < 0.01 else f"{p:.2f}"
 
 
 def rests_on(estimate: OnlineEstimate) -> str:
@@ -118,7 +163,9 @@ def stream(name: str, estimate: OnlineEstimate | None, lost: int = 0) -> str:
 
 
 def _com(estimate: OnlineEstimate) -> str:
-    if not estimate.determined[:4].all() or estimate.phi[0] <= 0 or not np.isfinite(estimate.covariance[:4, :4]).all():
+    if estimate.determined[0] and not estimate.held:
+        return f'<span style="{_DIM}">no centre of mass: nothing is held</span>'
+    if not has_com(estimate):
         return f'<span style="{_DIM}">centre of mass undetermined</span>'
     r = 1000 * estimate.phi[1:4] / estimate.phi[0]
     half = 1000 * com_std(estimate) * Z95

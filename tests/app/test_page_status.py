@@ -1,0 +1,188 @@
+"""Beside the numbers of the page: what it waits for and why, what does not fit, how old answer and tare are."""
+
+from dataclasses import replace
+from time import monotonic, sleep
+
+import numpy as np
+import pytest
+
+from armload.app.page import tables
+from armload.app.page.page import Page
+from armload.app.page.status import Watcher, waits_for
+from armload.devices import Replay, Simulator, Source
+from armload.errors import SourceError
+from armload.payloads import test_payload
+from armload.service import Session, Unknown
+
+HELD = test_payload().parameters
+
+
+class Lost(Source):
+    """A robot that is lost after some seconds."""
+
+    def __init__(self, inner, seconds):
+        self.inner, self.seconds = inner, seconds
+        self.name, self.n, self.rate, self.speed = "robot", inner.n, inner.rate, None
+
+    def __iter__(self):
+        for sample in self.inner:
+            if sample.t > self.seconds:
+                raise SourceError("the robot was unplugged")
+            yield sample
+
+    def close(self):
+        self.inner.close()
+
+
+def simulated(panda, **settings):
+    return Simulator(panda, payloads=[(0.0, HELD)], speed=None, rate=250.0, **settings)
+
+
+@pytest.fixture(scope="module")
+def seen(panda):
+    """A session that has seen a simulated Panda hold the test payload for four seconds, and its last estimate then."""
+    session = Session(simulated(panda, duration=4.0), panda, method="map")
+    session.run()
+    yield session
+    session.close()
+
+
+@pytest.fixture(scope="module")
+def lost(panda):
+    """The same of a robot that was lost."""
+    session = Session(Lost(simulated(panda, duration=4.0), 3.0), panda, method="map")
+    session.start()
+    end = monotonic() + 60.0
+    while not session.ended:
+        assert monotonic() < end
+        sleep(0.01)
+    yield session
+    session.close()
+
+
+def test_before_the_first_sample_the_page_says_that_it_waits_for_it(panda):
+    session = Session(simulated(panda, duration=1.0), panda, method="map")
+    status = Watcher(session).look()
+    assert status.why.reason is Unknown.STARTING
+    assert "waits for</b> the first sample" in tables.status(None, status)
+    assert status.age is None
+    session.close()
+
+
+def test_an_answer_that_nobody_renews_gets_older_by_the_clock(seen):
+    watcher = Watcher(seen)
+    first = watcher.look(100.0).age
+    assert first == pytest.approx(seen.estimate.age)
+    assert watcher.look(103.5).age == pytest.approx(first + 3.5)
+    assert "answer 3.5 s old" in tables.status(seen.estimate, watcher.look(103.5 - first))
+
+
+def test_probabilities_are_told_with_the_answer(seen):
+    text = tables.status(seen.estimate, Watcher(seen).look())
+    assert seen.estimate.p_held > 0.99
+    assert "P(held) &gt;&#8239;0.99" in text
+    assert "P(change)" in text
+
+
+def test_a_log_that_has_ended_is_not_lost_and_waits_for_nothing(seen):
+    status = Watcher(seen).look()
+    assert status.why.reason is Unknown.SOURCE_ENDED
+    assert not status.gone
+    assert status.waits is None
+    assert "the source has ended" in tables.status(seen.estimate, status)
+
+
+def test_a_robot_that_is_lost_is_waited_for_and_why_is_said(lost):
+    status = Watcher(lost).look()
+    assert status.why.reason is Unknown.SOURCE_LOST
+    assert status.gone
+    assert "the robot was unplugged" in status.waits
+    assert "P(held)" not in tables.status(lost.estimate, status)
+
+
+def test_what_is_not_determined_waits_for_motion_by_name(seen):
+    some = replace(seen.estimate, determined=np.arange(10) < 4, moving=False)
+    assert waits_for(some, None) == ("motion (the arm is not moving; Ixx, Ixy, Ixz, Iyy, Iyz, Izz undetermined)")
+    assert waits_for(replace(some, moving=True), None).startswith("faster and wider motion (Ixx")
+    assert waits_for(replace(some, determined=np.ones(10, dtype=bool)), None) is None
+    assert waits_for(replace(some, held=False), None) is None  # there is no inertia of nothing
+
+
+def test_torque_of_the_wrong_sign_does_not_fit_and_is_said_once(panda, analytic_log):
+    log = analytic_log(panda, HELD, duration=8.0)
+    session = Session(Replay(replace(log, tau=-log.tau), panda, speed=None), panda, method="map")
+    session.run()
+    status = Watcher(session).look()
+    assert session.doubt is not None
+    assert status.misfit == session.doubt
+    assert "does not fit:" in tables.status(session.estimate, status)
+    assert session.doubt[:40] not in tables.headline(session.estimate, None, status.misfit)
+    session.close()
+
+
+def test_the_age_of_a_tare_is_counted_from_when_it_was_taken_or_recorded(panda, analytic_log, monkeypatch):
+    log = replace(analytic_log(panda, duration=4.0), source="empty.csv", epoch=1e9)
+    session = Session(simulated(panda, duration=8.0), panda, tare=log, method="map")
+    watcher = Watcher(session)
+    monkeypatch.setattr("time.time", lambda: 1e9 + float(log.t[-1]) + 600.0)
+    assert watcher.look(50.0).tare == "empty.csv, 10 min old"
+    session.tare = replace(log, epoch=0.0)  # as an order to tare leaves it
+    watcher.look(60.0)
+    assert watcher.look(75.0).tare == "taken 15.0 s ago"
+    assert "does not say when" in Watcher(session).look().tare
+    session.close()
+
+
+@pytest.fixture
+def page_of():
+    """The page of a session, as nobody looks at it."""
+    pytest.importorskip("viser", reason="the page needs viser")
+    pages = []
+
+    def made(session):
+        pages.append(Page(session, port=0))
+        pages[-1].show()
+        return pages[-1]
+
+    yield made
+    for page in pages:
+        page.close()
+
+
+def test_after_a_loss_nothing_old_is_shown_as_if_it_were_so(lost, page_of):
+    page = page_of(lost)
+    assert lost.estimate.held
+    assert lost.estimate.determined[:4].all()
+    assert 'data-armload="mass">—<' in page._headline.content
+    assert "the robot was unplugged" in page._headline.content
+    assert "kg" not in page._headline.content
+    assert page._table.content == ""
+    assert not page.scene._payload.visible
+    assert not page.scene._region.visible
+
+
+def test_a_payload_is_drawn_only_where_its_centre_of_mass_is_determined(seen, page_of):
+    page = page_of(seen)
+    assert f"{seen.estimate.phi[0]:.3f} ± " in page._headline.content  # a log that has ended keeps its answer
+    assert page.scene._payload.visible
+    assert page.scene._region.visible
+    some = np.arange(10) != 2
+    for estimate in (replace(seen.estimate, determined=some), replace(seen.estimate, held=False)):
+        page.scene.show(seen.sample, estimate, None)
+        assert not page.scene._payload.visible
+        assert not page.scene._region.visible
+        assert " mm<" not in tables.headline(estimate)
+    assert "no centre of mass: nothing is held" in tables.headline(replace(seen.estimate, held=False))
+
+
+def test_the_flange_stays_in_the_middle_of_the_picture_or_the_base_where_it_is(seen, page_of):
+    scene, poses = page_of(seen).scene, np.linspace(-0.5, 0.5, 3)[:, None] * np.ones(7) + [0, 0, 0, -1.5, 0, 1.5, 0]
+    for close, (fixed, moved) in {True: ("flange", "base"), False: ("base", "flange")}.items():
+        scene.close, seen_at = close, {"flange": [], "base": []}
+        for q in poses:
+            scene.show(seen.sample._replace(q=q), seen.estimate, None)
+            seen_at["base"].append(np.array(scene._arm._whole.position))
+            seen_at["flange"].append(seen_at["base"][-1] + seen.arm.frame_pose(q)[1][0])
+        assert np.allclose(seen_at[fixed], seen_at[fixed][0], atol=1e-9)
+        assert np.ptp(seen_at[moved], axis=0).max() > 0.1
+        assert np.allclose(seen_at["flange"], 0.0, atol=1e-9) == close
