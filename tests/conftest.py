@@ -13,26 +13,39 @@ from armload.recording import Recording
 FAMILIES = ("fr3", "gen3", "iiwa14", "panda", "ur10e", "ur5e", "xarm7")
 
 
-# Files that workers take first: `make test` gives a worker a file, and the next in this order when that is done. In a
-# fresh clone the first compiles nearly all there is, while the other worker has files that compile next to nothing.
-# Then come the longest, so that none is left for the end.
+# Files that workers take first: `make test` gives a worker a file, and the next in this order when that is done. These
+# are the longest, the longest first, so that none is left for the end; what they need of compiled code, `make` has made
+# before.
 FIRST = (
-    "estimators/test_identifier.py",
-    "ensembles/test_learners.py",
-    "ensembles/test_learners_saved.py",
-    "lab/test_study.py",
-    "arms/test_arms.py",
-    "simulation/test_simulate.py",
-    "motion/test_motion_check.py",
-    "identification/test_logs_as_found.py",
     "identification/test_identify.py",
     "online/test_online_events.py",
-    "posterior/test_hybrid.py",
+    "estimators/test_identifier.py",
     "app/test_live.py",
-    "app/test_light_install.py",
+    "app/test_cli_identify.py",
+    "identification/test_recording_plausibility.py",
+    "identification/test_segments.py",
+    "online/test_online.py",
+    "identification/test_logs_as_found.py",
+    "app/test_cli.py",
+    "lab/test_benchmark.py",
+    "online/test_log_and_stream.py",
+    "posterior/test_hybrid.py",
+    "ensembles/test_learners.py",
+    "devices/test_sources.py",
+    "devices/test_mcap_record.py",
+    "app/test_measure.py",
+    "lab/test_report.py",
+    "lab/test_study.py",
     "app/test_cli_workflow.py",
-    "app/test_cli_examples.py",
     "lab/test_episodes.py",
+    "identification/test_answer.py",
+    "posterior/test_profile.py",
+    "ensembles/test_learners_saved.py",
+    "simulation/test_simulate.py",
+    "app/test_cli_profile.py",
+    "app/test_light_install.py",
+    "lab/test_study_page.py",
+    "lab/test_study_claims.py",
 )
 TESTS = Path(__file__).resolve().parent
 

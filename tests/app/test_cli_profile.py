@@ -121,6 +121,7 @@ def _said(words, capsys):
     return json.loads(capsys.readouterr().out)
 
 
+@pytest.mark.full
 def test_a_design_with_a_profile_tells_more_than_one_without_a_tare(profile, tmp_path, capsys):
     pose = ["--from", "0,-0.5,0,-2,0,1.6,0.8", "--time", "0.5", "--joints", "6-7", "--payload", "1"]
     words = ["motion", "design", "--robot", "panda", *pose, "--tare", "none", "--out", str(tmp_path / "m.json")]

@@ -36,6 +36,8 @@ def call(capsys):
 
 # ---------------------------------------------------------------------- demo
 
+# What a demo does one after another (data set, training, identification, report) has quick tests of its own below.
+
 
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory):
@@ -47,6 +49,7 @@ def demo(tmp_path_factory):
     return folder, comparison, printed.getvalue()
 
 
+@pytest.mark.full
 def test_demo_compares_every_kind_on_a_payload_nobody_trained_on(demo):
     _, comparison, printed = demo
     names = [
@@ -79,6 +82,7 @@ def test_demo_compares_every_kind_on_a_payload_nobody_trained_on(demo):
         assert any(line.split("  ")[0].strip() == name and all(cell in line for cell in shown) for line in lines), name
 
 
+@pytest.mark.full
 def test_demo_writes_what_it_found(demo):
     folder, _, printed = demo
     found = json.loads((folder / "identified.json").read_text())
@@ -92,6 +96,7 @@ def test_demo_writes_what_it_found(demo):
     assert len(list((folder / "models").glob("*.safetensors"))) == 4
 
 
+@pytest.mark.full
 def test_the_same_seed_makes_the_demo_s_logs_and_models_again(demo, tmp_path):
     folder, comparison, _ = demo
     shutil.copytree(folder / "dataset", tmp_path / "dataset")  # used again; everything else is made anew
@@ -111,6 +116,7 @@ def test_demo_replaces_the_data_set_of_an_older_demo_and_nothing_else(call, tmp_
     assert (tmp_path / "dataset" / "mine.txt").read_text() == "keep"
 
 
+@pytest.mark.full
 def test_demo_s_logs_are_identified_again_as_the_demo_did(demo, call):
     folder = demo[0]
     argv = ("identify", folder / "run.csv", "--robot", "panda", "--tare", folder / "tare.csv", "--json")
@@ -255,8 +261,8 @@ def test_report_of_a_log_shows_motion_torques_and_every_method(call, work, tmp_p
 @pytest.mark.usefixtures("few_points")
 def test_report_with_truth_shows_errors_and_baselines(call, tmp_path):
     panda = arm("panda")
-    write_recording(tmp_path / "log.npz", simulate(panda, taie2024(), franka_hand(), rate=100.0))
-    write_recording(tmp_path / "tare.npz", simulate(panda, taie2024(), rate=100.0))
+    write_recording(tmp_path / "log.npz", simulate(panda, taie2024(), franka_hand(), rate=100.0, duration=3.0))
+    write_recording(tmp_path / "tare.npz", simulate(panda, taie2024(), rate=100.0, duration=3.0))
     argv = ("report", tmp_path / "log.npz", "--robot", "panda", "--out", tmp_path / "r.html")
     printed = call(*argv, "--tare", tmp_path / "tare.npz", "--truth", "franka-hand").out
     page = text_of(tmp_path / "r.html")

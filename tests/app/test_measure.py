@@ -112,7 +112,7 @@ def test_what_cannot_be_is_one_sentence_and_nothing_is_made(arguments, said, mot
     assert sorted(path.name for path in tmp_path.iterdir()) == ["small.json"]
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.full)])
 def test_what_is_ended_in_the_middle_leaves_a_log_that_can_be_read(number, motion, tmp_path):
     log = tmp_path / "logs" / "empty.csv"
     command = [sys.executable, "-m", "armload", "measure", "sim", "--robot", "panda", "--motion", motion, "--move"]

@@ -673,7 +673,7 @@ def test_a_client_that_takes_long_to_load_is_not_a_robot_that_does_not_answer(cl
         open_source("fr3://192.0.2.9", arm("fr3"))
 
 
-@pytest.mark.parametrize("asked", [False, True])
+@pytest.mark.parametrize("asked", [False, pytest.param(True, marks=pytest.mark.full)])
 def test_what_a_client_prints_is_kept_apart_unless_asked_for(client, monkeypatch, capfd, asked):
     client("""
         def Robot(*_):

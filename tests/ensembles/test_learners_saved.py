@@ -109,6 +109,10 @@ def test_saving_twice_writes_the_same_bytes_and_leaves_nothing_beside(saved, pan
     assert [p.name for p in tmp_path.iterdir()] == ["again.safetensors"]
 
 
+KINDS = [pytest.param(name, marks=[] if name == "tree + network" else pytest.mark.full) for name in ENSEMBLES]
+
+
+@pytest.mark.parametrize("saved", KINDS, indirect=True)
 def test_a_saved_model_predicts_without_the_libraries_that_trained_it(saved):
     _, path, model = saved
     program = (

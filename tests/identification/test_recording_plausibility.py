@@ -37,7 +37,7 @@ def sound():
         robot = arm(name)
         sensors = Sensors.panda(robot) if name == "panda" else Sensors.generic(robot)
         runs = []
-        for seed in range(3):
+        for seed in range(2):
             motion = taie2024() if name == "panda" and seed == 0 else random_motion(robot, seed)
             for share in (0, 1, 2):
                 payload = heavy(share * robot.rated_payload, seed) if share else None

@@ -201,6 +201,7 @@ def test_the_numbers_do_not_depend_on_how_many_cells_are_measured_at_once(small)
     assert load_cells(folder / "cells") == again
 
 
+@pytest.mark.full  # of the runner, which does it, the tests are quick: another key is measured again
 def test_a_cell_of_another_size_is_measured_again(small):
     folder, cells_of, _, cells, _ = small
     name = "benchmark-training-mean-row-s0"
@@ -209,6 +210,7 @@ def test_a_cell_of_another_size_is_measured_again(small):
     assert measure(folder, cells_of)[name] == cells[name] | {"wall_s": json.loads(path.read_text())["wall_s"]}
 
 
+@pytest.mark.full  # each protocol has a quick test on made-up runs
 def test_every_learned_cell_has_all_protocols_and_finite_errors(small):
     _, _, _, cells, _ = small
     for name, cell in cells.items():

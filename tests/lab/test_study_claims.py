@@ -160,6 +160,15 @@ def by_id(claims):
     return {claim["id"]: claim for claim in claims}
 
 
+def verdict_on(cells, name):
+    """What the cells say about the claim of that id: `evaluate`, asked for no other."""
+    wanted = [claim for claim in load_claims() if claim["id"] == name]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("armload.lab.study.claims.load_claims", lambda: wanted)
+        (found,) = evaluate(cells)
+    return found
+
+
 # ------------------------------------------------------------------ the claims
 
 
@@ -220,7 +229,7 @@ def test_the_paper_s_contradictions_follow_from_its_own_percentages():
 
 def test_held_out_improvement_is_that_of_the_usual_reading():
     cells = study(tree_1_row=0.25, tree_1_payload=0.5)
-    claim = by_id(evaluate(cells))["fig4-tree-network-m"]
+    claim = verdict_on(cells, "fig4-tree-network-m")
     assert claim["ours"] == pytest.approx(75.0)  # seed 0 at 1000 epochs: 0.25 against 1
     assert claim["held_out"] == pytest.approx(50.0)
     assert claim["units"] == PAYLOADS
@@ -237,7 +246,7 @@ def test_an_interval_over_payloads_is_that_of_a_bootstrap_of_pairs():
             cells[f"reading-{kind}-1stage-raw-row-ideal-s0"]["protocols"]["held_out"]["payloads"], values, strict=True
         ):
             row[0] = value
-    claim = by_id(evaluate(cells))["fig4-tree-network-m"]
+    claim = verdict_on(cells, "fig4-tree-network-m")
     drawn = np.random.default_rng(5).integers(PAYLOADS, size=(20000, PAYLOADS))
     found = 100 * (1 - better[drawn].mean(axis=1) / worse[drawn].mean(axis=1))
     assert claim["ours"] == pytest.approx(100 * (1 - better.mean() / worse.mean()), abs=0.01)
@@ -249,7 +258,7 @@ def test_other_seeds_widen_the_interval():
     cells = study()
     for seed, factor in enumerate((0.2, 0.4, 0.1)):
         cells[f"tree-1stage-raw-row-ideal-s{seed}"]["protocols"]["held_out"]["single"] = (factor * UNIT).tolist()
-    claim = by_id(evaluate(cells | tree_readings(0.2)))["fig4-tree-network-m"]
+    claim = verdict_on(cells | tree_readings(0.2), "fig4-tree-network-m")
     # networks have the same error with every seed: the error of the trees is doubled by one, halved by the other
     assert claim["ours"] == pytest.approx(80.0)
     assert [claim["low"], claim["high"]] == pytest.approx([60.0, 90.0])
@@ -275,7 +284,7 @@ def test_semi_real_runs_are_reported_where_they_are():
     for c in cells.values():
         if c["spec"]["kind"] != "rival":
             c["protocols"]["test_payload_semi_real"] = c["protocols"]["test_payload_real_like"]
-    claim = by_id(evaluate(cells))["fig7-tree-rls-m"]
+    claim = verdict_on(cells, "fig7-tree-rls-m")
     assert claim["semi_real"] == claim["ours"] == pytest.approx(80.0)
 
 
@@ -302,7 +311,7 @@ def test_an_interval_that_spans_zero_leaves_a_claim_open():
     cells = study(tree_1_row=0.9, tree_1_payload=0.9)
     for k, row in enumerate(cells["reading-tree-1stage-raw-row-ideal-s0"]["protocols"]["held_out"]["payloads"]):
         row[1] *= (0.2, 2.0)[k % 2]
-    claim = by_id(evaluate(cells))["fig4-tree-network-mrx"]
+    claim = verdict_on(cells, "fig4-tree-network-mrx")
     assert claim["low"] < 0.0 < claim["high"]
     assert claim["verdict"] == UNDETERMINED
 
@@ -316,7 +325,7 @@ def test_a_claim_on_a_rival_depends_on_how_it_was_run(field, value, choice):
     for spec in rivals(FULL):
         if getattr(spec, field) == value:
             cells[spec.name] = rival(spec, 0.01)
-    claim = by_id(evaluate(cells))["fig7-tree-rls-m"]
+    claim = verdict_on(cells, "fig7-tree-rls-m")
     assert (claim["verdict"], claim["on"]) == (DEPENDS, [choice])
     assert claim["bearing"] < claim["readings"]
 
@@ -327,7 +336,7 @@ def test_standardised_training_is_a_reading_and_can_turn_a_claim():
         for split in ("row", "payload"):
             made = reading(kind, split=split, held_out=factor, scale="standard")
             cells[made["name"]] = made
-    claim = by_id(evaluate(cells))["fig4-tree-network-mrx"]
+    claim = verdict_on(cells, "fig4-tree-network-mrx")
     assert (claim["verdict"], claim["on"]) == (DEPENDS, ["the scaling"])
     assert (claim["bearing"], claim["readings"]) == (6, 8)  # raw: three stops, two splits; standardised: one stop
 
@@ -424,24 +433,24 @@ def first_estimates(cells, name, factors, protocol="test_payload_real_like"):
 
 def test_accurate_from_the_first_step_means_better_than_looking_at_nothing():
     cells = study()
-    first = by_id(evaluate(cells))["first-step-tree"]
+    first = verdict_on(cells, "first-step-tree")
     assert first["ours"] == pytest.approx(60.0)  # 2·0.8 against the training mean's 4
     assert (first["verdict"], first["units"]) == (CONFIRMED, RUNS["test_payload_real_like"])
     first_estimates(cells, "tree", 10.0)
-    first = by_id(evaluate(cells))["first-step-tree"]
+    first = verdict_on(cells, "first-step-tree")
     assert first["ours"] == pytest.approx(-150.0)  # 10 against 4
     assert first["verdict"] == NOT_CONFIRMED
-    assert by_id(evaluate(cells))["first-step-network"]["verdict"] == CONFIRMED
+    assert verdict_on(cells, "first-step-network")["verdict"] == CONFIRMED
 
 
 def test_the_first_step_weighs_all_ten_parameters_four_of_one_stage_and_six_of_two():
     cells = study()
     first_estimates(cells, "tree-1stage", [1.0] * 4 + [1e6] * 6)
     first_estimates(cells, "tree-2stage", [1e6] * 4 + [8.0] * 6)
-    first = by_id(evaluate(cells))["first-step-tree"]
+    first = verdict_on(cells, "first-step-tree")
     assert first["ours"] == pytest.approx(100 * (1 - 0.25**0.4 * 2.0**0.6), abs=0.01)
     first_estimates(cells, "tree", 1e-3, "test_payload_nominal")  # not what is judged
-    assert by_id(evaluate(cells))["first-step-tree"] == first
+    assert verdict_on(cells, "first-step-tree") == first
 
 
 def test_the_interval_of_the_first_step_is_that_over_arms():
@@ -449,7 +458,7 @@ def test_the_interval_of_the_first_step_is_that_over_arms():
     factors = np.array([1.0, 2.0, 3.0, 2.0])  # of four arms
     for c in named(cells, "tree"):
         c["protocols"]["test_payload_real_like"]["first"] = (factors[:, None] * UNIT).tolist()
-    first = by_id(evaluate(cells))["first-step-tree"]
+    first = verdict_on(cells, "first-step-tree")
     drawn = np.random.default_rng(8).choice(factors, size=(20000, 4)).mean(axis=1)
     assert first["ours"] == pytest.approx(50.0)
     assert [first["low"], first["high"]] == pytest.approx(np.quantile(100 * (1 - drawn / 4), [0.025, 0.975]), abs=3.0)
@@ -458,9 +467,9 @@ def test_the_interval_of_the_first_step_is_that_over_arms():
 def test_an_improvement_below_a_percent_is_none_for_statements_too():
     cells = study()
     first_estimates(cells, "tree", 4.0 * 0.991)
-    assert by_id(evaluate(cells))["first-step-tree"]["verdict"] == NOT_CONFIRMED
+    assert verdict_on(cells, "first-step-tree")["verdict"] == NOT_CONFIRMED
     first_estimates(cells, "tree", 4.0 * 0.989)
-    assert by_id(evaluate(cells))["first-step-tree"]["verdict"] == CONFIRMED
+    assert verdict_on(cells, "first-step-tree")["verdict"] == CONFIRMED
 
 
 def test_cells_without_first_estimates_leave_the_first_step_unmeasured():
@@ -475,22 +484,22 @@ def test_cells_without_first_estimates_leave_the_first_step_unmeasured():
 
 def test_filter_and_calibration_are_those_of_the_benchmark_s_authors():
     """Calibration on the run's own motion decides; on another motion it is ours and does not."""
-    before = by_id(evaluate(study()))["no-filter-tree"]["ours"]
+    before = verdict_on(study(), "no-filter-tree")["ours"]
     cells = study()
     for run in cells["benchmark-rls-filter-calibrated-other-s0"]["protocols"].values():
         run["second_half"] = [[1e-4 * x for x in row] for row in run["second_half"]]
-    assert by_id(evaluate(cells))["no-filter-tree"]["ours"] == before
+    assert verdict_on(cells, "no-filter-tree")["ours"] == before
     for run in cells["rival-filter-540-panda-calibrated"]["protocols"].values():
         run["second_half"] = [[1e2 * x for x in row] for row in run["second_half"]]
-    assert by_id(evaluate(cells))["no-filter-tree"]["ours"] == pytest.approx(20.0)  # 0.8 against filtered RLS, 2/2
+    assert verdict_on(cells, "no-filter-tree")["ours"] == pytest.approx(20.0)  # 0.8 against filtered RLS, 2/2
 
 
 def test_flat_is_measured_from_2_85_s_on():
     cells, t = study(), np.linspace(0, 6, 121)
     curve("network-2stage", cells, running=np.where(t < 2.84, 1.0, 0.0100))
-    assert by_id(evaluate(cells))["flat-network"]["ours"] == 0.0
+    assert verdict_on(cells, "flat-network")["ours"] == 0.0
     curve("network-2stage", cells, running=np.where(t < 4.0, 0.012, 0.0100))
-    flat = by_id(evaluate(cells))["flat-network"]
+    flat = verdict_on(cells, "flat-network")
     assert flat["ours"] == pytest.approx(20.0)  # 0.002 of 0.01
     assert flat["verdict"] == NOT_CONFIRMED
 
@@ -498,11 +507,11 @@ def test_flat_is_measured_from_2_85_s_on():
 def test_overshoot_is_an_early_peak_above_the_error_of_the_answer_nothing():
     cells, t = study(), np.linspace(0, 6, 121)
     curve("benchmark-rls-s", cells, running=np.where(t < 1.0, 0.05, 0.011))
-    shown = by_id(evaluate(cells))["rls-overshoot"]
+    shown = verdict_on(cells, "rls-overshoot")
     assert shown["ours"] == pytest.approx(400.0)
     assert shown["verdict"] == CONFIRMED
     curve("benchmark-rls-s", cells, running=np.where(t < 4.0, 0.011, 0.05))
-    assert by_id(evaluate(cells))["rls-overshoot"]["verdict"] == NOT_CONFIRMED
+    assert verdict_on(cells, "rls-overshoot")["verdict"] == NOT_CONFIRMED
 
 
 def test_statements_about_the_real_robot_compare_real_like_with_nominal_arms():
@@ -516,13 +525,13 @@ def test_statements_about_the_real_robot_compare_real_like_with_nominal_arms():
 
 
 def test_mixed_ensembles_are_compared_at_the_same_cap_on_epochs():
-    mixed = by_id(evaluate(study(tree_1_row=0.5)))["mixed-better"]
+    mixed = verdict_on(study(tree_1_row=0.5), "mixed-better")
     assert mixed["ours"] == pytest.approx(50.0)  # 0.25 against the trees' 0.5; networks at 60 epochs have 2
     assert mixed["held_out"] == pytest.approx(75.0)
 
 
 def test_trees_against_networks_is_the_geometric_mean_over_both_trainings():
-    claim = by_id(evaluate(study(tree_1_row=0.25, tree_2_row=4.0, tree_1_payload=0.25)))["trees-better"]
+    claim = verdict_on(study(tree_1_row=0.25, tree_2_row=4.0, tree_1_payload=0.25), "trees-better")
     assert claim["ours"] == pytest.approx(0.0)  # sqrt(0.25·4) = 1
     assert claim["held_out"] == pytest.approx(50.0)  # sqrt(0.25·1)
 

@@ -69,6 +69,7 @@ def test_a_stream_of_the_empty_arm_is_one_more_session(panda, world, profile):
     assert learned.uncertainty(poses).mean() < profile.uncertainty(poses).mean()
 
 
+@pytest.mark.full  # that a log with a payload is not learned from: tests/app/test_cli_profile.py
 def test_nothing_is_learned_from_a_payload(panda, world, profile):
     last, learned = streamed(panda, world, profile, [(0.0, draw_payload("boxes", 1, 0.8))])
     assert last.held

@@ -1,6 +1,7 @@
 """A log is a stream that ends: `identify` says of a log what the stream says once it is concluded."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from armload.simulation import World, simulate
 TOOL = InertialParameters.from_com(0.4, (0.0, 0.01, 0.05), np.diag([1e-3, 1e-3, 5e-4]))
 
 
+@cache
 def logs(name, rate=200.0, seconds=2.0, seed=3):
     """A run with a payload and a tare on another motion, of an arm that differs from its model."""
     robot = arm(name)
@@ -59,8 +61,13 @@ def case(kind, panda_logs, same_motion):
     return robot, run, tare if wants_tare else None, TOOL if kind == "tool" else None
 
 
-@pytest.mark.parametrize("method", [None, "map-gp"])
-@pytest.mark.parametrize("kind", ["untared", "tare", "same motion", "tool", "30 Hz", "gaps", "motor torque"])
+KINDS = ("untared", "tare", "same motion", "tool", "30 Hz", "gaps", "motor torque")
+CASES = [(kind, None) for kind in KINDS]
+CASES += [(kind, "map-gp") for kind in ("untared", "tare", "motor torque")]
+CASES += [pytest.param(kind, "map-gp", marks=pytest.mark.full) for kind in ("same motion", "tool", "30 Hz", "gaps")]
+
+
+@pytest.mark.parametrize(("kind", "method"), CASES)
 def test_identify_says_what_the_concluded_stream_says(kind, method, panda_logs, same_motion):
     robot, run, tare, tool = case(kind, panda_logs, same_motion)
     answer = identify(run, robot, tare=tare, tool=tool, method=method)

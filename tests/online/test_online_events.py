@@ -2,6 +2,7 @@
 
 import threading
 import time
+from functools import cache
 
 import numpy as np
 import pytest
@@ -59,6 +60,12 @@ def said(log, method=None, pause=None, **more):
     return estimates, list(events.values())
 
 
+@cache
+def taken_up(rate, method):
+    """What is said while half a kilo is taken up after five seconds: told once, and asked for by more than one test."""
+    return said(stream(1, [(5.0, HALF_KILO)], 6.3, rate), method)
+
+
 def at(estimates, t):
     """The last estimate by t."""
     return next(estimate for estimate in reversed(estimates) if estimate.t <= t)
@@ -70,7 +77,7 @@ def covers(estimate, phi):
 
 @pytest.mark.parametrize("rate", [200.0, 1000.0])
 def test_half_a_kilo_is_noticed_in_a_third_of_a_second_and_its_mass_known_in_one(rate):
-    estimates, events = said(stream(1, [(5.0, HALF_KILO)], 7.0, rate))
+    estimates, events = taken_up(rate, None)
     assert [event.kind for event in events] == ["grasp"]
     assert 5.0 < events[0].t < 5.3
     before, after = at(estimates, 4.99), at(estimates, 6.0)
@@ -82,20 +89,20 @@ def test_half_a_kilo_is_noticed_in_a_third_of_a_second_and_its_mass_known_in_one
 
 
 def test_fewer_answers_find_the_same_changes_at_the_same_times():
-    log = stream(1, [(4.0, HALF_KILO), (6.0, None)], 9.0)
+    log = stream(1, [(3.0, HALF_KILO), (4.5, None)], 6.0)
     estimates, events = said(log)
     seldom, same = said(log, every=0.1)
     assert [(event.kind, event.t, event.began) for event in same] == [(e.kind, e.t, e.began) for e in events]
     assert [event.kind for event in same] == ["grasp", "return"]
     assert [event.mass for event in same] == pytest.approx([event.mass for event in events], abs=0.02)
-    often, rarely = (len({one.phi.tobytes() for one in es if 3.0 < one.t < 4.0}) for es in (estimates, seldom))
+    often, rarely = (len({one.phi.tobytes() for one in es if 2.0 < one.t < 3.0}) for es in (estimates, seldom))
     assert (often, rarely) == (pytest.approx(100, abs=5), pytest.approx(10, abs=1))
-    assert max(one.age for one in seldom if 3.0 < one.t < 4.0) < 0.11
+    assert max(one.age for one in seldom if 2.0 < one.t < 3.0) < 0.11
     assert seldom[-1].phi == pytest.approx(estimates[-1].phi, abs=1e-3)
 
 
 def test_while_a_change_settles_the_answer_follows_it_and_is_not_called_calibrated():
-    estimates, events = said(stream(1, [(5.0, HALF_KILO)], 6.0))
+    estimates, events = taken_up(200.0, None)
     settling = [estimate for estimate in estimates if estimate.settling]
     assert settling
     assert all(0.0 <= estimate.t - events[0].t <= 1.0 for estimate in settling)
@@ -116,7 +123,7 @@ def handed_over(log, start, seconds, body):
 
 
 def test_a_slow_hand_over_is_one_grasp_and_the_answer_follows_it():
-    log, mass = handed_over(stream(12, [], 15.0), 8.0, 2.0, HALF_KILO)
+    log, mass = handed_over(stream(12, [], 12.0), 8.0, 2.0, HALF_KILO)
     estimates, events = said(log)
     assert [event.kind for event in events] == ["grasp"]
     assert 8.0 < events[0].t < 9.0
@@ -158,13 +165,8 @@ def test_a_change_while_the_arm_stands_is_noticed_then():
 
 
 def test_a_mass_is_told_once_it_is_known_and_not_before():
-    log = stream(1, [(5.0, HALF_KILO)], 7.0)
-    identifier, masses = OnlineIdentifier(arm("panda"), method="map-gp"), []
-    for sample in log:
-        event = identifier.update(*sample).event
-        if event is not None:
-            masses.append((event.kind, event.mass))
-    identifier.close()
+    estimates, _ = taken_up(200.0, "map-gp")
+    masses = [(one.event.kind, one.event.mass) for one in estimates if one.event is not None]
     assert {kind: mass is None for kind, mass in masses} == {"change": True, "grasp": False}
     assert masses[-1][1] == pytest.approx(0.5, abs=0.05)
 
@@ -179,17 +181,17 @@ def test_nothing_is_put_down_by_an_arm_that_holds_nothing():
 
 
 def test_while_somebody_pushes_the_arm_a_contact_is_likely_and_nothing_is_called_calibrated():
-    log = stream(6, [], 12.0)
+    log = stream(6, [], 9.0)
     panda = arm("panda")
-    size = np.sin(np.pi * np.clip(log.t - 9.0, 0.0, 1.0)) ** 2
+    size = np.sin(np.pi * np.clip(log.t - 6.0, 0.0, 1.0)) ** 2
     J, R = panda.frame_motion(log.q).jacobian[:, 3:], panda.frame_pose(log.q)[0]
     pushed = size[:, None] * np.einsum("nij,ni->nj", J, R.transpose(0, 2, 1) @ np.array([0.0, 40.0, 0.0]))
     estimates, events = said(Recording(log.t, log.q, log.dq, log.tau - pushed))
     assert events == []
-    during = [e for e in estimates if 9.3 < e.t < 9.9]
+    during = [e for e in estimates if 6.3 < e.t < 6.9]
     assert np.median([e.p_contact for e in during]) > 0.99
     assert not any(e.interval == "calibrated" for e in during)
-    assert max(e.p_contact for e in estimates if 7.0 < e.t < 9.0) < 0.5
+    assert max(e.p_contact for e in estimates if 4.0 < e.t < 6.0) < 0.5
     assert estimates[-1].interval == "calibrated"
 
 
@@ -242,23 +244,26 @@ def test_another_payload_of_another_mass_is_no_return():
     assert covers(estimates[-1], other.phi)[:4].all()
 
 
-@pytest.mark.parametrize("payload", [None, HALF_KILO], ids=["empty", "loaded"])
+@pytest.mark.parametrize("payload", [None, pytest.param(HALF_KILO, marks=pytest.mark.full)], ids=["empty", "loaded"])
 def test_nothing_is_noticed_where_nothing_changes(payload):
-    _, events = said(stream(4, [(-1.0, payload)], 20.0, 100.0, taie2024()), "map-gp")
+    _, events = said(stream(4, [(-1.0, payload)], 14.0, 100.0, taie2024()), "map-gp")
     assert events == []
 
 
 def test_a_slow_drift_of_the_torque_is_no_change():
-    log = stream(5, [], 20.0, 100.0)
-    drift = np.outer(log.t / log.t[-1], 5e-3 * arm("panda").limits.effort)  # 0.4 N·m on the large joints
+    log = stream(5, [], 14.0, 100.0)
+    drift = np.outer(log.t / 20.0, 5e-3 * arm("panda").limits.effort)  # 0.4 N·m in 20 s on the large joints
     _, events = said(Recording(log.t, log.q, log.dq, log.tau + drift), "map-gp")
     assert events == []
 
 
-@pytest.mark.parametrize("force", [(0.0, 40.0, 0.0), (0.0, 0.0, -40.0)], ids=["sideways", "down"])
+DOWN = pytest.param((0.0, 0.0, -40.0), marks=pytest.mark.full)
+
+
+@pytest.mark.parametrize("force", [(0.0, 40.0, 0.0), DOWN], ids=["sideways", "down"])
 def test_a_push_that_ends_gives_the_estimate_back(force):
-    log = stream(6, [(3.0, HALF_KILO)], 14.0)
-    start, end = 8.0, 9.0
+    log = stream(6, [(3.0, HALF_KILO)], 10.0)
+    start, end = 6.0, 7.0
     panda = arm("panda")
     size = np.sin(np.pi * np.clip((log.t - start) / (end - start), 0.0, 1.0)) ** 2
     J, R = panda.frame_motion(log.q).jacobian[:, 3:], panda.frame_pose(log.q)[0]
@@ -276,7 +281,7 @@ def test_a_push_that_ends_gives_the_estimate_back(force):
 
 
 def test_a_replay_says_the_same_bit_for_bit_however_the_second_thread_fares():
-    log = stream(7, [(3.0, HALF_KILO), (5.5, None)], 7.5)
+    log = stream(7, [(3.0, HALF_KILO), (5.5, None)], 6.5)
     (ours, events), (theirs, other) = said(log), said(log, pause=0.004)
     assert len(events) == 2
     assert events == other
@@ -309,11 +314,11 @@ def test_a_pose_first_seen_shortly_after_a_change_is_not_another_change():
     assert [event.kind for event in events] == ["grasp"]
 
 
-@pytest.fixture(scope="module")
-def breaking_away(real_data):
+def breaking_away(real_data, seconds):
     """A stream of a real UR10e that holds 2.805 kg, at rest for 2.5 s: when it began, and what was said."""
     ur = arm("ur10e")
     loaded, tare = (read_recording(real_data / f"ur10e_{name}.csv", ur) for name in ("loaded_2805g", "unloaded"))
+    loaded = loaded.between(loaded.t[0], loaded.t[0] + seconds)
     identifier, estimates = OnlineIdentifier(ur, tare), []
     for sample in zip(loaded.t, loaded.q, loaded.dq, loaded.tau, strict=True):
         estimates.append(identifier.update(*sample))
@@ -322,8 +327,8 @@ def breaking_away(real_data):
 
 
 @pytest.mark.full
-def test_a_real_arm_that_breaks_away_from_rest_is_no_change_of_payload(breaking_away):
-    start, estimates = breaking_away
+def test_a_real_arm_that_breaks_away_from_rest_is_no_change_of_payload(real_data):
+    start, estimates = breaking_away(real_data, np.inf)
     assert estimates[-1].event is None
     assert not any(at(estimates, start + t).determined[0] for t in (1.0, 2.0))
     assert all(covers(at(estimates, start + t), 2.805)[0] for t in np.arange(10.0, 64.0, 2.0))
@@ -331,15 +336,15 @@ def test_a_real_arm_that_breaks_away_from_rest_is_no_change_of_payload(breaking_
 
 
 @pytest.mark.xfail(strict=True, reason="half a second after it broke away, 5.7 ± 2.3 kg are said: stiction is let go")
-def test_a_real_arm_that_has_just_broken_away_is_not_sure_of_a_wrong_mass(breaking_away):
-    start, estimates = breaking_away
+def test_a_real_arm_that_has_just_broken_away_is_not_sure_of_a_wrong_mass(real_data):
+    start, estimates = breaking_away(real_data, 4.1)
     said = [at(estimates, start + t) for t in (3.0, 3.5, 4.0)]
     assert all(covers(one, 2.805)[0] for one in said)
 
 
 @pytest.mark.parametrize("rate", [30.0, 200.0])
 def test_a_change_is_said_to_have_begun_when_it_did(rate):
-    _, events = said(stream(1, [(5.0, HALF_KILO)], 7.5, rate), "map-gp")
+    _, events = taken_up(rate, "map-gp")
     assert [event.kind for event in events] == ["grasp"]
     assert abs(events[0].began - 5.0) < max(0.03, 2.0 / rate)
     assert 5.0 < events[0].t < 5.2
