@@ -54,3 +54,15 @@ def test_what_an_enriched_path_tells_is_on_the_page_and_is_at_most_half_of_what_
     found = result("enriched_path")["arms"]
     assert enriched_sentence(found) in PAGE
     assert all(max(one["ratio"]) <= 0.5 for one in found.values())
+
+
+def test_how_far_off_a_centre_of_mass_is_and_in_how_many_worlds_is_what_was_measured():
+    panda, ur = (result("designed_motions")["arms"][name] for name in ("panda", "ur10e"))
+    words = " ".join(PAGE.split())
+    assert f"{panda['poses']['worlds']} worlds of the Panda and {ur['poses']['worlds']} of the UR10e" in words
+    for name, text in (
+        ("poses", "{:.2g} mm (UR10e: {:.2g} mm) with four static poses"),
+        ("designed same", "{:.2g} mm ({:.2g} mm) with the designed 2 s"),
+        ("pair", "{:.2g} mm ({:.2g} mm) with an empty run of its own"),
+    ):
+        assert text.format(1e3 * panda[name]["centre"], 1e3 * ur[name]["centre"]) in words
