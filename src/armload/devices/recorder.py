@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Self
@@ -29,6 +28,7 @@ from armload.inertia import InertialParameters
 from armload.online import OnlineEstimate
 from armload.recording import Sample
 from armload.recording.columns import column_names
+from armload.recording.growing_file import GrowingFile
 
 RECORDS = (".csv", ".mcap")
 
@@ -62,7 +62,7 @@ class Recorder:
         self.kept = 0
         self.bad = 0
         self.paths: list[Path] = []
-        self._bad_lines: _Lines | None = None
+        self._bad_lines: GrowingFile | None = None
         self._last = -math.inf
         self._late = math.inf  # time of the sample before, if it was a late one
         for other in (self._path_of_part(2), self._path_of_bad()):  # refused now, not when it is needed
@@ -129,9 +129,9 @@ class Recorder:
 
     def _refuse(self, sample: Sample, why: str) -> None:
         if self._bad_lines is None:
-            self._bad_lines = _Lines(self._path_of_bad())
+            self._bad_lines = GrowingFile(self._path_of_bad())
         values = {name: _strict(np.asarray(value).tolist()) for name, value in sample._asdict().items()}
-        self._bad_lines.append(json.dumps({"why": why, **values}, allow_nan=False))
+        self._bad_lines.append((json.dumps({"why": why, **values}, allow_nan=False) + "\n").encode())
         self.bad += 1
 
 
@@ -180,44 +180,11 @@ class _CsvPart:
     """One CSV log of a record."""
 
     def __init__(self, path: Path, n: int) -> None:
-        self._lines = _Lines(path)
-        self._lines.append(",".join(column_names(n)))
+        self._lines = GrowingFile(path)
+        self._lines.append((",".join(column_names(n)) + "\n").encode())
 
     def append(self, row: list[float]) -> None:
-        self._lines.append(",".join(map(repr, row)))
+        self._lines.append((",".join(map(repr, row)) + "\n").encode())
 
     def close(self) -> None:
         self._lines.close()
-
-
-class _Lines:
-    """A text file that grows by whole lines, one system call each."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self._file: int | None = None
-        try:
-            self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND | os.O_CLOEXEC, 0o644)
-        except FileExistsError:
-            raise RecordingError(f"{path} exists: a record is never written over; choose another name") from None
-        except OSError as error:
-            raise RecordingError(f"{path} cannot be written: {error.strerror}") from None
-        self._size = 0
-
-    def append(self, line: str) -> None:
-        if self._file is None:
-            raise RecordingError(f"{self.path} is closed: nothing more can be kept in it")
-        data = (line + "\n").encode()
-        try:
-            written = os.write(self._file, data)
-            if written < len(data):
-                os.ftruncate(self._file, self._size)
-                raise RecordingError(f"{self.path} cannot grow beyond {self._size} bytes: the disk is full")
-        except OSError as error:
-            raise RecordingError(f"{self.path} cannot be written: {error.strerror}") from None
-        self._size += written
-
-    def close(self) -> None:
-        if self._file is not None:
-            os.close(self._file)
-            self._file = None

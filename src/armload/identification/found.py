@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from armload.arms import Arm
 from armload.estimators import ArmMismatch, Estimate
 from armload.identification.arm_health import ArmHealth
-from armload.identification.beside import know
 from armload.identification.choice import Choice, choose
 from armload.identification.intervals import Before
+from armload.identification.known_payload import know
 from armload.identification.thresholds import LARGEST_OFFSETS, MISFIT, MOVES
 from armload.inertia import distance_to_body, is_consistent
 from armload.posterior import HybridIdentifier, Known, PosteriorLeastSquares, Profile

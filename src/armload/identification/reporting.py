@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.identification.answer import Identification, body_of, is_removal
-from armload.identification.beside import told
 from armload.identification.found import Found
 from armload.identification.intervals import about_com, intervals, phi_interval
+from armload.identification.known_payload import determined_with
 from armload.identification.notes import (
     another_model,
     arm_changed,
@@ -63,7 +63,10 @@ def answered(
     if found.weak_std is not None:
         leaning = determined & (found.weak_std > LEANS * estimate.std)
     if found.known is not None:  # what was given is known, whatever the log tells, and does not rest on the prior
-        determined, leaning = told(determined, found.known, estimate.std, before), leaning & ~found.known.which
+        determined, leaning = (
+            determined_with(determined, found.known, estimate.std, before),
+            leaning & ~found.known.which,
+        )
     phi = body_of(estimate, determined[0], found.exchanged)
     low, high = phi_interval(phi, estimate.phi, estimate.std, determined, before, otherwise)
     if unsure is not None:

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from armload.arms import Arm
 from armload.estimators import Estimate, Identifier
 from armload.identification.answer import body_of
-from armload.identification.beside import told
 from armload.identification.intervals import Before
+from armload.identification.known_payload import determined_with
 from armload.inertia import determined, held, held_probability
-from armload.online.beside import denied_by, taken_by
 from armload.online.concluding import doubts_of
+from armload.online.known_payload import denied_by, taken_by
 from armload.online.learning import change_of_arm
 from armload.online.thresholds import STANDS
 from armload.posterior import PosteriorLeastSquares
@@ -97,7 +97,7 @@ class Judgement:
         """
         std, before = estimate.std, self.before
         by_samples = determined(std, before.std if before.used else None, run.weak_std, self._weak)
-        self.determined = told(by_samples, taken_by(run), std, before)
+        self.determined = determined_with(by_samples, taken_by(run), std, before)
         self.held = held(float(estimate.phi[0]), float(std[0]), bool(self.determined[0]))
         self.p_held = held_probability(float(estimate.phi[0]), float(std[0]), float(self._weak[0]))
         notes = []

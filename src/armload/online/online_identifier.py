@@ -18,9 +18,9 @@ import numpy as np
 from armload.arms import Arm
 from armload.errors import IdentificationError
 from armload.estimators import Estimate, Identifier
-from armload.identification.beside import know
 from armload.identification.choice import choose
 from armload.identification.intervals import Before
+from armload.identification.known_payload import know
 from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
 from armload.online.gate import Gate, Health, all_finite

@@ -18,6 +18,7 @@ from typing import Any
 
 from armload.errors import RecordingError
 from armload.extras import install
+from armload.recording.growing_file import GrowingFile
 
 _MAGIC = b"\x89MCAP0\r\n"
 _HEAD = 9  # bytes before a record's content: what it is, and its length
@@ -80,45 +81,22 @@ class McapFile:
                 self._file.close()
 
 
-class _Whole:
-    """A new file to which bytes are given whole or not at all; where that fails it is closed, as it was before."""
-
-    def __init__(self, path: Path) -> None:
-        self._path, self._size = path, 0
-        try:
-            self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND | os.O_CLOEXEC, 0o644)
-        except FileExistsError:
-            raise RecordingError(f"{path} exists: a record is never written over; choose another name") from None
-        except OSError as error:
-            raise RecordingError(f"{path} cannot be written: {error.strerror}") from None
-        self.open = True
+class _Whole(GrowingFile):
+    """The same as the writer of MCAP asks for it; where writing fails it is closed."""
 
     def write(self, data: bytes) -> int:
-        if not self.open:
-            raise RecordingError(f"{self._path} is closed: nothing more can be kept in it")
         try:
-            written = os.write(self._file, data)
-            if written < len(data):
-                os.ftruncate(self._file, self._size)
-                raise RecordingError(f"{self._path} cannot grow beyond {self._size} bytes: the disk is full")
-        except (OSError, RecordingError) as error:
+            self.append(data)
+        except RecordingError:
             self.close()
-            if isinstance(error, RecordingError):
-                raise
-            raise RecordingError(f"{self._path} cannot be written: {error.strerror}") from None
-        self._size += written
-        return written
+            raise
+        return len(data)
 
     def tell(self) -> int:
-        return self._size
+        return self.size
 
     def flush(self) -> None:
         """Nothing is held back."""
-
-    def close(self) -> None:
-        if self.open:
-            os.close(self._file)
-            self.open = False
 
 
 def is_cut_off(path: Path) -> bool:

@@ -27,7 +27,7 @@ def know(identifier: Identifier, known: Known | None) -> None:
         )
 
 
-def told(
+def determined_with(
     determined: NDArray[np.bool_], known: Known | None, std: NDArray[np.float64], before: Before
 ) -> NDArray[np.bool_]:
     """Which parameters (10,) the log or what is known determines.
