@@ -1,12 +1,12 @@
-"""Puts the functions of `armload.kernels` into a wheel, compiled; an editable install compiles them when it needs them.
+"""Puts the kernels (`armload.runtime.kernels`) into a wheel, compiled; an editable install compiles them when needed.
 
     python hatch_build.py FOLDER | --here
 
-compiles the libraries named in `armload.kernels.LIBRARIES` for the signatures in `src/armload/kernels.json`, which
-`tests/record_kernels.py` writes. The compiler is numba's (`numba.pycc`), told what `kernels.settings` tells it in a
-checkout; linking needs a C++ compiler. Where ARMLOAD_PURE_WHEEL is set, a wheel without libraries is built, which needs
-numba where it is installed. `--here` compiles the library for this processor alone and prints its folder, whose name
-changes with any source: what the tests take for ARMLOAD_KERNELS.
+compiles the libraries named in `kernels.LIBRARIES` for the signatures in `src/armload/runtime/kernels.json`, which
+`tests/record_kernels.py` writes. The compiler is numba's (`numba.pycc`), with the settings that a checkout uses
+(`kernels.settings`); linking needs a C++ compiler. Where ARMLOAD_PURE_WHEEL is set, a wheel without libraries is built,
+which needs numba where it is installed. `--here` compiles the library for this processor only and prints its folder,
+whose name changes with any source: the tests set ARMLOAD_KERNELS to it.
 """
 
 from __future__ import annotations
@@ -46,7 +46,11 @@ class Kernels(BuildHookInterface):
 
 def kept(folder: Path, names: list[str] | None = None) -> list[Path]:
     """The libraries of this source and Python, compiled where they are not there: pip asks for a wheel twice."""
-    sources = [Path(__file__), *sorted((ROOT / "src" / "armload").rglob("*.py")), ROOT / "src/armload/kernels.json"]
+    sources = [
+        Path(__file__),
+        *sorted((ROOT / "src" / "armload").rglob("*.py")),
+        ROOT / "src/armload/runtime/kernels.json",
+    ]
     key = hashlib.sha256(repr((sys.version, platform.machine(), version("numba"), names)).encode())
     for path in sources:
         key.update(path.read_bytes())
@@ -63,7 +67,7 @@ def kept(folder: Path, names: list[str] | None = None) -> list[Path]:
 def compile_all(folder: Path, names: list[str] | None = None) -> list[Path]:
     """Compile each library in a process of its own, for its processor: all that a wheel holds where none is named."""
     sys.path.insert(0, str(ROOT / "src"))
-    from armload.kernels import FOLDER, LIBRARIES
+    from armload.runtime.kernels import FOLDER, LIBRARIES
 
     names = names or (list(LIBRARIES) if platform.machine() == "x86_64" else ["_kernels_any"])
     running = []
@@ -85,9 +89,9 @@ def compile_one(name: str, folder: Path) -> None:
     from numba.core.cpu import FastMathOptions
     from numba.pycc import CC
 
-    from armload import kernels
+    from armload.runtime import kernels
 
-    library = CC(name, "armload.kernels")
+    library = CC(name, "armload.runtime.kernels")
     library.output_dir, library.target_cpu = str(folder), kernels.LIBRARIES[name][0]
     options: dict[Any, dict[str, Any]] = {}
     for dispatcher, signatures in _wanted():
@@ -111,7 +115,7 @@ def compile_one(name: str, folder: Path) -> None:
 def for_this_processor() -> str:
     """The library that this processor runs."""
     sys.path.insert(0, str(ROOT / "src"))
-    from armload import kernels
+    from armload.runtime import kernels
 
     return next(name for name, (_, needed) in kernels.LIBRARIES.items() if needed <= kernels._processor())
 
@@ -119,7 +123,7 @@ def for_this_processor() -> str:
 def _wanted() -> Iterator[tuple[Any, list[tuple[Any, ...]]]]:
     """Each kernel that Python calls, and what it is compiled for."""
     sys.path.insert(0, str(ROOT / "src"))
-    from armload import kernels
+    from armload.runtime import kernels
 
     for path, signatures in kernels.signatures().items():
         module, _, function = path.rpartition(".")

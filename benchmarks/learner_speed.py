@@ -19,7 +19,7 @@ from script import write
 from threadpoolctl import threadpool_limits
 
 from armload.ensembles import BaggingEnsemble, NetworkLearner
-from armload.version import package_versions
+from armload.runtime.version import package_versions
 
 ROWS, PAYLOADS, MEMBERS = 20_000, 77, 5
 SEEDS = 3  # of the comparison of losses

@@ -25,10 +25,10 @@ from pathlib import Path
 import numpy as np
 
 from armload.arms import arm
-from armload.atomic import replacing
 from armload.devices import Simulator
 from armload.payloads import test_payload
 from armload.recording import Recording, write_recording
+from armload.runtime.atomic import replacing
 from armload.simulation import Sensors, World
 
 RESULT = Path(__file__).parent / "results" / "recovery.json"

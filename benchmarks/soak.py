@@ -27,10 +27,10 @@ from scipy.stats import linregress
 from scipy.stats import t as student
 
 from armload.arms import arm, rated_mass
-from armload.atomic import replacing
 from armload.devices import Simulator, Source
 from armload.payloads import draw_payload
 from armload.recording import Sample
+from armload.runtime.atomic import replacing
 from armload.service import Session
 from armload.simulation import Sensors, World
 

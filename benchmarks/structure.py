@@ -82,7 +82,7 @@ class Package:
         while todo:
             node = todo.pop()
             later = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and not lazy
-            # what a package names there it imports when it is first asked for (`armload.lazy`)
+            # what a package names there it imports when it is first asked for (`armload.runtime.lazy`)
             on_use = lazy and self.paths[name].name == "__init__.py"
             if later or (isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test) and not on_use):
                 continue

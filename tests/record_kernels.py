@@ -1,9 +1,9 @@
-"""Writes src/armload/kernels.json: with which arguments Python calls each kernel, which a wheel is compiled for.
+"""Writes src/armload/runtime/kernels.json: the arguments with which Python calls each kernel, for compiling a wheel.
 
     python -m pytest -p record_kernels -m "" tests/inertia tests/posterior …     (PYTHONPATH=tests, without -n)
 
 runs the tests and adds what they called. An array that is not in C order, or of a type that is not in `_TYPES` of
-`armload.kernels`, is compiled for when it comes: it is printed, to be mended where it is handed over.
+`armload.runtime.kernels`, is compiled for when it comes: it is printed, to be mended where it is handed over.
 """
 
 import inspect
@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-import armload.kernels as kernels
+import armload.runtime.kernels as kernels
 
 _NAMES = {"float64", "float32", "int64", "int32", "bool"}
 _original = kernels._just_in_time

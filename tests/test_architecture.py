@@ -16,7 +16,7 @@ ROW = re.compile(r"^\| `([a-z0-9_]+)(?:/|\.py)` \|.*\| ([^|]*) \|$", re.MULTILIN
 
 # Which rooms may import what is slow to load or speaks to the outside. Everything else is free.
 OWNERS = {
-    "numba": {"kernels"},
+    "numba": {"runtime"},
     "pinocchio": {"arms"},
     "coal": {"arms"},
     "clarabel": set(),  # the tests' oracle

@@ -161,7 +161,7 @@ def test_all_is_importable_and_complete(name):
         alias.asname or alias.name
         for node in ast.walk(tree)
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("armload")
-        if node.module != "armload.lazy"
+        if node.module != "armload.runtime.lazy"
         for alias in node.names
     }
     forgotten = {n for n in imported if not n.startswith("_")} - set(public_names)

@@ -14,8 +14,8 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armload.lazy import on_first_use
-from armload.version import __version__
+from armload.runtime.lazy import on_first_use
+from armload.runtime.version import __version__
 
 if TYPE_CHECKING:
     from armload.arms import ARMS, Arm, arm

@@ -15,8 +15,8 @@ from armload.inertia import NAMES, InertialParameters, com_to_phi
 from armload.motion import taie2024
 from armload.payloads import Payload, franka_hand, write_payload
 from armload.recording import Recording, read_recording, write_recording
+from armload.runtime.version import __version__
 from armload.simulation import simulate
-from armload.version import __version__
 
 KEYS = [
     "method",

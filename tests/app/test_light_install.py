@@ -25,9 +25,9 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 import armload
-from armload import extras, kernels
 from armload.payloads import test_payload as payload_of_the_tests
 from armload.recording import write_recording
+from armload.runtime import extras, kernels
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -169,7 +169,7 @@ def test_each_library_of_a_wheel_says_what_numba_says(light, panda, analytic_log
         if not needed <= kernels._processor():
             continue  # which would not run on this processor
         code = (
-            f"import armload.kernels as kernels; kernels._processor = lambda: {needed!r}; import armload; {found}"
+            f"from armload.runtime import kernels; kernels._processor = lambda: {needed!r}; import armload; {found}"
             "print(kernels._library().__name__, *found.phi)"
         )
         done = light("-c", code)

@@ -7,10 +7,10 @@ import stat
 import numpy as np
 import pytest
 
-from armload.atomic import replacing
 from armload.errors import PayloadError
 from armload.inertia import InertialParameters
 from armload.payloads import Payload, container_loadings, franka_hand, random_payload, read_payload, write_payload
+from armload.runtime.atomic import replacing
 
 HAND = franka_hand().parameters
 

@@ -15,7 +15,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from armload.arms import Arm
-from armload.kernels import kernel
+from armload.runtime.kernels import kernel
 
 
 class MomentumRow:

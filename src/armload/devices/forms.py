@@ -6,13 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from armload.atomic import replacing
 from armload.devices.files.form import mjcf_text, sdf_text, urdf_text
 from armload.devices.franka.form import desk_text, set_load_text
 from armload.devices.load import Load
 from armload.devices.ros2.form import inertia_stamped_text
 from armload.devices.ur.form import set_payload_text, set_target_payload_text
 from armload.errors import SinkError
+from armload.runtime.atomic import replacing
 
 
 class Form(NamedTuple):

@@ -37,7 +37,7 @@ from armload.devices.remote_mover import RemoteMover
 from armload.devices.ring import Ring
 from armload.devices.source import Source
 from armload.errors import ArmloadError, SourceError
-from armload.extras import missing
+from armload.runtime.extras import missing
 
 _CALLS = ("read_once", "set_load")  # what may be asked of a source from outside
 _ORDERS = ("begin", "stop", "whereabouts", "put")  # and of a mover

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from armload.lazy import on_first_use
+from armload.runtime.lazy import on_first_use
 
 if TYPE_CHECKING:
     from armload.ensembles.artefact import load_model, save_model

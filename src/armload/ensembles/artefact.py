@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
-from armload.atomic import replacing
 from armload.ensembles.compiled import (
     AveragedMembers,
     CombinedEnsembles,
@@ -32,7 +31,8 @@ from armload.errors import ArmloadError, ModelError
 from armload.inertia import NAMES
 from armload.motion import Motion, MotionFingerprint
 from armload.recording.columns import column_names
-from armload.version import package_versions
+from armload.runtime.atomic import replacing
+from armload.runtime.version import package_versions
 
 if TYPE_CHECKING:
     from armload.ensembles.bagging import Ensemble

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.atomic import replacing
 from armload.errors import ModelError
+from armload.runtime.atomic import replacing
 
 
 class Weights(NamedTuple):

@@ -16,7 +16,7 @@ from typing import ClassVar, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armload.kernels import kernel
+from armload.runtime.kernels import kernel
 
 _CHUNK = 2048  # rows predicted at once: bounds the memory of a wide hidden layer
 

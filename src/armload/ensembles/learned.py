@@ -9,8 +9,8 @@ from armload.arms import Arm
 from armload.ensembles.trained_model import LearnedModel
 from armload.estimators import Estimate, Identifier
 from armload.inertia import SMALL, Z95
-from armload.kernels import kernel
 from armload.recording import Recording, Sample
+from armload.runtime.kernels import kernel
 
 
 class LearnedIdentifier(Identifier):

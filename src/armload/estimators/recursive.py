@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from armload.arms import Arm, payload_regressor
 from armload.estimators.contract import Estimate, Identifier
 from armload.inertia.cholesky import factor, solve
-from armload.kernels import kernel
 from armload.recording import GAP
 from armload.regression import BlockMeans
 from armload.regression.lag import GAIN, Lag
+from armload.runtime.kernels import kernel
 
 AT_REST = 0.01  # [rad/s] of any joint: slower is noise of the velocity, and tells nothing of an inertia
 _TRANSIENT = 5.0  # time constants after which an observer started in motion has settled

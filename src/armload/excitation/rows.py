@@ -19,9 +19,9 @@ from scipy.signal import lfilter
 
 from armload.arms import FRICTION_WIDTH
 from armload.arms.momentum_row import MomentumRow, momentum_rows
-from armload.kernels import kernel
 from armload.regression import Correction, JointFeatures
 from armload.regression.mismatch import TILTS
+from armload.runtime.kernels import kernel
 
 _STEP = 1e-7  # [rad, rad/s] of the difference quotients: the rounding of 1e-16 shows as 1e-9
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from armload.lazy import on_first_use
+from armload.runtime.lazy import on_first_use
 
 if TYPE_CHECKING:
     from armload.identification.answer import Identification

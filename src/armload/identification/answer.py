@@ -12,7 +12,7 @@ from armload.estimators import Estimate
 from armload.identification import text
 from armload.identification.arm_health import ArmHealth
 from armload.inertia import HELD, NAMES, InertialParameters, nearest_body
-from armload.version import __version__
+from armload.runtime.version import __version__
 
 _ARRAYS = {
     "phi": (10,),

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from armload.lazy import on_first_use
+from armload.runtime.lazy import on_first_use
 
 if TYPE_CHECKING:
     from armload.inertia.about_com import com_interval, inertia_com_std, largest_inertia_com

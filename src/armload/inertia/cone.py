@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from armload.kernels import kernel
+from armload.runtime.kernels import kernel
 
 _ROOT2 = float(np.sqrt(2.0))
 

@@ -27,7 +27,7 @@ import numpy as np
 from armload.inertia.cholesky import factor
 from armload.inertia.cone import congruent, dual, of_dual, pack, primal, pseudo, unpack
 from armload.inertia.orthogonal import eigen, least_squares, reflect, singular
-from armload.kernels import kernel
+from armload.runtime.kernels import kernel
 
 _BORDER, _LEAST = 0.1, 1e-3  # a step leaves 0.1 of the way to the border, times what the predictor left, at least 1e-3
 _STALLED = 9  # steps without halving the bound; a badly scaled metric has five in a row

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from armload.kernels import kernel
+from armload.runtime.kernels import kernel
 
 _SWEEPS = 30  # of rotations; a matrix of four rows needs about five
 _ROUNDING = 1e-15

@@ -18,7 +18,7 @@ from armload.inertia.consistency import LENGTH, is_consistent
 from armload.inertia.interior_point import nearest
 from armload.inertia.orthogonal import eigen
 from armload.inertia.parameters import InertialParameters
-from armload.kernels import kernel
+from armload.runtime.kernels import kernel
 
 _SCALE = np.array([1.0] + [1 / LENGTH] * 3 + [1 / LENGTH**2] * 6)
 _BALL = np.array([1.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 2.0, 0.0, 2.0])  # phi·_SCALE of the body whose J is the identity

@@ -11,8 +11,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-from armload.atomic import replacing
 from armload.errors import DatasetError
+from armload.runtime.atomic import replacing
 
 
 def key_of(*parts: Any) -> str:

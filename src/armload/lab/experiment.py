@@ -19,11 +19,11 @@ from typing import Any
 
 import numpy as np
 
-from armload.atomic import replacing
 from armload.errors import DatasetError
 from armload.lab.cells import finished_cell, key_of, load_cells, save_cell
 from armload.lab.engine import ATTEMPTS, engine
-from armload.version import __version__, package_versions
+from armload.runtime.atomic import replacing
+from armload.runtime.version import __version__, package_versions
 
 Cells = dict[str, dict[str, Any]]  # by name
 

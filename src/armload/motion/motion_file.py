@@ -12,10 +12,10 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from armload.atomic import replacing
 from armload.errors import MotionError
 from armload.motion.fourier import FourierMotion
 from armload.motion.motion import Motion
+from armload.runtime.atomic import replacing
 
 if TYPE_CHECKING:
     from armload.motion.path import PathMotion

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.identification.thresholds import DEGREES_FROM, EFFORT
-from armload.kernels import kernel
 from armload.recording import GAP, Sample
+from armload.runtime.kernels import kernel
 
 REASONS = (
     "wrong size",  # not n numbers

@@ -25,7 +25,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.kernels import kernel
 from armload.online.thresholds import (
     BODY_COM,
     BODY_GYRATION,
@@ -47,6 +46,7 @@ from armload.online.thresholds import (
     SAME_ERROR,
     STARTS,
 )
+from armload.runtime.kernels import kernel
 
 _DRIFT, _CONTACT = 1, 2  # where each kind begins among the probabilities; 0: steady
 _HANDING = _CONTACT + len(PUSH_SIZES)

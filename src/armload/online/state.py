@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from armload.atomic import replacing
 from armload.errors import IdentificationError
+from armload.runtime.atomic import replacing
 
 FORMAT = 10
 _PACKAGE = "armload."

@@ -22,11 +22,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.atomic import replacing
 from armload.errors import ArmloadError, PayloadError
 from armload.inertia import NAMES, InertialParameters
 from armload.payloads.payload import Box, Payload, require_consistent
 from armload.payloads.uncertainty import Uncertainty
+from armload.runtime.atomic import replacing
 
 FORMAT = "armload-payload/1"
 _TRIPLE = ("mass", "com", "inertia_com")

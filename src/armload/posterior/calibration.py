@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 
 from armload.ensembles import Compiled
 from armload.inertia import Z95
-from armload.kernels import kernel
 from armload.posterior.evidence import Evidence
 from armload.posterior.payload_prior import MixturePosterior, MixturePrior
+from armload.runtime.kernels import kernel
 
 COVERAGE = 0.95  # share of intervals that hold: the convention of the field
 # range of the factor: a guard, where the bag is asked about traits unlike all it has seen

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.inertia.cholesky import factor
-from armload.kernels import kernel
 from armload.posterior.scales import Posterior
+from armload.runtime.kernels import kernel
 
 _RATIOS = ("noise", "pose", "velocity", "friction")
 # What a calibration may know of a log, in this order: `Evidence.traits`.

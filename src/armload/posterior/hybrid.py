@@ -13,7 +13,6 @@ from armload.arms import Arm
 from armload.errors import ModelError
 from armload.inertia import Z95, near_consistent, nearest_body
 from armload.inertia.cholesky import inverse
-from armload.kernels import kernel
 from armload.posterior.calibration import Calibration
 from armload.posterior.evidence import Evidence
 from armload.posterior.known import Known
@@ -25,6 +24,7 @@ from armload.posterior.same_motion import SameMotion
 from armload.recording import Recording
 from armload.regression import JointFeatures, solution_prior_std
 from armload.regression.noise import SMOOTH
+from armload.runtime.kernels import kernel
 
 # how likely it is, beforehand, that something was taken off since the tare: one log in ten. A stated prior; a removal
 # of some standard deviations says so by itself (test_what_was_taken_off_since_the_tare_is_negative)

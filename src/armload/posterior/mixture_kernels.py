@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from armload.kernels import kernel
+from armload.runtime.kernels import kernel
 
 
 @kernel(fastmath={"contract", "reassoc", "nsz"})

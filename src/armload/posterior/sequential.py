@@ -27,8 +27,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.kernels import kernel
 from armload.regression.rows import Row
+from armload.runtime.kernels import kernel
 
 
 @dataclass(eq=False)

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.atomic import replacing
 from armload.errors import ModelError
+from armload.runtime.atomic import replacing
 
 
 def write_tensors(path: Path, tensors: Mapping[str, NDArray], name: str, header: Any, what: str) -> None:

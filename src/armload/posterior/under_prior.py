@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from armload.inertia.cholesky import factor, invert
-from armload.kernels import kernel
+from armload.runtime.kernels import kernel
 
 
 @kernel

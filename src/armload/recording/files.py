@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from armload.arms import Arm
-from armload.atomic import replacing
 from armload.errors import RecordingError
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.csv_file import read_csv, write_csv
@@ -17,6 +16,7 @@ from armload.recording.npz_file import read_npz, write_npz
 from armload.recording.parquet_file import read_parquet, write_parquet
 from armload.recording.recording import Recording
 from armload.recording.ros_bag import BAG_SUFFIXES, read_bag
+from armload.runtime.atomic import replacing
 
 _READERS = {
     **dict.fromkeys((".csv", ".tsv", ".txt"), read_csv),

@@ -8,11 +8,11 @@ from typing import Any
 
 from armload.arms import Arm
 from armload.errors import RecordingError, one_line
-from armload.extras import install
 from armload.recording.array_table import WIDEST, ArrayTable, Column
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.recording import Recording
 from armload.recording.table import read_table, table_chunks
+from armload.runtime.extras import install
 
 
 def read_hdf5(path: Path, where: str, arm: Arm | None = None, spec: ColumnSpec | None = None) -> Recording:

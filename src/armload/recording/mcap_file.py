@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from armload.errors import RecordingError
-from armload.extras import install
 from armload.recording.growing_file import GrowingFile
+from armload.runtime.extras import install
 
 _MAGIC = b"\x89MCAP0\r\n"
 _HEAD = 9  # bytes before a record's content: what it is, and its length

@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.errors import RecordingError, one_line
-from armload.extras import install
 from armload.recording.array_table import WIDEST, ArrayTable, Column
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.columns import column_names
 from armload.recording.recording import CHANNELS, Recording
 from armload.recording.table import read_table, table_chunks
+from armload.runtime.extras import install
 
 _METADATA = b"armload.recording"
 _BUFFER = 1 << 20  # bytes of a column that are read at a time

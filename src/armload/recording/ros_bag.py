@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm, names_among
 from armload.errors import RecordingError, one_line
-from armload.extras import missing
 from armload.recording.checked import Chunks
 from armload.recording.mcap_file import is_cut_off, mended
 from armload.recording.recording import Recording
+from armload.runtime.extras import missing
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 BAG_SUFFIXES = (".bag", ".db3", ".mcap")

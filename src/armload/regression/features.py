@@ -20,7 +20,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armload.kernels import kernel
+from armload.runtime.kernels import kernel
 
 # [rad] of the pose, mixed, as nobody knows the one of an arm. Stated priors
 # (test_pose_features_have_the_kernel_of_a_gaussian_process)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armload.kernels import kernel
+from armload.runtime.kernels import kernel
 
 # λ [1/s], a lag of 50 ms: slow against the joints' vibration (15 Hz and more) and the sensors' skew, fast against the
 # motion and a change of payload. What the lag takes from r it takes from W, exactly: the choice costs noise, no bias

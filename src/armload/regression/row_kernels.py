@@ -15,10 +15,10 @@ import numpy as np
 
 from armload.arms import FRICTION_WIDTH
 from armload.arms.momentum_row import leaning_row, momentum_rows
-from armload.kernels import kernel
 from armload.recording import GAP
 from armload.regression.features import features_of_sample
 from armload.regression.mismatch import TILTS
+from armload.runtime.kernels import kernel
 
 # what `lag_torque` returns of a sample at which the lags start; 1: of another that completes a row, 0: of others
 FRESH = 2

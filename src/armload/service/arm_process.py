@@ -24,10 +24,10 @@ from armload.arms import Arm
 from armload.devices import Detached, Reader
 from armload.devices.reader import columns_of
 from armload.errors import ArmloadError, IdentificationError
-from armload.kernels import COMPILING
 from armload.online import OnlineEstimate, OnlineIdentifier
 from armload.posterior import load_profile
 from armload.recording import read_recording
+from armload.runtime.kernels import COMPILING
 from armload.service.finite import finite
 from armload.service.ready import ready
 from armload.service.reconnecting import Reconnecting
@@ -186,7 +186,7 @@ _compiling = threading.Event()
 
 
 class _Compiling(logging.Handler):
-    """Hears that functions are compiled, which `armload.kernels` logs."""
+    """Hears that functions are compiled, which `armload.runtime.kernels` logs."""
 
     def emit(self, record: logging.LogRecord) -> None:
         if record.getMessage() == COMPILING:

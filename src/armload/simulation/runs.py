@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.errors import ArmError, MotionError, PayloadError
-from armload.extras import require
 from armload.inertia import InertialParameters
 from armload.motion import Motion
 from armload.recording import Recording
+from armload.runtime.extras import require
 from armload.simulation.controller import Command, Gains
 from armload.simulation.plant import build_model, settled_start
 from armload.simulation.resolution import FINE, Resolution

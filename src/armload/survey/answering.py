@@ -12,10 +12,10 @@ from threadpoolctl import threadpool_limits
 
 from armload.errors import ArmloadError, EpisodesError, RecordingError, one_line
 from armload.identification import identify
+from armload.runtime.version import __version__
 from armload.survey.logs import Log, filesystem
 from armload.survey.rows import UNUSABLE, answered, unusable
 from armload.survey.settings import Settings
-from armload.version import __version__
 
 
 def answer_log(log: Log, settings: Settings, key: str, stamp: str, content: str) -> dict[str, Any]:

@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from armload.atomic import replacing
 from armload.errors import ArmloadError
 from armload.identification import check_usable
 from armload.inertia import NAMES
@@ -21,6 +20,7 @@ from armload.posterior import Profile, learn_profile, save_profile
 from armload.posterior.profile_learning import by_clock
 from armload.posterior.profile_session import check_fits
 from armload.recording import Recording
+from armload.runtime.atomic import replacing
 from armload.survey.logs import Log
 from armload.survey.rows import ANSWERED, SEPARATOR
 from armload.survey.settings import Settings

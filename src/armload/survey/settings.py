@@ -14,8 +14,8 @@ from armload.lab.cells import key_of
 from armload.payloads import Payload
 from armload.posterior import HybridModel, Profile, load_profile
 from armload.recording import ColumnSpec, Recording, read_long
+from armload.runtime.version import __version__
 from armload.survey.logs import Log, file_hash
-from armload.version import __version__
 
 _ARM = "{arm}"
 

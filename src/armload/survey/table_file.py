@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from armload.atomic import replacing
 from armload.errors import UsageError
+from armload.runtime.atomic import replacing
 from armload.survey.rows import FLAG, NUMBER, TEXT, WHOLE, columns
 
 SUFFIXES = (".parquet", ".csv", ".json")

@@ -28,8 +28,8 @@ from contextlib import contextmanager
 
 from armload.app.cli.arguments import Parser, attach_values
 from armload.errors import ArmloadError, UsageError
-from armload.extras import missing
-from armload.version import __version__
+from armload.runtime.extras import missing
+from armload.runtime.version import __version__
 
 COMMANDS = {
     "demo": "the main job from end to end, in under three minutes: simulate, train, identify, compare, report",
@@ -140,7 +140,7 @@ class _Notes(logging.Handler):
 
 @contextmanager
 def _notes_on_stderr() -> Iterator[None]:
-    """Show what takes long, as `armload.kernels` says of compiling."""
+    """Show what takes long, as `armload.runtime.kernels` says of compiling."""
     logger, handler = logging.getLogger("armload"), _Notes()
     level = logger.level
     logger.addHandler(handler)

@@ -22,8 +22,8 @@ def print_json(value: dict[str, Any]) -> None:
 
 def write_json(path: str, value: dict[str, Any]) -> None:
     """One JSON object in a file that appears whole or not at all; UsageError where it cannot be written."""
-    from armload.atomic import replacing
     from armload.errors import UsageError
+    from armload.runtime.atomic import replacing
 
     text = json.dumps(value, allow_nan=False) + "\n"
     try:

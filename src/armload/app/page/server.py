@@ -10,7 +10,7 @@ import socket
 from typing import Any
 
 from armload.errors import UsageError
-from armload.extras import install
+from armload.runtime.extras import install
 
 # [length of all links] from what is looked at to the eye: the whole arm is seen, or the payload and the wrist
 _FROM_AFAR, _FROM_CLOSE = (0.7, -0.7, 0.28), (0.3, -0.3, 0.12)

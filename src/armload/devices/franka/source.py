@@ -22,8 +22,8 @@ from numpy.typing import ArrayLike
 from armload.arms import Arm
 from armload.devices.source import Source
 from armload.errors import SourceError, one_line
-from armload.extras import install
 from armload.recording import Sample
+from armload.runtime.extras import install
 
 
 class _System(NamedTuple):

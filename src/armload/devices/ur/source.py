@@ -23,8 +23,8 @@ import numpy as np
 from armload.arms import ARMS, Arm
 from armload.devices.source import Source
 from armload.errors import SourceError, one_line
-from armload.extras import install
 from armload.recording import Sample
+from armload.runtime.extras import install
 
 _FIELDS = ["timestamp", "actual_q", "actual_qd", "actual_current"]
 _LOOK = 2e-4  # [s] between two looks for the next sample

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from armload.atomic import replacing
 from armload.errors import ReportError
 from armload.inertia import NAMES, UNITS
 from armload.lab.benchmark.benchmark_page import APPENDIX, COMMAND, PAIRS, TITLE, sections
@@ -25,6 +24,7 @@ from armload.lab.experiment import listed, write_json
 from armload.lab.report import write_markdown, write_report
 from armload.lab.report.shown import GROUPS
 from armload.lab.report.style import look
+from armload.runtime.atomic import replacing
 
 _NOTE = f"Written by `{COMMAND}`; every number on this page comes from its cells."
 _rounded = partial(listed, digits=4)

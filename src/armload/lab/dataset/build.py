@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armload.arms import Arm
-from armload.atomic import replacing
 from armload.errors import DatasetError
 from armload.lab.dataset.parquet_table import IDENTITIES, Dataset, content_hash, open_dataset, read_table, table_columns
 from armload.lab.dataset.provenance import (
@@ -34,6 +33,7 @@ from armload.lab.engine import engine
 from armload.motion import Motion
 from armload.payloads import Payload
 from armload.recording import Recording
+from armload.runtime.atomic import replacing
 from armload.simulation import Run, Sensors, World, simulate_inverse, simulate_many
 
 if TYPE_CHECKING:

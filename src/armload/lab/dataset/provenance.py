@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from armload.arms import Arm
-from armload.atomic import replacing
 from armload.errors import DatasetError
 from armload.motion import Motion, MotionFingerprint
 from armload.payloads import Payload
+from armload.runtime.atomic import replacing
+from armload.runtime.version import package_versions
 from armload.simulation import Sensors, World
 from armload.simulation.inverse import TRACKING
-from armload.version import package_versions
 
 FORMAT = "armload data set 1"
 SAMPLERS = ("mujoco", "inverse")  # how runs come about: `simulate`, `simulate_inverse`

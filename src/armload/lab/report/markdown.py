@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armload.atomic import replacing
 from armload.errors import ReportError
 from armload.lab.report.html import Section, write_whole
 from armload.lab.report.shown import Table
 from armload.lab.report.style import look
+from armload.runtime.atomic import replacing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armload.arms import Arm
-from armload.atomic import replacing
 from armload.errors import ReportError
 from armload.lab.report.style import COLOURS, look, new_figure
 from armload.motion import Motion, rated_load
+from armload.runtime.atomic import replacing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -23,7 +23,7 @@ from armload.lab.study.rivals import rival_tasks
 from armload.lab.study.spec import Spec
 from armload.lab.study.trained import SPLITTING, train
 from armload.regression import GaussianPrior
-from armload.version import package_versions
+from armload.runtime.version import package_versions
 
 
 def run_study(

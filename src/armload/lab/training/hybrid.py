@@ -21,7 +21,7 @@ from armload.lab.training.records import TIMES, Records, measure_episodes
 from armload.payloads import draw_payload
 from armload.posterior import TRAITS, HybridModel, MixturePrior, Training
 from armload.regression import payload_prior_std
-from armload.version import __version__, package_versions
+from armload.runtime.version import __version__, package_versions
 
 EPISODES = 2400
 _CHUNK = 300  # episodes that are kept together: what an interruption can lose

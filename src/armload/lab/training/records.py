@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.atomic import replacing
 from armload.errors import ModelError
 from armload.lab.engine import Engine
 from armload.lab.episodes import Episode, simulate_episodes
 from armload.posterior import Evidence, SmoothPosteriorLeastSquares
 from armload.recording import Recording
+from armload.runtime.atomic import replacing
 
 TIMES = (0.02, 0.05, 0.1, 0.5, 1.0, 3.0, 6.0)  # [s] since the run began
 _BATCH = 4  # episodes per task

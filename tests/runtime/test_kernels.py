@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import armload
-from armload import kernels
+from armload.runtime import kernels
 
 PACKAGE = Path(armload.__file__).parent
 

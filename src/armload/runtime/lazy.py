@@ -43,7 +43,7 @@ def on_first_use(package: str) -> tuple[Callable[[str], Any], Callable[[], list[
         try:
             value = getattr(importlib.import_module(homes()[name]), name)
         except ModuleNotFoundError as error:
-            from armload.extras import missing
+            from armload.runtime.extras import missing
 
             raise (error if (said := missing(error)) is None else ModuleNotFoundError(said, name=error.name)) from None
         setattr(module, name, value)
