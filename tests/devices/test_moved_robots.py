@@ -6,6 +6,7 @@ Each server (`servers`) moves armload's simulated arm by the maker's protocol, a
 import functools
 import json
 import os
+import pty
 import shlex
 import signal
 import subprocess
@@ -18,6 +19,7 @@ import numpy as np
 import pytest
 
 from armload.arms import arm
+from armload.excitation import Obstacle, Surroundings
 from armload.inertia import to_order
 from armload.motion import FourierMotion, save_motion
 from armload.payloads import test_payload as held_payload
@@ -33,6 +35,7 @@ POSES = {
     "panda": [0.0, -0.5, 0.1, -2.0, 0.1, 1.7, 0.5],
     "fr3": [0.0, -0.5, 0.1, -2.0, 0.1, 1.7, 0.5],
 }
+NEAR = 0.03  # [rad] that each joint stands away from where the motion begins
 MAKES = {"ur": ("ur10e", "rtde_control", "ur_robot.py"), "fr3": ("fr3", "pylibfranka", "franka_robot.py")}
 MAKES["panda"] = ("panda", "panda_py", "franka_robot.py")
 MAKES["ros2"] = ("panda", None, "ros_robot.py")
@@ -77,7 +80,7 @@ class Served:
         cosine = 0.1 * np.array([[1.0, -1.0, 1.0 / 3]] * len(pose)) * np.linspace(1.0, 0.6, len(pose))[:, None]
         self.motion = FourierMotion(pose, sine, cosine, 5.0, "small").smooth()
         save_motion(tmp_path / "small.json", self.motion)
-        at = ",".join(f"{x:.6f}" for x in self.motion.position([0.0])[0] + 0.03)
+        at = ",".join(f"{x:.6f}" for x in self.motion.position([0.0])[0] + NEAR)
         command = [self.python, SERVERS / program, "--robot", self.name, "--address", address, "--", at]
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=self.env)
         self.listener = threading.Thread(target=self._listen, daemon=True)
@@ -102,24 +105,43 @@ class Served:
                 pytest.fail(f"no {event} among {self.said(since)}" + ("" if run is None else run.communicate()[1]))
             time.sleep(0.02)
 
-    def measure(self, *arguments, wait=True):
+    def box_in_the_way(self):
+        """A box where the motion goes farthest from its start: nothing touches it before."""
+        q = self.motion.position(np.linspace(0.0, self.motion.duration, 200))
+        place = self.robot.frame_pose(q)[1]
+        box = Obstacle(tuple(place[np.linalg.norm(place - place[0], axis=1).argmax()].tolist()), (0.02, 0.02, 0.02))
+        before = np.linspace(q[0] + NEAR, q[0], 20)
+        assert Surroundings(self.robot, None, (box,)).clearance(before)[:, 2].min() > 0.05
+        return "--box=" + ",".join(f"{x:.4f}" for x in (*box.centre, *box.edges))
+
+    def measure(self, *arguments, wait=True, typed=None):
         told = f"sh -c {shlex.quote('echo mount > ' + str(self.folder / 'told'))}"
         self.logs = self.folder / f"logs{len(self.runs)}"
         command = [self.python, "-m", "armload", "measure", self.spec, "--robot", self.name, "--method", "map"]
         command += ["--off-path", "0.3"]  # a busy machine is late: what stops an arm off its path is in test_movers.py
         command += ["--motion", self.folder / "small.json", "--dir", self.logs, "--grip", told]
-        run = subprocess.Popen(
-            [*HEARS_CTRL_C, *map(str, command), *map(str, arguments)],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            env=self.env,
-        )
-        self.runs.append(run)
+        terminal = pty.openpty() if typed is not None else None
+        try:
+            run = subprocess.Popen(
+                [*HEARS_CTRL_C, *map(str, command), *map(str, arguments)],
+                stdin=subprocess.DEVNULL if terminal is None else terminal[1],
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+                env=self.env,
+            )
+            self.runs.append(run)
+            if terminal is not None:
+                os.write(terminal[0], f"{typed}\n".encode())
+                return self._ended(run)
+        finally:
+            for end in terminal or ():
+                os.close(end)
         threading.Thread(target=self._mount, args=(run,), daemon=True).start()
-        if not wait:
-            return run
+        return self._ended(run) if wait else run
+
+    @staticmethod
+    def _ended(run):
         out, err = run.communicate(timeout=240.0)
         if run.returncode == 2:
             in_vain(err)
@@ -181,13 +203,16 @@ def child_of(process):
 
 
 @in_time
-def test_nothing_moves_without_consent_nor_past_a_limit(served):
-    for arguments, said in (
-        ((), "nobody is at a terminal to agree"),
-        (("--move", "--floor", "0.9"), "the arm hits the floor"),
-        (("--move", "--approach", "0.02"), "more than the 0.02 rad of --approach"),
+def test_nothing_moves_without_consent_nor_past_a_limit_nor_into_a_box(served):
+    for arguments, typed, said in (
+        ((), None, "nobody is at a terminal to agree"),
+        ((), "no", "nothing was moved: there was no consent"),
+        (("--move", "--floor", "0.9"), None, "the arm hits the floor"),
+        (("--move", "--approach", "0.02"), None, "more than the 0.02 rad of --approach"),
+        (("--move", served.box_in_the_way()), None, "the arm hits a box: "),
+        ((served.box_in_the_way(),), "yes", "the arm hits a box: "),  # nobody is asked: a yes does not help
     ):
-        code, out, err = served.measure(*arguments)
+        code, out, err = served.measure(*arguments, typed=typed)
         assert (code, out) == (2, "")
         assert said in err.splitlines()[-1]
     code, out, _ = served.measure("--dry-run")
@@ -235,10 +260,11 @@ def test_whatever_ends_it_the_arm_comes_to_rest_and_the_log_can_be_read(served):
 @in_time
 def test_the_answer_is_written_in_the_controller_s_order_after_both_runs(served):
     out = served.folder / "answer.json"
+    writes = ("--apply", "--mounted", "nothing", "--undetermined-inertia")
     if served.spec.startswith("ros2"):
         assert "takes no payload" in served.measure("--move", "--apply")[2]
-        return
-    code, _, err = served.measure("--move", "--apply", "--mounted", "nothing", "--undetermined-inertia", "--out", out)
+        writes = ()
+    code, _, err = served.measure("--move", *writes, "--out", out)
     assert code == 0, err
     answer = json.loads(out.read_text())
     truth = held_payload().parameters
@@ -248,8 +274,11 @@ def test_the_answer_is_written_in_the_controller_s_order_after_both_runs(served)
     half = 0.5 * (np.array(answer["com_high"]) - answer["com_low"])
     assert np.all(np.abs(np.array(answer["com"]) - truth.com) < 2.0 * half)  # as sure as the loop's timing lets it be
     said = served.said()
-    assert said.index("mounted") < said.index("payload")
     assert said.count("moving") == 3  # to the start, without and with the payload
+    if not writes:
+        assert "payload" not in said
+        return
+    assert said.index("mounted") < said.index("payload")
     numbers = next(event for event in served.events if event["event"] == "payload")["numbers"]
     written = to_order(held_payload().parameters, "ur" if served.name == "ur10e" else "franka")
     assert len(numbers) == len(written)
