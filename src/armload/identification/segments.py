@@ -14,8 +14,8 @@ Of something light the mass shows first: with a prior on its moments that lets i
 chi-squared of one. Where there is a tare or a profile it raises a doubt, but makes no cut: what an arm does wrong in
 half a second looks like a weight, too (a real Panda's).
 
-Which cuts come into question is asked of a model with fewer smooth functions, at a tenth of the work; T, which decides,
-is of the whole model at the likeliest of them.
+Which cuts come into question is asked of a model with fewer smooth functions, all cuts of one solution
+(`cut_scan.py`); T, which decides, is of the whole model at the likeliest of them.
 """
 
 from __future__ import annotations
@@ -26,8 +26,10 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armload.arms import Arm
+from armload.identification.cut_scan import added_at_cuts, of_the_log
 from armload.identification.thresholds import (
     CUT,
     CUTS_LEAST,
@@ -147,7 +149,7 @@ class _Search:
             spacing = max(spacing // _FINER, 1)
             near = best + spacing * np.arange(-_FINER, _FINER + 1)
             cuts = np.unique(np.clip(near, first, last - 1))
-            best = int(cuts[np.argmax([T for T, _ in self._roughly(self._stretches(start, stop, cuts))])])
+            best = int(cuts[np.argmax(self._roughly(self._stretches(start, stop, cuts))[:, 0])])
         # the rows' lag still holds what was there before, and the cut is off by some rows
         until, after = (int(np.searchsorted(t, t[best] + aside)) for aside in (-SETTLED, SETTLED))
         earlier, later = self.within(start, until).times, self.within(after, stop).times
@@ -156,16 +158,23 @@ class _Search:
     def _best(self, start: int, stop: int, cuts: np.ndarray) -> tuple[int, float, float]:
         """The cut with the largest T, T, and the largest of any cut's mass alone."""
         stretches = self._stretches(start, stop, cuts)
-        roughly = np.array(self._roughly(stretches))
+        roughly = self._roughly(stretches)
         likely = np.unique([*np.argsort(roughly[:, 0])[-_LIKELIEST:], np.argmax(roughly[:, 1])])
-        found = [self._statistic(stretches[: k + 1], stretches[k + 1 :], self.whole) for k in likely]
+        found = [self._statistic(stretches[: k + 1], stretches[k + 1 :]) for k in likely]
         best = int(np.argmax([T for T, _ in found]))
         return int(cuts[likely[best]]), found[best][0], max(light for _, light in found)
 
-    def _roughly(self, stretches: list[RegressionData]) -> list[tuple[float, float]]:
-        """Both statistics of every cut, with fewer smooth functions."""
-        few = [data.of_features(self.few) for data in stretches]
-        return [self._statistic(few[:k], few[k:], self.rough) for k in range(1, len(few))]
+    def _roughly(self, stretches: list[RegressionData]) -> NDArray[np.float64]:
+        """Both statistics of every cut (K, 2), with fewer smooth functions, and scales of the likeliest cut."""
+        for stretch in stretches:
+            stretch.session = self.session
+        cuts = added_at_cuts(self.rough.known, stretches, self.few, self.weak, self.rough.start)
+        best = int(np.argmax([self._tests(*cut)[0] for cut in cuts])) + 1
+        parts = [RegressionData.joined(part).of_features(self.few) for part in (stretches[:best], stretches[best:])]
+        said = solve([*self.rough.known, *parts], self.weak, None, SMOOTH, _ITERATIONS, self.rough.start)
+        scales = of_the_log(said.scales, (parts[0].blocks.duration, parts[1].blocks.duration))
+        cuts = added_at_cuts(self.rough.known, stretches, self.few, self.weak, scales)
+        return np.array([self._tests(*cut) for cut in cuts])
 
     def _stretches(self, start: int, stop: int, cuts: np.ndarray) -> list[RegressionData]:
         return [self._data(slice(a, b)) for a, b in pairwise([start, *cuts.tolist(), stop])]
@@ -176,18 +185,20 @@ class _Search:
             data.take(rows)
         return data
 
-    def _statistic(
-        self, before: list[RegressionData], after: list[RegressionData], model: _Model
-    ) -> tuple[float, float]:
+    def _statistic(self, before: list[RegressionData], after: list[RegressionData]) -> tuple[float, float]:
         parts = [RegressionData.joined(before), RegressionData.joined(after)]
         for part in parts:
             part.session = self.session
-        solution = solve([*model.known, *parts], self.weak, None, SMOOTH, _ITERATIONS, model.start)
+        said = solve([*self.whole.known, *parts], self.weak, None, SMOOTH, _ITERATIONS, self.whole.start)
+        return self._tests(said.information, said.vector)
+
+    def _tests(self, information: NDArray[np.float64], vector: NDArray[np.float64]) -> tuple[float, float]:
+        """T, and the statistic of the mass alone, of what a cut's two sides say."""
         wide = np.diag(self.weak**-2.0)  # directions that neither part tells
-        T = float(solution.vector @ np.linalg.solve(solution.information + wide, solution.vector)) / self.kappa
-        if self.physics.arm.motor_torque or not model.known:
+        T = float(vector @ np.linalg.solve(information + wide, vector)) / self.kappa
+        if self.physics.arm.motor_torque or not self.whole.known:
             return T, 0.0  # friction that grows with the load differs from part to part as a weight does
-        return T, _OF_MASS * of_mass(solution.information / self.kappa, solution.vector / self.kappa)
+        return T, _OF_MASS * of_mass(information / self.kappa, vector / self.kappa)
 
 
 def of_mass(information: np.ndarray, vector: np.ndarray) -> float:

@@ -123,14 +123,22 @@ class RegressionData:
         """The same with the first waves of the pose only, to be read and not to be added to."""
         out = RegressionData(self.correction, self.gain, features, self.blocks.block, self.session)
         out.noise = self.noise
-        keep, scale = self.features.first(features)
-        shared = np.arange(10 + self.correction.size)
-        rows = np.concatenate([shared, len(shared) + keep])
-        by = np.concatenate([np.ones(len(shared)), scale])
+        rows, by = self._of(features)
         out.A = self.A[:, rows[:, None], rows] * np.outer(by, by)
         out.b, out.c = self.b[:, rows] * by, self.c
         out.blocks = self.blocks.mapped(lambda sums: sums[..., np.append(rows, -1)] * np.append(by, 1.0))
         return out
+
+    def of_payload(self, features: JointFeatures) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """∫ W_jᵀ·X_j dt (n, 10, size) and ∫ W_jᵀ·r_j dt (n, 10), X_j with the first waves of the pose only."""
+        rows, by = self._of(features)
+        return self.A[:, :10, rows] * by, self.b[:, :10]
+
+    def _of(self, features: JointFeatures) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Which unknowns are those with fewer features, and the factors that make them so."""
+        keep, scale = self.features.first(features)
+        shared = np.arange(10 + self.correction.size)
+        return np.concatenate([shared, len(shared) + keep]), np.concatenate([np.ones(len(shared)), scale])
 
     def selected(self, E: NDArray) -> tuple[NDArray, NDArray]:
         """A and b over the unknowns z, where [phi, eta] = E·z; the features' weights stay out of it."""
