@@ -58,6 +58,7 @@ from armload.online import OnlineIdentifier
 
 SEED = 90_000
 PAGE = ROOT / "docs" / "online.md"
+LOOK = 0.02  # [s] between two looks at what is said
 BINS = np.array([0.0, 0.02, 0.1, 0.3, 0.7, 0.9, 0.98, 1.0])
 FELT = np.array([0.02, *(3 * [0.002])])  # [kg], [kg·m] what is as large is another payload
 NAMES = {
@@ -91,11 +92,14 @@ NAMES = {
 def measured(scene: Scene) -> dict[str, Any]:
     """One scene as a cell's numbers."""
     stream = streamed(scene)
-    identifier, said, events = OnlineIdentifier(stream.robot, stream.tare), [], {}
+    identifier, said, events, last = OnlineIdentifier(stream.robot, stream.tare), [], {}, -np.inf
     for sample in stream.log:
         one = identifier.update(*sample)
         if one.event is not None:
             events[one.event.t] = one.event.to_dict()
+        if one.t - last < 0.999 * LOOK:
+            continue
+        last = one.t
         back = one.event is not None and one.event.kind == "return"
         said.append(
             (
