@@ -10,7 +10,7 @@ nothing even then decides nothing in these scenes.
 
 streams    10 scenes of 7–12 s at 250 and 500 Hz with the hybrid: payloads grasped, released, swapped, taken up again,
            two of 0.2 kg, pushes at the flange, an arm that nothing happens to, a UR10e with motor torque. Real-like
-           arms (`World.real_like`). What is called a change, late or false is as in events.py.
+           arms (`World.real_like`). What is called a change, late or false says watching.py.
 logs       16 sound logs of 4 s, and 8 that something is wrong with: a base tilted by 30°, the torque sign of a joint
            turned, a tool taken off since the tare, motor torque of an arm that nobody knows. All go through `identify`.
 tares      12 logs of 4 s with a tare of the same arm 0 to 30 days before, the age said or not, or of another arm.
@@ -38,8 +38,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from events import Push, _step, matched, watched
+from event_scenes import Push
 from threadpoolctl import threadpool_limits
+from watching import matched, step, watched
 
 import armload
 from armload import Recording, __version__, arm
@@ -224,7 +225,7 @@ def on_streams(scenes: list[Stream]) -> tuple[dict[str, Any], list[bytes]]:
     steps, alarms, called, kept, answers = [], 0, 0, 0, []
     for stream in scenes:
         found = watched(OnlineIdentifier(arm(stream.robot), stream.tare), stream.log)
-        own, rest = matched([_step(k, stream.held, found) for k in range(1, len(stream.held))], found.events)
+        own, rest = matched([step(k, stream.held, found) for k in range(1, len(stream.held))], found.events)
         steps += own
         for push in stream.pushes:
             events = [e for e in rest if push.start <= e["t"] <= push.end + 3.0]
