@@ -13,13 +13,14 @@ from armload.arms import Arm, arm, payload_regressor
 from armload.inertia import InertialParameters
 from armload.lab.dataset import Dataset, build_dataset
 from armload.lab.evaluation import EvaluationRun
-from armload.motion import Motion, random_motion, taie2024
-from armload.payloads import Payload, container_loadings, random_payloads, test_payload
+from armload.motion import Motion, excitation, random_motion
+from armload.payloads import Payload, container_loadings, draw_payload, random_payloads, test_payload
 from armload.recording import Recording, read_recording
 from armload.simulation import Run, Sensors, World, simulate_many
 
 # Seeds of what is drawn: kept apart, so that no run shares its noise with the training data.
-NOISE, WORLDS, FAMILY, MOTIONS, TARE = 5000, 100, 7000, 300, 900
+NOISE, WORLDS, FAMILY, MOTIONS, TARE, LOADINGS = 5000, 100, 7000, 300, 900, 20_000
+PANDA, CONTAINER = "panda", "container"  # the paper's arm and payloads
 
 
 @dataclass(frozen=True)
@@ -48,31 +49,49 @@ class Basis:
         folder: where the data sets are built.
         size: `FULL` (the paper's 249 788 rows) or `QUICK`.
         real_log: an unloaded log of a real Panda, for the semi-real runs; None: there are none.
+        robot: the arm by name; the paper's is a Panda.
+        payloads: "container", the paper's, or a family of `draw_payload`.
     """
 
     folder: Path
     size: Size = FULL
     real_log: Path | None = None
+    robot: str = PANDA
+    payloads: str = CONTAINER
+
+    @property
+    def rests_on(self) -> tuple[Path, Size, Path | None, str, str]:
+        """What `basis_of_process` makes the same basis of."""
+        return self.folder, self.size, self.real_log, self.robot, self.payloads
 
     @cached_property
     def arm(self) -> Arm:
-        """The nominal Panda, bare to its flange."""
-        return arm("panda")
+        """The nominal arm, bare to its flange."""
+        return arm(self.robot)
 
     @cached_property
     def motion(self) -> Motion:
-        """The excitation: a re-design, the paper's coefficients being unpublished."""
-        return taie2024()
+        """The excitation: a re-design for the Panda, the paper's coefficients being unpublished; else a random one."""
+        return excitation(self.arm)
 
     @cached_property
     def loadings(self) -> list[Payload]:
-        """The training payloads."""
-        return container_loadings()[:: self.size.every]
+        """The training payloads; of a random family as many as the paper's."""
+        paper = container_loadings()
+        if self.payloads != CONTAINER:
+            paper = [draw_payload(self.payloads, LOADINGS + k) for k in range(len(paper))]
+        return paper[:: self.size.every]
 
     @cached_property
     def truth(self) -> InertialParameters:
         """The test payload, which is not among the loadings (the role of the paper's Table I)."""
-        return InertialParameters(test_payload().parameters.phi, self.arm.frame)
+        payload = test_payload() if self.payloads == CONTAINER else draw_payload(self.payloads, LOADINGS - 1)
+        return InertialParameters(payload.parameters.phi, self.arm.frame)
+
+    @cached_property
+    def sensors(self) -> Sensors:
+        """Those of the arm's sheet, or the like."""
+        return Sensors.of(self.arm)
 
     def dataset(self, sensors: str, progress: bool = False) -> Dataset:
         """The data set with "ideal" sensors or those of a real "panda"; built where it is not there yet."""
@@ -81,7 +100,7 @@ class Basis:
             self.arm,
             [self.motion],
             self.loadings,
-            sensors=None if sensors == "ideal" else Sensors.panda(self.arm),
+            sensors=None if sensors == "ideal" else self.sensors,
             rows_per_run=self.size.rows,
             progress=progress,
         )
@@ -116,7 +135,7 @@ class Basis:
         return self._simulated(same_motion=True) | self._on_real_log()
 
     def _simulated(self, same_motion: bool) -> dict[str, list[EvaluationRun]]:
-        robot, size, sensors = self.arm, self.size, Sensors.panda(self.arm)
+        robot, size, sensors = self.arm, self.size, self.sensors
         nominal = World.nominal(robot)
         worlds = [World.real_like(robot, WORLDS + k) for k in range(size.worlds)]
         family = [
@@ -166,6 +185,8 @@ class Basis:
 
 
 @lru_cache(maxsize=1)
-def basis_of_process(folder: Path, size: Size, real_log: Path | None) -> Basis:
+def basis_of_process(
+    folder: Path, size: Size, real_log: Path | None = None, robot: str = PANDA, payloads: str = CONTAINER
+) -> Basis:
     """One for all cells that a process measures, so that its runs are simulated once."""
-    return Basis(folder, size, real_log)
+    return Basis(folder, size, real_log, robot, payloads)

@@ -47,23 +47,23 @@ def _shrunk(spec: Spec, size: Size) -> Spec:
 def basis_of_readings(basis: Basis) -> Basis:
     """The same data set and arm, measured on many real-like arms and nothing else."""
     arms = ARMS if basis.size.max_epochs is None else basis.size.worlds + 1
-    return Basis(basis.folder, replace(basis.size, worlds=arms, payloads=0, motions=0))
+    return replace(basis, size=replace(basis.size, worlds=arms, payloads=0, motions=0), real_log=None)
 
 
 def reading_tasks(basis: Basis) -> list[Task]:
     """The cells of the readings as tasks for `run_tasks`."""
     on = basis_of_readings(basis)
     return [
-        Task.of_one(spec.name, spec.key(on.fingerprint), measured_reading, spec, (on.folder, on.size))
+        Task.of_one(spec.name, spec.key(on.fingerprint), measured_reading, spec, on.rests_on)
         for spec in reading_specs(basis.size)
     ]
 
 
-def measured_reading(spec: Spec, rests_on: tuple[Any, Size]) -> dict[str, Any]:
+def measured_reading(spec: Spec, rests_on: tuple[Any, ...]) -> dict[str, Any]:
     """The numbers of one cell: as any cell's, on fewer protocols, `held_out` for each payload as well."""
     import time
 
-    basis, begun = basis_of_process(*rests_on, None), time.perf_counter()
+    basis, begun = basis_of_process(*rests_on), time.perf_counter()
     trained = train(spec, basis)
     runs: dict[str, list[EvaluationRun]] = {name: members for name, members in basis.runs.items() if members}
     measured = measure_learned(trained.predict, runs)

@@ -13,7 +13,6 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -89,7 +88,7 @@ def rival_tasks(basis: Basis) -> list[Task]:
             f"least squares at {rate} Hz, noise: {sensors}",
             {r.name: key_of(_FORMAT, on.fingerprint, TUNED_ON, GRID, FORGETTING, asdict(r)) for r in group},
             measured_rivals,
-            ((on.folder, on.size), rate, sensors),
+            (on.rests_on, rate, sensors),
             unit="row",
         )
         for (rate, sensors), group in groups.items()
@@ -97,13 +96,14 @@ def rival_tasks(basis: Basis) -> list[Task]:
 
 
 def measured_rivals(
-    names: Sequence[str], rests_on: tuple[Path, Size], rate: int, sensors: str
+    names: Sequence[str], rests_on: tuple[Any, ...], rate: int, sensors: str
 ) -> Iterator[dict[str, Any]]:
     """The cells of these names: error of the mean over the second half of each run (R, 10)."""
-    basis = basis_of_process(*rests_on, None)
+    basis = basis_of_process(*rests_on)
     runs = simulated(basis, rate, sensors)
-    others = tuning_runs(basis, rate, sensors) if any(r.tuned for r in rivals(basis.size)) else []
-    for rival in (r for r in rivals(basis.size) if r.name in names):
+    wanted = [r for r in rivals(basis.size) if r.name in names]
+    others = tuning_runs(basis, rate, sensors) if any(r.tuned for r in wanted) else []
+    for rival in wanted:
         begun = time.perf_counter()
         chosen = tune(basis, rival, others) if rival.tuned else (USUAL[rival.derivative], 1.0)
         errors = {
@@ -142,7 +142,7 @@ def tuning_runs(basis: Basis, rate: int, sensors: str) -> list[EvaluationRun]:
 def _runs(
     basis: Basis, worlds: Sequence[World], held: Sequence[InertialParameters], rate: int, sensors: str, noise: int
 ) -> list[EvaluationRun]:
-    seen = {"panda": Sensors.panda(basis.arm), "ideal": Sensors.ideal()}[sensors]
+    seen = basis.sensors if sensors == "panda" else Sensors.ideal()
     motion = basis.motion
     loaded = [Run(motion, phi, w, seen, noise + k) for k, (phi, w) in enumerate(zip(held, worlds, strict=True))]
     empty = [Run(motion, None, w, seen, noise + 500 + k) for k, w in enumerate(worlds)]

@@ -15,7 +15,7 @@ from armload.estimators import Identifier
 from armload.identification import METHODS
 from armload.lab.evaluation import EvaluationRun, PriorLeastSquares, mean_absolute_error
 from armload.lab.experiment import Cells, Task, run_tasks
-from armload.lab.study.basis import Basis, Size, basis_of_process
+from armload.lab.study.basis import Basis, basis_of_process
 from armload.lab.study.plan import plan
 from armload.lab.study.protocols import measure_learned, measure_stream
 from armload.lab.study.readings import reading_tasks
@@ -48,17 +48,13 @@ def run_study(
     if jobs > 1 or cluster is not None:  # or each process would build them
         for sensors in sorted({spec.sensors for spec in todo}):
             basis.dataset(sensors, progress)
-    rests_on, bars, fingerprint = (
-        (basis.folder, basis.size, basis.real_log),
-        progress and jobs == 1 and cluster is None,
-        basis.fingerprint,
-    )
+    rests_on, fingerprint, bars = basis.rests_on, basis.fingerprint, progress and jobs == 1 and cluster is None
     tasks = [Task.of_one(spec.name, spec.key(fingerprint), _measured, spec, rests_on, bars) for spec in todo]
     tasks += [*rival_tasks(basis), *reading_tasks(basis)]
     return run_tasks(tasks, results, jobs=jobs, cluster=cluster, until=until, say=say, part="cell", indent=1)
 
 
-def _measured(spec: Spec, rests_on: tuple[Path, Size, Path | None], progress: bool) -> dict[str, Any]:
+def _measured(spec: Spec, rests_on: tuple[Any, ...], progress: bool) -> dict[str, Any]:
     """The numbers of one cell."""
     basis, begun = basis_of_process(*rests_on), time.perf_counter()
     measured = _benchmark(spec, basis) if spec.kind == "benchmark" else _learned(spec, basis, progress)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from armload.ensembles import BaggingEnsemble, MixedEnsemble, TwoStage
 
 SPLITTING: dict[str | None, Callable[..., Split]] = {"row": split_rows, "payload": split_payloads}
-_SIGNALS = {"t": slice(0, 1), "q": slice(1, 8), "dq": slice(8, 15), "tau": slice(15, 22)}
+_SIGNALS = ("q", "dq", "tau")  # columns of n joints each, after the time's one
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def train(spec: Spec, basis: Basis, progress: bool = False) -> Trained:
 
     dataset = basis.dataset(spec.sensors, progress)
     split = SPLITTING[spec.split](dataset, spec.seed)
-    hidden = [_SIGNALS[signal] for signal in spec.drop]
+    hidden = [_columns(signal, basis.arm.n) for signal in spec.drop]
 
     def seen(X: NDArray) -> NDArray:
         X = X.copy()
@@ -78,6 +78,12 @@ def train(spec: Spec, basis: Basis, progress: bool = False) -> Trained:
         left.unlink()
     epochs = None if model.epochs_ is None else np.ravel(model.epochs_).tolist()
     return Trained(lambda X: model.predict(seen(X)), epochs, file.stat().st_size, *_errors(model, seen, dataset, split))
+
+
+def _columns(signal: str, joints: int) -> slice:
+    """Where a signal stands in rows of (t, q, dq, tau)."""
+    first = 0 if signal == "t" else 1 + joints * _SIGNALS.index(signal)
+    return slice(first, first + (1 if signal == "t" else joints))
 
 
 def _errors(model: Any, seen: Callable, dataset: Dataset, split: Split) -> tuple[NDArray, NDArray]:
