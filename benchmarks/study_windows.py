@@ -41,7 +41,7 @@ from study_windows_data import (
 )
 
 from armload import arm
-from armload.atomic import replacing
+from armload.runtime.atomic import replacing
 from armload.ensembles import BaggingEnsemble, NetworkLearner
 from armload.ensembles.window_networks import WindowNetworks
 from armload.lab.cells import key_of

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from armload import Arm, arm
 from armload.arms import rated_effort
-from armload.atomic import replacing
+from armload.runtime.atomic import replacing
 from armload.motion import FourierMotion, random_motion
 from armload.payloads import draw_payload
 from armload.recording import Recording
