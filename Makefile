@@ -11,6 +11,9 @@ AHEAD = ARMLOAD_KERNELS="$$($(BIN)/python hatch_build.py --here)"
 # One worker for each file: what its tests share (a study, a demo) is made once. The order is that of tests/conftest.py.
 PYTEST = $(AHEAD) $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
+# Where full tests need ports, real time or both cores: these run one after another, when the others are done.
+ALONE = tests/app tests/devices tests/lab/test_experiment.py tests/service tests/survey
+
 # What Python compiled is kept, whatever the caller's environment says: the tests start a hundred processes.
 unexport PYTHONDONTWRITEBYTECODE
 
@@ -41,7 +44,8 @@ test-all: lint parts ## as test, and the tests marked full too (skipped with a r
 	$(PYTEST) -m ""
 
 test-full: $(VENV)/.stamp parts ## only the tests marked full: the site, the wheel, and clients, ROS 2 and a browser if to be had
-	$(AHEAD) $(BIN)/python -m pytest -m full
+	$(PYTEST) -m full $(addprefix --ignore=,$(ALONE)); first=$$?; \
+		$(AHEAD) $(BIN)/python -m pytest -m full $(ALONE) && exit $$first
 
 parts: $(VENV)/.stamp
 	@$(MAKE) --no-print-directory $(VENV)/.vendors || echo "no makers' clients: their tests will be skipped" >&2
@@ -69,14 +73,17 @@ clean: ## remove everything that can be made again, the virtual environment incl
 	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # The stamp is touched last: a set-up that was interrupted is taken up again by the next make. Most of what is installed
-# is never imported: Python compiles what is, when it is.
+# is never imported: Python compiles what is, when it is. Two gigabytes are unpacked, by two processes, half the names each.
 $(VENV)/.stamp: requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
 		echo "armload needs Python 3.11 or newer, and '$(PYTHON)' is" \
 		"$$($(PYTHON) --version 2>&1 || echo missing): name another one with 'make PYTHON=python3.12'" >&2; exit 1; }
 	@echo "setting up $(VENV) (once; a few minutes)"
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	@$(PIP) install --no-deps --no-compile --requirement requirements.lock
+	@grep '^[a-m]' requirements.lock > $(VENV)/a-m.txt; grep -v '^[a-m]' requirements.lock > $(VENV)/n-z.txt
+	@$(PIP) install --no-deps --no-compile --requirement $(VENV)/a-m.txt & first=$$!; \
+		$(PIP) install --no-deps --no-compile --requirement $(VENV)/n-z.txt; second=$$?; \
+		wait $$first && exit $$second
 	@$(PIP) install --no-deps --no-build-isolation --editable .
 	@touch $@
 

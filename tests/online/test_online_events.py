@@ -75,7 +75,7 @@ def covers(estimate, phi):
     return np.abs(estimate.phi - phi) <= 1.96 * estimate.std
 
 
-@pytest.mark.parametrize("rate", [200.0, 1000.0])
+@pytest.mark.parametrize("rate", [200.0, pytest.param(1000.0, marks=pytest.mark.full)])
 def test_half_a_kilo_is_noticed_in_a_third_of_a_second_and_its_mass_known_in_one(rate):
     estimates, events = taken_up(rate, None)
     assert [event.kind for event in events] == ["grasp"]
@@ -123,7 +123,7 @@ def handed_over(log, start, seconds, body):
 
 
 def test_a_slow_hand_over_is_one_grasp_and_the_answer_follows_it():
-    log, mass = handed_over(stream(12, [], 12.0), 8.0, 2.0, HALF_KILO)
+    log, mass = handed_over(stream(12, [], 10.5), 8.0, 2.0, HALF_KILO)
     estimates, events = said(log)
     assert [event.kind for event in events] == ["grasp"]
     assert 8.0 < events[0].t < 9.0
@@ -156,10 +156,10 @@ class Stopping(Motion):
 
 
 def test_a_change_while_the_arm_stands_is_noticed_then():
-    body, motion = box(1.0), Stopping(random_motion(arm("panda"), 13), 8.0)
-    estimates, events = said(stream(13, [(11.0, body)], 13.0, motion=motion), "map-gp")
+    body, motion = box(1.0), Stopping(random_motion(arm("panda"), 13), 5.0)
+    estimates, events = said(stream(13, [(7.0, body)], 8.5, motion=motion), "map-gp")
     assert len(events) == 1
-    assert 11.0 < events[0].t < 11.5
+    assert 7.0 < events[0].t < 7.5
     assert covers(estimates[-1], body.phi)[0]
     assert not estimates[-1].moving
 
@@ -171,6 +171,7 @@ def test_a_mass_is_told_once_it_is_known_and_not_before():
     assert masses[-1][1] == pytest.approx(0.5, abs=0.05)
 
 
+@pytest.mark.full  # some seconds
 def test_nothing_is_put_down_by_an_arm_that_holds_nothing():
     """Half a kilo pulls the empty arm up: no body can, and so it is a contact."""
     log = stream(14, [], 11.0)
@@ -181,20 +182,21 @@ def test_nothing_is_put_down_by_an_arm_that_holds_nothing():
 
 
 def test_while_somebody_pushes_the_arm_a_contact_is_likely_and_nothing_is_called_calibrated():
-    log = stream(6, [], 9.0)
+    log = stream(6, [], 7.0)
     panda = arm("panda")
-    size = np.sin(np.pi * np.clip(log.t - 6.0, 0.0, 1.0)) ** 2
+    size = np.sin(np.pi * np.clip(log.t - 4.0, 0.0, 1.0)) ** 2
     J, R = panda.frame_motion(log.q).jacobian[:, 3:], panda.frame_pose(log.q)[0]
     pushed = size[:, None] * np.einsum("nij,ni->nj", J, R.transpose(0, 2, 1) @ np.array([0.0, 40.0, 0.0]))
     estimates, events = said(Recording(log.t, log.q, log.dq, log.tau - pushed))
     assert events == []
-    during = [e for e in estimates if 6.3 < e.t < 6.9]
+    during = [e for e in estimates if 4.3 < e.t < 4.9]
     assert np.median([e.p_contact for e in during]) > 0.99
     assert not any(e.interval == "calibrated" for e in during)
-    assert max(e.p_contact for e in estimates if 4.0 < e.t < 6.0) < 0.5
+    assert max(e.p_contact for e in estimates if 3.0 < e.t < 4.0) < 0.5
     assert estimates[-1].interval == "calibrated"
 
 
+@pytest.mark.full  # some seconds
 def test_what_is_put_down_is_gone_and_what_is_taken_up_again_is_recognised():
     payload, truth = HALF_KILO, HALF_KILO.phi
     log = stream(2, [(5.0, payload), (10.0, None), (15.0, payload)], 20.0)
@@ -308,6 +310,7 @@ def test_threads_do_not_pile_up_with_the_changes():
     assert most <= 6  # the runs kept, and the watch's own
 
 
+@pytest.mark.full  # some seconds
 def test_a_pose_first_seen_shortly_after_a_change_is_not_another_change():
     log = stream(5001, [(-1.0, None), (5.217, box(1.0))], 14.0, motion=taie2024())
     _, events = said(log, "map-gp")  # the empty arm was not seen in all poses of the round before it took hold
