@@ -27,7 +27,7 @@ from armload.app.cli.printing import console
 from armload.app.cli.train_hybrid import cells_table, episodes_shown, summary
 from armload.lab.training import Records
 from armload.lab.training.coverage import coverage_on
-from armload.lab.training.hybrid import drawn_episodes, episode_records
+from armload.lab.training.hybrid import CHUNK, draw_chunk, episode_records
 from armload.posterior import HybridModel, shipped_model
 from armload.regression import solution_prior_std
 
@@ -136,7 +136,8 @@ def main() -> None:
     found = coverage_on(records, model.prior_for(robot), model.calibration)
     console().print(cells_table(found))
     print(f"pooled: {100 * found.pooled:.1f} %")
-    drawn = drawn_episodes(robot, episodes=asked.episodes, seed=SEED)
+    chunks = ((first, min(CHUNK, asked.episodes - first)) for first in range(0, asked.episodes, CHUNK))
+    drawn = [episode for chunk in chunks for episode in draw_chunk(robot, "broad", SEED, *chunk)]
     families = np.array([episode.payload.name.split()[0] for episode in drawn])
     lines = compared(errors(robot, model, records), records, families)
     verdict = verdicts(lines)

@@ -1,4 +1,4 @@
-"""An identifier beside a running robot: what a stream may do to it, and what it must not."""
+"""An identifier on a running robot: what a stream may do to it, and what it must not."""
 
 import json
 import re

@@ -385,4 +385,4 @@ def test_wanted_torque_that_is_asked_for_by_name_is_read_and_said_to_be_that(tmp
     columns = {k: v for k, v in rtde(log, CONSTANTS, True).items() if "current" not in k} | moments
     found = read_recording(write(tmp_path / "log.csv", columns), UR, columns="tau=target_moment_{i}")
     same(found, log)
-    assert any("not told of does not show in it" in note for note in found.notes)
+    assert any("not set in the controller does not show in it" in note for note in found.notes)

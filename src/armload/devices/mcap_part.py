@@ -38,8 +38,8 @@ TOPICS = {
     LOG: "rcl_interfaces/msg/Log",
 }
 _INFO, _WARN = 20, 30  # levels of rcl_interfaces/Log
-_TOLD = ("method", "relative_to", "interval", "held", "p_held", "p_change", "p_contact", "p_drift", "n_samples")
-_TOLD = (*_TOLD, "since", "age", "lag", "moving", "settling", "left_out", "pauses", "clock_jumps")
+_SHOWN = ("method", "relative_to", "interval", "held", "p_held", "p_change", "p_contact", "p_drift", "n_samples")
+_SHOWN = (*_SHOWN, "since", "age", "lag", "moving", "settling", "left_out", "pauses", "clock_jumps")
 
 
 class McapPart:
@@ -79,15 +79,15 @@ class McapPart:
         dim = [SimpleNamespace(label=label, size=size, stride=stride) for label, size, stride in shape]
         layout = SimpleNamespace(dim=dim, data_offset=0)
         self._file.write(PARAMETERS, self._now, SimpleNamespace(layout=layout, data=rows.ravel()))
-        said = estimate.to_dict()
-        told = {name: said[name] for name in _TOLD}
-        told["determined"] = " ".join(name for name, known in zip(NAMES, said["determined"], strict=True) if known)
+        answer = estimate.to_dict()
+        values = {name: answer[name] for name in _SHOWN}
+        values["determined"] = " ".join(name for name, known in zip(NAMES, answer["determined"], strict=True) if known)
         status = SimpleNamespace(
             level=int(bool(estimate.notes)),
             name="armload: payload",
             message="; ".join(estimate.notes),
             hardware_id="",
-            values=[SimpleNamespace(key=key, value=str(value)) for key, value in told.items()],
+            values=[SimpleNamespace(key=key, value=str(value)) for key, value in values.items()],
         )
         self._file.write(DIAGNOSTICS, self._now, SimpleNamespace(header=_header(self._now), status=[status]))
 

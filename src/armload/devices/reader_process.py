@@ -84,9 +84,9 @@ class _Reader:
                 self.pass_on(source, recorder)
             self.report(event="ended")
         except ModuleNotFoundError as error:
-            if (said := missing(error)) is None:
+            if (sentence := missing(error)) is None:
                 raise
-            self.report(event="error", message=said)
+            self.report(event="error", message=sentence)
         except (ArmloadError, OSError) as error:
             self.report(event="error", message=str(error))
 

@@ -142,7 +142,7 @@ class DetachedMover(Detached, Mover):
 
     def write(self, load: Load, *, allow_undetermined_inertia: bool = False) -> Any:
         """Tell the controller the load, guarded, and return what was sent."""
-        said = {
+        content = {
             "phi": load.parameters.phi.tolist(),
             "frame": load.parameters.frame,
             "determined": load.determined,
@@ -151,7 +151,7 @@ class DetachedMover(Detached, Mover):
             "std": None if load.std is None else load.std.tolist(),
         }
         try:
-            return self._call("put", said, allow_undetermined_inertia)
+            return self._call("put", content, allow_undetermined_inertia)
         except SourceError as error:
             raise SinkError(str(error)) from None
 

@@ -91,7 +91,7 @@ class CommandedLeastSquares(NormalLeastSquares):
 
     Args:
         arm: the bare arm.
-        motion: what the controller was told.
+        motion: the commanded one.
         start: time of the log at which the motion started [s]; None: at the first sample.
         weighted: as in `NormalLeastSquares`.
 

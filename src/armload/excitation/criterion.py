@@ -60,7 +60,7 @@ class Criterion:
         arm: the bare arm.
         tare: "same": the loaded run's own motion, run empty before; "own": the second motion; None: no tare; a log or a
             motion: that one.
-        profile: what many logs said of the arm; None: there is none.
+        profile: what was learned of the arm from many logs; None: there is none.
         prior: of the payload; None: the weak prior.
     """
 

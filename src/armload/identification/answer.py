@@ -94,7 +94,7 @@ class Identification:
     moves: whether no rigid body explains the torques; not in the JSON. another: whether the arm is another one than at
         its tare, or than the profile's; not in the JSON.
     health: the arm itself, as the log shows it, of a method that asks; not in the JSON.
-    gain_known: whether a known weight told the torque's scale; not in the JSON.
+    gain_known: whether a known weight fixed the torque's scale; not in the JSON.
     """
 
     method: str

@@ -46,7 +46,7 @@ def choose(
         arm: the bare arm. tare: an earlier log of it, if there is one.
         method: a name of the catalogue, or a trained model's file; None: the most trustworthy for the arm.
         live: for a stream, where no motion is known beforehand.
-        profile: what many logs said of this arm.
+        profile: what was learned of this arm from many logs.
 
     Raises:
         ArmloadError: an unknown method, a model that is missing or of another arm, or a tare the method has no use for.

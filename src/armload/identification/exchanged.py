@@ -1,4 +1,4 @@
-"""Two torque columns in each other's place: told by the fit of the arm's own torque, before and after."""
+"""Two torque columns in each other's place: found by the fit of the arm's own torque, before and after."""
 
 from __future__ import annotations
 

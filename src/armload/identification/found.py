@@ -34,7 +34,7 @@ class Asked:
     """How a log is to be identified.
 
     method: as of `identify`. drift: by how many daily deviations the arm may differ from what it was at its tare.
-    known: what is known of the payload beside the log. profile: what many logs said of the arm.
+    known: what is known of the payload apart from the log. profile: what was learned of the arm from many logs.
     """
 
     method: str | Path | None = None
@@ -62,8 +62,8 @@ class Found(NamedTuple):
     exchanged: whether the estimate is rather the difference of two bodies, one put on for another.
     kappa: by how much the physics overrates the log's evidence, of a method that knows.
     gain_std: relative standard deviation of the torque's scale, of a method that allows for one. gain_known: whether a
-        known weight told it.
-    known: of the payload beside the log. alone: mean (10,) and covariance (10, 10) of what the log alone says then.
+        known weight fixed it.
+    known: of the payload apart from the log. log_only: mean (10,) and covariance (10, 10) without that.
     health: the arm itself, of a method that asks.
     """
 
@@ -86,7 +86,7 @@ class Found(NamedTuple):
     restlessness: float = 0.0
     exchanged: bool = False
     known: Known | None = None
-    alone: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    log_only: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     kappa: float | None = None
     gain_std: float | None = None
     gain_known: bool = False
@@ -105,16 +105,16 @@ class Found(NamedTuple):
 
     def with_error(self, covariance: NDArray[np.float64]) -> Found:
         """The same with one more error of phi, of that covariance (10, 10): of a tool that is not known exactly."""
-        unprojected, alone = (x and (x[0], x[1] + covariance) for x in (self.unprojected, self.alone))
+        unprojected, log_only = (x and (x[0], x[1] + covariance) for x in (self.unprojected, self.log_only))
         estimate = replace(self.estimate, covariance=self.estimate.covariance + covariance)
-        return self._replace(estimate=estimate, unprojected=unprojected, alone=alone)
+        return self._replace(estimate=estimate, unprojected=unprojected, log_only=log_only)
 
     def less(self, tool: NDArray[np.float64]) -> Found:
         """The same without a tool (10,)."""
-        unprojected, alone = (x and (x[0] - tool, x[1]) for x in (self.unprojected, self.alone))
+        unprojected, log_only = (x and (x[0] - tool, x[1]) for x in (self.unprojected, self.log_only))
         known = self.known and self.known.with_tool(np.zeros(10))
         estimate = replace(self.estimate, phi=self.estimate.phi - tool)
-        return self._replace(estimate=estimate, unprojected=unprojected, known=known, alone=alone)
+        return self._replace(estimate=estimate, unprojected=unprojected, known=known, log_only=log_only)
 
 
 def found_in(recording: Recording, arm: Arm, tare: Recording | None, asked: Asked) -> Found:
@@ -174,7 +174,7 @@ def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Foun
         gain_std=None if posterior is None else posterior.posterior.gain_std,
         gain_known=asked.profile is not None and asked.profile.gain_std is not None,
         known=asked.known,
-        alone=None if posterior is None else posterior.alone,
+        log_only=None if posterior is None else posterior.log_only,
         health=None if posterior is None else ArmHealth.of(posterior),
     )
 

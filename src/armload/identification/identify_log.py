@@ -56,11 +56,11 @@ def identify(
         mass: of what is identified, where it was weighed, and its standard deviation [kg].
         com: its centre of mass (3,), where that is known, in the arm's payload frame, and its standard deviation along
             each axis [m].
-        profile: what many logs said of this arm (`armload.posterior.learn_profile`), or the path of its file; the
-            answer is what was added since. With a tare beside, that is of the recording's own day.
+        profile: what was learned of this arm from many logs (`armload.posterior.learn_profile`), or the path of its
+            file; the answer is what was added since. With a tare too, the tare is of the recording's own day.
         method: a name in `armload.METHODS`, or the path of a trained model; None: the most trustworthy for the arm,
             "hybrid" where one is shipped, "map-gp" elsewhere.
-        progress: told in a few words what is being done.
+        progress: called with a few words on what is being done.
 
     Raises:
         ArmloadError: a file cannot be read, the log is not plausible for this arm, or the method cannot be used on it.

@@ -1,4 +1,4 @@
-"""What is known of a payload beside the log, and what that makes of an answer; for logs and streams."""
+"""What is known of a payload apart from the log, and what that makes of an answer; for logs and streams."""
 
 from __future__ import annotations
 

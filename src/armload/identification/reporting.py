@@ -57,8 +57,8 @@ def answered(
     """
     estimate, before, weak = found.estimate, found.before, payload_prior_std(arm)
     determined = determined_by(estimate.std, before.std if before.used else None, found.weak_std, weak)
-    alone = found.alone or (estimate.phi, estimate.covariance)  # what is given does not tell whether anything is held
-    is_held = held(float(alone[0][0]), float(np.sqrt(alone[1][0, 0])), bool(determined[0]))
+    log_only = found.log_only or (estimate.phi, estimate.covariance)  # whether anything is held, only the log tells
+    is_held = held(float(log_only[0][0]), float(np.sqrt(log_only[1][0, 0])), bool(determined[0]))
     leaning = np.zeros(10, dtype=bool)
     if found.weak_std is not None:
         leaning = determined & (found.weak_std > LEANS * estimate.std)
@@ -146,10 +146,10 @@ def _doubt(found: Found, arm: Arm, mass_determined: bool, relative_to: str) -> s
         return changed
     if found.restlessness > RESTLESS:
         return not_rigid(found.restlessness)
-    if found.known is not None and found.alone is not None:
-        denied = found.known.denied(*found.alone)
+    if found.known is not None and found.log_only is not None:
+        denied = found.known.denied(*found.log_only)
         if denied is not None:
-            return other_than_given(denied, *found.alone)
+            return other_than_given(denied, *found.log_only)
     if found.strange_links and relative_to in ("arm", "tool"):  # a tare tells what the links are
         return another_model(arm.name, found.strange_links)
     if found.offset_ratio:

@@ -59,7 +59,7 @@ KAPPA_UNKNOWN = 4.5
 # times kappa, where torque is motor current: friction that grows with the load differs from part to part. Sound
 # simulated logs of a UR10e reach 33 without it, a real one 25
 MOTOR_SIDE = 2.0
-# [s] the shortest part that is told from its neighbours: with less no inertia and hardly a mass is known
+# [s] the shortest part that is distinguished from its neighbours: with less no inertia and hardly a mass is known
 PART_LEAST = 0.5
 # [s] left out after a change: four lags of the regression, 2 % of the old torque is left
 SETTLED = 0.2

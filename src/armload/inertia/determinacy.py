@@ -23,7 +23,7 @@ LIGHTEST_HELD = 1e-3  # [kg] less is nothing: a log that is compared with itself
 def determined(
     std: NDArray[np.float64],
     before: NDArray[np.float64] | None,
-    alone: NDArray[np.float64] | None = None,
+    unlearned: NDArray[np.float64] | None = None,
     weak: NDArray[np.float64] | None = None,
 ) -> NDArray[np.bool_]:
     """Which parameters (10,) the data determine.
@@ -31,12 +31,13 @@ def determined(
     Args:
         std: standard deviation of the estimate (10,).
         before: the same before the data; None: the method has no prior.
-        alone: standard deviation without a learned prior, of a method that has one: a family's bodies are alike, what
-            follows from the mass alone the log has not told. weak: standard deviation before, for `alone`.
+        unlearned: standard deviation without the learned prior, of a method that has one: bodies of a family are alike,
+            so that such a prior derives the rest from the mass, which is no evidence of the log. weak: standard
+            deviation before the data, for `unlearned`.
     """
     out = Z95 * std <= SMALL if before is None else std <= before / SHRINK
-    if alone is not None and weak is not None:
-        out = out & (alone <= weak / SHRINK)
+    if unlearned is not None and weak is not None:
+        out = out & (unlearned <= weak / SHRINK)
     return out
 
 

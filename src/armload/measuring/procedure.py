@@ -66,14 +66,14 @@ class Procedure:
         folder: for the logs `empty.csv` and `loaded.csv`, which must not exist.
         tare: a log of the empty arm: there is no empty run, and the payload is on already.
         tare_age: how old that is [s]; None: by the logs' clocks.
-        profile: what many logs said of this arm.
+        profile: what was learned of this arm from many logs.
         mass: of the payload, where it was weighed: 3 sigma more is what the movements are checked with.
         com: its centre of mass, where that is known.
         method: of the identification.
         accuracy: the loaded run ends when it is reached; None: with the motion.
         floor, boxes, approach: see `plan_of`.
         thresholds: where a movement is stopped.
-        say: told what is being done.
+        say: called with what is being done.
 
     Raises:
         RecordingError: a log is there already, or the folder cannot be made.

@@ -1,4 +1,4 @@
-"""Payload identification beside a running robot."""
+"""Payload identification on a running robot."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ class OnlineEstimate(Estimate):
     n_samples: samples of this payload so far.
     age: how much older the newest sample that counted in phi is than t [s]; it grows while samples cannot be used or do
         not fit, and while the arm stands, whose samples tell nothing new; `notes` then says so. Together with `lag`.
-    lag: how long ago the last sample had arrived when it was answered, as far as that was told (`behind`) [s]: what
+    lag: how long ago the last sample had arrived when it was answered, as far as that is known (`behind`) [s]: what
         waits for an identifier that is too slow gets old.
     since: when this payload was taken up, on the stream's clock [s].
     relative_to: "arm", "tool" (which the arm was given with), "tare", or "before": the run of the empty arm before the

@@ -1,4 +1,4 @@
-"""A change of payload, as it is told to whoever listens."""
+"""A change of payload, as it is reported."""
 
 from __future__ import annotations
 

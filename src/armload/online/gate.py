@@ -126,7 +126,7 @@ class Gate:
             self._shift += max(_PAUSE - step, 0.0)
         elif step > self.gap:
             self.health.pauses += 1
-            self._shift -= max(step - _PAUSE, 0.0)  # an arm that was switched off has told nothing meanwhile
+            self._shift -= max(step - _PAUSE, 0.0)  # an arm that was switched off gave no information meanwhile
         self._elsewhere = None
         self._t, self._q = now, q
         self.health.used += 1

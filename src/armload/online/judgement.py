@@ -19,7 +19,7 @@ from armload.online.learning import change_of_arm
 from armload.online.thresholds import STANDS
 from armload.posterior import PosteriorLeastSquares
 
-_STANDING = "standing: nothing new is told until the arm moves, or what it holds changes"
+_STANDING = "standing: nothing new is learned until the arm moves, or what it holds changes"
 _STANDING_MOTOR = "standing: a change of payload is noticed only when the arm moves"
 CHANGING = "the payload is changing"
 LEFT_OUT = "samples that do not fit are left out: something pulls at the arm, or the payload is changing"

@@ -1,4 +1,4 @@
-"""What a run makes of what is known of payloads beside the stream: taken where something is held that may be it."""
+"""What a run makes of what is known of payloads apart from the stream: taken where something is held that may be it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def taken_by(run: Identifier) -> Known | None:
 
 def denied_by(run: Identifier) -> str | None:
     """That what a run holds is not what is known; None: it may be it, or nothing is known."""
-    if not isinstance(run, PosteriorLeastSquares) or run.known is None or run.alone is None or run.taken:
+    if not isinstance(run, PosteriorLeastSquares) or run.known is None or run.log_only is None or run.taken:
         return None
-    denied = run.known.denied(*run.alone)
-    return None if denied is None else other_than_given(denied, *run.alone)
+    denied = run.known.denied(*run.log_only)
+    return None if denied is None else other_than_given(denied, *run.log_only)

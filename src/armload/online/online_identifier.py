@@ -1,4 +1,4 @@
-"""The identifier that runs beside a robot for days: nothing it is fed makes it stop, every sample is answered.
+"""The identifier that runs next to a robot for days: nothing it is fed makes it stop, every sample is answered.
 
 identifier = OnlineIdentifier(arm("panda"))
 for sample in source:
@@ -51,7 +51,7 @@ class OnlineIdentifier:
         tare: an earlier log of the same arm, on any motion, with whatever was mounted then: estimates are of what was
             added since.
         method: a name of the catalogue, or a trained model's file; None: the most trustworthy for the arm.
-        profile: what many logs said of this arm; estimates are of what was added since.
+        profile: what was learned of this arm from many logs; estimates are of what was added since.
         known: of a payload, beside the stream; taken where something is held, and only while the samples do not deny
             that this is it, which `notes` says then.
         every: [s] between two new answers of a payload whose run has begun 1.5 s ago, at most 0.1; changes are looked

@@ -88,14 +88,14 @@ TAKEN_BACK = 0.2
 FIRST_TARED = 0.2
 # [s] the same without a tare: the arm's offsets and friction must have been seen before anything can be unlike them
 FIRST_UNTARED = 2.0
-# [s] of a new run from which its kind is told: before, the prior alone says whether something is held
+# [s] of a new run from which its kind is decided: before, the prior alone says whether something is held
 KIND_FROM = 0.25
-# [s] of a new run after which its kind is told, however little is known of the mass
+# [s] of a new run after which its kind is decided, however little is known of the mass
 KIND_LATEST = 1.5
 # [s] of a new run within which it may be recognised as an earlier one: twice the longest push
 # (test_what_is_put_down_is_gone_and_what_is_taken_up_again_is_recognised)
 RETURN_UNTIL = 6.0
-# [payloads] standard deviation of the mass with which a kind is told: 50 g of a Panda, a light payload held or not
+# [payloads] standard deviation of the mass with which a kind is decided: 50 g of a Panda, a light payload held or not
 KIND_STD = 0.033
 # [payloads] the same to tell one payload from an earlier one: 15 g of a Panda
 RETURN_STD = 0.01
@@ -107,7 +107,7 @@ RETURN_STD = 0.01
 SAME_RUN = 7.779440339734858  # the 90 % quantile of a chi-square distribution of four degrees of freedom
 # [s] an empty run must have lasted to be a tare: with less it knows the arm no better than the prior
 TARE_FROM = 3.0
-# [payloads] standard deviation of the change of mass, below which it is told: 150 g of a Panda
+# [payloads] standard deviation of the change of mass, below which it is reported: 150 g of a Panda
 # (test_the_mass_of_a_change_is_what_the_runs_tell_once_its_kind_is_known)
 STEP_STD = 0.1
 
@@ -119,15 +119,15 @@ MOVING = AT_REST
 RECENT = 0.5
 # [s] of rows that count for nothing: with the time that one pose counts, as long at rest as `RECENT`
 STANDS = RECENT - SMOOTH.block
-# [s] without a usable sample that are told: a pause of this length (`recording.GAP`) ends the filters' memory
+# [s] without a usable sample that are reported: a pause of this length (`recording.GAP`) ends the filters' memory
 # (test_an_answer_ages_and_says_why_while_no_sample_can_be_used)
 SILENT = 0.1
-# [samples] in a row that are told where their times are bad, too: 0.1 s at 500 Hz, 1 s at the lowest rate
+# [samples] in a row that are reported where their times are bad, too: 0.1 s at 500 Hz, 1 s at the lowest rate
 # (test_a_stream_of_which_nothing_can_be_used_says_why)
 BAD_IN_A_ROW = 50
 # [pauses] in a row, no two samples between them that belong together: one or two are a robot's, five are a wrong unit
 PAUSES_IN_A_ROW = 5
-# [s] between two answers of a run whose kind is told, at most: as often as a service speaks
+# [s] between two answers of a run whose kind is decided, at most: as often as a service speaks
 # (test_fewer_answers_find_the_same_changes_at_the_same_times)
 SELDOM = 0.1
 

@@ -225,16 +225,16 @@ def _text(content: dict[str, Any], key: str, path: Path) -> str | None:
 
 
 def _uncertainty(content: dict[str, Any], path: Path) -> Uncertainty:
-    said = content.get("std")
-    if said is None:
+    std = content.get("std")
+    if std is None:
         return Uncertainty()
     names = {"mass", "com", "inertia"}
-    if not isinstance(said, dict) or not set(said) <= names:
+    if not isinstance(std, dict) or not set(std) <= names:
         raise PayloadError(
-            f"payload file {path}: std is {json.dumps(said)[:80]}, expected an object with some of mass [kg], com [m] "
+            f"payload file {path}: std is {json.dumps(std)[:80]}, expected an object with some of mass [kg], com [m] "
             "and inertia (a share)"
         )
-    return Uncertainty(**{key: float(_numbers(value, (), f"std of {key}", path)) for key, value in said.items()})
+    return Uncertainty(**{key: float(_numbers(value, (), f"std of {key}", path)) for key, value in std.items()})
 
 
 def _boxes(content: dict[str, Any], path: Path) -> tuple[Box, ...]:

@@ -24,7 +24,7 @@ _LEAST_SWING, _LEAST_FREQUENCY = 0.1, 0.1  # [rad], [Hz] less is not worth namin
 _RATE = 50.0  # [Hz] enough to compare: a swing has hardly anything above a few hertz
 _LONGEST = 20.0  # [s] of a run that is looked at
 _FEATURES = (32, 4)  # of pose and velocity: enough to compare
-_ALIKE = 0.95  # combinations told about almost as little as the least are named with it: none of them is special
+_ALIKE = 0.95  # combinations known almost as little as the least are named with it: none of them is special
 _PART = 0.3  # of a combination's largest part: smaller parts are not named
 _HELPS = 0.9  # of the half-widths that are not small enough: what counts as better
 
@@ -56,7 +56,7 @@ class Advice:
             else f"would narrow {', '.join(self.missing)} to {self.shrinks:.0%}"
         )
         return (
-            f"least is told about {self.weakest} ({self.share:.0%} of the standard deviation is left); of the joints "
+            f"least is known about {self.weakest} ({self.share:.0%} of the standard deviation is left); of the joints "
             f"with room for it, {self.joint} is most worth moving more: ±{self.swing:.2g} rad at "
             f"{self.frequency:.2g} Hz on top {what}"
         )

@@ -93,7 +93,7 @@ class Bound:
     def combinations(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """What the whole run tells about each combination of parameters, relative to what was known, the least first.
 
-        Their standard deviations over those of the prior (10,), from 1 (nothing is told) down, and their directions as
+        Their standard deviations over those of the prior (10,), from 1 (no information) down, and their directions as
         rows (10, 10), in units of the parameters' prior standard deviations D: eigenvectors of D⁻¹·B·D⁻¹.
         """
         scale = self.prior_std

@@ -20,7 +20,6 @@ from armload.posterior.map import PosteriorLeastSquares
 from armload.posterior.model_file import HybridModel
 from armload.posterior.payload_prior import MixturePrior
 from armload.posterior.profile import Profile
-from armload.posterior.same_motion import SameMotion
 from armload.recording import Recording
 from armload.regression import JointFeatures, solution_prior_std
 from armload.regression.noise import SMOOTH
@@ -58,6 +57,7 @@ class HybridIdentifier(PosteriorLeastSquares):
 
     name = "hybrid"
     _noise = SMOOTH
+    _smooth = True
     _iterations = 5
 
     def __init__(
@@ -73,14 +73,7 @@ class HybridIdentifier(PosteriorLeastSquares):
         self._traits_frame = self.model.into_frame(arm)
         self.calibrated = self.model.calibrated
         self.payload_prior = (self._payloads.mean, self._payloads.std)
-        self.features = features or (JointFeatures(arm.n) if profile is None else profile.features)
-        super().__init__(arm, tare, profile=profile)
-        if tare is not None:
-            self._same_motion = SameMotion(arm, tare, self.gain)
-
-    @property
-    def _features(self) -> JointFeatures:
-        return self.features
+        super().__init__(arm, tare, features=features, same_motion=True, profile=profile)
 
     def reset(self) -> None:
         """Forget the run (not the tare); the next sample is the first."""
@@ -115,7 +108,7 @@ class HybridIdentifier(PosteriorLeastSquares):
         self._trusted = self.model.calibration.trusted(self.evidence(elapsed))
         tool = self.arm.attached is not None or self.stream.without_tare
         found = answer(self._trusted, self.model.calibration, self._payloads, tool, not concluded, self.known)
-        self.exchanged, self.alone, self.taken = found.exchanged, found.alone, found.taken
+        self.exchanged, self.log_only, self.taken = found.exchanged, found.log_only, found.taken
         return found.phi, found.covariance
 
 
@@ -124,14 +117,14 @@ class Answer(NamedTuple):
 
     exchanged: whether one body was rather exchanged for another: then phi is the difference of two, and need be no
         body.
-    alone: mean and covariance of what the log alone says, where something is known beside. taken: whether phi rests on
+    log_only: mean and covariance from the log only, where something else is known, too. taken: whether phi rests on
         that, too.
     """
 
     phi: NDArray[np.float64]
     covariance: NDArray[np.float64]
     exchanged: bool
-    alone: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    log_only: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     taken: bool = False
 
 
@@ -165,25 +158,25 @@ def answer(
     mean, covariance = found.mean, calibration.widened(found, trusted)
     if not quick:
         covariance = holding(covariance, 0, found.mass_if_any - found.mean[0])
-    alone = given = None
+    log_only = given = None
     if known is not None:
-        alone = sign * mean, covariance
-        given = known.given(*alone)
+        log_only = sign * mean, covariance
+        given = known.given(*log_only)
         if given is not None:
             mean, covariance = sign * given[0], given[1]
-            told = other and known.given(sign * other[0], other[1])
-            other = told and (sign * told[0], told[1])
-    beside = alone, given is not None
+            both = other and known.given(sign * other[0], other[1])
+            other = both and (sign * both[0], both[1])
+    extra = log_only, given is not None
     if quick:
-        return Answer(sign * near_consistent(mean, inverse(covariance)), covariance, False, *beside)
+        return Answer(sign * near_consistent(mean, inverse(covariance)), covariance, False, *extra)
     if exchanged > 0.5:
-        return Answer(sign * mean, covariance, True, *beside)
+        return Answer(sign * mean, covariance, True, *extra)
     body = nearest_body(mean, covariance)
     if exchanged > _EXCHANGED:  # likelier than before the log: it may be no body, and its interval holds what was found
         covariance = covariance + np.outer(mean - body, mean - body)
     if other is not None:
         covariance = holding_both(covariance, other[0] - body, other[1])
-    return Answer(sign * body, covariance, False, *beside)
+    return Answer(sign * body, covariance, False, *extra)
 
 
 def holding(covariance: NDArray[np.float64], i: int, aside: float) -> NDArray[np.float64]:

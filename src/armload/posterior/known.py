@@ -1,4 +1,4 @@
-"""What is known of a payload beside the log: it was weighed, or its centre of mass is that of a drawing.
+"""What is known of a payload apart from the log: it was weighed, or its centre of mass is that of a drawing.
 
 Each is one more measurement of phi ~ N(mean, C), H·phi = z + N(0, R), so that with S = H·C·Hᵀ + R and K = C·Hᵀ·S⁻¹
 
@@ -110,18 +110,18 @@ class KnownCentre:
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """All that is known of a payload beside the log.
+    """All that is known of a payload apart from the log.
 
     Args:
         mass, com: None: not known.
-        beside: phi (10,) of what is held beside it, a tool say, in an estimate of both.
+        tool: phi (10,) of a tool that is held with it, in an estimate of both.
         if_held: whether it is taken only where an estimate holds something, and does not deny that this is it: a stream
             goes on when the payload was put down, or another one taken up.
     """
 
     mass: KnownMass | None = None
     com: KnownCentre | None = None
-    beside: NDArray[np.float64] | None = None
+    tool: NDArray[np.float64] | None = None
     if_held: bool = False
 
     @classmethod
@@ -144,7 +144,7 @@ class Known:
 
     def with_tool(self, tool: NDArray[np.float64]) -> Self:
         """The same of an estimate that holds a tool (10,), too."""
-        return replace(self, beside=tool)
+        return replace(self, tool=tool)
 
     @property
     def which(self) -> NDArray[np.bool_]:
@@ -171,8 +171,8 @@ class Known:
         return mean - self._own(mean) + own, covariance
 
     def _own(self, mean: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Less what is beside."""
-        return mean if self.beside is None else mean - self.beside
+        """Less the tool."""
+        return mean if self.tool is None else mean - self.tool
 
 
 def _given(
@@ -183,8 +183,8 @@ def _given(
     variance: float,
 ) -> Gaussian:
     """phi ~ N(mean, covariance) given rows·phi = z + N(0, variance·1)."""
-    told = rows @ covariance
-    S = told @ rows.T + variance * np.eye(len(z))
-    K = np.linalg.solve(S, told).T
-    rest = covariance - K @ told
+    cross = rows @ covariance
+    S = cross @ rows.T + variance * np.eye(len(z))
+    K = np.linalg.solve(S, cross).T
+    rest = covariance - K @ cross
     return mean + K @ (z - rows @ mean), 0.5 * (rest + rest.T)

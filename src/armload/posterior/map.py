@@ -48,8 +48,10 @@ class PosteriorLeastSquares(Identifier):
             relative to it.
         gain: λ of the lag [1/s].
         prior: what is known about the payload before; None: the weak prior of `solution_prior_std`.
-        profile: what many logs said of this arm; a tare is then of the run's own session. Estimates are relative to
-            what was mounted in the profile's logs.
+        features: of the arm's smooth mismatch; None: those of the method, or of the profile where it has any.
+        same_motion: whether a tare along the run's own motion takes the posterior's place in the `evidence`.
+        profile: of this arm, learned from many logs; a tare is then of the run's own session. Estimates are relative
+            to what was mounted in the profile's logs.
 
     Attributes:
         reference: an earlier run of the stream with the same mounted as at the tare; it is a tare, too.
@@ -59,13 +61,12 @@ class PosteriorLeastSquares(Identifier):
     name = "map"
     _noise: NoiseModel = RIGID
     _iterations = 12  # of expectation–maximisation in a last solution; with features it settles in five
+    _smooth = False  # whether the arm's smooth mismatch is an unknown, too
     _same_motion: SameMotion | None = None
-    test_tare = (
-        True  # whether an answer asks if arm and gravity are as they were said to be; episodes of a training do not
-    )
+    test_tare = True  # whether an answer tests that arm and gravity are as stated; episodes of a training do not
     publish = PUBLISH  # [s] between two live answers; a service that speaks ten times a second asks for fewer
     known: Known | None = None  # of the payload, beside the log
-    alone: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None  # what the log alone says then
+    log_only: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None  # then the answer from the log only
     taken = False  # whether the last answer rests on what is known, too
     exchanged = False  # whether the last answer is rather the difference of two bodies, one put on for another
     _traits_frame: NDArray[np.float64] | None = None  # see `Evidence.of`: they are about the estimate's own frame
@@ -76,9 +77,15 @@ class PosteriorLeastSquares(Identifier):
         tare: Recording | None = None,
         gain: float = GAIN,
         prior: GaussianPrior | None = None,
+        *,
+        features: JointFeatures | None = None,
+        same_motion: bool = False,
         profile: Profile | None = None,
     ) -> None:
         self.arm, self.gain, self.prior, self.profile, self.session = arm, gain, prior, profile, SAME
+        self.features = features or self._own_features()
+        if same_motion and tare is not None:
+            self._same_motion = SameMotion(arm, tare, gain)
         self._weak = payload_prior_std(arm)
         self._correction = Correction(arm, rated_effort(arm)) if profile is None else profile.correction(arm)
         self.reference: PosteriorLeastSquares | None = None
@@ -95,7 +102,7 @@ class PosteriorLeastSquares(Identifier):
         if tare is not None:
             self._check(tare)
             if profile is None:
-                data, self._start = tare_data(tare, arm, gain, self._features, self._noise, self._iterations)
+                data, self._start = tare_data(tare, arm, gain, self.features, self._noise, self._iterations)
                 self._correction = data.correction
             else:  # the unknowns, and what begins a solution, are the profile's
                 data = self.empty_data()
@@ -103,14 +110,14 @@ class PosteriorLeastSquares(Identifier):
             self._tares.append(data)
         self.reset()
 
-    @property
-    def _features(self) -> JointFeatures:
-        """Of the smooth part: none."""
-        return JointFeatures(self.arm.n, 0, 0)
+    def _own_features(self) -> JointFeatures:
+        if not self._smooth:
+            return JointFeatures(self.arm.n, 0, 0)
+        return JointFeatures(self.arm.n) if self.profile is None else self.profile.features
 
     def empty_data(self) -> RegressionData:
         """An empty regression of the kind this method accumulates."""
-        return RegressionData(self._correction, self.gain, self._features, self._noise.block, self.session)
+        return RegressionData(self._correction, self.gain, self.features, self._noise.block, self.session)
 
     # ------------------------------------------------------------------ samples in, estimates out
 
@@ -155,7 +162,7 @@ class PosteriorLeastSquares(Identifier):
 
     def _take(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
         steps = np.diff(t, prepend=self._now)
-        self._elapsed += float(steps[steps <= GAP].sum())  # an arm that was switched off has told nothing meanwhile
+        self._elapsed += float(steps[steps <= GAP].sum())  # an arm that was switched off gave no information meanwhile
         self._now = float(t[-1])
         self._count += len(t)
         self._squares += float(np.vdot(dq, dq))
@@ -183,9 +190,9 @@ class PosteriorLeastSquares(Identifier):
         phi, covariance = self.stream.answer()
         if self.known is None:
             return phi, covariance
-        self.alone, given = (phi, covariance), self.known.given(phi, covariance)
+        self.log_only, given = (phi, covariance), self.known.given(phi, covariance)
         self.taken = given is not None
-        return given or self.alone
+        return given or self.log_only
 
     # ------------------------------------------------------------------ what the answer rests on
 
@@ -204,7 +211,7 @@ class PosteriorLeastSquares(Identifier):
                 tares, start = (*earlier.tares, earlier.finish()), earlier.posterior.scales
             self._stream = StreamingPosterior(
                 self._correction,
-                self._features,
+                self.features,
                 self._noise,
                 solution_prior_std(self.arm),
                 self.prior,
@@ -262,7 +269,7 @@ class PosteriorLeastSquares(Identifier):
         log = (evidence.information, evidence.vector, stream.posterior, now, tare_time, speed, weak, difference)
         return Evidence.of(*log, self._traits_frame)
 
-    # ------------------------------------------------------------------ beside a running robot
+    # ------------------------------------------------------------------ on a running robot
 
     def allow_for(self, drift: float) -> None:
         """Before the first sample: by how many daily deviations the arm may differ from what it was at its tare."""

@@ -70,7 +70,7 @@ class SequentialPosterior:
     def predict(self, row: Row) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """`seen` (n, 12) and `scale` (n,) of a row as `take` would leave them; the row is not conditioned on.
 
-        A row's joints are then not told of each other.
+        Its joints are then not conditioned on each other.
         """
         scale, seen = np.sqrt(row.h * row.weights / self.noise), np.zeros_like(self.seen)
         self._condition(row, scale, seen, False)

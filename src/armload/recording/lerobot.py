@@ -121,8 +121,8 @@ def _chosen(there: Sequence[int], spec: ColumnSpec, where: str) -> int:
     """The episode that was asked for, or the only one."""
     shown = f"{there[0]}" if len(there) == 1 else f"{there[0]} … {there[-1]}"
     if spec.episode is None and len(there) > 1:
-        said = f"{where} holds {len(there)} episodes ({shown}): expected one; name it with --episode K"
-        raise EpisodesError(said, tuple(there))
+        message = f"{where} holds {len(there)} episodes ({shown}): expected one; name it with --episode K"
+        raise EpisodesError(message, tuple(there))
     if spec.episode is not None and spec.episode not in there:
         raise RecordingError(f"{where} has no episode {spec.episode}: expected one of {shown}")
     return there[0] if spec.episode is None else spec.episode

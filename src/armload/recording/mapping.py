@@ -207,7 +207,7 @@ def _not_measured(header: Header, places: list[int]) -> list[str]:
         return []
     return [
         f"{header.where}: tau is {some([header.names[place] for place in places])}, as was asked for; by its name it "
-        f"{WHY_NOT['desired']}: a payload that the controller was not told of does not show in it"
+        f"{WHY_NOT['desired']}: a payload that is not set in the controller does not show in it"
     ]
 
 

@@ -232,8 +232,8 @@ class _Tables:
             self._stamp, self._stamped = stamps[0], len(set(stamps)) > 1 or len(stamps) == 1
             self._origin = stamps[0] if self._stamped else log_times[0]
             if not self._stamped:
-                said = f"{self._where}: the messages of {self._topic} are not stamped: took the times of logging"
-                self.notes = (said,)
+                note = f"{self._where}: the messages of {self._topic} are not stamped: took the times of logging"
+                self.notes = (note,)
         elif not self._stamped and set(stamps) != {self._stamp}:
             raise RecordingError(
                 f"{self._where}: only some messages of {self._topic} are stamped: expected all or none; record it anew"

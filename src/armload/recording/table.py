@@ -226,8 +226,8 @@ def _episode(episodes: NDArray[np.float64], spec: ColumnSpec, where: str) -> NDA
     there = np.unique(episodes)
     shown = ", ".join(f"{episode:g}" for episode in there[:8]) + (", …" if len(there) > 8 else "")
     if spec.episode is None and len(there) > 1:
-        said = f"{where} holds {len(there)} episodes ({shown}): expected one; name it with --episode K"
-        raise EpisodesError(said, tuple(int(episode) for episode in there if np.isfinite(episode)))
+        message = f"{where} holds {len(there)} episodes ({shown}): expected one; name it with --episode K"
+        raise EpisodesError(message, tuple(int(episode) for episode in there if np.isfinite(episode)))
     if spec.episode is not None and spec.episode not in there:
         raise RecordingError(f"{where} has no episode {spec.episode}: expected one of {shown}")
     return np.ones(len(episodes), dtype=bool) if spec.episode is None else episodes == spec.episode

@@ -56,11 +56,12 @@ def _slope(moment: NDArray[np.float64], current: NDArray[np.float64], dq: NDArra
     X, i = X[:, np.ptp(X, axis=0) > 0.0] if len(X) else X, current[clear]
     if len(X) <= X.shape[1] or not X.shape[1] or np.ptp(moment[clear]) == 0.0:
         return _ratio(moment[clear], i)
-    said, *_ = np.linalg.lstsq(X, i, rcond=None)
-    left = float(np.mean((i - X @ said) ** 2))
+    constants, *_ = np.linalg.lstsq(X, i, rcond=None)
+    left = float(np.mean((i - X @ constants) ** 2))
     std = np.sqrt(left * np.linalg.pinv(X.T @ X)[0, 0])
     size = float(np.mean(i**2))
-    return float(said[0]) if said[0] > 0.0 and left <= _FITS**2 * size and std <= _KNOWN * said[0] else None
+    usable = constants[0] > 0.0 and left <= _FITS**2 * size and std <= _KNOWN * constants[0]
+    return float(constants[0]) if usable else None
 
 
 def _ratio(moment: NDArray[np.float64], current: NDArray[np.float64]) -> float | None:

@@ -1,6 +1,6 @@
 """What is known about a payload before the first sample: a Gaussian over the ten parameters, phi ~ N(mean, covariance).
 
-Whoever trains on a family of payloads puts such knowledge into the model. Least squares may be told the same, and only
+Whoever trains on a family of payloads puts such knowledge into the model. Least squares may be given the same, and only
 then does a comparison of the two say something about the methods.
 """
 

@@ -2,8 +2,8 @@
 
 A wheel holds two libraries made by `hatch_build.py`, one for processors of the last ten years and one for any: nothing
 is compiled then, and numba, which brings a whole LLVM, is not needed. In a checkout `kernel` is numba's `njit`, which
-keeps on disk what it compiled; whoever waits for it is told. Where ARMLOAD_KERNELS names a folder, a library is looked
-for there too: `make test` compiles one of the sources as they are, and each process of the tests starts the sooner.
+keeps on disk what it compiled; a message says that it compiles. Where ARMLOAD_KERNELS names a folder, a library is
+looked for there too: `make test` compiles one of the sources as they are, so that processes of the tests start faster.
 
 All kernels divide as numpy does (x/0 is ±inf or nan: a test of each divisor costs branches) and leave the interpreter
 alone. Compiling takes seconds, so they do without what numba compiles slowly: an assignment to a slice (`a[:] = b`)
@@ -66,7 +66,7 @@ def settings(options: dict[str, Any]) -> dict[str, Any]:
 class _Ahead:
     """A function from a library, and numba's for arguments of other types than it was compiled for.
 
-    The library believes what it is told of an array's type and order, so these are looked at in each call.
+    The library does not check an array's type and order, so these are checked here in each call.
     """
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any], library: Any) -> None:
@@ -147,22 +147,22 @@ def _processor() -> frozenset[str]:
 def _just_in_time(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     from numba import njit
 
-    _tell_who_waits()
+    _log_compiling()
     return njit(**settings(options))(function)
 
 
 @cache
-def _tell_who_waits() -> None:
+def _log_compiling() -> None:
     from numba.core import event
 
     class Listener(event.Listener):
         """Logs once in each process that something of armload is compiled; what is found on disk is not."""
 
-        told = False
+        logged = False
 
         def on_start(self, event: Any) -> None:
-            if not self.told and event.data["dispatcher"].py_func.__module__.startswith("armload."):
-                self.told = True
+            if not self.logged and event.data["dispatcher"].py_func.__module__.startswith("armload."):
+                self.logged = True
                 logging.getLogger("armload").info(COMPILING)
 
         def on_end(self, event: Any) -> None:

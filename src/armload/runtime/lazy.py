@@ -45,7 +45,8 @@ def on_first_use(package: str) -> tuple[Callable[[str], Any], Callable[[], list[
         except ModuleNotFoundError as error:
             from armload.runtime.extras import missing
 
-            raise (error if (said := missing(error)) is None else ModuleNotFoundError(said, name=error.name)) from None
+            sentence = missing(error)
+            raise (error if sentence is None else ModuleNotFoundError(sentence, name=error.name)) from None
         setattr(module, name, value)
         return value
 

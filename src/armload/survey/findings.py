@@ -56,15 +56,15 @@ class ArmFinding:
     @property
     def advice(self) -> str:
         """What to do about the arm; "" where nothing is."""
-        said = []
+        advice = []
         if self.retare:
-            said.append(
+            advice.append(
                 f"is not as it was at its tare or in its profile, at joint {self.joint} most: record it empty, and "
                 "tare it or learn its profile anew; if it was exchanged, learn the new one from its own logs alone"
             )
         if self.loose:
-            said.append("holds things that seem to move: look at its gripper")
-        return f"{self.arm} {', and '.join(said)}" if said else ""
+            advice.append("holds things that seem to move: look at its gripper")
+        return f"{self.arm} {', and '.join(advice)}" if advice else ""
 
 
 def arm_findings(rows: Sequence[dict[str, Any]]) -> list[ArmFinding]:
@@ -118,20 +118,20 @@ def _of_arm(arm: str, rows: Sequence[dict[str, Any]], shift: Shift | None) -> Ar
 
 
 def _lately(
-    said: Sequence[bool], logs: Sequence[list[dict[str, Any]]], share: float
+    flags: Sequence[bool], logs: Sequence[list[dict[str, Any]]], share: float
 ) -> tuple[float | None, float | str | None]:
     """Share of the last logs that say so, and since when, if that is enough to act; None where too few were asked."""
-    if len(said) < FEWEST:
+    if len(flags) < FEWEST:
         return None, None
-    last = float(np.mean(said[-LAST:]))
-    if last < share or sum(said[-LAST:]) < 2:
+    last = float(np.mean(flags[-LAST:]))
+    if last < share or sum(flags[-LAST:]) < 2:
         return last, None
     # the change that parts the logs best in two: the likelihood of a constant rate before and one after it
-    from_here = max(range(len(said)), key=lambda k: _log_likelihood(said[:k]) + _log_likelihood(said[k:]))
+    from_here = max(range(len(flags)), key=lambda k: _log_likelihood(flags[:k]) + _log_likelihood(flags[k:]))
     row = logs[from_here][0]
     return last, row["log"] if row["date"] is None else row["date"]
 
 
-def _log_likelihood(said: Sequence[bool]) -> float:
-    hits, count = sum(said), len(said)
+def _log_likelihood(flags: Sequence[bool]) -> float:
+    hits, count = sum(flags), len(flags)
     return sum(x * np.log(x / count) for x in (hits, count - hits) if x)

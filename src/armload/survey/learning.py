@@ -41,7 +41,7 @@ def learn_profiles(
     stretches are the same is not learned again.
 
     Args:
-        rows: of a survey. settings: with which it was made. say: told what is being done.
+        rows: of a survey. settings: with which it was made. say: called with what is being done.
 
     Raises:
         OSError: the folder cannot be written.

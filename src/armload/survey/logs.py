@@ -100,8 +100,8 @@ def _of_web(fs: Any, url: str) -> str:
     From a server that says nothing, the file is read.
     """
     about = fs.info(url)
-    if said := {name: about[name] for name in _VALIDATORS if about.get(name)}:
-        return hashlib.sha256(repr((url, about["size"], said)).encode()).hexdigest()
+    if validators := {name: about[name] for name in _VALIDATORS if about.get(name)}:
+        return hashlib.sha256(repr((url, about["size"], validators)).encode()).hexdigest()
     with fs.open(url, block_size=0) as stream:  # as it comes: such a server may know no ranges
         return _digest(stream)
 

@@ -64,7 +64,7 @@ def survey(
         settings: what is asked of every log.
         out: the table, .parquet, .csv or .json. What is finished is kept beside it (`cells_of`).
         jobs: processes; None: as many as there are cores. cluster: as of `armload.lab.engine.engine`.
-        progress: called as progress(done, total) after every log. say: told what is being done.
+        progress: called as progress(done, total) after every log. say: called with what is being done.
 
     Raises:
         UsageError: no log was found, or something that is named for all logs is not there.

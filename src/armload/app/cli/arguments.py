@@ -202,7 +202,7 @@ def add_identifier_arguments(parser: argparse.ArgumentParser) -> None:
         "--profile",
         type=file_name,
         metavar="P",
-        help="what many logs said of this arm (armload profile); the answer is what was added since",
+        help="what was learned of this arm from many logs (armload profile); the answer is what was added since",
     )
     parser.add_argument(
         "--method",

@@ -40,7 +40,7 @@ COMMANDS = {
     "survey": "tell of thousands of logs, of many arms, what was held, when, how heavy, and which arm drifts",
     "measure": "move the robot, without and with the payload, and identify it: the whole procedure in one command",
     "live": "identify while the robot runs, or a simulated one, or a log: a page in the browser, or lines of JSON",
-    "serve": "identify beside robots for months: reconnects, keeps its state, alarms, an endpoint; several arms",
+    "serve": "identify payloads on robots for months: reconnects, keeps its state, alarms, an endpoint; several arms",
     "export": "write what was identified in a controller's or simulator's form: Franka, UR, URDF, MJCF, SDF, ROS 2",
     "methods": "list the methods of identification: when to use each, its source, and what is left out",
     "report": "write an HTML report: figures of the log and of every method's estimate over time",
@@ -110,7 +110,8 @@ def _guarded(arguments: list[str], show_traceback: bool) -> int:
         where = f"{error.filename}: " if error.filename else ""
         return _fail(f"{where}{error.strerror or error}", 2, show_traceback)
     except ModuleNotFoundError as error:
-        return _bug(error, show_traceback) if (said := missing(error)) is None else _fail(said, 2, show_traceback)
+        needed = missing(error)
+        return _bug(error, show_traceback) if needed is None else _fail(needed, 2, show_traceback)
     except Exception as error:
         return _bug(error, show_traceback)
 

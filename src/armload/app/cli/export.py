@@ -103,12 +103,12 @@ def write(
     frame: str | None = None,
     name: str = "payload",
     doubts: Sequence[str] = (),
-    told: Sequence[str] = (),
+    earlier: Sequence[str] = (),
 ) -> None:
     """Write a load in a form, to a file or to stdout, about the frame asked for, else the one the form wants.
 
-    doubts: notes to print beside those on the load. told: notes of its identification, which say already what was not
-    determined and what rests on the prior.
+    doubts: notes to print with those on the load. earlier: notes of its identification, which say already what was
+    not determined and what rests on the prior.
 
     Raises:
         SinkError: the form's frame is not known, or no body has the load's parameters and a mass above 0.
@@ -138,7 +138,7 @@ def write(
         print_note("nothing seems to be held: the mass is within three standard deviations of zero")
     if elsewhere:
         print_note(f"a controller counts from its flange; these numbers are about {load.frame}, as was asked for")
-    for note in (*told, *doubts, *([] if told else _on_numbers(body)), *_on_use(body, to)):
+    for note in (*earlier, *doubts, *([] if earlier else _on_numbers(body)), *_on_use(body, to)):
         print_note(note)
     if out is None:
         print(text, end="")

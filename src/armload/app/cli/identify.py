@@ -112,7 +112,7 @@ def run(options: argparse.Namespace) -> None:
     if options.to is not None:
         from armload.devices import Load
 
-        write(Load.of(result), options.to, options.out, arm, options.frame, told=result.notes)
+        write(Load.of(result), options.to, options.out, arm, options.frame, earlier=result.notes)
         return
     if options.out is not None:
         write_json(options.out, result.to_dict())

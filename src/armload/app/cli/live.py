@@ -128,11 +128,11 @@ def run(options: argparse.Namespace) -> int | None:
     # the page takes time from its own process: what runs on the clock is read in another one
     detached = True if not options.headless and options.speed is not None and options.speed <= 1.0 else None
     written = options.record or ""
-    told = written if written.lower().endswith(".mcap") else None  # with what is said of the samples
+    mcap = written if written.lower().endswith(".mcap") else None  # with the answers, too
     source = open_source(
         options.source,
         arm,
-        record=None if told else options.record,
+        record=None if mcap else options.record,
         detached=detached,
         speed=options.speed,
         loop=options.loop,
@@ -140,9 +140,9 @@ def run(options: argparse.Namespace) -> int | None:
         columns=columns if of_log and not (has_topics(options.source) and options.tare is not None) else None,
     )
     if isinstance(source, Detached) and "://" in options.source:
-        source = _reopened(source, options, arm, None if told else options.record)
+        source = _reopened(source, options, arm, None if mcap else options.record)
     with source:
-        recorder = Recorder(told, arm.n, arm.joint_names) if told else None
+        recorder = Recorder(mcap, arm.n, arm.joint_names) if mcap else None
         known = Known.of(options.mass, options.com, if_held=True)
         session = Session(source, arm, tare, options.method, _warn, profile, known=known, recorder=recorder)
         try:

@@ -67,7 +67,7 @@ def parser() -> Parser:
     )
     add_tare_age_argument(parser)
     add_known_arguments(parser)
-    add("--profile", type=file_name, metavar="P", help="what many logs said of this arm (armload profile)")
+    add("--profile", type=file_name, metavar="P", help="what was learned of this arm from many logs (armload profile)")
     add(
         "--tool",
         type=file_name,

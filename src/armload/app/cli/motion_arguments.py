@@ -95,7 +95,7 @@ def add_knowledge_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="LOG|MOTION|none",
         help="an earlier run of the arm that is at hand, or none (default: the same motion is run empty before)",
     )
-    parser.add_argument("--profile", type=file_name, metavar="P", help="what many logs said of this arm")
+    parser.add_argument("--profile", type=file_name, metavar="P", help="what was learned of this arm from many logs")
     add_column_arguments(parser)
 
 

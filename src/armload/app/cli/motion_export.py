@@ -1,4 +1,4 @@
-"""`armload motion export`: a motion as a file that a robot's own tools read, from where the arm stands, if told."""
+"""`armload motion export`: a motion as a file that a robot's own tools read, from where the arm stands, if asked."""
 
 from __future__ import annotations
 

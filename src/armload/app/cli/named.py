@@ -28,13 +28,13 @@ def columns_of(options: argparse.Namespace, of_tare: bool = False) -> ColumnSpec
     from armload.recording import ColumnSpec
 
     if of_tare and (given := getattr(options, "tare_columns", None)) is not None:
-        said = ColumnSpec() if given == AS_NAMED else ColumnSpec.of(given)
+        spec = ColumnSpec() if given == AS_NAMED else ColumnSpec.of(given)
     else:
         companions = {"tau": "effort_key", "rate": "log_rate", "episode": "episode"}
         more = {key: getattr(options, name, None) for key, name in companions.items()}
-        said = ColumnSpec.of(options.columns).over(**more)
+        spec = ColumnSpec.of(options.columns).over(**more)
     episode = getattr(options, "tare_episode", None) if of_tare else None
-    return said if episode is None else replace(said, episode=episode)
+    return spec if episode is None else replace(spec, episode=episode)
 
 
 def read_logs(

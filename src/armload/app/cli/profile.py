@@ -189,16 +189,17 @@ def _next(profile: Profile) -> tuple[str, ...]:
     """What to record next, and what does not fit."""
     from armload.posterior.drift import CHANGED
 
-    said = [
+    advice = [
         f"{Path(session.name).name} does not fit the other sessions (misfit {session.statistic:.0f}): another arm, "
         "another base, or something was mounted; learn the profile without it"
         for session in profile.sessions
         if session.statistic > CHANGED
     ]
     if len(profile.sessions) < 4:
-        said.append(f"{len(profile.sessions)} sessions do not tell how the arm drifts: record it on four days or more")
+        days = f"{len(profile.sessions)} sessions do not tell how the arm drifts: record it on four days or more"
+        advice.append(days)
     moved = profile.poses.max(axis=0) - profile.poses.min(axis=0)
     still = [str(j + 1) for j in range(profile.n) if moved[j] < 0.5]
     if still:
-        said.append(f"joint {', '.join(still)} moved by less than half a radian in all logs: move it further")
-    return tuple(said)
+        advice.append(f"joint {', '.join(still)} moved by less than half a radian in all logs: move it further")
+    return tuple(advice)

@@ -1,4 +1,4 @@
-"""`armload serve`: identify beside robots for months, with a process for each, alarms and an endpoint."""
+"""`armload serve`: identify payloads on robots for months, with a process for each, alarms and an endpoint."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def parser() -> Parser:
     """The arguments of `armload serve`."""
     parser = Parser(
         prog="armload serve",
-        description="Identify beside one or several robots for months: reconnects, keeps its state, tells its age.",
+        description="Identify payloads on one or several robots for months: reconnects, keeps its state, alarms.",
         epilog=_EXAMPLES,
     )
     add = parser.add_argument

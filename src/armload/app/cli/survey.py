@@ -110,8 +110,8 @@ def run(options: argparse.Namespace) -> None:
         f"{found.logs} logs ({found.anew} answered anew): {len(found.rows)} rows, {found.unusable} of them of logs "
         "that cannot be answered"
     )
-    for arm, said in learned.items():
-        print(f"profile of {arm}: {said}")
+    for arm, outcome in learned.items():
+        print(f"profile of {arm}: {outcome}")
     print(f"wrote {options.out}; look at it with: armload survey report {options.out} --out report.html")
 
 

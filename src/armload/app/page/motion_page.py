@@ -32,7 +32,7 @@ class MotionPage:
     Args:
         motion: what the arm does.
         arm: whose motion it is.
-        around: floor, boxes and what is held, as they are drawn and distances told; None: a floor at the base.
+        around: floor, boxes and what is held, as they are drawn, with distances; None: a floor at the base.
         host: the interface to listen on. port: if it is taken, the next free one; 0: any.
         period: between two pictures [s].
 

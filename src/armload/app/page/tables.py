@@ -28,7 +28,7 @@ def headline(
     """Mass and centre of mass, large, and the state of the identification.
 
     Args:
-        misfit: a note that is told elsewhere.
+        misfit: a note that is shown elsewhere.
     """
     if estimate is None:
         return f'<div style="{_TEXT}" data-armload="state">waiting for the first sample</div>'
@@ -58,7 +58,7 @@ def state_of(estimate: OnlineEstimate, misfit: str | None = None) -> str:
     """In a few words: whether anything is held, and what keeps it from being known better.
 
     Args:
-        misfit: a note that is told elsewhere.
+        misfit: a note that is shown elsewhere.
     """
     if estimate.settling:
         words = ["the payload has just changed"]
@@ -78,8 +78,8 @@ def status(estimate: OnlineEstimate | None, status: Status) -> str:
     """Probabilities, what is waited for and why, what does not fit, and how old answer and tare are."""
     lines = []
     if estimate is not None and not status.gone:
-        said = (("held", estimate.p_held), ("change", estimate.p_change), ("contact", estimate.p_contact))
-        judged = [(what, p) for what, p in said if p is not None and estimate.p_held > 0.0]  # 0.0: nobody judged yet
+        probabilities = (("held", estimate.p_held), ("change", estimate.p_change), ("contact", estimate.p_contact))
+        judged = [(what, p) for what, p in probabilities if p is not None and estimate.p_held > 0.0]  # 0.0: not yet
         if judged:
             words = "&ensp;".join(f"P({what}) {_probability(p)}" for what, p in judged)
             lines.append(f'<div data-armload="probabilities">{words}</div>')

@@ -29,12 +29,12 @@ def answer_section(
         values = known.get(name, [None] * len(part))
         for row, value, true in zip(part, shown(part), values, strict=True):
             what = f"{name} {row.name}".strip()
-            told = () if truth is None else ("" if true is None else f"{true:+.{digits[row.unit]}f}",)
-            rows.append((what, value, *told, row.unit, row.mark))
+            true_value = () if truth is None else ("" if true is None else f"{true:+.{digits[row.unit]}f}",)
+            rows.append((what, value, *true_value, row.unit, row.mark))
     columns = ("quantity", "value", *(() if truth is None else ("truth",)), "unit", "")
     mass = shown(ten(result)[:1])[0]
-    said = f"**{mass} kg**" if result.held else f"{mass} kg: {result.why_not_held}"
-    text = f"{result.robot} holds {said}, about {result.frame}, relative to the {result.relative_to}."
+    holding = f"**{mass} kg**" if result.held else f"{mass} kg: {result.why_not_held}"
+    text = f"{result.robot} holds {holding}, about {result.frame}, relative to the {result.relative_to}."
     if result.notes:
         text += "\n\n" + "\n\n".join(note[:1].upper() + note[1:] + "." for note in result.notes)
     return Section(title, text, (Table("The answer", columns, tuple(rows), rests_on(result)),))

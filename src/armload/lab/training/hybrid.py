@@ -24,7 +24,7 @@ from armload.regression import payload_prior_std
 from armload.runtime.version import __version__, package_versions
 
 EPISODES = 2400
-_CHUNK = 300  # episodes that are kept together: what an interruption can lose
+CHUNK = 300  # episodes that are kept together: what an interruption can lose
 _MOTIONS = 120  # of a chunk
 _FIRST_SEED = 11  # of the first chunk; other seeds of a training begin far from it
 _DRAWS = 1500  # payloads of each family
@@ -129,13 +129,13 @@ def episode_records(
 ) -> Records:
     """What a training rests on: evidence and truth of its episodes. Arguments as of `train_hybrid`."""
     parts: list[Records] = []
-    for first in range(0, episodes, _CHUNK):
-        count = min(_CHUNK, episodes - first)
+    for first in range(0, episodes, CHUNK):
+        count = min(CHUNK, episodes - first)
         path = None if folder is None else folder / f"episodes-{_key(arm, population, seed, first, count)[:12]}.npz"
         if path is not None and path.is_file():
             part = Records.load(path)
         else:
-            drawn = _chunk(arm, population, seed, first, count)
+            drawn = draw_chunk(arm, population, seed, first, count)
 
             def tell(done: int, _: int, first: int = first) -> None:
                 if progress is not None:
@@ -148,12 +148,6 @@ def episode_records(
     return Records.joined(parts)
 
 
-def drawn_episodes(arm: Arm, population: str = "broad", episodes: int = EPISODES, seed: int = 0) -> list[Episode]:
-    """The episodes behind `episode_records`, in its order, not simulated. Arguments as of `train_hybrid`."""
-    parts = [_chunk(arm, population, seed, k, min(_CHUNK, episodes - k)) for k in range(0, episodes, _CHUNK)]
-    return [episode for part in parts for episode in part]
-
-
 def _key(arm: Arm, population: str, seed: int, first: int, count: int) -> str:
     """Of everything that a chunk's records depend on."""
     facts = (arm.fingerprint, arm.known_as, arm.rated_payload, arm.link_spread, arm.motor_torque)
@@ -162,5 +156,6 @@ def _key(arm: Arm, population: str, seed: int, first: int, count: int) -> str:
     return key_of(__version__, facts, limits, recipe, seed, first, count, TIMES, TRAITS)
 
 
-def _chunk(arm: Arm, population: str, seed: int, first: int, count: int) -> list[Episode]:
-    return draw_episodes(arm, population, count, 1000 * seed + _FIRST_SEED + first // _CHUNK, motions=_MOTIONS)
+def draw_chunk(arm: Arm, population: str, seed: int, first: int, count: int) -> list[Episode]:
+    """The episodes of a training from number `first` on, not simulated; `first` is a multiple of `CHUNK`."""
+    return draw_episodes(arm, population, count, 1000 * seed + _FIRST_SEED + first // CHUNK, motions=_MOTIONS)
