@@ -1,6 +1,6 @@
 """What designed motions are worth: errors over time against other motions, on the same arms with the same payloads.
 
-    nice -n 15 python benchmarks/designed_motions.py [--worlds 100] [--jobs 1] [--minutes 600] [--enriched]
+    nice -n 15 python benchmarks/designed_motions.py [--worlds 100] [--jobs 1] [--minutes 600] [--anew] [--enriched]
 
 Every world is another arm that differs from its model as real ones do (`World.real_like`), with another payload of
 boxes and its arm's sensors. The candidates run on the same worlds, with the same estimator: the default of `identify`.
@@ -8,23 +8,25 @@ Motions shorter than the run are repeated. The tare of most is 20 s of the empty
 pairs it is 5 s at the place itself. Errors are those of mass, of the three moments and of the six inertias (mean of
 their magnitudes); an accuracy is reached when all three are within 10 g, 1.5 g·m, 1e-3 kg·m², and stay so at the times
 that are looked at: `TIMES`, or `TIMES_OF_PAIRS` where it is reached early. "predicted" is the bound's 95 % half-width
-over the one that the estimator gives; "centre" is the distance of the centre of mass from the true one after 6 s. Half
+over the one that the estimator gives; "centre" is the distance of the centre of mass from the true one after 6 s. Most
 of what a world costs is the estimator at those times; a bound is of a motion and is the same in all worlds. What is
-measured is kept in out/, so that the script goes on where it stopped. Writes benchmarks/results/designed_motions.json,
-the tables in docs/motion.md and docs/pictures/designed_motions.png from the worlds there are. With --enriched only what
+measured is kept in benchmarks/results/designed_motions_worlds.json, so that a later run adds to it, whatever has
+changed in the code since (--anew: with the code of now only), and where one stops, in out/. Writes
+benchmarks/results/designed_motions.json, the tables in docs/motion.md and docs/pictures/designed_motions.png from the
+worlds that have all candidates. With --enriched only what
 the enriched path says of what the path alone leaves undetermined, by the bound: benchmarks/results/enriched_path.json.
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import designed_worlds
 import numpy as np
+from designed_worlds import compact, motion_hash
 from numpy.typing import NDArray
 from script import ROOT, markdown_table, options, say, write, write_table
 
@@ -36,11 +38,12 @@ from armload.inertia import Z95, InertialParameters
 from armload.lab.cells import key_of
 from armload.lab.experiment import Task, run_tasks, source_key
 from armload.lab.report.style import look, new_figure
-from armload.motion import FourierMotion, Motion, MotionFingerprint, excitation, load_motion, random_motion, save_motion
+from armload.motion import EndlessMotion, FourierMotion, Motion, excitation, load_motion, random_motion, save_motion
 from armload.motion.point_to_point import PointToPoint
 from armload.payloads import draw_payload
 from armload.posterior import bound
 from armload.recording import Recording
+from armload.regression.rows import REGRESSOR_RATE
 from armload.simulation import Run, Sensors, World, simulate_many
 from armload.simulation.resolution import COARSE
 
@@ -49,6 +52,7 @@ TIMES = (1.0, 2.0, 3.0, 6.0)  # [s] of the tables
 TIMES_OF_PAIRS = (0.5, 1.0, 1.5, 2.0, 3.0, 6.0)  # [s]
 WANTED = np.array([10e-3, 1.5e-3, 1e-3])  # [kg, kg·m, kg·m²]
 LASTING = 6.0  # [s] of a loaded run
+EMPTY = 5.0  # [s] of a pair's empty run
 _RATE = 500.0  # [Hz] of the logs
 POSES = {"panda": (0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8), "ur10e": (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)}
 RATED = {"panda": 3.0, "ur10e": 6.0}  # [kg] payloads drawn and allowed for: a UR10e cannot hold 12.5 kg at this pose
@@ -74,29 +78,6 @@ NAMES = {
 def times_of(empty: Motion | None) -> tuple[float, ...]:
     """When a candidate is looked at, by its own empty run [s]."""
     return TIMES if empty is None else TIMES_OF_PAIRS
-
-
-@dataclass(frozen=True, eq=False)
-class Repeated(Motion):
-    """A motion from rest to rest, again and again."""
-
-    inner: Motion
-    lasting: float
-
-    @property
-    def name(self) -> str:  # type: ignore[override]
-        return f"{self.inner.name}, repeated"
-
-    @property
-    def n(self) -> int:
-        return self.inner.n
-
-    @property
-    def duration(self) -> float:
-        return self.lasting
-
-    def derivative(self, t: NDArray[np.float64], order: int) -> NDArray[np.float64]:
-        return self.inner.derivative(np.mod(t, self.inner.duration), order)
 
 
 def allowed(robot: Arm) -> Constraints:
@@ -164,9 +145,9 @@ def motions_of(robot: Arm) -> Candidates:
             kept(robot, "designed 3 s", lambda: [design_motion(keep, Criterion(robot, tare), 3.0).motion])[0],
             None,
         ),
-        "wiggle pair": (wiggle, Repeated(wiggle, 5.0)),
+        "wiggle pair": (wiggle, wiggle),
         "excitation pair": (taie, taie),
-        "designed same": (same, Repeated(same, 5.0)),
+        "designed same": (same, same),
         "pair": tuple(kept(robot, "pair", lambda: _pair(robot, keep))),  # type: ignore[dict-item]
     }
 
@@ -204,9 +185,16 @@ def kept(robot: Arm, name: str, make: Any) -> list[Motion]:
 
 def bounds_of(robot: Arm, run: Motion, empty: Motion | None) -> NDArray[np.float64]:
     """The bound's half-widths (T, 10) of a candidate: those of every world."""
-    before, lasting = (elsewhere(robot), 20.0) if empty is None else (empty, 5.0)
-    followed = [Repeated(m, t) if m.duration < t else m for m, t in ((run, LASTING), (before, lasting))]
-    return bound(robot, followed[0], tare=followed[1], times=times_of(empty)).half_width
+    before = (elsewhere(robot), 20.0) if empty is None else (empty, EMPTY)
+    loaded, tare = (followed_for(robot, motion, lasting) for motion, lasting in ((run, LASTING), before))
+    return bound(robot, loaded, tare=tare, times=times_of(empty)).half_width
+
+
+def followed_for(robot: Arm, motion: Motion, lasting: float) -> Recording:
+    """A log of so many seconds of an arm that follows a motion exactly, again and again."""
+    t = np.linspace(0.0, lasting, round(lasting * REGRESSOR_RATE) + 1)
+    q, dq, ddq = EndlessMotion(motion)(t)
+    return Recording(t, q, dq, robot.torque(q, dq, ddq), source=motion.name)
 
 
 def measure(
@@ -218,8 +206,7 @@ def measure(
     truth = InertialParameters(held.phi, robot.frame)
 
     def logged(motion: Motion, payload: InertialParameters | None, lasting: float, noise: int) -> Recording:
-        repeated = Repeated(motion, lasting) if motion.duration < lasting else motion
-        run = Run(repeated, payload, world, sensors, _SEED + 2 * seed + noise)
+        run = Run(EndlessMotion(motion), payload, world, sensors, _SEED + 2 * seed + noise)
         return simulate_many(robot, [run], rate=_RATE, duration=lasting, workers=1, resolution=COARSE)[0]
 
     common = None
@@ -230,7 +217,7 @@ def measure(
         if empty is None:
             tare = common = logged(elsewhere(robot), None, 20.0, 0) if common is None else common
         else:
-            tare = logged(empty, None, 5.0, 0)
+            tare = logged(empty, None, EMPTY, 0)
         found = choose(robot, tare).identifier.at(logged(motion, truth, LASTING, 1), times_of(empty))
         best = bounds[candidate] if candidate in bounds else bounds_of(robot, motion, empty)
         centre = [one.phi[1:4] / max(one.phi[0], 1e-3) - truth.phi[1:4] / truth.mass for one in found]
@@ -247,36 +234,25 @@ def measure(
         }
 
 
-def in_three(off: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Mean magnitudes of mass, moments and inertias (..., 3) of (..., 10)."""
-    off = np.abs(off)
-    return np.stack([off[..., 0], off[..., 1:4].mean(axis=-1), off[..., 4:].mean(axis=-1)], axis=-1)
-
-
 def summary(cells: list[dict[str, Any]]) -> dict[str, Any]:
     """Of one candidate on one arm."""
     times = cells[0]["times"]
-    three = in_three(np.array([c["errors"] for c in cells]))  # (worlds, T, 3)
+    three = np.array([c["three"] for c in cells])  # (worlds, T, 3)
     within = np.all(three <= WANTED, axis=2)
     stays = np.flip(np.logical_and.accumulate(np.flip(within, axis=1), axis=1), axis=1)
     reached = np.where(stays.any(axis=1), np.array(times)[stays.argmax(axis=1)], np.inf)
-    ratio = np.array([c["bound"] for c in cells]) / np.array([c["half_width"] for c in cells])
-    off = np.abs(np.array([c["errors"] for c in cells])) / np.array([c["bound"] for c in cells])
+    ratio = np.array([c["predicted"] for c in cells])
+    off = np.array([c["off"] for c in cells])
     return {
         "worlds": len(cells),
         "error": {str(t): three[:, k].mean(axis=0).tolist() for k, t in enumerate(times)},
-        "centre": float(np.median([c["centre"][-1] for c in cells])),
+        "centre": float(np.median([c["centre"] for c in cells])),
         "reached_median_s": _finite(np.quantile(reached, 0.5, method="higher")),
         "reached_90_s": _finite(np.quantile(reached, 0.9, method="higher")),
         "reached_share": float(np.isfinite(reached).mean()),
-        "predicted_over_given": [float(np.median(ratio[:, -1])), *np.quantile(ratio[:, -1], [0.05, 0.95]).tolist()],
-        "within_bound_95": float((off[:, -1] <= 1.0).mean()),
+        "predicted_over_given": [float(np.median(ratio)), *np.quantile(ratio, [0.05, 0.95]).tolist()],
+        "within_bound_95": float((off <= 1.0).mean()),
     }
-
-
-def _text(motion: Motion | None) -> str:
-    """A motion, to tell it from others: its positions at 50 Hz."""
-    return "" if motion is None else json.dumps(MotionFingerprint.of(motion).to_dict(), sort_keys=True)
 
 
 def _finite(x: float) -> float | None:
@@ -339,39 +315,48 @@ def enriched_sentence(found: dict[str, Any]) -> str:
 
 def main() -> None:
     """Design, run, table."""
-    asked = options(__doc__, worlds=100, jobs=1, arms="panda,ur10e", minutes=600.0, enriched=False)
+    asked = options(__doc__, worlds=100, jobs=1, arms="panda,ur10e", minutes=600.0, anew=False, enriched=False)
     if asked.enriched:
         widths = {name: opened(arm(name)) for name in asked.arms.split(",")}
         write_table(ROOT / "docs" / "motion.md", "enriched path", enriched_sentence(widths))
         write("enriched_path", {"arms": widths}, None)
         return
     code = source_key(*(ROOT / "src" / "armload" / room for room in ("simulation", "regression", "posterior")))
-    tasks = []
+    tasks, hashes = [], {}
     robots = {name: arm(name) for name in asked.arms.split(",")}
     chosen = {name: motions_of(robot) for name, robot in robots.items()}
-    texts = {name: {c: [_text(m) for m in pair] for c, pair in chosen[name].items()} for name in robots}
+    for name, candidates in chosen.items():
+        for c, (run, empty) in candidates.items():
+            hashes[f"{name} {c}"] = motion_hash((run, LASTING), *([] if empty is None else [(empty, EMPTY)]))
     bounds = {
         name: {c: bounds_of(robot, run, empty) for c, (run, empty) in chosen[name].items() if run is not None}
         for name, robot in robots.items()
     }
+    everything = designed_worlds.read()
+    worlds = designed_worlds.of_now(everything, hashes, lambda w: not asked.anew or w["code"] == code[:12])
     for seed in range(asked.worlds):
         for name, robot in robots.items():
-            keys = {
-                f"{name} {c} {seed}": key_of(code, name, c, *texts[name][c], seed, TIMES_OF_PAIRS) for c in chosen[name]
-            }
-            tasks.append(Task(f"{name} {seed}", keys, measure, (robot, chosen[name], bounds[name], seed), "candidate"))
-    cells = run_tasks(tasks, OUT / "cells", jobs=asked.jobs, until=60 * asked.minutes, say=say).values()
+            missing = [c for c in chosen[name] if f"{name} {c} {seed}" not in worlds]
+            keys = {f"{name} {c} {seed}": key_of(code, name, c, hashes[f"{name} {c}"], seed) for c in missing}
+            if keys:
+                tasks.append(
+                    Task(f"{name} {seed}", keys, measure, (robot, chosen[name], bounds[name], seed), "candidate")
+                )
+    cells = run_tasks(tasks, OUT / "cells", jobs=asked.jobs, until=60 * asked.minutes, say=say)
+    worlds |= {name: compact(cell, code, hashes[name.rsplit(" ", 1)[0]]) for name, cell in cells.items()}
+    designed_worlds.write(everything | worlds)
     found: dict[str, dict[str, Any]] = {}
     for name in robots:
-        mine = {c: [x for x in cells if (x["arm"], x["candidate"]) == (name, c)] for c in NAMES}
-        paired = set.intersection(*(set(x["seed"] for x in xs) for xs in mine.values()))
-        found[name] = {c: summary([x for x in xs if x["seed"] in paired]) for c, xs in mine.items() if paired}
-    found = {name: rows for name, rows in found.items() if rows}
+        mine = {c: {k: w for k in range(asked.worlds) if (w := worlds.get(f"{name} {c} {k}"))} for c in NAMES}
+        paired = sorted(set.intersection(*(set(each) for each in mine.values())))
+        if paired:
+            found[name] = {c: summary([each[k] for k in paired]) for c, each in mine.items()}
     for name, rows in found.items():
         print(table(rows))
         write_table(ROOT / "docs" / "motion.md", f"designed motions {name}", table(rows))
     draw(found, ROOT / "docs" / "pictures" / "designed_motions.png")
-    write("designed_motions", {"wanted": WANTED.tolist(), "rated": RATED, "arms": found}, None)
+    codes = sorted({w["code"] for w in worlds.values()})
+    write("designed_motions", {"wanted": WANTED.tolist(), "rated": RATED, "codes": codes, "arms": found}, None)
 
 
 if __name__ == "__main__":

@@ -3,12 +3,12 @@
     nice -n 15 python benchmarks/motor_side_limits.py [--worlds 20] [--arm ur10e] [--minutes 30]
 
 The same designed pair (2 s, after 5 s of it empty) with the same payloads and seeds on simulated arms that differ from
-their model as real ones do (`World.real_like`), with one part of that difference taken away: "of the arm". "Of the
-bound" is the smallest 95 % half-width that any estimator can reach in the mean of such arms, from the variances of that
-population (`scales_of`), which has no gain: what the gain leaves is on top, gain·|phi|. Then ways that a user has on
-the arm as it is: a longer empty run, a longer loaded run, poses that are crossed slowly from both sides, so that
-friction cancels, and a weight that is known (5 kg to 1 g) hung on once, which calibrates the torque
-(`armload profile --mass`). Errors are mean magnitudes of mass, moments and inertias as in `designed_motions.py`, whose
+their model as real ones do (`World.real_like`), with one part of that difference taken away; and the smallest 95 %
+half-width that any estimator can reach in the mean of such arms, from the variances of that population (`scales_of`),
+which knows neither gains nor that gears lose a share of the payload's torque, too. Then ways that a user has on the arm
+as it is: a longer empty run, a longer loaded run, poses that are crossed slowly from both sides, so that
+friction cancels, and a profile of three logs, a weight that is known (5 kg to 1 g) hung on once, which calibrates
+the torque (`armload profile --mass`). Errors are mean magnitudes of mass, moments and inertias as in `designed_motions.py`, whose
 motions these are. What is measured is kept in out/. Writes benchmarks/results/motor_side_limits.json and the tables in
 docs/motion.md.
 """
@@ -21,7 +21,8 @@ from typing import Any
 
 import numpy as np
 from designed_motions import OUT as DESIGNS
-from designed_motions import POSES, RATED, allowed, in_three, kept
+from designed_motions import POSES, RATED, allowed, followed_for, kept
+from designed_worlds import in_three
 from numpy.typing import NDArray
 from script import ROOT, markdown_table, options, say, write, write_table
 
@@ -31,7 +32,7 @@ from armload.identification import choose
 from armload.inertia import Z95, InertialParameters
 from armload.lab.cells import key_of
 from armload.lab.experiment import Task, run_tasks, source_key
-from armload.motion import EndlessMotion, Motion
+from armload.motion import EndlessMotion, Motion, random_motion
 from armload.motion.point_to_point import PointToPoint
 from armload.payloads import draw_payload
 from armload.posterior import bound, learn_profile, with_known_weight
@@ -43,6 +44,8 @@ from armload.simulation.resolution import COARSE
 _RATE = 500.0  # [Hz] of the logs
 _SEED = 320_000  # of payloads and sensors, apart from those of the other benchmarks
 _WEIGHT, _WEIGHT_STD = 5.0, 1e-3  # [kg] that is hung on once
+_PARTS = ("load", "friction", "residual", "links")  # that the bound knows
+_DAYS, _DAY = 3, 20.0  # empty logs of a profile, [s] of each
 _POPULATION = 40  # worlds whose variances the bound takes
 _STEP, _SLOW = 0.12, 0.15  # [rad] each side of a pose, [rad/s] across it: beyond most widths of the friction
 
@@ -62,7 +65,7 @@ REMOVED: dict[str, Change] = {
     "friction": lambda w, s, _: (_without_friction(w), s),
     "residual": lambda w, s, _: (replace(w, residual=None), s),
     "links": lambda w, s, r: (replace(w, links=World.nominal(r).links), s),
-    "sensors": lambda w, s, _: (w, Sensors.ideal()),
+    "sensors": lambda w, _s, _r: (w, Sensors.ideal()),
     "gain, load": lambda w, s, _: (replace(w, gain=None, friction=replace(w.friction, load=None)), s),
     "gain, friction": lambda w, s, _: (replace(_without_friction(w), gain=None), s),
     "gain, load, friction": lambda w, s, r: (replace(w, gain=None, friction=Friction.none(r.n), stiction=None), s),
@@ -87,6 +90,8 @@ WAYS = {
     "both sides": "six poses crossed slowly from both sides, empty and loaded",
     "weight": "2 s, after 5 s of it empty, gains from a known weight",
     "weight, longer": "6 s of it, after 20 s of it empty, gains from a known weight",
+    "profile": "2 s, after 5 s of it empty, with a profile of three empty logs of 20 s",
+    "profile, weight": "the same, and gains from a known weight",
     "weight, both sides": "six poses crossed from both sides, gains from a known weight",
 }
 
@@ -101,7 +106,9 @@ def both_sides(robot: Arm) -> Motion:
         at[0] = pose[0]
         for side in (-1.0, 1.0, -1.0):
             goal = at + side * _STEP * sign
-            lasts = max(0.6, 1.6 * float(np.abs(goal - stops[-1]).max()) / (1.0 if side < 0 and len(stops) % 3 == 1 else _SLOW))
+            lasts = max(
+                0.6, 1.6 * float(np.abs(goal - stops[-1]).max()) / (1.0 if side < 0 and len(stops) % 3 == 1 else _SLOW)
+            )
             times.append((now, now + lasts))
             stops.append(goal)
             now += lasts
@@ -111,7 +118,7 @@ def both_sides(robot: Arm) -> Motion:
     return PointToPoint(np.array(stops), starts, ends, name="both sides")
 
 
-def motions(robot: Arm) -> dict[str, Motion]:
+def motions(robot: Arm) -> dict[str, Any]:
     """The designed pair's motion, for ever, and the poses."""
     keep = allowed(robot)
     (same,) = kept(robot, "designed same", lambda: [design_motion(keep, Criterion(robot, "same"), 2.0).motion])
@@ -137,16 +144,20 @@ def measure(names: Sequence[str], robot: Arm, chosen: dict[str, Motion], seed: i
         world, sensors = REMOVED[removed](World.real_like(robot, seed), Sensors.of(robot), robot)
         motion, before, lasting = runs_of(way, chosen)
 
-        def logged(payload: InertialParameters | None, seconds: float, noise: int, as_it_is: Any = (world, sensors, motion)) -> Recording:
+        def logged(
+            payload: InertialParameters | None, seconds: float, noise: int, as_it_is: Any = (world, sensors, motion)
+        ) -> Recording:
             w, s, m = as_it_is
             run = Run(m, payload, w, s, _SEED + 3 * seed + noise)
             return simulate_many(robot, [run], rate=_RATE, duration=seconds, workers=1, resolution=COARSE)[0]
 
         tare, profile = logged(None, before, 0), None
-        if way.startswith("weight"):
-            profile = with_known_weight(
-                learn_profile(robot, [tare]), robot, logged(hung, before, 2), _WEIGHT, _WEIGHT_STD
-            )
+        if way.startswith("profile"):
+            days = [(world, sensors, random_motion(robot, 40 + k, duration=_DAY, harmonics=10)) for k in range(_DAYS)]
+            profile = learn_profile(robot, [logged(None, _DAY, 10 + k, day) for k, day in enumerate(days)])
+        if "weight" in way:
+            profile = learn_profile(robot, [tare]) if profile is None else profile
+            profile = with_known_weight(profile, robot, logged(hung, before, 2), _WEIGHT, _WEIGHT_STD)
         found = choose(robot, tare, profile=profile).identifier.run(logged(truth, lasting, 1))
         yield {
             "removed": removed,
@@ -162,14 +173,8 @@ def population_bound(robot: Arm, removed: str, chosen: dict[str, Motion]) -> NDA
     """Half-widths (10,) of the bound of such arms after the designed pair."""
     pairs = [REMOVED[removed](World.real_like(robot, 500 + k), Sensors.of(robot), robot) for k in range(_POPULATION)]
     scales = scales_of(robot, [w for w, _ in pairs], pairs[0][1], _RATE)
-    loaded, empty = (_followed(robot, chosen["designed"], seconds) for seconds in (2.0, 5.0))
+    loaded, empty = (followed_for(robot, chosen["designed"].motion, seconds) for seconds in (2.0, 5.0))
     return bound(robot, loaded, tare=empty, scales=scales, times=[2.0]).half_width[-1]
-
-
-def _followed(robot: Arm, motion: Motion, seconds: float) -> Recording:
-    t = np.arange(round(_RATE * seconds) + 1) / _RATE
-    q, dq, ddq = motion(t)
-    return Recording(t, q, dq, robot.torque(q, dq, ddq), source=motion.name)
 
 
 def in_words(three: Any) -> str:
@@ -188,6 +193,28 @@ def summary(cells: list[dict[str, Any]]) -> dict[str, Any]:
         "of_mass": float((np.abs(errors[:, 0]) / mass).mean()),
         "inside": float((np.abs(errors) <= np.array([c["half_width"] for c in cells])).mean()),
     }
+
+
+def tables(removed: dict[str, dict[str, Any]], ways: dict[str, dict[str, Any]]) -> dict[str, str]:
+    """By their marks on the page."""
+    columns = ["", "error", "of the mass", "half-width given (median)", "truth inside"]
+    out = {}
+    for mark, first, words, rows in (
+        ("motor side removed", "taken away", WORDS, removed),
+        ("motor side ways", "way", WAYS, ways),
+    ):
+        cells = [
+            [
+                words[name],
+                in_words(row["error"]),
+                f"{100 * row['of_mass']:.1f} %",
+                in_words(row["half_width"]),
+                f"{100 * row['inside']:.0f} %",
+            ]
+            for name, row in rows.items()
+        ]
+        out[mark] = markdown_table([first, *columns[1:]], "lrrrr", cells)
+    return out
 
 
 def main() -> None:
@@ -209,17 +236,13 @@ def main() -> None:
     done = set.intersection(*({c["seed"] for c in cells if (c["removed"], c["way"]) == pair} for pair in pairs))
     cells = [c for c in cells if c["seed"] in done]
     removed = {r: summary([c for c in cells if (c["removed"], c["way"]) == (r, "as designed")]) for r in REMOVED}
-    for r, row in removed.items():
-        row["bound"] = in_three(population_bound(robot, r, chosen)).tolist()
+    best = {r: in_three(population_bound(robot, r, chosen)).tolist() for r in ("nothing", *_PARTS)}
     ways = {way: summary([c for c in cells if (c["removed"], c["way"]) == ("nothing", way)]) for way in WAYS}
-    rows = [[WORDS[r], in_words(x["error"]), f"{100 * x['of_mass']:.1f} %", in_words(x["bound"])] for r, x in removed.items()]
-    first = markdown_table(["taken away", "error", "of the mass", "bound of such arms"], "lrrr", rows)
-    rows = [[WAYS[w], in_words(x["error"]), f"{100 * x['of_mass']:.1f} %", in_words(x["half_width"]), f"{100 * x['inside']:.0f} %"] for w, x in ways.items()]
-    second = markdown_table(["way", "error", "of the mass", "half-width given (median)", "truth inside"], "lrrrr", rows)
-    print(first, second, sep="\n\n")
-    for mark, text in (("motor side removed", first), ("motor side ways", second)):
+    for mark, text in tables(removed, ways).items():
+        print(text)
         write_table(ROOT / "docs" / "motion.md", mark, text)
-    write("motor_side_limits", {"arm": robot.name, "worlds": len(done), "removed": removed, "ways": ways}, None)
+    result = {"arm": robot.name, "worlds": len(done), "removed": removed, "ways": ways, "bound": best}
+    write("motor_side_limits", result, None)
 
 
 def _path(motion: Motion, before: float, lasting: float) -> list[Any]:

@@ -157,3 +157,17 @@ def test_a_measurement_with_a_profile_is_relative_to_its_own_empty_run(profile, 
     words = ["identify", logs[0], "--robot", "panda", "--tare", logs[1], "--profile", str(profile)]
     again = _said([*words, "--method", "map-gp"], capsys)
     np.testing.assert_allclose(said["phi"], again["phi"], rtol=1e-9)
+
+
+def test_a_profile_of_another_arm_is_refused_before_anything_moves(profile, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    start = ["--robot", "fr3", "--profile", str(profile)]
+    for words in (
+        ["motion", "design", *start, "--from", "0,-0.5,0,-2,0,1.6,0.8", "--out", "m.json"],
+        ["measure", "sim", *start, "--at", "0,-0.5,0,-2,0,1.6,0.8", "--move", "--speed", "max"],
+    ):
+        assert main(words) == 2
+        said = capsys.readouterr()
+        assert said.out == ""
+        assert "panda" in said.err.splitlines()[-1]
+        assert list(tmp_path.iterdir()) == []

@@ -257,9 +257,10 @@ class Arm:
         """Rotation (N, 3, 3) and position (N, 3) [m] of the payload frame in the base."""
         q = self._samples(q, None, None)[0]
         R, p = np.empty((len(q), 3, 3)), np.empty((len(q), 3))
+        model, data, last, frame = self._model, self._data, self.n, self._frame_placement
         for k in range(len(q)):
-            pin.forwardKinematics(self._model, self._data, q[k])
-            placement = self._data.oMi[self.n] * self._frame_placement
+            pin.forwardKinematics(model, data, q[k])
+            placement = data.oMi[last] * frame
             R[k], p[k] = placement.rotation, placement.translation
         return R, p
 

@@ -125,20 +125,23 @@ class Constraints:
         assert payload is not None
         for j in np.flatnonzero((self.start < low) | (self.start > high)):
             limits = arm.limits
+            middle = (limits.position_low[j] + limits.position_high[j]) / 2
+            needed = abs(self.start[j] - middle) / (limits.position_high[j] - middle)
             raise MotionError(
                 f"{arm.joint_names[j]} starts at {self.start[j]:.4g} rad, outside {self.share:g} of its range about "
                 f"the middle, {low[j]:.4g} to {high[j]:.4g} rad (its limits are {limits.position_low[j]:.4g} and "
-                f"{limits.position_high[j]:.4g}): start elsewhere, or allow a larger share"
+                f"{limits.position_high[j]:.4g}): start elsewhere{_or_share(needed)}"
             )
         bare, each = arm.torque(self.start), self._static()
         held = bare + each
         over = np.abs(held).max(axis=0) - self.most["torque"]
         j = int(np.argmax(over / np.where(np.isfinite(self.most["torque"]), self.most["torque"], 1.0)))
         if over[j] >= 0.0:
+            needed = float((np.abs(held).max(axis=0) / arm.limits.effort).max())
             raise MotionError(
                 f"at the start {arm.joint_names[j]} needs {np.abs(held[:, j]).max():.4g} N·m to hold the worst "
                 f"payload of the range (up to {payload.mass:g} kg), more than {self.most['torque'][j]:.4g} N·m, "
-                f"{self.share:g} of its limit: start elsewhere, allow a larger share, or give the payload's mass "
+                f"{self.share:g} of its limit: start elsewhere{_or_share(needed)}, or give the payload's mass "
                 f"({self._holds(bare, each)})"
             )
         self.around.check_start(self.start)
@@ -154,3 +157,8 @@ class Constraints:
         rest = np.zeros((1, self.arm.n))
         Y = payload_regressor(self.arm.frame_motion(self.start[None]), rest, rest)[0]  # (n, 10)
         return self.corners @ Y.T
+
+
+def _or_share(needed: float) -> str:
+    """A larger share as a way out, where one is enough for the start; a motion needs some more."""
+    return f", allow a larger share (more than {np.ceil(100.0 * needed) / 100.0:g})" if needed < 1.0 else ""

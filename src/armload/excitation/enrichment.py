@@ -21,7 +21,7 @@ from armload.excitation.constraints import Constraints
 from armload.excitation.criterion import Criterion
 from armload.excitation.optimisation import Climb
 from armload.excitation.track import Track
-from armload.excitation.tube import Tube, away
+from armload.excitation.tube import Tube, away, poses
 from armload.excitation.verification import RATE, Used, used
 from armload.motion import Motion, PathMotion
 
@@ -30,6 +30,7 @@ _POINTS_PER_SECOND = 6.0  # control points: changes so small tell by their accel
 _SHORTEST = 0.5  # [s] of a stretch that is changed
 _STILL = 1e-3  # [rad/s] of the fastest joint: the path stands
 _STAGES = ((10, 50.0), (14, 1000.0))  # iterations of L-BFGS and weight of the penalty
+_RATE = 25.0  # [Hz] of the samples while it is looked for, four for each control point
 _REACH = 0.03  # [rad] that a control point is scaled by
 _POINTS = 100.0  # [Hz] of the path that is handed out
 _SHRINKS, _SHRINK = 40, 0.95
@@ -90,9 +91,9 @@ def enrich(
             f"the path {path.name!r} has no stretch of {_SHORTEST:g} s between stops: there is nothing to change"
         )
     track = Track(path, path.duration, stretches)
-    tube = Tube(arm, track.base_at(track.sampled(50.0).t, 0), distance, angle)
+    tube = Tube(arm, track.base_at(track.sampled(_RATE).t, 0), distance, angle)
     reach = np.full(arm.n, min(_REACH, 3.0 * max(angle, distance / 0.3)))
-    problem = Climb(constraints, criterion, [track], [reach], tube)
+    problem = Climb(constraints, criterion, [track], [reach], tube, _RATE)
     x = 0.3 * np.random.default_rng(seed).normal(size=problem.size)
     for iterations, weight in _STAGES:
         x = problem.climb(x, iterations, weight)[0]
@@ -125,15 +126,21 @@ def _as_the_path(constraints: Constraints, path: Motion) -> Constraints:
 def _held_back(
     constraints: Constraints, path: Motion, track: Track, c: NDArray[np.float64], distance: float, angle: float
 ) -> tuple[PathMotion, float, float, list[Used]]:
+    found: list[Used] = []
+    given = poses(constraints.arm, path, RATE)
     for _ in range(_SHRINKS):
         changed = PathMotion.of(_Changed(track, c, path.name), _POINTS, f"{path.name}-enriched")
-        far, turned = (float(x.max()) for x in away(constraints.arm, path, changed, RATE))
-        found = [one for one in used(constraints, changed) if one.what != "rest"]
+        far, turned = (float(x.max()) for x in away(given, poses(constraints.arm, changed, RATE)))
         over = max(far / distance if distance > 0 else 0.0, turned / angle if angle > 0 else 0.0)
-        if over <= _INSIDE and found[0].share <= 1.0:
+        if over > _INSIDE:
+            c = c * min(_SHRINK, _INSIDE / over)
+            continue
+        found = [one for one in used(constraints, changed) if one.what != "rest"]
+        if found[0].share <= 1.0:
             return changed, far, turned, found
-        c = c * (min(_SHRINK, _INSIDE / over) if over > _INSIDE else _SHRINK)
-    raise MotionError(f"no change of the path {path.name!r} keeps to the constraints: {found[0].text}")
+        c = c * _SHRINK
+    what = found[0].text if found else "none stays within the tube"
+    raise MotionError(f"no change of the path {path.name!r} keeps to the constraints: {what}")
 
 
 @dataclass(frozen=True, eq=False)

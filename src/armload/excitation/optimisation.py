@@ -129,11 +129,12 @@ class Climb:
         tracks: Sequence[Track],
         reach: Sequence[NDArray[np.float64]],
         tube: Tube | None = None,
+        rate: float = _RATE,
     ) -> None:
         self.constraints, self.criterion, self.tracks = constraints, criterion, tracks
         self.penalty, self.tube = Penalty(constraints), tube
         self.evaluations = 0
-        self.samples = [track.sampled(_RATE) for track in tracks]
+        self.samples = [track.sampled(rate) for track in tracks]
         self.scale = [each[constraints.moving] for each in reach]
         self.size = sum(track.count * len(constraints.moving) for track in tracks)
 

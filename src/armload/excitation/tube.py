@@ -48,10 +48,17 @@ class Tube:
         return share * total
 
 
-def away(arm: Arm, one: Motion, other: Motion, rate: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Distance [m] and angle [rad] (N,) between the payload frame's poses on two motions."""
-    t = np.linspace(0.0, one.duration, max(2, round(one.duration * rate) + 1))
-    (R, p), (S, r) = arm.frame_pose(one(t)[0]), arm.frame_pose(other(t)[0])
+Poses = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
+def poses(arm: Arm, motion: Motion, rate: float) -> Poses:
+    """Rotations (N, 3, 3) and places (N, 3) [m] of the payload frame on a motion."""
+    return arm.frame_pose(motion(np.linspace(0.0, motion.duration, max(2, round(motion.duration * rate) + 1)))[0])
+
+
+def away(one: Poses, other: Poses) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Distance [m] and angle [rad] (N,) between the payload frame's poses on two motions that last as long."""
+    (R, p), (S, r) = one, other
     # |R − S| = 2·√2·|sin(angle/2)|: exact for small angles, where the trace is not
     half = np.linalg.norm(R - S, axis=(1, 2)) / (2.0 * np.sqrt(2.0))
     return np.linalg.norm(p - r, axis=1), 2.0 * np.arcsin(np.minimum(half, 1.0))
