@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from armload.runtime.lazy import on_first_use
 
 if TYPE_CHECKING:
+    from armload.devices.counted import Controller, Counted, controller_of
     from armload.devices.detached import Detached
     from armload.devices.files.source import Replay
     from armload.devices.forms import CONTROLLERS, FORMS, Form, export_load
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
 __all__ = [
     "CONTROLLERS",
     "FORMS",
+    "Controller",
+    "Counted",
     "Detached",
     "Form",
     "FrankaLoad",
@@ -56,6 +59,7 @@ __all__ = [
     "URSource",
     "about",
     "check_writable",
+    "controller_of",
     "export_load",
     "flange_of",
     "franka_load",

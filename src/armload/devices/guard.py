@@ -65,6 +65,7 @@ def check_writable(
     write: bool = False,
     flange: str | None = None,
     allow_undetermined_inertia: bool = False,
+    allow_nothing: bool = False,
 ) -> InertialParameters:
     """The parameters to write, about the flange, if they may be written at all.
 
@@ -76,6 +77,7 @@ def check_writable(
         write: must be True: writing is asked for, never a side effect.
         flange: the frame the controller counts from; default: the built-in arm's.
         allow_undetermined_inertia: write the reported inertia though the log did not determine all of it.
+        allow_nothing: write a load of zero, which says that nothing is held.
 
     Raises:
         SinkError: writing was not asked for, the robot moves, the load is another arm's, it is no body, its mass or
@@ -99,10 +101,11 @@ def check_writable(
             "pass allow_undetermined_inertia=True to write what was known beforehand"
         )
     mass = load.parameters.mass
-    if mass <= 0:
+    nothing = allow_nothing and not load.parameters.phi.any()
+    if mass <= 0 and not nothing:
         raise SinkError(f"the load has a mass of {mass:.4g} kg: expected a mass above 0")
     consistent = load.consistent and (not isinstance(result, Identification) or result.consistent)
-    if not consistent:
+    if not consistent and not nothing:
         raise SinkError("the load is inconsistent: no body can have these parameters; identify again before writing it")
     _check_counted_once(load, end_effector)
     if arm.rated_payload is None:

@@ -21,13 +21,14 @@ from pathlib import Path
 from typing import Any
 
 from armload.arms import Arm
-from armload.devices import Detached, Reader
+from armload.devices import Detached, Reader, controller_of
 from armload.devices.reader import columns_of
 from armload.errors import ArmloadError, IdentificationError
 from armload.online import OnlineEstimate, OnlineIdentifier
 from armload.posterior import load_profile
 from armload.recording import read_recording
 from armload.runtime.kernels import COMPILING
+from armload.service.feedback import Feedback
 from armload.service.finite import finite
 from armload.service.ready import ready
 from armload.service.reconnecting import Reconnecting
@@ -60,6 +61,7 @@ class ArmProcess:
                 reader.end(0.0)
         self.source = Reconnecting(self._opens, said=self.note, name=settings.source, n=self.arm.n)
         self.session: Session | None = None
+        self._feedback: Feedback | None = None
 
     def run(self) -> None:
         """Until the source or standard input ends."""
@@ -68,6 +70,8 @@ class ArmProcess:
         self.session = session = self._made_session()
         self._saved = time.monotonic()
         try:
+            if self.settings.apply is not None:
+                self._feedback = self._made_feedback()
             for sample in self._ticks(session):
                 now = time.monotonic()
                 if now - self._told >= 0.999 * self.every:
@@ -78,6 +82,8 @@ class ArmProcess:
                 self._tell(session, time.monotonic())
                 self._save(session)
         finally:
+            if self._feedback is not None:
+                self._feedback.close()
             session.close()
 
     def note(self, text: str) -> None:
@@ -109,6 +115,8 @@ class ArmProcess:
         why = why_unknown(estimate, link, now, session.trouble, session.doubt)
         if estimate is None and _compiling.is_set() and source.state == "streaming":
             why = Why(Unknown.COMPILING, COMPILING)
+        if self._feedback is not None and estimate is not None and session.sample is not None:
+            self._feedback.offer(estimate, session.sample.q, why is None)
         self._say(estimate, why)
 
     def _say(self, estimate: OnlineEstimate | None, why: Why | None) -> None:
@@ -127,6 +135,8 @@ class ArmProcess:
             "saved": None if self._kept is None else max(0.0, time.time() - self._kept),
             "arm_changed": None if self.session is None else self.session.arm_changed,
         }
+        if self._feedback is not None:
+            head["applied"] = {"mass": self._feedback.mass, "waits": self._feedback.waits}
         if estimate is None:
             self._write({**head, "age": None, "lag": None, "mass": None})
             return
@@ -153,6 +163,13 @@ class ArmProcess:
         from armload.identification import plausible_tool
 
         return bare.with_payload(plausible_tool(bare.in_frame(tool.parameters), bare))
+
+    def _made_feedback(self) -> Feedback:
+        bare = self.settings.bare_arm()
+        controller = controller_of(self.settings.source, bare, lambda: self.source.present)
+        feedback = Feedback(bare, controller, self.settings.mounted_on(bare), self.note)
+        feedback.start()
+        return feedback
 
     def _made_session(self) -> Session:
         settings = self.settings

@@ -66,6 +66,11 @@ class Reconnecting(Source):
         return self._lost + (0 if self._source is None else self._source.lost)
 
     @property
+    def present(self) -> Detached | None:
+        """The present connection; None while there is none."""
+        return self._source
+
+    @property
     def process(self):
         """The present reader's process; None while there is none."""
         return None if self._source is None else self._source.process

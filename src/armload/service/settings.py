@@ -10,14 +10,18 @@ import re
 import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 from armload.errors import UsageError
 from armload.identification.arm_options import ArmOptions
 
+if TYPE_CHECKING:
+    from armload.arms import Arm
+    from armload.inertia import InertialParameters
+
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
-_PATHS = ("tare", "profile", "tool", "save", "record")
+_PATHS = ("tare", "profile", "tool", "save", "record", "mounted")
 _KINDS = {"str": str, "float": (int, float), "bool": bool, "int": int, "tuple": list, "dict": dict}
 
 
@@ -28,7 +32,8 @@ class ArmSettings(ArmOptions):
     name: in lines and addresses. source: see `open_source`. save: the folder of its state; None: nothing is kept.
     record: a `.csv` file that does not exist yet. rating: the most it may hold [kg]; None: what the arm is rated for.
     com_range: the farthest its payload's centre of mass may be [m]. loop: replay a log again and again.
-    rate: of the simulator [Hz].
+    rate: of the simulator [Hz]. apply: "auto": what is identified is told to the robot's controller (`Feedback`).
+    mounted: path of what was on the flange at the tare or profile, or "nothing"; for `apply`.
     """
 
     name: str
@@ -39,20 +44,42 @@ class ArmSettings(ArmOptions):
     com_range: float | None = None
     loop: bool = False
     rate: float = 1000.0
+    apply: str | None = None
+    mounted: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.apply not in (None, "auto"):
+            raise UsageError(f'{self.name}: apply is {self.apply!r}: expected "auto"')
+        if self.apply is not None and self.source.partition("://")[0] not in ("fr3", "panda", "ur"):
+            raise UsageError(
+                f"{self.name}: no load can be written to {self.source}: expected fr3://, panda:// or ur://"
+            )
 
     @property
     def state(self) -> Path | None:
         """The file of the identifier's state. Other settings have another name: a state with another tare is none."""
         if self.save is None:
             return None
-        asked = {
-            key: value for key, value in self.to_dict().items() if key not in ("save", "record", "rating", "com_range")
-        }
+        beside = ("save", "record", "rating", "com_range", "apply", "mounted")
+        asked = {key: value for key, value in self.to_dict().items() if key not in beside}
         for key in ("tare", "profile", "tool"):
             if asked[key] is not None and (path := Path(asked[key])).is_file():
                 asked[key] = [asked[key], hashlib.sha256(path.read_bytes()).hexdigest()]
         digest = hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:8]
         return Path(self.save) / f"{self.name}-{digest}.npz"
+
+    def mounted_on(self, bare: Arm) -> InertialParameters | None:
+        """What is on the flange that answers lack; None: nobody says.
+
+        Raises:
+            PayloadError: its file is missing or none.
+        """
+        from armload.inertia import InertialParameters  # slow to load, and the supervisor needs none
+
+        if self.mounted == "nothing":
+            return InertialParameters.zero(bare.frame)
+        tool = dataclasses.replace(self, tool=self.mounted or self.tool).tool_on(bare)
+        return None if tool is None else tool.parameters
 
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -147,7 +174,7 @@ def _arm(table: dict[str, Any], path: Path) -> ArmSettings:
         if key not in settings:
             raise UsageError(f"{where}: there is no {key}: expected name, source and robot for each arm")
     for key in _PATHS:
-        if key in settings and settings[key] not in ("franka-hand", "test"):
+        if key in settings and settings[key] not in ("franka-hand", "test", "nothing"):
             settings[key] = str(path.parent / settings[key])
     if "://" not in settings["source"] and settings["source"] != "sim":
         settings["source"] = str(path.parent / settings["source"])

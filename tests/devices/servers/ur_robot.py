@@ -56,6 +56,7 @@ class Robot:
         self.running, self.ready = False, 1
         self.target, self.heard, self.patience = None, time.monotonic(), np.inf
         self.state = {}
+        self.payload = [0.0] * 10
         self.tick = 0
 
     def run(self):
@@ -87,6 +88,9 @@ class Robot:
             "robot_status_bits": 3 if self.running else 1,
             "runtime_state": 2 if self.running else 1,
             "output_int_register_0": self.ready,
+            "payload": self.payload[0],
+            "payload_cog": self.payload[1:4],
+            "payload_inertia": self.payload[4:],
         }
 
     def end(self, event):
@@ -111,6 +115,7 @@ class Robot:
         elif number == WATCHDOG:
             self.patience = 1.0 / numbers[0]
         elif number == SET_TARGET_PAYLOAD:
+            self.payload = numbers[:10]
             say("payload", numbers=numbers)
         elif number == END:
             self.end("ended")
@@ -131,7 +136,7 @@ def rtde(connection, robot):
                     continue
                 last, numbers = tick, []
                 for name in names:
-                    value = state.get(name, np.zeros(6) if kind(name) == "VECTOR6D" else 0)
+                    value = state.get(name, np.zeros(int(FORMS[kind(name)][:-1] or 1)))
                     numbers += [float(x) if "d" in FORMS[kind(name)] else int(x) for x in np.atleast_1d(value)]
                 answer(connection, DATA, struct.pack(form, 1, *numbers))
         except OSError:

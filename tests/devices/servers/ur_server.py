@@ -19,7 +19,7 @@ VERSION, CONTROLLER, OUTPUTS, INPUTS, START, PAUSE, DATA = 86, 118, 79, 73, 83, 
 INTEGERS = {"robot_status_bits": "UINT32", "safety_status_bits": "UINT32", "runtime_state": "UINT32"}
 INTEGERS |= {"robot_mode": "INT32", "safety_mode": "INT32", "safety_status": "INT32"}
 INTEGERS |= {name: "UINT64" for name in ("actual_digital_input_bits", "actual_digital_output_bits")}
-FORMS = {"DOUBLE": "d", "VECTOR6D": "6d", "UINT32": "I", "INT32": "i", "UINT64": "Q"}
+FORMS = {"DOUBLE": "d", "VECTOR3D": "3d", "VECTOR6D": "6d", "UINT32": "I", "INT32": "i", "UINT64": "Q"}
 
 
 def say(event, **facts):
@@ -29,7 +29,10 @@ def say(event, **facts):
 def kind(name):
     if name in INTEGERS:
         return INTEGERS[name]
-    return "VECTOR6D" if name.startswith(("actual_q", "actual_current", "target_")) else "DOUBLE"
+    if name == "payload_cog":
+        return "VECTOR3D"
+    six = ("actual_q", "actual_current", "target_", "payload_inertia")
+    return "VECTOR6D" if name.startswith(six) else "DOUBLE"
 
 
 def receive(connection, size):

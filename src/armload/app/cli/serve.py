@@ -59,6 +59,17 @@ def parser() -> Parser:
     add("--save", type=file_name, metavar="DIR", help="keep the state in this folder, every minute")
     add("--loop", action="store_true", help="replay a log again and again")
     add("--every", type=at_least(0.02, float), metavar="S", help="seconds between lines of an arm (0.1)")
+    add(
+        "--apply",
+        choices=("auto",),
+        help="tell the robot's controller what is identified, at standstill, in small steps (fr3://, panda://, ur://)",
+    )
+    add(
+        "--mounted",
+        type=file_name,
+        metavar="FILE|nothing",
+        help="what was on the flange at the tare, which the controller must count, too",
+    )
     add("--quiet", action="store_true", help="no lines on stdout but alarms")
     add("--host", metavar="H", help="interface of the endpoint (127.0.0.1); others need --token-file")
     add(
@@ -115,7 +126,7 @@ def settings_of(options: argparse.Namespace) -> ServiceSettings:
         raise UsageError(f"--webhook is {options.webhook!r}: expected an address such as https://HOST/PATH")
     of_arms = ("frame", "gravity", "tare", "profile", "tool", "method")
     if options.sources[0].endswith(".toml"):
-        given = [name for name in ("robot", *of_arms) if getattr(options, name) is not None]
+        given = [name for name in ("robot", *of_arms, "apply", "mounted") if getattr(options, name) is not None]
         if given or len(options.sources) > 1 or options.loop:
             what = f"--{given[0]}" if given else "--loop" if options.loop else options.sources[1]
             raise UsageError(f"{options.sources[0]} names the arms, but there is also {what}: write it into the file")
@@ -123,7 +134,7 @@ def settings_of(options: argparse.Namespace) -> ServiceSettings:
         if options.save is None:
             return settings
         return replace(settings, arms=tuple(replace(arm, save=options.save) for arm in settings.arms))
-    more = {name: getattr(options, name) for name in (*of_arms, "save", "loop")}
+    more = {name: getattr(options, name) for name in (*of_arms, "save", "loop", "apply", "mounted")}
     arms = []
     for k, source in enumerate(options.sources):
         robot = options.robot or robot_of(source)

@@ -35,6 +35,8 @@ def franka_load(parameters: InertialParameters) -> FrankaLoad:
     >>> franka_load(load).inertia
     [1.0, 0.2, 0.0, 0.2, 2.0, 0.0, 0.0, 0.0, 2.5]
     """
+    if not parameters.phi.any():  # nothing has no centre of mass
+        return FrankaLoad(0.0, [0.0] * 3, [0.0] * 9)
     numbers = numbers_of(parameters, "franka")
     return FrankaLoad(numbers[0], numbers[1:4], numbers[4:])
 

@@ -40,11 +40,16 @@ SYSTEMS = {
 
 
 class FrankaStatus(NamedTuple):
-    """State of the robot: velocity (n,) [rad/s], masses set for the end effector and the load [kg]."""
+    """State of the robot: velocity (n,) [rad/s], masses set for the end effector and the load [kg].
+
+    com_load, inertia_load: of the load, in the flange frame (3,) [m], about itself (9,) column by column [kg·m²].
+    """
 
     dq: list[float]
     m_ee: float
     m_load: float
+    com_load: list[float]
+    inertia_load: list[float]
 
 
 class FrankaSource(Source):
@@ -98,9 +103,10 @@ class FrankaSource(Source):
         return self._arrived
 
     def read_once(self) -> FrankaStatus:
-        """The robot's present velocity and the masses it counts with."""
+        """The robot's present velocity and what it counts with."""
         state = self.state()
-        return FrankaStatus([float(x) for x in state.dq], float(state.m_ee), float(state.m_load))
+        dq, com, inertia = ([float(x) for x in np.ravel(y)] for y in (state.dq, state.F_x_Cload, state.I_load))
+        return FrankaStatus(dq, float(state.m_ee), float(state.m_load), com, inertia)
 
     def set_load(self, mass: float, com: ArrayLike, inertia: ArrayLike) -> None:
         """Tell the robot what it holds, over this connection; only at rest. `armload.devices` asks before it writes.

@@ -30,6 +30,7 @@ def set_load(
     write: bool = False,
     flange: str | None = None,
     allow_undetermined_inertia: bool = False,
+    allow_nothing: bool = False,
 ) -> FrankaLoad:
     """Tell a Franka robot what it holds, and return the arguments that were sent.
 
@@ -40,7 +41,7 @@ def set_load(
         robot: the vendor's client.
         result: what was identified.
         arm: the robot's arm.
-        write, flange, allow_undetermined_inertia: see `check_writable`.
+        write, flange, allow_undetermined_inertia, allow_nothing: see `check_writable`.
 
     Raises:
         SinkError: the load must not be written (see `check_writable`), or the robot refused it.
@@ -59,6 +60,7 @@ def set_load(
             write=write,
             flange=flange,
             allow_undetermined_inertia=allow_undetermined_inertia,
+            allow_nothing=allow_nothing,
         )
     )
     try:

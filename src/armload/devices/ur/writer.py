@@ -42,6 +42,7 @@ def set_load(
     write: bool = False,
     flange: str | None = None,
     allow_undetermined_inertia: bool = False,
+    allow_nothing: bool = False,
 ) -> URPayload:
     """Tell a Universal Robots arm what is on its flange, and return the arguments that were sent.
 
@@ -52,7 +53,7 @@ def set_load(
         control, receive: the vendor's clients.
         result: what was identified.
         arm: the robot's arm.
-        write, flange, allow_undetermined_inertia: see `check_writable`.
+        write, flange, allow_undetermined_inertia, allow_nothing: see `check_writable`.
 
     Raises:
         SinkError: the load must not be written (see `check_writable`), or the robot refused it.
@@ -71,6 +72,7 @@ def set_load(
             write=write,
             flange=flange,
             allow_undetermined_inertia=allow_undetermined_inertia,
+            allow_nothing=allow_nothing,
         )
     )
     try:

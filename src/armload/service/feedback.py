@@ -1,0 +1,164 @@
+"""Feedback: what was identified is told to the robot's controller, in steps too small to move the arm.
+
+A controller that counts a wrong payload holds the arm a little too low or too high. Told all at once, it would correct
+that with a jerk. So the load goes from what the controller counts to what was identified along a straight line in phi,
+which has a body at each point if both ends are bodies, and each step changes the gravity torque of no joint by more
+than `STEP` of its effort limit:
+
+    phi_k = phi_counted + s·Δ,   Δ = phi_found − phi_counted,   s = min(1, STEP / max_j |g_j(q, Δ)| / u_j)
+
+Nothing is written while the answer is unknown or undetermined or the arm moves, and each step is read back.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm, payload_regressor
+from armload.devices import Controller, Load, is_moving
+from armload.errors import ArmloadError, SinkError
+from armload.inertia import InertialParameters
+from armload.online import OnlineEstimate
+
+# of a joint's effort limit: 0.4 N·m of 87. A joint held with 600 N·m/rad (libfranka's example) moves 0.7 mrad, at no
+# more than 6 mrad/s, which still counts as a standstill (`devices.guard.STANDSTILL`)
+STEP = 5e-3
+PAUSE = 0.2  # [s] between two steps: such a joint has come to rest by then
+_ENOUGH = 0.1  # of STEP: what is left is not worth a step
+LIGHT = 0.05  # [kg] what differs by more is told, too, where it does not show in the joints of this pose
+_OLDEST = 10.0  # [s] an answer may be: an arm that has stood for longer moves first
+_FRESH = 0.5  # [s] since the answer was made
+_TAKEN, _LOOK = 1.0, 0.01  # [s] until what was sent is read back, between two looks
+_SAME = 1e-3  # [kg, kg·m, kg·m²] between what was sent and what is read back
+
+
+class _Answer(NamedTuple):
+    estimate: OnlineEstimate
+    q: NDArray[np.float64]
+    known: bool
+    at: float
+
+
+class Feedback:
+    """Keeps a controller's load what was identified, from a thread of its own.
+
+    Args:
+        arm: the arm that is identified. controller: of it. mounted: the tool, or what was on at the tare or profile,
+            which the load lacks; None: nobody says, so that such a load is refused where the controller counts nothing
+            else.
+        note: called with a sentence whenever a load has been told whole, or was refused.
+
+    Attributes:
+        mass: of the load the controller counts [kg]; None: it has not been asked yet.
+        waits: why nothing is written just now; None: the controller counts what was identified.
+    """
+
+    def __init__(
+        self, arm: Arm, controller: Controller, mounted: InertialParameters | None, note: Callable[[str], None]
+    ) -> None:
+        # a model computes in a memory of its own, which two threads must not share
+        self._arm, self._bare = arm, replace(arm, attached=None)
+        self._controller, self._mounted, self._note = controller, mounted, note
+        self.mass: float | None = None
+        self.waits: str | None = "nothing is known yet"
+        self._answer: _Answer | None = None
+        self._under_way, self._refused = False, ""
+        self._gone = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def offer(self, estimate: OnlineEstimate, q: NDArray[np.float64], known: bool) -> None:
+        """The newest answer, where the arm is, and whether the answer can be used; returns at once."""
+        self._answer = _Answer(estimate, q, known, time.monotonic())
+
+    def start(self) -> None:
+        """Begin."""
+
+        def keep() -> None:
+            while not self._gone.wait(PAUSE):
+                self.step()
+
+        self._thread = threading.Thread(target=keep, name="armload-feedback", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """End; a step under way is finished."""
+        self._gone.set()
+        if self._thread is not None:
+            self._thread.join(2.0)
+        self._controller.close()
+
+    def step(self) -> None:
+        """One look, and one step if it is time for one."""
+        try:
+            self.waits = self._waits()
+            self._refused = ""
+        except ArmloadError as error:
+            self.waits = str(error)
+            if self.waits != self._refused:
+                self._note(f"no load is told to the controller: {error}")
+            self._refused = self.waits
+            self._under_way = False
+        if not self._under_way:
+            self._controller.done()
+
+    def _waits(self) -> str | None:
+        answer, under_way = self._answer, self._under_way
+        self._under_way = False
+        if answer is None or not answer.known or time.monotonic() - answer.at > _FRESH:
+            return "the answer is unknown"
+        if answer.estimate.age > _OLDEST:
+            return "the arm has stood for long: it moves first"
+        if answer.estimate.held and not all(answer.estimate.determined[:4]):
+            return "the centre of mass is undetermined"
+        counted = self._controller.counted()
+        self.mass = counted.load.mass
+        if is_moving(counted.dq):
+            return "the arm moves"
+        found = self._found(answer.estimate, counted.end_effector)
+        own = replace(self._bare, frame=counted.load.frame or self._bare.frame)
+        wanted = own.in_frame(found.parameters)
+        difference = wanted - counted.load
+        most = float((np.abs(_gravity(own, answer.q, difference)) / own.limits.effort).max())
+        if most <= (_ENOUGH if under_way else 1.0) * STEP and abs(difference.mass) < LIGHT:
+            if under_way:
+                self._note(f"the controller counts {self.mass:.3f} kg")
+            return None
+        share = min(1.0, STEP / max(most, 1e-12))
+        told = wanted if share == 1.0 else InertialParameters(counted.load.phi + share * difference.phi, wanted.frame)
+        self._controller.put(replace(found, parameters=told, std=None))
+        self.mass, self._under_way = self._read_back(told), True
+        return f"told in steps: {self.mass:.3f} of {wanted.mass:.3f} kg"
+
+    def _read_back(self, told: InertialParameters) -> float:
+        """The mass it counts now [kg], once that is what it was told."""
+        until = time.monotonic() + _TAKEN
+        while np.abs((back := self._controller.counted().load).phi - told.phi).max() > _SAME:
+            if time.monotonic() > until:
+                raise SinkError(f"the controller was told {told.mass:.3f} kg and counts {back.mass:.3f} kg")
+            time.sleep(_LOOK)
+        return back.mass
+
+    def _found(self, estimate: OnlineEstimate, end_effector: float) -> Load:
+        """The load to count beside the end effector [kg]; zero where nothing is held and nothing is mounted."""
+        found = Load.of(estimate, self._arm)
+        if estimate.held:
+            found = found.as_body()
+        else:
+            nothing = InertialParameters.zero(self._arm.frame)
+            found = replace(found, parameters=nothing, determined=(True,) * 10, std=None)
+        if self._mounted is not None and end_effector == 0.0 and found.relative_to not in (None, "arm"):
+            found = found + self._bare.in_frame(self._mounted)
+        return found
+
+
+def _gravity(arm: Arm, q: NDArray[np.float64], body: InertialParameters) -> NDArray[np.float64]:
+    """Gravity torque (n,) [N·m] of a body about the arm's frame; linear in phi."""
+    still = np.zeros((1, arm.n))
+    return payload_regressor(arm.frame_motion(np.atleast_2d(q)), still, still)[0] @ body.phi

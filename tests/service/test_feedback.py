@@ -1,0 +1,281 @@
+"""What is told to a controller: only at rest, of what is determined, within the rating, in steps that move nothing."""
+
+import contextlib
+import json
+import re
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armload.arms import arm
+from armload.devices import Counted, Detached, check_writable, controller_of
+from armload.errors import SinkError, SourceError, UsageError
+from armload.inertia import InertialParameters, is_consistent
+from armload.online import OnlineEstimate, OnlineIdentifier
+from armload.payloads import test_payload
+from armload.service import ArmSettings
+from armload.service.feedback import STEP, Feedback
+
+SERVERS = Path(__file__).resolve().parents[1] / "devices" / "servers"
+HELD = test_payload().parameters
+HAND = InertialParameters.from_com(0.7, (0.0, 0.0, 0.04), 2e-3 * np.eye(3), "panda_link8")
+Q = np.array([0.0, 0.4, 0.0, -1.6, 0.0, 2.0, 0.7])
+
+
+@pytest.fixture
+def answer(analytic_log, kept):
+    """What a stream says of the test payload."""
+    if "said" not in kept:
+        with contextlib.closing(OnlineIdentifier(arm("panda"), method="map")) as identifier:
+            for sample in analytic_log(arm("panda"), HELD, duration=3.0):
+                kept["said"] = identifier.update(*sample)
+    return kept["said"]
+
+
+@pytest.fixture(scope="module")
+def kept():
+    """What is made once."""
+    return {}
+
+
+def changed(said: OnlineEstimate, **fields) -> OnlineEstimate:
+    return OnlineEstimate.of({**vars(said), **fields})
+
+
+class Asked:
+    """A controller that takes what the guard lets through, and keeps it."""
+
+    def __init__(self, end_effector=0.0, rated=None):
+        panda = arm("panda")
+        self.arm = panda if rated is None else replace(panda, rated_payload=rated)
+        self.dq, self.end_effector, self.deaf, self.ended = [0.0] * 7, end_effector, False, 0
+        self.told = [InertialParameters.zero("panda_link8")]
+
+    def counted(self):
+        return Counted(self.dq, self.end_effector, self.told[-1])
+
+    def put(self, load):
+        body = check_writable(
+            load,
+            self.arm,
+            moving=False,
+            end_effector=self.end_effector,
+            write=True,
+            allow_undetermined_inertia=True,
+            allow_nothing=True,
+        )
+        if not self.deaf:
+            self.told.append(body)
+
+    def done(self):
+        self.ended += 1
+
+    def close(self):
+        pass
+
+
+def feedback(controller, mounted=None):
+    notes = []
+    return Feedback(arm("panda"), controller, mounted, notes.append), notes
+
+
+def told(one, said, known=True, most=200):
+    """Let it step until it waits."""
+    for _ in range(most):
+        one.offer(said, Q, known)
+        one.step()
+        if one.waits is None or not one.waits.startswith("told in steps"):
+            return one.waits
+    raise AssertionError("it goes on and on")
+
+
+def test_a_load_goes_in_steps_of_which_none_changes_a_joint_s_torque_by_more_than_its_share(answer):
+    controller = Asked()
+    one, notes = feedback(controller)
+    assert told(one, answer) is None
+    steps, panda = controller.told, arm("panda")
+    np.testing.assert_allclose(steps[-1].phi, answer.phi, atol=1e-9)
+    torques = np.array([panda.with_payload(body).torque(Q) if body.mass else panda.torque(Q) for body in steps])
+    share = np.abs(np.diff(torques, axis=0)) / panda.limits.effort
+    assert len(steps) > 5
+    assert share.max() <= STEP * (1.0 + 1e-6)
+    assert all(is_consistent(body.phi) for body in steps[1:])
+    assert notes == [f"the controller counts {answer.phi[0]:.3f} kg"]
+    assert controller.ended == 1
+
+
+def test_what_is_put_down_is_told_in_steps_down_to_nothing(answer):
+    controller = Asked()
+    one, _ = feedback(controller)
+    told(one, answer)
+    empty = changed(answer, phi=np.zeros(10), held=False, determined=np.ones(10, dtype=bool))
+    before = len(controller.told)
+    assert told(one, empty) is None
+    assert len(controller.told) - before > 5
+    assert not controller.told[-1].phi.any()
+
+
+@pytest.mark.parametrize(
+    ("fields", "known", "says"),
+    [
+        ({}, False, "the answer is unknown"),
+        ({"age": 11.0}, True, "the arm has stood for long: it moves first"),
+        ({"determined": np.array([True, False, *[True] * 8])}, True, "the centre of mass is undetermined"),
+    ],
+)
+def test_nothing_is_told_of_what_is_not_known(answer, fields, known, says):
+    controller = Asked()
+    one, _ = feedback(controller)
+    assert told(one, changed(answer, **fields), known) == says
+    assert len(controller.told) == 1
+
+
+def test_nothing_is_told_to_an_arm_that_moves(answer):
+    controller = Asked()
+    controller.dq = [0.0, 0.02, *[0.0] * 5]
+    one, _ = feedback(controller)
+    assert told(one, answer) == "the arm moves"
+    assert len(controller.told) == 1
+
+
+def test_what_the_guard_refuses_is_said_once_and_not_told(answer):
+    controller = Asked(rated=1.0)
+    one, notes = feedback(controller)
+    heavy = changed(answer, phi=10.0 * answer.phi)
+    for _ in range(3):
+        waits = told(one, heavy)
+    assert controller.told[-1].mass <= 1.0
+    assert "rated for 1 kg" in waits
+    assert len(notes) == 1
+
+
+def test_a_controller_that_does_not_count_what_it_was_told_is_refused(answer):
+    controller = Asked()
+    controller.deaf = True
+    one, _ = feedback(controller)
+    assert "was told" in told(one, answer)
+
+
+@pytest.mark.parametrize(("end_effector", "mass"), [(0.0, 0.7), (0.7, 0.0)])
+def test_what_was_mounted_is_told_where_the_robot_does_not_count_it_already(answer, end_effector, mass):
+    controller = Asked(end_effector)
+    one, _ = feedback(controller, HAND)
+    assert told(one, changed(answer, relative_to="tare")) is None
+    assert controller.told[-1].mass == pytest.approx(answer.phi[0] + mass, abs=1e-9)
+
+
+def test_what_lacks_something_that_nobody_names_is_not_told(answer):
+    one, _ = feedback(controller := Asked())
+    assert "add what was mounted then" in told(one, changed(answer, relative_to="tare"))
+    assert len(controller.told) == 1
+
+
+def test_only_a_robot_s_source_can_be_told():
+    with pytest.raises(SourceError, match="no load can be written to sim"):
+        controller_of("sim", arm("panda"), lambda: None)
+    with pytest.raises(UsageError, match=r"left: no load can be written to run\.csv"):
+        ArmSettings("panda", name="left", source="run.csv", apply="auto")
+
+
+# ---------------------------------------------------------------------- loopback robots and the makers' clients
+
+
+@contextlib.contextmanager
+def robot_at(program, *arguments):
+    """A loopback robot's process, killed whatever happens, and what it says."""
+    command = [sys.executable, str(SERVERS / f"{program}.py"), *map(str, arguments)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        said, ready = [], threading.Event()
+
+        def hear():
+            for line in process.stdout:
+                said.append(json.loads(line))
+                ready.set()
+
+        thread = threading.Thread(target=hear, daemon=True)
+        thread.start()
+        try:
+            assert ready.wait(60.0)
+            yield said
+        finally:
+            process.kill()
+            thread.join(30.0)
+
+
+def told_by_its_client(controller, said, robot):
+    """Steps until the robot counts it; what it counts then."""
+    one = Feedback(robot, controller, InertialParameters.zero(robot.frame), lambda _: None)
+    until = time.monotonic() + 400.0
+    try:
+        while time.monotonic() < until:
+            one.offer(said, np.zeros(robot.n) + 0.5, True)
+            one.step()
+            if one.waits is None:
+                return controller.counted().load
+            time.sleep(0.02)
+    finally:
+        one.close()
+    raise AssertionError(one.waits)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(("name", "package", "version"), [("panda", "panda_py", 5), ("fr3", "pylibfranka", 10)])
+def test_a_franka_robot_counts_what_was_identified_and_nothing_again_once_it_is_put_down(
+    answer, name, package, version, tmp_path
+):
+    pytest.importorskip(package, reason=f"{package} has no wheel for this Python")
+    robot = arm(name)
+    said = changed(answer, frame=robot.frame, phi=0.3 * answer.phi, around=0.3 * answer.phi)
+    still = {"t": 10.0 + 1e-3 * np.arange(240_000)}
+    still |= {key: np.full((240_000, 7), x) for key, x in (("q", 0.5), ("dq", 0.0), ("tau", 1.0))}
+    log = tmp_path / "still.npz"
+    np.savez(log, **still)
+    urdf = tmp_path / "robot.urdf"
+    limits = r'\1<position_based_velocity_limits velocity_offset="0.2" deceleration_limit="5.0" />'
+    urdf.write_text(re.sub(r"(<limit [^>]*/>)", limits, robot.urdf.replace(f"{name}_", "")))
+    address = "127.0.7.77"
+    with (
+        robot_at("franka_server", log, "--address", address, "--version", version, "--urdf", urdf) as s,
+        contextlib.closing(Detached(f"{name}://{address}", robot)) as source,
+    ):
+        controller = controller_of(f"{name}://{address}", robot, lambda: source)
+        counted = told_by_its_client(controller, said, robot)
+        np.testing.assert_allclose(counted.phi, said.phi, atol=1e-5)
+        loads = [event["numbers"][0] for event in s if event["event"] == "load"]
+        assert len(loads) > 2
+        assert loads == sorted(loads)
+        nothing = changed(said, phi=np.zeros(10), held=False, determined=np.ones(10, dtype=bool))
+        assert told_by_its_client(controller, nothing, robot).mass == 0.0
+
+
+@pytest.mark.full
+def test_a_ur_counts_what_was_identified_through_the_real_control_interface(answer):
+    pytest.importorskip("rtde_control", reason="ur-rtde has no wheel for this Python")
+    robot = arm("ur10e")
+    said = changed(answer, frame=robot.frame, phi=0.3 * answer.phi, around=0.3 * answer.phi)
+    address = "127.0.7.78"
+    with robot_at("ur_robot", "0.5,-1.2,1.5,-0.8,0.5,0.5", "--address", address) as s:
+        controller = controller_of(f"ur://{address}", robot, lambda: None)
+        counted = told_by_its_client(controller, said, robot)
+        np.testing.assert_allclose(counted.phi, said.phi, atol=1e-6)
+        events = [event["event"] for event in s]
+    assert events.count("payload") > 1
+    assert events.count("script") == 1
+    assert "moving" not in events
+
+
+def test_a_refused_step_ends_the_series(answer):
+    class Refusing(Asked):
+        def put(self, _):
+            raise SinkError("the robot refused the load")
+
+    one, _ = feedback(controller := Refusing())
+    assert told(one, answer) == "the robot refused the load"
+    assert controller.ended == 1
