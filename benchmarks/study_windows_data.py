@@ -66,7 +66,7 @@ def episode(k: int) -> tuple[Recording, Recording, NDArray[np.float64]]:
     payload = draw_payload("boxes", k)
     common: dict[str, Any] = {"world": world, "sensors": sensors, "rate": RATE, "duration": DURATION}
     log = simulate_inverse(robot, motion(k % MOTIONS), [(0.0, payload)], **common, seed=2 * k, start=60.0)
-    tare = simulate_inverse(robot, motion((k * 7 + 1) % MOTIONS), **common, seed=2 * k + 1)
+    tare = simulate_inverse(robot, motion((k + 1) % MOTIONS), **common, seed=2 * k + 1)
     return log, tare, payload.parameters.phi
 
 
