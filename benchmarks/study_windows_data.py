@@ -66,12 +66,13 @@ def episode(k: int) -> tuple[Recording, Recording, NDArray[np.float64]]:
     payload = draw_payload("boxes", k)
     common: dict[str, Any] = {"world": world, "sensors": sensors, "rate": RATE, "duration": DURATION}
     log = simulate_inverse(robot, motion(k % MOTIONS), [(0.0, payload)], **common, seed=2 * k, start=60.0)
-    tare = simulate_inverse(robot, motion((k * 7 + 1) % MOTIONS), **common, seed=2 * k + 1)
+    tare = simulate_inverse(robot, motion((k + 1) % MOTIONS), **common, seed=2 * k + 1)
     return log, tare, payload.parameters.phi
 
 
-def judged(worlds: str, count: int) -> list[tuple[Recording, Recording, NDArray[np.float64]]]:
-    """Runs by MuJoCo, of payloads, motions and arms that no training has: of `World.real_like` or of `World.beyond`."""
+def judged_runs(worlds: str, count: int) -> tuple[list[Run], list[Run], list[NDArray[np.float64]]]:
+    """Runs of payloads, motions and arms that no training has, their tares' and the truth; arms are those of `worlds`,
+    "real_like" or "beyond"."""
     robot, first = arm("panda"), _UNSEEN + (worlds == "beyond") * 100_000
     sensors, made = Sensors.panda(robot).evenly(), getattr(World, worlds)
     loaded, bare, truth = [], [], []
@@ -80,7 +81,13 @@ def judged(worlds: str, count: int) -> list[tuple[Recording, Recording, NDArray[
         loaded.append(Run(random_motion(robot, k), payload, world, sensors, k, start=60.0))
         bare.append(Run(random_motion(robot, k + 10_000), None, world, sensors, k + 10_000))
         truth.append(payload.parameters.phi)
-    logs = (simulate_many(robot, runs, rate=RATE, duration=DURATION) for runs in (loaded, bare))
+    return loaded, bare, truth
+
+
+def judged(worlds: str, count: int) -> list[tuple[Recording, Recording, NDArray[np.float64]]]:
+    """These runs by MuJoCo: log, tare and truth."""
+    *both, truth = judged_runs(worlds, count)
+    logs = (simulate_many(arm("panda"), runs, rate=RATE, duration=DURATION) for runs in both)
     return list(zip(*logs, truth, strict=True))
 
 

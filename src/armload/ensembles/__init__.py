@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from armload.ensembles.stages import MixedEnsemble, TwoStage
     from armload.ensembles.trained_model import LearnedModel
     from armload.ensembles.tree import TreeLearner
+    from armload.ensembles.window_networks import WindowNetworks
 
 __all__ = [
     "BaggingEnsemble",
@@ -30,6 +31,7 @@ __all__ = [
     "Progress",
     "TreeLearner",
     "TwoStage",
+    "WindowNetworks",
     "load_model",
     "save_model",
 ]

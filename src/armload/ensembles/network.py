@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from armload.ensembles.adam import AdamState, adam_step
 from armload.ensembles.checkpoint import Training, TrainingState, Weights
 from armload.ensembles.compiled import CompiledNetworks
 from armload.ensembles.progress import Progress, Report
@@ -195,18 +196,9 @@ def _functions() -> tuple[Any, Any]:
 
     @jax.jit
     def epoch(training: Any, X: Any, y: Any, rows: Any, weight: Any, rate: Any) -> Any:
-        def step(carry: Any, drawn: Any) -> tuple[Any, None]:  # Adam: Kingma & Ba 2015, Algorithm 1
-            weights, first, second, count = carry
+        def step(carry: Any, drawn: Any) -> tuple[Any, None]:
             chosen, blank = drawn
-            g = gradients(weights, X[chosen], y[chosen], blank)
-            count = count + 1
-            first = jax.tree.map(lambda m, d: 0.9 * m + 0.1 * d, first, g)
-            second = jax.tree.map(lambda v, d: 0.999 * v + 0.001 * d * d, second, g)
-            c1, c2 = 1 - 0.9**count, 1 - 0.999**count
-            weights = jax.tree.map(
-                lambda w, m, v: w - rate * (m / c1) / (jnp.sqrt(v / c2) + 1e-8), weights, first, second
-            )
-            return (weights, first, second, count), None
+            return tuple(adam_step(AdamState(*carry), gradients(carry[0], X[chosen], y[chosen], blank), rate)), None
 
         return jax.lax.scan(step, training, (rows, weight))[0]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -42,7 +43,7 @@ def write_markdown(
             count += 1
             link = f"{pictures}-{count}.png"
             _write_picture(Path(path).parent / link, figure)
-            lines += [f"![{caption.partition(':')[0]}]({link})", "", f"*{caption}*", ""]
+            lines += [f"![{_first_sentence(caption)}]({link})", "", f"*{caption}*", ""]
     return write_whole(path, "\n".join(lines).rstrip() + "\n", "the page")
 
 
@@ -53,6 +54,11 @@ def markdown(table: Table) -> str:
     rows = [table.columns, ["---"] * len(table.columns), *table.rows]
     lines = ["| " + " | ".join(str(cell).replace("|", "\\|") for cell in row) + " |" for row in rows]
     return f"**{table.title}**\n\n" + "\n".join(lines) + f"\n\n{table.note}\n"
+
+
+def _first_sentence(caption: str) -> str:
+    """What stands for a picture where it cannot be seen: the caption up to its first full stop or colon."""
+    return re.split(r"(?<!Fig)[.:](?: |$)", caption)[0]
 
 
 def _write_picture(path: Path, figure: Figure) -> None:

@@ -24,8 +24,7 @@ if TYPE_CHECKING:
 Claims = Sequence[Mapping[str, Any]]
 CAPTIONS = {
     4: "Fig. 4, single-stage training: mean absolute error of single samples on held-out rows (above), and the ratio "
-    "of "
-    "the two ensembles' errors beside the paper's (below).",
+    "of the two ensembles' errors beside the paper's (below).",
     5: "Fig. 5, two-stage training: as Fig. 4. The paper gives no number for Izz.",
     6: "Fig. 6, the test payload in simulation (nominal arm) and on real-like arms, which stand for the real one. The "
     "paper gives no numbers.",
@@ -64,6 +63,9 @@ ten-thousandth.
 **Checks.** `python benchmarks/study_crosscheck.py` trains the trees with scikit-learn alone and puts its errors
 beside the cells'. A test computes every verdict again from the cells by other code. Filtered RLS agree with an
 implementation of [7] written anew from its formulas.
+
+**Beyond the paper.** [Which claims travel](paper_travel.md) to another arm and to other payloads; [what a learner of
+raw signals learns](learning.md), and what learners that are tied to no motion add to physics.
 
 **No real Panda with a payload was measured.** `Real-like` arms are simulated arms that differ from their model as
 real ones do. Read "real robot" in a claim as the paper's, "real-like" as ours."""
@@ -139,9 +141,8 @@ def claims_table(claims: Claims) -> Table:
         )
     columns = ("claim", "what the paper says", "paper [%]", "ours [%]", "payloads held out [%]", "real log [%]")
     note = (
-        f"An improvement is 1 − error of the better method over that of the other; below zero it is the other way "
-        f"round. "
-        f"Real log: another motion than the training's; it does not enter the verdict. {NOT_YET}"
+        "An improvement is 1 − error of the better method over that of the other; below zero it is the other way "
+        f"round. Real log: another motion than the training's; it does not enter the verdict. {NOT_YET}"
     )
     return Table("Percentages", (*columns, "holds under", "verdict"), tuple(rows), note)
 
@@ -250,10 +251,8 @@ def _time(cells: Cells) -> str:
     hours = sum(cell["wall_s"] for cell in cells.values()) / 3600.0
     return (
         f"**Time.** The {len(cells)} cells behind this page took {hours:.1f} h, added up, some of them on a machine "
-        f"that "
-        "had other work to do; a run that was stopped goes on where it was. The page itself is written from the "
-        "cells in "
-        "seconds."
+        "that had other work to do; a run that was stopped goes on where it was. The page itself is written from the "
+        "cells in seconds."
     )
 
 
