@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from script import RESULTS
 
-from armload.atomic import replacing
 from armload.motion import Motion
+from armload.runtime.atomic import replacing
 
 FILE = RESULTS / "designed_motions_worlds.json"
 _RATE = 50.0  # [Hz] at which motions are compared

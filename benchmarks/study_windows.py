@@ -41,12 +41,12 @@ from study_windows_data import (
 )
 
 from armload import arm
-from armload.runtime.atomic import replacing
 from armload.ensembles import BaggingEnsemble, NetworkLearner
 from armload.ensembles.window_networks import WindowNetworks
 from armload.lab.cells import key_of
 from armload.lab.experiment import Task, listed, run_tasks
 from armload.posterior import HybridIdentifier, SmoothPosteriorLeastSquares
+from armload.runtime.atomic import replacing
 
 FORMAT = 1  # of a cell; a change makes every one unfinished
 WORLDS = ("real_like", "beyond")

@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 
 from armload import Arm, arm
 from armload.arms import rated_effort
-from armload.runtime.atomic import replacing
 from armload.motion import FourierMotion, random_motion
 from armload.payloads import draw_payload
 from armload.recording import Recording
 from armload.regression import Correction, FilteredRegression, GaussianPrior
+from armload.runtime.atomic import replacing
 from armload.simulation import Run, Sensors, World, simulate_inverse, simulate_many
 
 INPUTS = ("raw", "residual", "rows")
