@@ -3,7 +3,8 @@
     python benchmarks/structure.py [--source src] [--before REV] [--test-seconds BEFORE AFTER]
 
 --before checks that revision out into a temporary worktree and measures it beside --source (a folder that holds
-`armload`). --test-seconds: of `make test`, measured elsewhere. Nothing of the package is run, its text is read:
+`armload`). --test-seconds: of `make test` on a fresh clone, as `suite.py` measures it. Nothing of the package is run,
+its text is read:
 
 rooms             folders and modules directly below the package, `__init__` and `__main__` left out
 longest module    lines of the longest file

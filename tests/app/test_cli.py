@@ -254,6 +254,7 @@ def test_numba_keeps_what_it_compiles_in_a_folder_of_the_user_s_own_where_nothin
     assert other.stat().st_mode & 0o777 == 0o700
 
 
+@pytest.mark.full  # some seconds
 def test_who_waits_for_the_compiler_is_told_once_and_not_when_all_is_on_disk(tmp_path):
     code = (
         "import numpy as np; from armload.app.cli.entry import _notes_on_stderr; "

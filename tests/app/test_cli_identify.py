@@ -286,18 +286,16 @@ def test_out_writes_the_json_whole_or_not_at_all(capsys, answer, logs, tmp_path)
     assert [file.name for file in tmp_path.iterdir()] == ["held.json"]
 
 
-@pytest.mark.parametrize("form", ["franka", "mjcf"])
-def test_to_prints_what_export_makes_of_the_saved_answer(capsys, logs, tmp_path, form):
-    log, path = str(logs / "body.csv"), tmp_path / "held.json"
-    assert main(["identify", log, "--robot", "panda", "--out", str(path)]) == 0
-    capsys.readouterr()
-    assert main(["export", str(path), "--to", form]) == 0
+@pytest.mark.parametrize("where", ["printed", "written"])
+def test_to_makes_what_export_makes_of_the_saved_answer(capsys, answer, logs, tmp_path, where):
+    log, form = str(logs / "body.csv"), {"printed": "franka", "written": "mjcf"}[where]
+    (tmp_path / "held.json").write_text(json.dumps(answer(log, "--robot", "panda")))
+    assert main(["export", str(tmp_path / "held.json"), "--to", form]) == 0
     exported = capsys.readouterr().out
-    assert main(["identify", log, "--robot", "panda", "--to", form]) == 0
-    assert capsys.readouterr().out == exported
-    assert main(["identify", log, "--robot", "panda", "--to", form, "--out", str(tmp_path / "load")]) == 0
-    assert capsys.readouterr().out == ""
-    assert (tmp_path / "load").read_text() == exported
+    out = ["--out", str(tmp_path / "load")] if where == "written" else []
+    assert main(["identify", log, "--robot", "panda", "--to", form, *out]) == 0
+    assert capsys.readouterr().out == ("" if out else exported)
+    assert not out or (tmp_path / "load").read_text() == exported
 
 
 def test_an_inertia_that_rests_on_the_prior_is_exported_with_a_note_and_a_comment(capsys, answer, logs, tmp_path):
@@ -358,6 +356,7 @@ def test_notes_of_the_reader_go_to_stderr(capsys, logs, tmp_path):
     assert "line 51" in err
 
 
+@pytest.mark.full  # some seconds
 def test_a_minute_at_one_kilohertz_is_answered(answer, analytic_log, panda, tmp_path):
     write_recording(tmp_path / "long.npz", analytic_log(panda, BODY, duration=60.0, rate=1000.0))
     found = answer(tmp_path / "long.npz", "--robot", "panda")
@@ -399,6 +398,7 @@ def test_real_empty_ur10e_without_a_tare_holds_nothing(answer, real_data):
     assert found["held"] is False
 
 
+@pytest.mark.full  # some seconds
 def test_real_loaded_ur10e_without_a_tare_is_within_its_interval(answer, real_data):
     found = answer(real_data / "ur10e_loaded_2805g.csv", "--robot", "ur10e")
     assert found["held"] is True

@@ -21,13 +21,13 @@ PANDA = ("--robot", "panda", "--profile")
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """Five empty logs, and one of a payload."""
+    """Four empty logs, and one of a payload."""
     made, panda = tmp_path_factory.mktemp("profile"), arm("panda")
-    world, motions = World.real_like(panda, 3), [random_motion(panda, seed, duration=6.0) for seed in range(6)]
-    runs = [Run(motion, None, world, seed=k) for k, motion in enumerate(motions[:5])]
-    runs.append(Run(motions[5], make_payload().parameters, world, seed=9))
+    world, motions = World.real_like(panda, 3), [random_motion(panda, seed, duration=6.0) for seed in range(5)]
+    runs = [Run(motion, None, world, seed=k) for k, motion in enumerate(motions[:4])]
+    runs.append(Run(motions[4], make_payload().parameters, world, seed=9))
     logs = simulate_many(panda, runs, rate=100.0, duration=6.0, workers=1, resolution=COARSE)
-    for name, log in zip([*(f"day{k}.csv" for k in range(5)), "run.csv"], logs, strict=True):
+    for name, log in zip([*(f"day{k}.csv" for k in range(4)), "run.csv"], logs, strict=True):
         write_recording(made / name, log)
     return made
 
@@ -35,7 +35,7 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def profile(folder):
     path = folder / "arm.profile"
-    logs = [str(folder / f"day{k}.csv") for k in range(4)]
+    logs = [str(folder / f"day{k}.csv") for k in range(3)]
     assert main(["profile", *logs, "--robot", "panda", "--out", str(path)]) == 0
     return path
 
@@ -53,21 +53,21 @@ def test_show_says_what_is_known_and_how_the_arm_drifted(profile, capsys, tmp_pa
     figure = tmp_path / "arm.png"
     assert main(["profile", "show", str(profile), "--figure", str(figure)]) == 0
     said = capsys.readouterr()
-    assert "4 sessions, 24 s" in said.out
-    assert "day3.csv" in said.out
+    assert "3 sessions, 18 s" in said.out
+    assert "day2.csv" in said.out
     assert figure.read_bytes()[:4] == b"\x89PNG"
     assert main(["profile", "show", str(profile), "--json"]) == 0
     fields = json.loads(capsys.readouterr().out)
-    assert len(fields["sessions"]) == 4
+    assert len(fields["sessions"]) == 3
     assert np.isfinite(fields["drift_offset"]).all()
 
 
 def test_update_adds_a_session_and_refuses_a_payload(folder, profile, capsys, tmp_path):
     path = tmp_path / "more.profile"
     path.write_bytes(profile.read_bytes())
-    log, out = str(folder / "day4.csv"), ["--robot", "panda", "--out", str(path), "--update"]
+    log, out = str(folder / "day3.csv"), ["--robot", "panda", "--out", str(path), "--update"]
     assert main(["profile", log, *out]) == 0
-    assert len(load_profile(path).sessions) == 5
+    assert len(load_profile(path).sessions) == 4
     before = path.read_bytes()
     capsys.readouterr()
     assert main(["profile", str(folder / "run.csv"), *out]) == 2

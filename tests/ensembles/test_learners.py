@@ -35,7 +35,11 @@ ENSEMBLES = {
 }
 
 
-@pytest.fixture(params=ENSEMBLES, scope="module")
+# two stages of networks are the two stages of trees, and networks, which JAX compiles anew for each stage
+DEAR = {"two-stage network": pytest.mark.full}
+
+
+@pytest.fixture(params=[pytest.param(name, marks=DEAR.get(name, ())) for name in ENSEMBLES], scope="module")
 def fitted(request):
     ensemble = clone(ENSEMBLES[request.param])
     return ensemble.fit(*rows(0), *rows(1, 60))
@@ -351,6 +355,7 @@ def test_the_stopping_rule_agrees_with_brute_force(seed, patience):
     assert stopped < 200
 
 
+@pytest.mark.full  # the rule itself has quick tests above
 def test_training_stops_by_the_rule_for_every_member():
     X, y = rows(0, 60)
     learner = NetworkLearner(hidden=16, max_epochs=200, batch=20, learning_rate=0.01, patience=3, tolerance=1e-2)

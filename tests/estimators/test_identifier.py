@@ -76,7 +76,10 @@ MAKE = CATALOGUE | {
 }
 
 
-@pytest.fixture(scope="module", params=MAKE)
+DEAR = {"ekf": pytest.mark.full}  # it is slow on every sample, and shares the base class with the others
+
+
+@pytest.fixture(scope="module", params=[pytest.param(name, marks=DEAR.get(name, ())) for name in MAKE])
 def make(request, panda, empty, model):
     return lambda: MAKE[request.param](panda, empty, model)
 

@@ -47,6 +47,12 @@ def answer(panda, loaded, empty):
     return identify(loaded, panda, tare=empty)
 
 
+@pytest.fixture(scope="module")
+def plain(panda, loaded):
+    """The answer without a tare."""
+    return identify(loaded, panda)
+
+
 def spread(phi, relative, seed=0):
     """A covariance with correlations, standard deviations in the given share of some size."""
     A = np.random.default_rng(seed).normal(size=(10, 14))
@@ -126,8 +132,8 @@ def test_an_answer_s_plus_minus_is_half_of_its_95_percent_interval(answer):
     assert text.count("95 %") == 1
 
 
-def test_what_is_undetermined_and_what_rests_on_the_prior_is_marked_in_place(panda, loaded):
-    found = identify(loaded, panda)
+def test_what_is_undetermined_and_what_rests_on_the_prior_is_marked_in_place(panda, loaded, plain):
+    found = plain
     leaning = found.determined & found.rests_on_prior
     assert leaning[4:].any()
     lines = str(found).splitlines()
@@ -172,7 +178,7 @@ def test_arrays_of_an_answer_are_numpy_s_and_cannot_be_written_to(answer):
 # ---------------------------------------------------------------------- what is given
 
 
-def test_names_and_paths_stand_for_what_they_name(panda, loaded, empty, tmp_path):
+def test_names_and_paths_stand_for_what_they_name(panda, loaded, empty, plain, tmp_path):
     write_recording(tmp_path / "run.csv", loaded)
     write_recording(tmp_path / "empty.npz", empty)
     write_payload(tmp_path / "tool.json", Payload("tool", InertialParameters(0.1 * BOX.phi, "panda_link8")))
@@ -188,8 +194,8 @@ def test_names_and_paths_stand_for_what_they_name(panda, loaded, empty, tmp_path
     )
     assert named.phi.tolist() == here.phi.tolist()
     assert named.log == "run.csv"
-    alone, by_file = armload.identify(loaded, "panda"), armload.identify(loaded, tmp_path / "mine.urdf")
-    assert by_file.phi == pytest.approx(alone.phi, abs=0.05)
+    by_file = armload.identify(loaded, tmp_path / "mine.urdf")
+    assert by_file.phi == pytest.approx(plain.phi, abs=0.05)
 
 
 def test_dir_shows_the_interface_only():
@@ -267,8 +273,8 @@ def test_an_empty_hand_gets_no_advice_on_inertia(panda, how):
     assert found.notes == ()
 
 
-def test_a_method_that_was_named_is_not_explained(panda, loaded):
-    for method in (None, "map-gp", "rls"):
-        text = " ".join([str(identify(loaded, panda, method=method)), *identify(loaded, panda, method=method).notes])
+def test_a_method_that_was_named_is_not_explained(panda, loaded, plain):
+    for answer in (plain, *(identify(loaded, panda, method=method) for method in ("map-gp", "rls"))):
+        text = " ".join([str(answer), *answer.notes])
         assert "asked for" not in text
         assert "holds for any motion" not in text

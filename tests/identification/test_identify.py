@@ -141,6 +141,7 @@ def test_taken_off_asks_for_as_much_evidence_as_held(panda, simulated):
         assert any("taken off" in note or "is negative" in note for note in answer.notes) == says
 
 
+@pytest.mark.full  # some seconds
 def test_gear_friction_in_the_torques_of_an_arm_that_nobody_knows_is_found_from_the_log(tmp_path):
     known = arm("ur5e")
     text = re.sub(r'mass value="([\d.e+-]+)"', lambda m: f'mass value="{1.01 * float(m[1])}"', known.urdf)
@@ -236,6 +237,7 @@ def test_a_known_tool_that_is_not_mounted_is_missed_and_said_to_be(panda, simula
     assert "less is mounted" in answer.notes[0]
 
 
+@pytest.mark.full  # some seconds
 def test_where_the_tare_does_not_tell_of_the_tool_the_intervals_hold_both_cases():
     ur, light = arm("ur10e"), 0.25 * TOOL.phi
     tool = InertialParameters(light, "tool0")
@@ -336,6 +338,7 @@ def test_real_logs_have_a_body_within_the_error_bars(real_answer, log, tare, rob
     answer = real_answer(log, tare, robot)
     assert answer.method == "hybrid"
     assert not any("no body fits" in note for note in answer.notes)
+    assert len(answer.segments) == 1  # the payload stays
 
 
 def test_error_bars_that_lean_on_the_prior_are_named_and_those_that_a_log_tells_are_not(

@@ -59,6 +59,7 @@ def test_the_baselines_know_the_payloads_that_are_to_be_found(panda, recipe, mas
     assert prior.mean[0] == pytest.approx(mass, abs=4.0 * prior.std[0] / np.sqrt(400))
 
 
+@pytest.mark.full  # some seconds
 def test_the_baselines_know_no_payload_of_an_episode_but_its_family(panda):
     truths = [episode.truth.phi for episode in draw_episodes(panda, "container", 10, 900_001, motions=1)]
     prior = prior_of(ALL["container"].recipe, panda)
@@ -306,6 +307,7 @@ def test_a_cell_counts_only_with_its_key(finished):
     assert finished_cell(finished / "cells", "untared-900009-rls-filter", cell["key"]) is None
 
 
+@pytest.mark.full  # some seconds
 def test_a_longer_run_keeps_the_episodes_of_the_shorter(finished):
     short = load_cells(finished / "cells")["untared-900001-rls-filter"]
     assert np.shape(short["phi"]) == (2, 6, 10)
@@ -314,6 +316,7 @@ def test_a_longer_run_keeps_the_episodes_of_the_shorter(finished):
     assert short["phi"] != last["phi"]
 
 
+@pytest.mark.full  # some seconds
 def test_the_files_say_the_same_as_the_cells(finished):
     cell = load_cells(finished / "cells")
     errors = np.abs(

@@ -244,6 +244,7 @@ def test_page_summary_and_report_are_written_from_the_cells(written):
     assert "same-prior least squares" in page
 
 
+@pytest.mark.full  # some seconds
 def test_the_committed_page_and_summary_are_what_the_committed_cells_say(tmp_path):
     results, messages = ROOT / "benchmarks" / "results", []
     cells = run_study(Basis(tmp_path, FULL), results / "taie2024", until=-1.0, say=messages.append)

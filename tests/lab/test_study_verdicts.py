@@ -140,6 +140,7 @@ def judge(better, worse, on, parameter, number):
     return "confirmed" if abs(found[0] - number) <= 10 else "direction only", found
 
 
+@pytest.mark.full  # some seconds
 @pytest.mark.parametrize("group", ["fig4", "fig5", "stages", "fig7-network", "fig7-tree", "conclusion", "abstract"])
 def test_every_percentage_s_verdict_follows_from_the_cells(group):
     for name, *claim, number in paper():

@@ -63,8 +63,7 @@ def case(kind, panda_logs, same_motion):
 
 KINDS = ("untared", "tare", "same motion", "tool", "30 Hz", "gaps", "motor torque")
 CASES = [(kind, None) for kind in KINDS]
-CASES += [(kind, "map-gp") for kind in ("untared", "tare", "motor torque")]
-CASES += [pytest.param(kind, "map-gp", marks=pytest.mark.full) for kind in ("same motion", "tool", "30 Hz", "gaps")]
+CASES += [pytest.param(kind, "map-gp", marks=() if kind == "untared" else pytest.mark.full) for kind in KINDS]
 
 
 @pytest.mark.parametrize(("kind", "method"), CASES)

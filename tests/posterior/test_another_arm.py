@@ -122,6 +122,7 @@ def test_the_tare_of_another_arm_is_said_and_the_intervals_hold_without_it(panda
     assert np.mean(inside) > 0.85
 
 
+@pytest.mark.full  # some seconds
 def test_the_same_arm_is_no_other_after_a_day(panda):
     drawn = draw_episodes(panda, "reference", 3, seed=81, motions=3)
     then = [replace(e, tare_world=replace(e.world, offset=np.asarray(e.world.offset) + 0.1)) for e in drawn]

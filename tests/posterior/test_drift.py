@@ -65,6 +65,7 @@ def test_a_tare_of_another_arm_is_noticed(panda):
         assert identifier.stream.drift.changed
 
 
+@pytest.mark.full  # some seconds
 def test_an_arm_that_has_not_changed_is_answered_as_without_the_question(panda, sound):
     for log in sound:
         asked, silent = HybridIdentifier(panda, log.tare), HybridIdentifier(panda, log.tare)
@@ -101,6 +102,7 @@ def test_rows_one_by_one_give_the_posterior_of_the_accumulated_rows_with_a_drift
     assert running[1] == pytest.approx(whole.vector, rel=1e-6, abs=1e-6 * np.abs(whole.vector).max())
 
 
+@pytest.mark.full  # some seconds
 def test_a_stream_that_is_concluded_doubts_an_old_tare_as_a_log_does(panda, old):
     log = old[0]
     identifier = OnlineIdentifier(panda, log.tare)

@@ -114,6 +114,7 @@ def test_a_difference_that_is_surely_no_body_is_answered_as_it_is_and_said(panda
     assert alone.interval == "calibrated"
 
 
+@pytest.mark.full  # some seconds
 def test_a_payload_on_a_bare_arm_is_not_called_an_exchange(panda, exchanged):
     for log in exchanged[1]:
         identifier = HybridIdentifier(panda, log.tare)

@@ -377,8 +377,8 @@ def test_records_read_back_as_they_were_written(synthetic, tmp_path):
 
 @pytest.fixture(scope="module")
 def logs(panda):
-    """The reference population: three arms, payloads, motions and tares."""
-    return list(simulate_episodes(draw_episodes(panda, "reference", 3, seed=77, motions=3)))
+    """The reference population: two arms, payloads, motions and tares."""
+    return list(simulate_episodes(draw_episodes(panda, "reference", 2, seed=77, motions=3)))
 
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
@@ -405,15 +405,14 @@ def test_errors_on_real_like_arms_stay_near_their_error_bars(logs, estimates):
         inside.append(np.abs(estimate.phi - log.truth.phi) < 1.96 * estimate.std)
         assert abs(estimate.phi[0] - log.truth.mass) < 0.05
         assert is_consistent(estimate.phi)
-    assert np.mean(inside) > 0.8  # of 30, 95 % of them expected; an arm's errors come together
+    assert np.mean(inside) > 0.8  # of 20, 95 % of them expected; an arm's errors come together
 
 
 def test_another_payload_frame_describes_the_same_body(panda, logs, estimates):
     wrist = arm("panda", "panda_link7")  # turns with the flange, 0.107 m before it
-    for log, here in zip(logs, estimates, strict=True):
-        there = HybridIdentifier(wrist, log.tare).run(log.run)
-        moved = wrist.in_frame(InertialParameters(here.phi, panda.frame))
-        assert there.phi == pytest.approx(moved.phi, abs=2e-4)  # the weak priors of either frame differ
+    here, there = estimates[0], HybridIdentifier(wrist, logs[0].tare).run(logs[0].run)
+    moved = wrist.in_frame(InertialParameters(here.phi, panda.frame))
+    assert there.phi == pytest.approx(moved.phi, abs=2e-4)  # the weak priors of either frame differ
 
 
 def test_what_was_taken_off_since_the_tare_is_negative(panda):

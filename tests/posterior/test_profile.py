@@ -64,6 +64,12 @@ def profile(panda, life):
     return learn_profile(panda, life[1])
 
 
+@pytest.fixture(scope="module")
+def young(panda, life):
+    """Of three days: made in half the time."""
+    return learn_profile(panda, life[1][:3])
+
+
 def test_what_integrates_out_the_days_is_the_solution_with_all_days_as_unknowns(panda, life):
     correction = Correction(panda, rated_effort(panda))
     data = [log_data(correction, log, SMALL, Session(k + 1, 1.0)) for k, log in enumerate(life[1][:3])]
@@ -130,13 +136,13 @@ def test_a_file_that_is_no_profile_is_refused_by_name(tmp_path, damage):
         load_profile(path)
 
 
-def test_a_profile_of_another_arm_or_base_is_refused(panda, run, profile):
+def test_a_profile_of_another_arm_or_base_is_refused(panda, run, young):
     with pytest.raises(ModelError, match="another arm"):
-        identify(replace(run, joint_names=None), arm("fr3"), profile=profile)
+        identify(replace(run, joint_names=None), arm("fr3"), profile=young)
     with pytest.raises(ModelError, match="gravity"):
-        HybridIdentifier(arm("panda", gravity=(-9.81, 0.0, 0.0)), profile=profile)
+        HybridIdentifier(arm("panda", gravity=(-9.81, 0.0, 0.0)), profile=young)
     with pytest.raises(IdentificationError, match="cannot use a profile"):
-        identify(run, panda, profile=profile, method="ols")
+        identify(run, panda, profile=young, method="ols")
 
 
 @pytest.mark.full
@@ -149,9 +155,9 @@ def test_a_body_is_the_same_about_another_frame(panda, run, profile):
     np.testing.assert_allclose(there.com, moved.com, atol=3e-3)
 
 
-def test_a_log_says_what_the_concluded_stream_says_with_a_profile(panda, run, profile):
-    answer = identify(run, panda, profile=profile)
-    stream = OnlineIdentifier(panda, profile=profile)
+def test_a_log_says_what_the_concluded_stream_says_with_a_profile(panda, run, young):
+    answer = identify(run, panda, profile=young)
+    stream = OnlineIdentifier(panda, profile=young)
     for sample in run:
         stream.update(*sample)
     end = stream.conclude()
@@ -160,18 +166,18 @@ def test_a_log_says_what_the_concluded_stream_says_with_a_profile(panda, run, pr
     np.testing.assert_allclose((end.phi - answer.phi) / end.std, 0.0, atol=1e-5)
 
 
-def test_another_arm_is_said_not_to_be_the_profile_s(panda, life, profile):
+def test_another_arm_is_said_not_to_be_the_profile_s(panda, life, young):
     other = World.real_like(panda, seed=4711)
     load = InertialParameters(life[0].payload.parameters.phi)
     log = simulated(panda, [other], [life[0].motion], load, 4.0)[0]
-    answer = identify(log, panda, profile=profile)
+    answer = identify(log, panda, profile=young)
     assert answer.interval == "approximate"
     assert "not as its profile says" in answer.notes[0]
 
 
-def test_a_tare_that_carries_something_beside_is_refused(panda, run, profile, life):
+def test_a_tare_that_carries_something_beside_is_refused(panda, run, young, life):
     with pytest.raises(IdentificationError, match="carries"):
-        identify(life[1][0], panda, profile=profile, tare=run)
+        identify(life[1][0], panda, profile=young, tare=run)
 
 
 @pytest.mark.full  # some seconds

@@ -94,6 +94,7 @@ def test_a_base_that_leans_is_found_without_a_tare(panda):
     assert told.phi_low[0] < answer.mass < told.phi_high[0]
 
 
+@pytest.mark.full  # some seconds
 def test_gravity_as_it_is_is_not_doubted(panda):
     for population in ("reference", "untared"):
         for log in logs_of(panda, panda, population):

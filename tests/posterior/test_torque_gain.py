@@ -62,6 +62,7 @@ def test_the_gains_of_the_joints_that_carry_the_weight_are_found(weighed):
     assert 1e-3 <= weighed.gain_std < 0.03
 
 
+@pytest.mark.full
 def test_the_gain_of_each_joint_has_an_interval_that_holds_and_is_wide_where_the_weight_is_not_felt(weighed):
     std = weighed.gain_joint_std
     assert np.all(np.abs(weighed.gain - (GAIN - 1.0)) < 3.0 * std)
@@ -84,6 +85,7 @@ def test_another_payload_is_then_found_in_its_own_mass(panda, logs, profile, wei
     assert identify(logs[5], panda, profile=read).mass == pytest.approx(with_.mass, abs=1e-4)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("mass", "std"), [(0.0, 0.1), (-1.0, 0.1), (np.nan, 0.1), (2.0, -1.0), (5.0, 0.002)])
 def test_a_weight_that_is_none_or_that_the_log_does_not_bear_is_refused(panda, logs, profile, mass, std):
     with pytest.raises(IdentificationError, match="weight"):

@@ -188,14 +188,18 @@ def entropic_pull(phi: NDArray, information: NDArray, reference: NDArray, pull: 
             return np.inf
         return float((y - target) @ Q @ (y - target) + pull * (towards @ y - log_det))
 
-    y = nearest_consistent(phi, information, _INSIDE) / units
-    now = cost(y)
-    for _ in range(_ITERATIONS):
+    def newton_step(y: NDArray) -> tuple[NDArray, float]:
+        """And what it gains, were the cost quadratic."""
         at = np.linalg.solve(np.einsum("k,kab->ab", y, basis), basis)  # J⁻¹·E_k
         gradient = 2.0 * Q @ (y - target) + pull * (towards - np.einsum("kaa->k", at))
         hessian = 2.0 * Q + pull * np.einsum("iab,jba->ij", at, at)
         step = -np.linalg.solve(hessian, gradient)
-        gain = -float(gradient @ step)
+        return step, -float(gradient @ step)
+
+    y = nearest_consistent(phi, information, _INSIDE) / units
+    now = cost(y)
+    for _ in range(_ITERATIONS):
+        step, gain = newton_step(y)
         if gain <= _CONVERGED * max(1.0, abs(now)):
             break
         share = 1.0
@@ -217,19 +221,22 @@ def fit_chart(phi: NDArray, information: NDArray) -> NDArray[np.float64]:
         e, away = from_log_cholesky(theta) - phi, (theta - _CHART_MEAN) / _CHART_STD
         return float(e @ information @ e + away @ away)
 
-    theta = log_cholesky(nearest_consistent(phi, information, _INSIDE))
-    now, damping = cost(theta), 1e-3
-    for _ in range(_ITERATIONS):
+    def quadratic(theta: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+        """Half the gradient; the Hessian, or Gauss and Newton's where that is not convex; the diagonal of theirs."""
         D, pushed = log_cholesky_jacobian(theta), information @ (from_log_cholesky(theta) - phi)
         H = D.T @ information @ D + np.diag(_CHART_STD**-2)
         gradient = D.T @ pushed + (theta - _CHART_MEAN) / _CHART_STD**2
         full = H + log_cholesky_curvature(theta, pushed)
-        if np.linalg.eigvalsh(full)[0] <= 0:
-            full = H  # not convex here
+        return gradient, full if np.linalg.eigvalsh(full)[0] > 0 else H, np.diag(np.diag(H))
+
+    theta = log_cholesky(nearest_consistent(phi, information, _INSIDE))
+    now, damping = cost(theta), 1e-3
+    for _ in range(_ITERATIONS):
+        gradient, full, diagonal = quadratic(theta)
         if gradient @ np.linalg.solve(full, gradient) <= _CONVERGED * max(1.0, now):
             break
         while damping < 1e12:
-            trial = theta - np.linalg.solve(full + damping * np.diag(np.diag(H)), gradient)
+            trial = theta - np.linalg.solve(full + damping * diagonal, gradient)
             then = cost(trial) if np.abs(trial[:4]).max() < 50.0 else np.inf  # e^50 is no body
             if then < now:
                 break
