@@ -109,17 +109,8 @@ class DifferenceLeastSquares(NormalLeastSquares):
 
     def take_rows(self, rows: Rows) -> None:
         """Take rows made elsewhere with the same gain, the payload's columns first."""
-        t = rows.t
-        edges = np.flatnonzero(np.diff(t, prepend=self._last_t) > GAP)
-        for start, stop in zip([0, *edges], [*edges, len(t)], strict=True):
-            if start in edges:
-                self._restart()
-                self._last_row = t[start]
-            if stop > start:
-                part = slice(start, stop)
-                self._add(*self._aligned(Rows(*(column[part] for column in rows))))
-        if len(t):
-            self._last_t, self._count = t[-1], self._count + len(t)
+        for part in self._between_gaps(rows.t):
+            self._add(*self._aligned(Rows(*(column[part] for column in rows))))
 
     def _aligned(self, rows: Rows) -> tuple[NDArray, NDArray, NDArray]:
         """Rows that the tare shows, less its own torque; rows are new, the tracker may release older ones."""

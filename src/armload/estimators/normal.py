@@ -12,6 +12,7 @@ Sources: Atkeson, An & Hollerbach, IJRR 1986 (OLS); Gautier & Poignet, Control E
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,15 +72,20 @@ class NormalLeastSquares(Identifier):
         """Times (M,), y (M, n) and Y (M, n, 10) of the rows that the next N samples complete."""
 
     def _take(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
+        for part in self._between_gaps(t):
+            self._add(*self._rows(t[part], q[part], dq[part], tau[part]))
+
+    def _between_gaps(self, t: NDArray) -> Iterator[slice]:
+        """The parts of times t (N,) between gaps; the filters begin anew before each part that follows a gap."""
         edges = np.flatnonzero(np.diff(t, prepend=self._last_t) > GAP)
         for start, stop in zip([0, *edges], [*edges, len(t)], strict=True):
             if start in edges:
                 self._restart()
                 self._last_row = t[start]
             if stop > start:
-                part = slice(start, stop)
-                self._add(*self._rows(t[part], q[part], dq[part], tau[part]))
-        self._last_t, self._count = t[-1], self._count + len(t)
+                yield slice(start, stop)
+        if len(t):
+            self._last_t, self._count = t[-1], self._count + len(t)
 
     def _add(self, t: NDArray, y: NDArray, Y: NDArray) -> None:
         if not len(t):

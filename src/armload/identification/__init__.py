@@ -9,9 +9,10 @@ from armload.runtime.lazy import on_first_use
 if TYPE_CHECKING:
     from armload.identification.answer import Identification
     from armload.identification.arm_health import ArmHealth
-    from armload.identification.choice import Choice, choose
+    from armload.identification.choice import DEFAULT, Choice, choose, default_for
     from armload.identification.identify_log import check_usable, identify, plausible_tool
-    from armload.identification.methods import DEFAULT, LEFT_OUT, METHODS, Method, default_for
+    from armload.identification.left_out import LEFT_OUT
+    from armload.identification.methods import METHODS, Method
     from armload.identification.plausibility import check_plausible
 
 __all__ = [

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 
 from armload.arms import Arm
-from armload.errors import IdentificationError
+from armload.errors import IdentificationError, ModelError
 from armload.estimators import Identifier
-from armload.identification.methods import METHODS, default_for, model_file
+from armload.identification.methods import METHODS
 from armload.posterior import Profile
 from armload.recording import Recording
 
+DEFAULT = "hybrid"  # the method where nothing is named and the arm has a trained model
+_ELSEWHERE = "map-gp"
 # names of the catalogue that need neither a motion known beforehand nor a model of their own
 LIVE = tuple(name for name, method in METHODS.items() if method.needs not in ("training", "motion"))
 
@@ -80,3 +84,43 @@ def _trained(arm: Arm, tare: Recording | None, file: Path, profile: Profile | No
             "out, or use the method map"
         )
     return Choice(model.kind, LearnedIdentifier(model, arm), True, str(file), error_known=model.error_std is not None)
+
+
+def default_for(arm: Arm) -> str:
+    """The name of the most trustworthy method for an arm: the hybrid where one is shipped, map-gp elsewhere.
+
+    Raises:
+        ModelError: a hybrid is shipped for the arm, and its file is missing or cannot be read.
+    """
+    from armload.posterior import HybridModel, shipped_model
+
+    if HybridModel.shipped(arm) is None:
+        return _ELSEWHERE
+    model = shipped_model(arm)
+    try:
+        model.prior_for(arm)
+    except ModelError:  # an arm of that name with other links
+        return _ELSEWHERE
+    return DEFAULT
+
+
+def model_file(name: str | Path, names: Sequence[str]) -> Path:
+    """The file of a trained model that was given in place of a method's name.
+
+    Raises:
+        IdentificationError: there is no such file; the message says what was meant, a file or one of `names`.
+    """
+    path, text = Path(name), str(name)
+    if path.is_file():
+        return path
+    if path.suffix or len(path.parts) > 1:  # no method is called so
+        state = "is not a file" if path.exists() else "does not exist"
+        raise IdentificationError(
+            f"the model {text} {state}: expected the .safetensors file that `armload train` wrote, or a method that "
+            "`armload methods` lists"
+        )
+    near = get_close_matches(text, names, 1)
+    raise IdentificationError(
+        f"unknown method {text!r}: expected one of {', '.join(names)}, or the path of a trained model"
+        + (f"; did you mean {near[0]!r}?" if near else "")
+    )

@@ -1,4 +1,4 @@
-"""The catalogue: every way armload has of identifying a payload, and what of the related work it leaves out.
+"""The catalogue: every way armload has of identifying a payload.
 
     METHODS["rls"].make(arm, tare)      # an Identifier, whatever the method
 
@@ -7,13 +7,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from difflib import get_close_matches
-from pathlib import Path
 
 from armload.arms import Arm
-from armload.errors import IdentificationError, ModelError
+from armload.errors import IdentificationError
 from armload.estimators import (
     ConsistentLeastSquares,
     DifferenceLeastSquares,
@@ -94,14 +92,6 @@ def calibrated(kind: Callable[[Arm], Identifier]) -> Callable[[Arm, Recording | 
     return lambda arm, tare: kind(arm) if tare is None else Tared(kind(arm), tare)
 
 
-def _with_tare(kind: Callable[[Arm, Recording], Identifier]) -> Callable[[Arm, Recording | None], Identifier]:
-    def build(arm: Arm, tare: Recording | None) -> Identifier:
-        assert tare is not None  # `Method.make` has asked for it
-        return kind(arm, tare)
-
-    return build
-
-
 def _trained(name: str) -> Callable[[Arm, Recording | None], Identifier]:
     def refuse(*_: object) -> Identifier:
         raise IdentificationError(
@@ -162,7 +152,7 @@ _CATALOGUE = (
         "Atkeson, An & Hollerbach, IJRR 1986; Hsu et al., ICRA 1987",
         tare="same motion",
         prior=False,
-        build=_with_tare(DifferenceLeastSquares),
+        build=DifferenceLeastSquares,
         needs="tare",
     ),
     Method(
@@ -172,7 +162,7 @@ _CATALOGUE = (
         "Khalil, Gautier & Lemoine, ICRA 2007; Gautier, J. Robotic Systems 1991",
         tare="own equation",
         prior=False,
-        build=_with_tare(JointLeastSquares),
+        build=JointLeastSquares,
         needs="tare",
     ),
     Method(
@@ -308,70 +298,3 @@ _CATALOGUE = (
 )
 # The catalogue: every method by its name, in the order of recommendation.
 METHODS: dict[str, Method] = {method.name: method for method in _CATALOGUE}
-DEFAULT = "hybrid"  # the method where nothing is named and the arm has a trained model
-_ELSEWHERE = "map-gp"
-
-
-def default_for(arm: Arm) -> str:
-    """The name of the most trustworthy method for an arm: the hybrid where one is shipped, map-gp elsewhere.
-
-    Raises:
-        ModelError: a hybrid is shipped for the arm, and its file is missing or cannot be read.
-    """
-    from armload.posterior import HybridModel, shipped_model
-
-    if HybridModel.shipped(arm) is None:
-        return _ELSEWHERE
-    model = shipped_model(arm)
-    try:
-        model.prior_for(arm)
-    except ModelError:  # an arm of that name with other links
-        return _ELSEWHERE
-    return DEFAULT
-
-
-def model_file(name: str | Path, names: Sequence[str]) -> Path:
-    """The file of a trained model that was given in place of a method's name.
-
-    Raises:
-        IdentificationError: there is no such file; the message says what was meant, a file or one of `names`.
-    """
-    path, text = Path(name), str(name)
-    if path.is_file():
-        return path
-    if path.suffix or len(path.parts) > 1:  # no method is called so
-        state = "is not a file" if path.exists() else "does not exist"
-        raise IdentificationError(
-            f"the model {text} {state}: expected the .safetensors file that `armload train` wrote, or a method that "
-            "`armload methods` lists"
-        )
-    near = get_close_matches(text, names, 1)
-    raise IdentificationError(
-        f"unknown method {text!r}: expected one of {', '.join(names)}, or the path of a trained model"
-        + (f"; did you mean {near[0]!r}?" if near else "")
-    )
-
-
-# What the paper's related work names (its reference numbers) and armload does not build, with the reason.
-LEFT_OUT: dict[str, str] = {
-    "vision: geometry, colour or depth images [8]": "needs a camera and a density; a log of the joints holds neither",
-    "exploration: pushing, poking, tilting an object [8]": (
-        "needs contact experiments before the grasp; a log is recorded after it"
-    ),
-    "vision and force/torque sensor together [9]": "needs both sensors",
-    "wrist force/torque sensor with an IMU [15]": (
-        "needs a sensor between flange and payload; if there is one, its wrench is the better measurement"
-    ),
-    "quaternion-based filtering [14]": (
-        "estimates orientation and acceleration from an IMU; joint encoders know the orientation already"
-    ),
-    "chaotic sparrow search with Kent map, Student's t and Lévy flight [19]": (
-        "a global search; this problem is linear and has one optimum in closed form"
-    ),
-    "offline techniques of dynamic identification compared in [10]": (
-        "that comparison finds that only least squares and machine-learning regression work online"
-    ),
-    "unsupervised classification of payload changes from torque [20]": (
-        "detects a change of payload, but gives no parameters; `OnlineIdentifier` detects changes"
-    ),
-}

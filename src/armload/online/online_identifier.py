@@ -27,6 +27,7 @@ from armload.online.gate import Gate, Health, all_finite
 from armload.online.judgement import CHANGING, LEFT_OUT, Judgement
 from armload.online.learning import learned_from
 from armload.online.listening import Listening
+from armload.online.presenting import presented
 from armload.online.restoring import load_identifier, save_identifier
 from armload.online.step import mass_step
 from armload.online.thresholds import KIND_LATEST, MOVING, RECENT, SELDOM
@@ -52,14 +53,12 @@ class OnlineIdentifier:
             added since.
         method: a name of the catalogue, or a trained model's file; None: the most trustworthy for the arm.
         profile: what was learned of this arm from many logs; estimates are of what was added since.
-        known: of a payload, beside the stream; taken where something is held, and only while the samples do not deny
-            that this is it, which `notes` says then.
+        known: of a payload, apart from the stream; used while something is held and no sample contradicts (`notes`).
         every: [s] between two new answers of a payload whose run has begun 1.5 s ago, at most 0.1; changes are looked
             for in each row all the same.
 
     Raises:
-        ArmloadError: an unknown method, or one that cannot use what is known, a model of another arm, or a tare that is
-            none of this arm.
+        ArmloadError: an unknown method, one that cannot use what is known, or a model or tare of another arm.
     """
 
     def __init__(
@@ -286,31 +285,16 @@ class OnlineIdentifier:
         return self._internal + self._stream.ahead - self._moved < RECENT
 
     def _present(self) -> OnlineEstimate:
-        engine, watch, stream, judged = self.engine, self._watch, self._stream, self._judgement
-        change, contact, drift = (None, None, None) if watch is None else watch.likely
-        age = stream.unseen + stream.ahead + judged.age(self._internal)
-        return OnlineEstimate.of(
-            {
-                **vars(judged.estimate),
-                "t": stream.clock,
-                "age": float(age),
-                "lag": 0.0,
-                "since": stream.clock if self._since is None else self._since,
-                "relative_to": self.relative_to,
-                "method": self.method,
-                "determined": judged.determined,
-                "held": judged.held,
-                "around": judged.around,
-                "before": judged.before,
-                "calibrated": engine.calibrated and not judged.doubted and (watch is None or watch.sure),
-                "p_held": judged.p_held,
-                "p_change": change,
-                "p_contact": contact,
-                "p_drift": drift,
-                "moving": self._moving,
-                "settling": watch is not None and watch.settling,
-                "event": self._event,
-                "health": self._gate.health,
-                "notes": judged.notes if stream.trouble is None else (*judged.notes, stream.trouble),
-            }
-        )
+        stream, sure = self._stream, self._watch is None or self._watch.sure
+        fields = {
+            "t": stream.clock,
+            "age": float(stream.unseen + stream.ahead + self._judgement.age(self._internal)),
+            "since": stream.clock if self._since is None else self._since,
+            "relative_to": self.relative_to,
+            "method": self.method,
+            "calibrated": self.engine.calibrated and not self._judgement.doubted and sure,
+            "moving": self._moving,
+            "event": self._event,
+            "health": self._gate.health,
+        }
+        return presented(self._judgement, self._watch, stream.trouble, fields)
