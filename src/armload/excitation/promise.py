@@ -50,7 +50,7 @@ def promised(criterion: Criterion, bound: NDArray[np.float64], payload: PayloadR
 
 
 def of_gain(criterion: Criterion, payload: PayloadRange) -> NDArray[np.float64]:
-    """The share (10,) of it that the torque's calibration and its gears leave of the heaviest payload, in any motion."""
+    """The share (10,) of it that calibration and gears leave of the heaviest payload, whatever the motion."""
     side = _side(criterion)
     lever = payload.mass * np.repeat([1.0, _LEVER[side], _LEVER[side] ** 2], [1, 3, 6])
     heaviest = np.maximum(np.abs(payload.corners()).max(axis=0), lever)
