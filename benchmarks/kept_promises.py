@@ -4,7 +4,7 @@
 
 Every design has its own pose, time, share of the limits, heaviest payload and tare, drawn at random; every world is an
 arm that differs from its model as real ones do, with a payload of the range and its sensors, none of them among those
-of `designed_motions.py`, from which the factors of `excitation/promise.py` are. The payload is identified after the
+from which the factors of `excitation/promise.py` are: `designed_motions.py`, and a first draw of this script. The payload is identified after the
 motion is over, with the default of `identify`. A promise is kept in a world where the half-widths given of mass, of all
 moments and of all inertias are within those said: what `--until` relies on. "given / bound" is of the estimator's
 half-widths over the bound's, "given / promised" of them over those that are said: of the largest of moments and of
@@ -38,7 +38,7 @@ from armload.simulation.resolution import COARSE
 
 TARES = ("same", "own", "elsewhere")
 _RATE = 500.0  # [Hz] of the logs
-_SEED = 950_000  # apart from those of the other benchmarks and of the shipped models
+_SEED = 970_000  # apart from those of other benchmarks, of the shipped models, and of the draw that set the factors
 _LIGHTEST = 0.3  # [kg] heaviest payload of a range
 HEAVIEST = {"panda": 3.0, "ur10e": 6.0}  # [kg] a UR10e cannot hold 12.5 kg at its pose
 _TARE_TIME = 4.0  # [s] of an own empty run
@@ -153,7 +153,14 @@ def main() -> None:
                 rows[f"{name}, {words}"] = summary(mine)
     print(table(rows))
     write_table(ROOT / "docs" / "motion.md", "kept promises", table(rows))
-    write("kept_promises", {"rows": rows, "kept": float(np.mean([r["kept"] for r in rows.values()]))}, None)
+    write(
+        "kept_promises",
+        {
+            "rows": rows,
+            "kept": float(np.average([r["kept"] for r in rows.values()], weights=[r["worlds"] for r in rows.values()])),
+        },
+        None,
+    )
 
 
 if __name__ == "__main__":

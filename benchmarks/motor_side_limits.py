@@ -6,9 +6,9 @@ The same designed pair (2 s, after 5 s of it empty) with the same payloads and s
 their model as real ones do (`World.real_like`), with one part of that difference taken away; and the smallest 95 %
 half-width that any estimator can reach in the mean of such arms, from the variances of that population (`scales_of`),
 which knows neither gains nor that gears lose a share of the payload's torque, too. Then ways that a user has on the arm
-as it is: a longer empty run, a longer loaded run, poses that are crossed slowly from both sides, so that
-friction cancels, and a profile of three logs, a weight that is known (5 kg to 1 g) hung on once, which calibrates
-the torque (`armload profile --mass`). Errors are mean magnitudes of mass, moments and inertias as in `designed_motions.py`, whose
+as it is: a longer empty run, a longer loaded run, poses that are crossed slowly from both sides, so that friction
+cancels, a profile of three logs, and a weight that is known (5 kg to 1 g) hung on once, which calibrates the torque
+(`armload profile --mass`). Errors are mean magnitudes of mass, moments and inertias as in `designed_motions.py`, whose
 motions these are. What is measured is kept in out/. Writes benchmarks/results/motor_side_limits.json and the tables in
 docs/motion.md.
 """

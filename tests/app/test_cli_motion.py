@@ -56,8 +56,11 @@ def test_an_export_without_a_file_is_printed_and_a_figure_is_a_picture(designed,
     assert capsys.readouterr().out == (tmp_path / "m.csv").read_text()
     assert main(["motion", "show", said["motion"], "--figure", str(tmp_path / "m.png")]) == 0
     assert (tmp_path / "m.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+    capsys.readouterr()
     assert main(["motion", "show", said["motion"], "--robot", "ur10e", "--figure", str(tmp_path / "n.png")]) == 2
-    assert "moves 7 joints: ur10e has 6" in capsys.readouterr().err
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert "moves 7 joints: ur10e has 6" in printed.err
 
 
 def test_the_json_says_what_is_told_and_what_is_used(designed):

@@ -56,6 +56,36 @@ def test_what_an_enriched_path_tells_is_on_the_page_and_is_at_most_half_of_what_
     assert all(max(one["ratio"]) <= 0.5 for one in found.values())
 
 
+def test_what_limits_motor_currents_is_what_was_measured(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    from motor_side_limits import in_words, tables
+
+    found, words = result("motor_side_limits"), " ".join(PAGE.split())
+    for text in tables(found["removed"], found["ways"]).values():
+        assert text in PAGE
+    removed, ways = found["removed"], found["ways"]
+    assert f"on {found['worlds']} other simulated UR10e" in words
+    mass, *others = in_words(removed["gain, load, friction"]["error"]).split(" · ")
+    assert f"the error is {mass} g · {' · '.join(others)}" in words
+    mass, *others = in_words(found["bound"]["nothing"]).split(" · ")
+    assert f"is {mass} g · {' · '.join(others)}" in words
+    # what the page says in words: the empty run takes these out, those are in proportion to the load, a weight halves
+    for gone in ("residual", "links", "sensors"):
+        assert abs(removed[gone]["error"][0] / removed["nothing"]["error"][0] - 1.0) < 0.05
+    assert removed["gain, load"]["error"][0] < 0.6 * removed["nothing"]["error"][0]
+    assert ways["weight"]["error"][0] < 0.55 * ways["as designed"]["error"][0]
+    assert ways["both sides"]["error"][0] > ways["as designed"]["error"][0]
+
+
+def test_the_table_of_processor_times_is_that_of_the_committed_benchmark(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    from design_time import table
+
+    found = result("design_time")["arms"]
+    assert table(found) in PAGE
+    assert all(each["design"] < 10.0 and each["nudge"] <= 1.0 for each in found.values())
+
+
 def test_how_far_off_a_centre_of_mass_is_and_in_how_many_worlds_is_what_was_measured():
     panda, ur = (result("designed_motions")["arms"][name] for name in ("panda", "ur10e"))
     words = " ".join(PAGE.split())

@@ -99,9 +99,9 @@ class Criterion:
         return 2 if self._designed_tare == "own" else 1
 
     @property
-    def designs_tare(self) -> bool:
-        """Whether the empty run is designed with the loaded one, at the same place."""
-        return self._designed_tare is not None
+    def designed_tare(self) -> str | None:
+        """The empty run that is designed with the loaded one: "same", "own"; None: there is none, or another log."""
+        return self._designed_tare
 
     @property
     def prior_half_width(self) -> NDArray[np.float64]:

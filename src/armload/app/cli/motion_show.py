@@ -12,6 +12,7 @@ from armload.app.cli.printing import console, print_note, table
 from armload.errors import UsageError
 
 if TYPE_CHECKING:
+    from armload.app.page.motion_page import MotionPage
     from armload.arms import Arm
     from armload.motion import Motion
 
@@ -39,6 +40,11 @@ def run_show(options: argparse.Namespace) -> int:
         raise UsageError("--host, --port and --box are of the page, but there is no --page")
     arm = arm_of(options)
     motion = motion_of(options.motion, arm)
+    page = _page(motion, arm, options) if options.page else None  # what refuses the motion, before anything is printed
+    if options.figure is not None:
+        from armload.lab.report.motion_figure import write_motion_figure
+
+        write_motion_figure(motion, arm, options.figure)
     q, dq, ddq = motion(np.linspace(0.0, motion.duration, 1001))
     rows = table(
         f"{motion.name}: {motion.n} joints, {motion.duration:g} s",
@@ -55,26 +61,23 @@ def run_show(options: argparse.Namespace) -> int:
     if note := getattr(motion, "note", ""):
         print(note)
     if options.figure is not None:
-        from armload.lab.report.motion_figure import write_motion_figure
-
-        write_motion_figure(motion, arm, options.figure)
         print_note(f"wrote {options.figure}")
-    return _serve(motion, arm, options) if options.page else 0
+    if page is not None:
+        print_note(f"{motion.name}: {page.url} (Ctrl-C ends it)")
+        try:
+            page.serve()
+        except KeyboardInterrupt:  # the only way to end it
+            pass
+        finally:
+            page.close()
+    return 0
 
 
-def _serve(motion: Motion, arm: Arm, options: argparse.Namespace) -> int:
+def _page(motion: Motion, arm: Arm, options: argparse.Namespace) -> MotionPage:
     from armload.app.page.motion_page import MotionPage
     from armload.excitation import Obstacle, Surroundings
 
     boxes = tuple(Obstacle((b[0], b[1], b[2]), (b[3], b[4], b[5])) for b in options.box)
     around = Surroundings(arm, options.floor, boxes, options.held)
     port = 8080 if options.port is None else options.port
-    page = MotionPage(motion, arm, around, options.host or "127.0.0.1", port)
-    print_note(f"{motion.name}: {page.url} (Ctrl-C ends it)")
-    try:
-        page.serve()
-    except KeyboardInterrupt:  # the only way to end it
-        pass
-    finally:
-        page.close()
-    return 0
+    return MotionPage(motion, arm, around, options.host or "127.0.0.1", port)
