@@ -6,7 +6,6 @@ one of them is made an array by NumPy (`np.asarray(log.q)`), with what that take
 
 from __future__ import annotations
 
-import mmap
 import os
 import tempfile
 import weakref
@@ -31,9 +30,10 @@ class _File:
         os.unlink(path)
         weakref.finalize(self, os.close, self.number)
 
-    def array(self) -> NDArray[np.float64]:
-        """All numbers, of which those are read that are looked at."""
-        return np.frombuffer(mmap.mmap(self.number, 0, access=mmap.ACCESS_READ))
+    def rows(self, start: int, stop: int, width: int) -> NDArray[np.float64]:
+        """Some rows (stop − start, width). They are read and not mapped: a process's pages of a file count as its own."""
+        size = 8 * width
+        return np.frombuffer(os.pread(self.number, size * (stop - start), size * start)).reshape(-1, width)
 
 
 class OnDisk:
@@ -48,8 +48,43 @@ class OnDisk:
         return self.shape[0]
 
     def __getitem__(self, index: Any) -> NDArray[np.float64]:
-        whole = self._file.array().reshape(-1, self._width)
-        return np.array(whole[self._rows, self._columns][index])  # a copy: the map and its pages are given back
+        rows, *columns = index if isinstance(index, tuple) else (index,)
+        if isinstance(rows, slice):
+            start, stop, step = rows.indices(len(self))
+            found = self._between(start, stop)[::step] if step > 0 else self._at(np.arange(start, stop, step))
+            return found[:, *columns]
+        rows = np.asarray(rows)
+        rows = np.flatnonzero(rows) if rows.dtype == bool else rows.astype(np.intp)
+        found = self._at(rows.ravel())
+        return found[np.arange(rows.size).reshape(rows.shape), *columns]
+
+    def _between(self, start: int, stop: int) -> NDArray[np.float64]:
+        """Rows that follow each other, a block at a time."""
+        out = np.empty((max(stop - start, 0), self.shape[1]))
+        for part in blocks(len(out)):
+            out[part] = self._read(start + part.start, start + part.stop)
+        return out
+
+    def _at(self, rows: NDArray[np.intp]) -> NDArray[np.float64]:
+        """Any rows (M,); those within one block are read at once.
+
+        Raises:
+            IndexError: there is no such row.
+        """
+        rows = np.where(rows < 0, rows + len(self), rows)
+        if len(rows) and not (0 <= rows.min() and rows.max() < len(self)):
+            raise IndexError(f"rows {rows.min()} to {rows.max()} of {len(self)}")
+        out = np.empty((len(rows), self.shape[1]))
+        order = np.argsort(rows, kind="stable")
+        edges = np.flatnonzero(np.diff(rows[order] // BLOCK)) + 1
+        for of_block in np.split(order, edges) if len(rows) else []:
+            first = int(rows[of_block[0]])
+            out[of_block] = self._read(first, int(rows[of_block[-1]]) + 1)[rows[of_block] - first]
+        return out
+
+    def _read(self, start: int, stop: int) -> NDArray[np.float64]:
+        first = self._rows.start
+        return self._file.rows(first + start, first + stop, self._width)[:, self._columns]
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[np.float64]:
         del copy  # it always is one
