@@ -1,30 +1,33 @@
 """Two versions of armload on the same logs and streams: what they answer, how far off it is, what an update costs.
 
-    python benchmarks/before_after.py --before REV [--seeds 5] [--rounds 5]
+    python benchmarks/before_after.py --before REV [--seeds 5] [--rounds 5] [--keep FOLDER] [--out FILE]
 
-The version before is a git revision, checked out for the time being; the version after is the code as it stands. Both
-run in processes of their own (before_after_worker.py), with the same interpreter and one thread for linear algebra.
-Logs and streams are simulated once, by the code as it stands (before_after_logs.py).
+The version before is a git revision; the version after is the code as it stands. Both run in processes of their own
+(before_after_worker.py), with the same interpreter and one thread for linear algebra. Logs and streams are simulated
+once, by the code as it stands (before_after_logs.py).
 
 Answers: an episode of every population of the benchmark for each seed, 3 s at 500 Hz, tares of at most 10 s; no
 training has used these seeds. Real logs, where ARMLOAD_REAL_DATA has them: what `armload identify --json` says.
 Streams: 3 s empty, then 5 s with a payload, at 1 kHz. In being timed the versions take turns; the time of an update is
 the least of all rounds, as the work is the same in each and a busy machine only adds to it.
 
-Writes benchmarks/results/before_after.json. About half an hour; fewer seeds are only printed.
+Writes benchmarks/results/before_after.json, which is of the rebuilt estimator (27f4e28), or --out. About half an hour;
+fewer seeds are only printed. --keep: the folder in which logs and every finished answer are kept, so that the same
+command goes on where it was stopped.
 """
 
 from __future__ import annotations
 
 import argparse
+import io
 import json
 import os
 import platform
 import subprocess
 import sys
+import tarfile
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +47,7 @@ from before_after_table import table
 from armload import __version__, read_recording
 from armload.inertia import Z95
 from armload.recording import GAP
+from armload.runtime.atomic import replacing
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULT = ROOT / "benchmarks" / "results" / "before_after.json"
@@ -54,25 +58,32 @@ ROUNDING = 1e-9  # [kg, kg·m, kg·m²] what was only moved differs by no more
 Sources = dict[str, Path]  # the folder with the package of each version: "before", "after"
 
 
-@contextmanager
-def checked_out(revision: str, folder: Path) -> Iterator[Path]:
-    """The files of a git revision, for the time being."""
-    subprocess.run(("git", "worktree", "add", "--quiet", "--detach", folder, revision), cwd=ROOT, check=True)
-    try:
-        yield folder
-    finally:
-        subprocess.run(("git", "worktree", "remove", "--force", folder), cwd=ROOT, check=True)
+def checked_out(revision: str, folder: Path) -> Path:
+    """The package as of a git revision, with that revision's times: what numba compiled of it stays valid."""
+    archive = subprocess.run(("git", "archive", revision, "src"), cwd=ROOT, capture_output=True, check=True).stdout
+    with tarfile.open(fileobj=io.BytesIO(archive)) as files:
+        files.extractall(folder, filter="data")
+    return folder / "src"
 
 
 def environment(source: Path) -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": str(source), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
 
-def worked(task: str, folder: Path, source: Path) -> dict[str, Any]:
+def worked(task: str, folder: Path, version: str, source: Path) -> dict[str, Any]:
     """What a version makes of a task."""
-    written = folder / "answers.json"
+    written = folder / f"{task}-{version}.json"
     subprocess.run((sys.executable, WORKER, task, folder, written), env=environment(source), check=True)
     return json.loads(written.read_text())
+
+
+def kept(path: Path, made: Callable[[], Any]) -> Any:
+    """What was made before and is in the file, or is made now and written there."""
+    if not path.is_file():
+        value = made()
+        with replacing(path) as temporary:
+            temporary.write_text(json.dumps(value), encoding="utf-8")
+    return json.loads(path.read_text(encoding="utf-8"))
 
 
 def largest(before: Any, after: Any) -> dict[str, float]:
@@ -86,8 +97,8 @@ def largest(before: Any, after: Any) -> dict[str, float]:
 
 def answers(folder: Path, sources: Sources, seeds: int) -> dict[str, Any]:
     """By how much answers changed; the hybrid's errors and coverage before and after."""
-    truth = write_episodes(folder, seeds)
-    found = {version: worked("answers", folder, source) for version, source in sources.items()}
+    truth = kept(folder / "truth.json", lambda: write_episodes(folder, seeds))
+    found = {version: worked("answers", folder, version, source) for version, source in sources.items()}
     asked: dict[str, list[str]] = {}
     for name, tasks in found["after"].items():
         for key in tasks:
@@ -105,7 +116,7 @@ def answers(folder: Path, sources: Sources, seeds: int) -> dict[str, Any]:
             "cpu_s": [round(sum(pair[k]["cpu_s"] for pair in pairs), 1) for k in (0, 1)],
         }
         if key.startswith("hybrid"):
-            real = np.array([truth[name][key == "hybrid, tare"] for name in names])
+            real = np.array([truth[name][key] for name in names])
             hybrid += [compared(key, t, k, both, real) for k, t in enumerate(TIMES)]
     return {"methods": methods, "hybrid": hybrid, "not_worse": all(line["not_worse"] for line in hybrid)}
 
@@ -151,11 +162,11 @@ def real_logs(folder: Path, sources: Sources) -> list[dict[str, Any]]:
 def streams(folder: Path, sources: Sources, rounds: int) -> dict[str, Any]:
     """What is said along streams, the changes noticed, and what an update costs."""
     write_streams(folder)
-    said = {version: worked("follow", folder, source) for version, source in sources.items()}
+    said = {version: worked("follow", folder, version, source) for version, source in sources.items()}
     times: dict[str, list[dict[str, Any]]] = {version: [] for version in sources}
     for _ in range(rounds):
         for version, source in sources.items():
-            times[version].append(worked("time", folder, source))
+            times[version].append(worked("time", folder, version, source))
     out = {}
     for name in STREAMS:
         before, after = (said[version][name] for version in sources)
@@ -195,11 +206,17 @@ def main() -> None:
     parser.add_argument("--before", required=True, metavar="REV", help="the version to compare with")
     parser.add_argument("--seeds", type=int, default=SEEDS)
     parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--keep", type=Path, metavar="FOLDER", help="where to keep what is finished")
+    parser.add_argument("--out", type=Path, default=RESULT, metavar="FILE")
     asked = parser.parse_args()
     command = ("git", "rev-parse", asked.before, "HEAD")
     revisions = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
-    with tempfile.TemporaryDirectory() as name, checked_out(asked.before, Path(name) / "before") as before:
-        sources, folder = {"before": before / "src", "after": ROOT / "src"}, Path(name)
+    with tempfile.TemporaryDirectory() as name:
+        folder: Path = (asked.keep or Path(name)).resolve()
+        folder.mkdir(parents=True, exist_ok=True)
+        if kept(folder / "revisions.json", lambda: revisions) != revisions:
+            raise SystemExit(f"{folder} holds answers of other revisions: name another folder")
+        sources = {"before": checked_out(asked.before, folder / "before"), "after": ROOT / "src"}
         result = {
             "command": f"python benchmarks/before_after.py --before {asked.before} --seeds {asked.seeds} "
             f"--rounds {asked.rounds}",
@@ -208,14 +225,14 @@ def main() -> None:
             "machine": f"{platform.machine()}, {os.cpu_count()} cores",
             "load": round(os.getloadavg()[0], 1),
             "seeds": {"episodes": [FIRST_SEED + k for k in range(asked.seeds)], "streams": STREAM_SEED},
-            "online": streams(folder, sources, asked.rounds),
-            "real_logs": real_logs(folder, sources),
+            "online": kept(folder / "online.json", lambda: streams(folder, sources, asked.rounds)),
+            "real_logs": kept(folder / "real_logs.json", lambda: real_logs(folder, sources)),
             "answers": answers(folder, sources, asked.seeds),
         }
     print(table(result))
     text = json.dumps(result, indent=1, ensure_ascii=False)
     if asked.seeds >= SEEDS:
-        RESULT.write_text(text + "\n", encoding="utf-8")
+        asked.out.write_text(text + "\n", encoding="utf-8")
     else:
         print(text)
 

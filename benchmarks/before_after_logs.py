@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from armload import Recording, arm, read_recording, simulate, write_recording
@@ -28,13 +27,13 @@ SLOW, SLOW_ON = ("ekf", "lmi", "rtls"), 6  # logs, of different populations
 STREAMS = {"panda": "panda", "panda, tare": "panda", "ur5e": "ur5e", "ur5e, tare": "ur5e"}
 STREAM_SEED, EMPTY, LASTS = 910_101, 3.0, 8.0  # [s]
 WINDOWS = (10.0, 12.0, 14.0)  # [s] of the real Panda log, with a payload's torque added
-Truth = dict[str, dict[bool, NDArray[np.float64]]]
+Truth = dict[str, dict[str, list[float]]]
 
 
 def write_episodes(folder: Path, seeds: int) -> Truth:
     """Write every episode's logs and the plan of what to ask of them: (key, method, with its tare, times [s]).
 
-    Returns the truth (10,) of each log relative to its tare (True) and as if there were none (False).
+    Returns the truth (10,) of each log, by what the hybrid is asked: relative to its tare, and as if there were none.
     """
     robot, truth, plan = arm("panda"), {}, {}
     for number, population in enumerate(ALL.values()):
@@ -46,7 +45,8 @@ def write_episodes(folder: Path, seeds: int) -> Truth:
             write_recording(folder / f"{name}.npz", made.run)
             if made.tare is not None:
                 write_recording(folder / f"{name}-tare.npz", made.tare)
-            truth[name] = {tared: made.truth.phi, False: replace(episode, tare_motion=None).truth.phi}
+            empty = replace(episode, tare_motion=None)
+            truth[name] = {"hybrid, tare": made.truth.phi.tolist(), "hybrid, no tare": empty.truth.phi.tolist()}
             methods = OTHERS + ("joint",) * tared + ("difference",) * population.same_motion
             methods += SLOW if seed == FIRST_SEED and number % (len(ALL) // SLOW_ON) == 0 else ()
             plan[name] = [

@@ -29,11 +29,15 @@ def logs(folder: Path, name: str, robot: Any) -> tuple[Recording, Recording | No
     return read_recording(folder / f"{name}.npz", robot), read_recording(tare, robot) if tare.exists() else None
 
 
-def answers(folder: Path) -> dict[str, Any]:
-    """phi and std (T, 10) of every task of every log, or why there are none."""
+def answers(folder: Path, written: Path) -> dict[str, Any]:
+    """phi and std (T, 10) of every task of every log, or why there are none; each log's are kept as they come."""
     plan, robot = json.loads((folder / "plan.json").read_text()), arm("panda")
     found: dict[str, Any] = {}
     for number, (name, tasks) in enumerate(plan.items(), start=1):
+        cell = written.with_suffix("") / f"{name}.json"
+        if cell.is_file():
+            found[name] = json.loads(cell.read_text())
+            continue
         run, tare = logs(folder, name, robot)
         found[name] = {}
         for key, method, tared, times in tasks:
@@ -45,6 +49,9 @@ def answers(folder: Path) -> dict[str, Any]:
             except ArmloadError as error:
                 said = {"refused": str(error)}
             found[name][key] = {**said, "cpu_s": round(time.process_time() - began, 2)}
+        cell.parent.mkdir(exist_ok=True)
+        cell.with_suffix(".part").write_text(json.dumps(found[name]))
+        cell.with_suffix(".part").rename(cell)
         print(f"{number} of {len(plan)}: {name}", file=sys.stderr, flush=True)
     return found
 
@@ -56,7 +63,7 @@ def stream(folder: Path, name: str, which: str) -> tuple[OnlineIdentifier, Recor
     return OnlineIdentifier(robot, tare), run
 
 
-def follow(folder: Path) -> dict[str, Any]:
+def follow(folder: Path, _: Path) -> dict[str, Any]:
     """t (N/EVERY,) and phi (N/EVERY, 10) along every stream, the changes noticed, when samples were first left out."""
     found: dict[str, Any] = {}
     for name, which in json.loads((folder / "streams.json").read_text()).items():
@@ -76,7 +83,7 @@ def follow(folder: Path) -> dict[str, Any]:
     return found
 
 
-def timed(folder: Path) -> dict[str, Any]:
+def timed(folder: Path, _: Path) -> dict[str, Any]:
     """Time of every update [ns] on one core, the thread's own and the wall's; the process' own of the stream [s]."""
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     thread, wall, found = time.thread_time_ns, time.perf_counter_ns, {}
@@ -100,4 +107,4 @@ if __name__ == "__main__":
     task, given, written = {"answers": answers, "follow": follow, "time": timed}[sys.argv[1]], *map(Path, sys.argv[2:])
     if not Path(armload.__file__).is_relative_to(os.environ["PYTHONPATH"]):
         raise SystemExit(f"found armload at {armload.__file__}: expected it below {os.environ['PYTHONPATH']}")
-    written.write_text(json.dumps(task(given)))
+    written.write_text(json.dumps(task(given, written)))

@@ -40,7 +40,7 @@ from armload.regression.noise import SMOOTH, whole_noise
 _FEATURES = (32, 4)
 
 
-class Told(NamedTuple):
+class CriterionValue(NamedTuple):
     """J, its change with q and dq of each motion (N, n), and the bound B (10, 10)."""
 
     value: float
@@ -108,7 +108,7 @@ class Criterion:
         """Of the 95 % intervals before the run (10,)."""
         return Z95 * self._prior.std
 
-    def __call__(self, motions: Sequence[MotionRows]) -> Told:
+    def __call__(self, motions: Sequence[MotionRows]) -> CriterionValue:
         """J of the rows of the loaded run, and of its own empty run where there is one."""
         order = {"same": [0, 0], "own": [1, 0], None: [0]}[self._designed_tare]
         runs = [self._data(rows) for rows in motions]
@@ -129,7 +129,7 @@ class Criterion:
                 places = [k for k, its in enumerate(order, start=first) if its == which]
                 parts = [self._root(problem.selections[k], found.slope, with_phi, scales.noise[k]) for k in places]
                 self._back(rows, np.concatenate(parts, axis=2), changes[which])
-        return Told(-2.0 * float(np.log(np.diag(L)).sum()), changes, B)
+        return CriterionValue(-2.0 * float(np.log(np.diag(L)).sum()), changes, B)
 
     @staticmethod
     def _root(selection: NDArray, slope: NDArray, with_phi: NDArray, noise: NDArray) -> NDArray[np.float64]:

@@ -98,7 +98,7 @@ def enrich(
     for iterations, weight in _STAGES:
         x = problem.climb(x, iterations, weight)[0]
     motion, far, turned, found = _held_back(constraints, path, track, problem.points(x)[0], distance, angle)
-    before, after = problem.told([path]).half_width, problem.told([motion]).half_width
+    before, after = problem.evaluated([path]).half_width, problem.evaluated([motion]).half_width
     return Enriched(motion, before, after, far, turned, found)
 
 

@@ -23,7 +23,7 @@ from scipy.optimize import minimize
 
 from armload.errors import MotionError
 from armload.excitation.constraints import LONGEST, SHORTEST, Constraints
-from armload.excitation.criterion import Criterion, Told
+from armload.excitation.criterion import Criterion, CriterionValue
 from armload.excitation.penalty import Penalty
 from armload.excitation.promise import promised
 from armload.excitation.track import Track
@@ -106,14 +106,14 @@ def design_motion(
         _drawn_together(constraints, SplineMotion(constraints.start, c, t, label))
         for c, t, label in zip(problem.points(x), times, names, strict=False)
     ]
-    told = problem.told(motions)
+    reached = problem.evaluated(motions)
     assert constraints.payload is not None
     return Design(
         motions[0],
         motions[1] if len(motions) > 1 else None,
-        told.half_width,
-        promised(criterion, told.half_width, constraints.payload),
-        told.value,
+        reached.half_width,
+        promised(criterion, reached.half_width, constraints.payload),
+        reached.value,
         used(constraints, motions[0]),
         problem.evaluations,
     )
@@ -164,9 +164,9 @@ class Climb:
             for s, c in zip(self.samples, controls, strict=True)
         ]
         rows = [model.forward(m[0], m[1], s.step) for m, s in zip(moved, self.samples, strict=True)]
-        told = self.criterion(rows)
-        total, out = -told.value, []
-        for k, change in enumerate(told.changes):
+        found = self.criterion(rows)
+        total, out = -found.value, []
+        for k, change in enumerate(found.changes):
             basis, (_, _, ddq, jerk) = self.samples[k].basis, moved[k]
             for part in (change.q, change.dq, change.momentum, change.drift):
                 part *= -1.0
@@ -179,7 +179,7 @@ class Climb:
             out.append((slope.T[self.constraints.moving] * self.scale[k][:, None]).ravel())
         return total, np.concatenate(out)
 
-    def told(self, motions: Sequence[Motion]) -> Told:
+    def evaluated(self, motions: Sequence[Motion]) -> CriterionValue:
         """J and the bound of finished motions."""
         rows = []
         for motion in motions:

@@ -26,7 +26,7 @@ _STEP = 1e-5  # [rad] of the difference quotients of clearances
 _EVERY = 2  # of the samples are looked at for clearances
 
 
-class Beyond(NamedTuple):
+class PenaltyValue(NamedTuple):
     """P, and how it changes with q, dq, ddq and the third derivative (N, n)."""
 
     value: float
@@ -54,7 +54,7 @@ class Penalty:
         jerk: NDArray[np.float64],
         change: RowAdjoint,
         weight: float,
-    ) -> Beyond:
+    ) -> PenaltyValue:
         """P of a motion; `weight` times its change with q, dq and the momentum form is added to `change`."""
         N = len(rows.q)
         share = weight / N
@@ -69,7 +69,7 @@ class Penalty:
         change.dq += out[0]
         total += self._torque(rows, change, share) + self._speed(rows, change, share)
         total += self._clearance(rows, change, share)
-        return Beyond(total / N, out[1], out[2])
+        return PenaltyValue(total / N, out[1], out[2])
 
     def _torque(self, rows: MotionRows, change: RowAdjoint, share: float) -> float:
         corners, links, step = self.constraints.corners, self._links, rows.step
