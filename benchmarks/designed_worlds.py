@@ -1,7 +1,7 @@
 """The worlds of `designed_motions.py` that are measured, in a file that is committed, so that later runs add to them.
 
 A world costs ten seconds of a processor, most of them the estimator's. Of each candidate in each world the file keeps
-what the tables need, to four digits; with which code it was measured (the simulator's, the rows' and the posterior's),
+what the tables need, to three digits; with which code it was measured (the simulator's, the rows' and the posterior's),
 and a hash of the motions, to a milliradian: a candidate whose motions have changed is measured anew, one whose code has
 is not, unless that is asked for.
 """
@@ -43,14 +43,14 @@ def motion_hash(*motions: tuple[Motion | None, float]) -> str:
 
 
 def compact(cell: dict[str, Any], code: str, motions: str) -> dict[str, Any]:
-    """What the tables need of one candidate in one world."""
+    """What the tables need of one candidate in one world: errors (T, 3), and at the end how far the centre is off, the
+    bound over the half-width given (10,), and how many of ten errors are within the bound."""
     error, width, bound = (np.array(cell[name]) for name in ("errors", "half_width", "bound"))
     return {
-        "times": cell["times"],
         "three": _short(in_three(error)),
         "centre": _short(cell["centre"][-1]),
         "predicted": _short(bound[-1] / width[-1]),
-        "off": _short(np.abs(error[-1]) / bound[-1]),
+        "within": int((np.abs(error[-1]) <= bound[-1]).sum()),
         "code": code[:12],
         "motions": motions,
     }
@@ -78,5 +78,5 @@ def of_now(worlds: Worlds, hashes: dict[str, str], good: Callable[[dict[str, Any
 
 
 def _short(x: Any) -> Any:
-    each = [float(f"{value:.4g}") for value in np.ravel(x)]
+    each = [float(f"{value:.3g}") for value in np.ravel(x)]
     return each[0] if np.ndim(x) == 0 else np.reshape(each, np.shape(x)).tolist()

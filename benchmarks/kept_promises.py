@@ -4,11 +4,11 @@
 
 Every design has its own pose, time, share of the limits, heaviest payload and tare, drawn at random; every world is an
 arm that differs from its model as real ones do, with a payload of the range and its sensors, none of them among those
-from which the factors of `excitation/promise.py` are: `designed_motions.py`, and a first draw of this script. The payload is identified after the
-motion is over, with the default of `identify`. A promise is kept in a world where the half-widths given of mass, of all
-moments and of all inertias are within those said: what `--until` relies on. "given / bound" is of the estimator's
-half-widths over the bound's, "given / promised" of them over those that are said: of the largest of moments and of
-inertias, median and 5 to 95 %. What is measured is kept in out/.
+from which the factors of `excitation/promise.py` are: `designed_motions.py`, and a first draw of this script. The
+payload is identified after the motion is over, with the default of `identify`. A promise is kept in a world where the
+half-widths given of mass, of all moments and of all inertias are within those said: what `--until` relies on.
+"given / bound" is of the estimator's half-widths over the bound's, "given / promised" of them over those that are said:
+of the largest of moments and of inertias, median and 5 to 95 %. What is measured is kept in out/.
 Writes benchmarks/results/kept_promises.json and the table in docs/motion.md.
 """
 

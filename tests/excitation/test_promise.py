@@ -9,6 +9,7 @@ from armload.excitation import Accuracy, Constraints, Criterion, PayloadRange, d
 from armload.excitation.promise import of_gain, promised
 
 READY = np.array([0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8])
+POSE_OF_MOTORS = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 LITTLE = np.full(10, 1e-9)
 
 
@@ -55,3 +56,9 @@ def test_what_the_gain_alone_does_not_allow_is_refused_and_a_lighter_payload_nam
     keep = Constraints(panda, READY, share=0.7, payload=PayloadRange(3.0))
     with pytest.raises(MotionError, match=r"calibrated to 0.5 % .*leaves 2.94 times .*less than 1 kg would do"):
         design_until(keep, Criterion(panda), Accuracy(mass=0.01))
+    arm_with_motors = arm("ur10e")
+    keep = Constraints(arm_with_motors, POSE_OF_MOTORS, share=0.9, payload=PayloadRange(3.0))
+    with pytest.raises(
+        MotionError, match=r"calibrated to 2 % and gears keep 1.7 % of a load to themselves \(1 sigma\)"
+    ):
+        design_until(keep, Criterion(arm_with_motors), Accuracy(mass=0.01))

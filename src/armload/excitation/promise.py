@@ -66,6 +66,13 @@ def gain_std(criterion: Criterion) -> float:
     return criterion.correction.gain_std or assumed_gain(criterion.arm, _side(criterion))
 
 
+def of_gain_in_words(criterion: Criterion) -> str:
+    """What that share comes from."""
+    loss = _LOSS[_side(criterion)]
+    gears = f" and gears keep {100 * loss:.2g} % of a load to themselves" if loss else ""
+    return f"the torque is calibrated to {100 * gain_std(criterion):.2g} %{gears} (1 sigma)"
+
+
 def _side(criterion: Criterion) -> str:
     """Where the arm's torque is measured: at the link, or as its motors' current."""
     return "motor" if criterion.arm.motor_torque else "link"

@@ -11,7 +11,7 @@ from armload.excitation.accuracy import Accuracy
 from armload.excitation.constraints import LONGEST, SHORTEST, Constraints
 from armload.excitation.criterion import Criterion
 from armload.excitation.optimisation import Design, design_motion
-from armload.excitation.promise import gain_std, of_gain
+from armload.excitation.promise import of_gain, of_gain_in_words
 
 _FIRST = 2.0  # [s] looked at first
 _DESIGNS = 6  # at most
@@ -79,10 +79,10 @@ def _check_gain(constraints: Constraints, criterion: Criterion, accuracy: Accura
     over = accuracy.over(of_gain(criterion, payload))
     if over >= 1.0:
         raise MotionError(
-            f"the accuracy asked for is out of reach of any motion: the torque is calibrated to "
-            f"{100 * gain_std(criterion):.2g} % (1 sigma), which of payloads up to {payload.mass:.3g} kg alone leaves "
-            f"{over:.3g} times as much; say how heavy the payload may be (less than {payload.mass / over:.2g} kg "
-            "would do), ask for less, or learn the gain with a known weight (armload profile --mass)"
+            f"the accuracy asked for is out of reach of any motion: {of_gain_in_words(criterion)}, which of payloads "
+            f"up to {payload.mass:.3g} kg alone leaves {over:.3g} times as much; say how heavy the payload may be (less "
+            f"than {payload.mass / over:.2g} kg would do), ask for less, or learn the gain with a known weight (armload "
+            "profile --mass)"
         )
 
 
