@@ -25,7 +25,7 @@ from armload.errors import ClusterError, UsageError
 ATTEMPTS = 3
 _ADDRESS = re.compile(r"(tcp|tls|ucx)://\S+:\d+$")
 _WAIT = 30.0  # [s] for a cluster to answer
-_NO_WORKER = 300.0  # [s] without any worker, after which none is waited for: a queue of a batch system takes minutes
+_NO_WORKER = 300.0  # [s] without any worker: a queue of a batch system takes minutes
 _LOOK = 5.0  # [s] after which it is looked whether the scheduler is there, where nothing is finished meanwhile
 _GONE = "the cluster is gone: nothing that was finished is lost; start it and run the same command again to go on"
 _NONE: Any = object()
@@ -36,10 +36,15 @@ R = TypeVar("R")
 
 @dataclass(frozen=True)
 class Engine:
-    """Something that runs tasks. jobs: how many processes, where there is no cluster. client: of a Dask cluster."""
+    """Something that runs tasks.
+
+    jobs: how many processes, where there is no cluster. client: of a Dask cluster. patience: [s] without any worker,
+        after which none is waited for.
+    """
 
     jobs: int
     client: Any = None
+    patience: float = _NO_WORKER
 
     def each(self, work: Callable[[T], R], items: Callable[[], Iterable[T]]) -> Iterator[tuple[T, R | None]]:
         """Each item and what work(item) is, in the order in which they are finished; None: its process was killed.
@@ -119,15 +124,15 @@ class Engine:
 
     def _cores(self) -> int:
         """Of all workers there are; waits for one."""
-        until = time.monotonic() + _NO_WORKER
+        until = time.monotonic() + self.patience
         while True:
             with _gone():
                 if cores := sum(self.client.ncores().values()):
                     return cores
             if time.monotonic() > until:
                 raise ClusterError(
-                    f"the cluster has had no worker for {_NO_WORKER / 60.0:.0f} minutes: start one, and run the same "
-                    "command again to go on"
+                    f"the cluster has had no worker for {self.patience / 60.0:.2g} minutes: start one, and run the "
+                    "same command again to go on"
                 )
             time.sleep(0.2)
 
