@@ -43,7 +43,10 @@ def _in_short(claims: Claims, turns: Sequence[Turned]) -> str:
     """The answer in two sentences."""
     once, by = distinct(claims), {t.change: t for t in turns}
     firm = sum(claim["verdict"] in (CONFIRMED, DIRECTION) for claim in once)
-    text = f"{firm} of the paper's {len(once)} percentages point its way here, whichever single choice is changed"
+    text = (
+        f"{firm} of the paper's {len(once)} percentages point its way here, and no single change of a choice that it "
+        "leaves open clearly turns them"
+    )
     conditions = {
         "whole payloads held out": ("on payloads that were not trained on", "on the paper's own split"),
         "rival calibrated as in [7]": ("beside least squares calibrated as in its reference [7]", "uncalibrated"),
