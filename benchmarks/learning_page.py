@@ -1,4 +1,4 @@
-"""The figure and the table of docs/learning.md, from benchmarks/results/learning_curves.json.
+"""The figure and the table of docs/learning.md, from results/learning_curves.json and learning_networks.json.
 
 python benchmarks/learning_page.py
 """
@@ -41,11 +41,11 @@ def shown(errors: NDArray[np.float64]) -> str:
     return f"{mass(errors)[0]:.0f} ± {mass(errors)[1]:.0f} · {moment:.1f} · {inertia:.1f}"
 
 
-def trainings(cells: list[dict[str, Any]]) -> dict[tuple[int, ...], list[dict[str, Any]]]:
-    """Cells of trees by (payloads, motions, arms), all seeds."""
+def trainings(cells: list[dict[str, Any]], learner: str = "trees") -> dict[tuple[int, ...], list[dict[str, Any]]]:
+    """Cells of a learner by (payloads, motions, arms), all seeds."""
     found: dict[tuple[int, ...], list[dict[str, Any]]] = {}
     for cell in cells:
-        if cell["name"].startswith("trees"):
+        if cell["name"].startswith(learner):
             found.setdefault(tuple(cell["counts"]), []).append(cell)
     return found
 
@@ -53,11 +53,13 @@ def trainings(cells: list[dict[str, Any]]) -> dict[tuple[int, ...], list[dict[st
 def table(cells: list[dict[str, Any]]) -> str:
     """Every training and every rival: errors in each set, and the cost of a training."""
     rows = []
-    for counts, same in sorted(trainings(cells).items()):
-        simulate, train = (np.mean([cell["cost_s"][part] for cell in same]) for part in ("simulate", "train"))
-        errors = [shown(pooled(same, name)) for name in ("training's own logs", *SETS)]
-        logs = "" if same[0]["logs"] == 1000 else f" ({same[0]['logs']} logs)"
-        rows.append([f"trees: {' · '.join(map(str, counts))}{logs}", *errors, f"{simulate:.0f} + {train:.0f}"])
+    for learner in ("trees", "networks"):
+        for counts, same in sorted(trainings(cells, learner).items()):
+            simulate, train = (np.mean([cell["cost_s"][part] for cell in same]) for part in ("simulate", "train"))
+            errors = [shown(pooled(same, name)) for name in ("training's own logs", *SETS)]
+            marks = [f"{same[0]['logs']} logs"] * (same[0]["logs"] != 1000) + ["one seed"] * (len(same) == 1)
+            name = f"{learner}: {' · '.join(map(str, counts))}" + (f" ({', '.join(marks)})" if marks else "")
+            rows.append([name, *errors, f"{simulate:.0f} + {train:.0f}"])
     judged = {s: [cell for cell in cells if cell.get("set") == s] for s in SETS}
     for method in PHYSICS:
         rows.append([method, "–", *(shown(pooled(judged[s], method)) for s in SETS), "–"])
@@ -69,7 +71,7 @@ def figure(cells: list[dict[str, Any]]) -> None:
     """Error of the mass over what was trained on, a panel for each set."""
     import matplotlib.pyplot as plt
 
-    trained = trainings(cells)
+    trained, networks = trainings(cells), trainings(cells, "networks")
     with look():
         canvas, panels = plt.subplots(1, 3, figsize=(8.6, 3.6), sharey=True)
         for axes, (name, title) in zip(panels, SETS.items(), strict=True):
@@ -79,6 +81,11 @@ def figure(cells: list[dict[str, Any]]) -> None:
                     continue
                 x, y, spread = ([p[0] for p in points], [p[1][0] for p in points], [p[1][1] for p in points])
                 axes.errorbar(x, y, spread, marker="o", ms=4, capsize=2, color=colour, label=f"trees over {label}")
+                beside = sorted(
+                    (x, mass(pooled(c, name))[0]) for k, c in networks.items() if (x := place(*k)) is not None
+                )
+                if len(beside) > 1:
+                    axes.plot(*zip(*beside, strict=True), "s", ls=(0, (4, 2)), ms=4, mfc="white", color=colour)
             rivals = [cell for cell in cells if cell.get("set") == name]
             for method, colour, style in zip(
                 PHYSICS, ("#8A8A8A", *COLOURS[4:]), ("--", ":", "-.", ":", "-"), strict=True
@@ -96,7 +103,8 @@ def figure(cells: list[dict[str, Any]]) -> None:
 
 
 def main() -> None:
-    cells = json.loads((RESULTS / "learning_curves.json").read_text(encoding="utf-8"))["cells"]
+    results = [RESULTS / f"learning_{name}.json" for name in ("curves", "networks")]
+    cells = [cell for file in results for cell in json.loads(file.read_text(encoding="utf-8"))["cells"]]
     figure(cells)
     write_table(ROOT / "docs" / "learning.md", "learning curves", table(cells))
 

@@ -51,8 +51,8 @@ from armload.runtime.atomic import replacing
 FORMAT = 1  # of a cell; a change makes every one unfinished
 WORLDS = ("real_like", "beyond")
 RUNS = 24  # judged on arms of each kind
-MEMBERS, WIDTH, STEPS = 3, 48, 3000  # of every bag of networks
-FEWER = {"transformer": 1000}  # steps of what costs six times as much
+MEMBERS, WIDTH, STEPS = 3, 48, 1500  # of every bag of networks
+FEWER = {"transformer": 750}  # steps of what costs six times as much
 EPOCHS = 60  # at most, of the networks over `statistics`
 ARCHITECTURES = ("conv", "gru", "transformer")
 SIZES = (500, 1000)  # further numbers of training episodes, of one learner
@@ -154,12 +154,13 @@ def _sharded(folder: Path, number: int) -> dict[str, Any]:
 
 def tasks(folder: Path, shards: int) -> list[Task]:
     """All cells, the telling ones first."""
-    settings, all_of_it = (FORMAT, RUNS, MEMBERS, WIDTH, STEPS, EPOCHS, PRIOR_PAYLOADS), shards * SHARD
-    made = [Task.of_one(f"judged-{w}", key_of(settings, w), judge, w, folder) for w in WORLDS]
+    runs, all_of_it = (FORMAT, RUNS, PRIOR_PAYLOADS), shards * SHARD
+    settings = (*runs, MEMBERS, WIDTH, STEPS, FEWER, EPOCHS)
+    made = [Task.of_one(f"judged-{w}", key_of(runs, w), judge, w, folder) for w in WORLDS]
     made += [Task.of_one(f"shard-{k:04d}", key_of(FORMAT, k), _sharded, folder, k) for k in range(shards)]
 
     def learner(name: str, measure: Any, *parameters: Any) -> Task:
-        return Task.of_one(name, key_of(settings, FEWER, shards, parameters), measure, *parameters, folder)
+        return Task.of_one(name, key_of(settings, shards, parameters), measure, *parameters, folder)
 
     def window(architecture: str, what: str, tare: str, episodes: int = all_of_it, seed: int = 0) -> Task:
         name = f"{architecture}-{what}-{tare.replace(' ', '-')}-{episodes}-s{seed}"

@@ -7,7 +7,7 @@ from armload.ensembles import WindowNetworks
 from armload.ensembles.window_networks import ARCHITECTURES, _functions
 from armload.errors import ModelError
 
-SMALL = {"members": 2, "width": 8, "steps": 60, "batch": 16}
+SMALL = {"members": 2, "width": 8, "steps": 200, "batch": 16}
 
 
 @pytest.fixture(scope="module")
