@@ -111,6 +111,7 @@ def test_changes_of_payload_are_in_the_log(live):
     assert texts[-1] == "the source has ended"
 
 
+@pytest.mark.full  # some seconds
 def test_identify_says_of_the_record_what_it_says_of_the_same_samples_as_csv(live, capsys):
     _, path, log = live
     answers = []

@@ -18,6 +18,7 @@ from armload.payloads import random_payload
 from armload.regression import FilteredRegression
 from armload.simulation import Resolution, Sensors, World, simulate
 
+QUICK, OTHERS = ("panda", "ur10e"), ("fr3", "gen3", "iiwa14", "ur5e", "xarm7")  # an arm of each family
 SHORT = {"duration": 0.5, "tare_duration": 0.5}
 
 
@@ -111,10 +112,11 @@ def test_impossible_segments_are_refused():
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_arm_may_run_every_kind_of_motion_with_its_rated_payload(any_arm, kind):
-    source = MotionSource(any_arm)
-    motion = source.draw(kind, np.random.default_rng(3), 6.0)
-    assert check_motion(any_arm, motion, rated_load(any_arm)).ok
+@pytest.mark.parametrize("name", [*QUICK, *(pytest.param(name, marks=pytest.mark.full) for name in OTHERS)])
+def test_the_arm_may_run_every_kind_of_motion_with_its_rated_payload(name, kind):
+    robot = arm(name)
+    motion = MotionSource(robot).draw(kind, np.random.default_rng(3), 6.0)
+    assert check_motion(robot, motion, rated_load(robot)).ok
     moved = np.ptp(motion(np.linspace(0, 6, 200))[0], axis=0) > 0.02
     assert np.any(moved)
     assert np.all(moved) == (kind != "partial")
