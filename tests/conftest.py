@@ -18,6 +18,7 @@ TWO = ("panda", "ur10e")  # of seven joints and of six, of a torque sensor and o
 # are the longest, the longest first, so that none is left for the end; what they need of compiled code, `make` has made
 # before.
 FIRST = (
+    "lab/test_study.py",  # of the full tests
     "identification/test_identify.py",
     "estimators/test_identifier.py",
     "online/test_online.py",
@@ -31,6 +32,7 @@ FIRST = (
     "posterior/test_hybrid.py",
     "devices/test_mcap_record.py",
     "online/test_log_and_stream.py",
+    "online/test_learning.py",
     "devices/test_sources.py",
     "app/test_cli_workflow.py",
     "identification/test_answer.py",
