@@ -11,12 +11,14 @@ from armload.recording import Recording
 
 # one arm of each family, and those that have a hybrid; the others differ from one of these in figures only
 FAMILIES = ("fr3", "gen3", "iiwa14", "panda", "ur10e", "ur5e", "xarm7")
+TWO = ("panda", "ur10e")  # of seven joints and of six, of a torque sensor and of motor currents
 
 
 # Files that workers take first: `make test` gives a worker a file, and the next in this order when that is done. These
 # are the longest, the longest first, so that none is left for the end; what they need of compiled code, `make` has made
 # before.
 FIRST = (
+    "lab/test_study.py",  # of the full tests
     "identification/test_identify.py",
     "estimators/test_identifier.py",
     "online/test_online.py",
@@ -30,6 +32,7 @@ FIRST = (
     "posterior/test_hybrid.py",
     "devices/test_mcap_record.py",
     "online/test_log_and_stream.py",
+    "online/test_learning.py",
     "devices/test_sources.py",
     "app/test_cli_workflow.py",
     "identification/test_answer.py",
@@ -67,6 +70,12 @@ def pytest_collection_modifyitems(items):
 @pytest.fixture(params=FAMILIES)
 def any_arm(request):
     """An arm of each family of the catalogue in turn."""
+    return arm(request.param)
+
+
+@pytest.fixture(params=[pytest.param(name, marks=() if name in TWO else pytest.mark.full) for name in FAMILIES])
+def some_arm(request):
+    """As `any_arm`, but two of them in the quick tests: for what takes a while."""
     return arm(request.param)
 
 

@@ -133,7 +133,7 @@ def work(tmp_path_factory):
     """A folder with a small data set and a model of each kind, made through the command line."""
     folder = tmp_path_factory.mktemp("work")
     data = folder / "data"
-    build = ["--payloads", "random:14", "--rows", "150", "--world", "nominal", "real-like:2", "--seed", "5"]
+    build = ["--payloads", "random:8", "--rows", "150", "--world", "nominal", "real-like:2", "--seed", "5"]
     assert main(["dataset", "--out", str(data), *build]) == 0
     assert main(["train", "--dataset", str(data), "--seed", "5", "--out", str(folder / "trees.safetensors")]) == 0
     return folder
@@ -141,7 +141,7 @@ def work(tmp_path_factory):
 
 def test_dataset_holds_what_was_asked_for(work):
     data = open_dataset(work / "data")
-    assert (data.runs, len(data)) == (28, 28 * 150)
+    assert (data.runs, len(data)) == (16, 16 * 150)
     assert [world["seed"] for world in data.provenance["worlds"]] == [None, 2]
     assert data.provenance["sensors"] is not None
     assert data.provenance["motions"][0]["name"] == "taie2024"
@@ -150,8 +150,8 @@ def test_dataset_holds_what_was_asked_for(work):
 def test_dataset_built_again_is_the_same_and_another_is_refused(work, call):
     build = ["dataset", "--out", work / "data", "--rows", "150", "--world", "nominal", "real-like:2", "--seed", "5"]
     before = open_dataset(work / "data").hash
-    assert before[:12] in call(*build, "--payloads", "random:14").out
-    captured = call(*build, "--payloads", "random:15", code=2)
+    assert before[:12] in call(*build, "--payloads", "random:8").out
+    captured = call(*build, "--payloads", "random:9", code=2)
     assert captured.out == ""
     assert "payloads" in captured.err
 
@@ -232,8 +232,8 @@ def test_a_trained_model_identifies_its_motion_and_refuses_another(work, call, t
 @pytest.fixture
 def few_points(monkeypatch):
     """Reports whose curves have few points: each is an estimate of every method."""
-    monkeypatch.setattr(contest, "_POINTS", 5)
-    monkeypatch.setattr(report_command, "_POINTS", 4)
+    monkeypatch.setattr(contest, "_POINTS", 3)
+    monkeypatch.setattr(report_command, "_POINTS", 3)
 
 
 @pytest.mark.full
@@ -261,8 +261,8 @@ def test_report_of_a_log_shows_motion_torques_and_every_method(call, work, tmp_p
 @pytest.mark.usefixtures("few_points")
 def test_report_with_truth_shows_errors_and_baselines(call, tmp_path):
     panda = arm("panda")
-    write_recording(tmp_path / "log.npz", simulate(panda, taie2024(), franka_hand(), rate=100.0, duration=3.0))
-    write_recording(tmp_path / "tare.npz", simulate(panda, taie2024(), rate=100.0, duration=3.0))
+    write_recording(tmp_path / "log.npz", simulate(panda, taie2024(), franka_hand(), rate=100.0, duration=2.0))
+    write_recording(tmp_path / "tare.npz", simulate(panda, taie2024(), rate=100.0, duration=2.0))
     argv = ("report", tmp_path / "log.npz", "--robot", "panda", "--out", tmp_path / "r.html")
     printed = call(*argv, "--tare", tmp_path / "tare.npz", "--truth", "franka-hand").out
     page = text_of(tmp_path / "r.html")

@@ -111,6 +111,7 @@ def test_changes_of_payload_are_in_the_log(live):
     assert texts[-1] == "the source has ended"
 
 
+@pytest.mark.full  # some seconds
 def test_identify_says_of_the_record_what_it_says_of_the_same_samples_as_csv(live, capsys):
     _, path, log = live
     answers = []
@@ -174,6 +175,7 @@ def test_a_record_cut_anywhere_is_read_up_to_a_whole_chunk_and_says_so(tmp_path,
         assert re.search(r"is cut off: it was read up to the end of its last whole chunk, \d+ messages", log.notes[0])
 
 
+@pytest.mark.full  # some seconds
 def test_kill_9_of_live_loses_what_came_after_the_last_chunk_only(tmp_path, panda):
     path = tmp_path / "run.mcap"
     command = [sys.executable, "-c", "from armload.app import main; raise SystemExit(main())", "live", "sim"]

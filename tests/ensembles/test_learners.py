@@ -414,7 +414,7 @@ def test_a_network_that_diverges_says_so():
 # ---------------------------------------------------------------------- ensembles of ensembles
 
 
-@pytest.mark.parametrize("kind", ["tree", SMALL], ids=["tree", "network"])
+@pytest.mark.parametrize("kind", ["tree", pytest.param(SMALL, marks=pytest.mark.full)], ids=["tree", "network"])
 def test_two_stages_equal_two_single_ensembles(kind):
     X, y = rows(0)
     Xv, yv = rows(1, 60)

@@ -54,7 +54,11 @@ def log(panda):
     return log_of(taie2024(), panda)
 
 
-@pytest.fixture(scope="module", params=ENSEMBLES)
+# networks are in "tree + network", two stages in those of trees
+DEAR = {name: pytest.mark.full for name in ("network", "two-stage network")}
+
+
+@pytest.fixture(scope="module", params=[pytest.param(name, marks=DEAR.get(name, ())) for name in ENSEMBLES])
 def saved(request, panda, log, tmp_path_factory):
     """(fitted ensemble, its file, the model loaded from it)."""
     rng = np.random.default_rng(1)

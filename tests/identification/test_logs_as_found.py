@@ -100,8 +100,10 @@ FOUND = {
 
 # the default method with and without a tare; its physics alone mostly with one
 BETWEEN = ("torque 5 ms late", "torque 10 ms late")  # what is told by none and by 20 ms
-TRIED = [(name, tared, None, 0) for name in FOUND if name not in BETWEEN for tared in (True, False)]
+TRIED = [(name, True, None, 0) for name in FOUND if name not in BETWEEN]
+TRIED += [(name, False, None, 0) for name in ("irregular", "torque 20 ms late")]
 OTHERS = [(name, tared, None, 0) for name in BETWEEN for tared in (True, False)]
+OTHERS += [(name, False, None, 0) for name in ("jittered", "lossy")]
 OTHERS += [(name, True, None, 1) for name in FOUND]
 OTHERS += [(name, True, method, 0) for name in FOUND for method in ("map-gp", "map")]
 OTHERS += [(name, False, method, 0) for name in ("irregular", "torque 20 ms late") for method in ("map-gp", "map")]

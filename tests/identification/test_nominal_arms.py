@@ -17,7 +17,7 @@ from armload.simulation import Sensors, World, simulate
 NOMINAL = ("gen3", "iiwa14", "ur5", "xarm7")
 
 
-@pytest.mark.parametrize("name", NOMINAL)
+@pytest.mark.parametrize("name", ["gen3", *(pytest.param(name, marks=pytest.mark.full) for name in NOMINAL[1:])])
 def test_it_is_answered_with_intervals_that_hold_the_mass_and_are_calibrated_where_a_hybrid_is_shipped(name):
     robot = arm(name)
     how = {"world": World.real_like(robot, 0), "sensors": Sensors.of(robot), "rate": 250.0}

@@ -255,7 +255,9 @@ def test_a_torque_that_never_changes_while_its_joint_moves_is_refused_by_joint(r
         check_plausible(replace(log, tau=tau), robot)
 
 
-@pytest.mark.parametrize("name", ["panda", "ur10e", "ur10e loaded", "ur10"])
+@pytest.mark.parametrize(
+    "name", ["panda", "ur10e", *(pytest.param(x, marks=pytest.mark.full) for x in ("ur10e loaded", "ur10"))]
+)
 @pytest.mark.parametrize("pair", [(4, 5), (3, 4), (1, 2)])
 def test_exchanged_torque_columns_of_a_real_log_are_named(wrong, name, pair):
     robot, log = wrong[name]

@@ -147,6 +147,7 @@ def test_the_same_comparison_gives_the_same_bytes():
     assert first == second
 
 
+@pytest.mark.full  # some seconds
 def test_a_comparison_of_one_run_and_one_time_makes_a_report():
     c = made_up(runs=1)
     short = Comparison(**{

@@ -207,18 +207,18 @@ def replace_tau(log, tau):
     return replace(log, tau=tau)
 
 
-def test_friction_and_residual_converge_to_the_motion_that_comes_out(any_arm):
-    gains, clock, motion = Gains.of(any_arm), rollout.Clock.at(500.0, 3000), motion_of(any_arm)
-    world = World.real_like(replace(any_arm, motor_torque=False), seed=1)
-    command = Command.along(any_arm, motion, clock.step, clock.steps)
-    prepared = runs.prepare(world.arm(any_arm), gains, Run(motion, PAYLOAD, world), world, command, clock)
+def test_friction_and_residual_converge_to_the_motion_that_comes_out(some_arm):
+    gains, clock, motion = Gains.of(some_arm), rollout.Clock.at(500.0, 3000), motion_of(some_arm)
+    world = World.real_like(replace(some_arm, motor_torque=False), seed=1)
+    command = Command.along(some_arm, motion, clock.step, clock.steps)
+    prepared = runs.prepare(world.arm(some_arm), gains, Run(motion, PAYLOAD, world), world, command, clock)
     left = {}
     for passes in (1, 2, 4):
         fine = replace(clock, resolution=Resolution(passes=passes))
         left[passes] = rms(rollout.iteration_error([prepared], fine, 1)[0]).max()
     assert left[2] < 0.25 * left[1]
     assert left[4] < 0.1 * left[2]
-    assert left[2] < max(0.01, 5e-5 * any_arm.limits.effort.max())
+    assert left[2] < max(0.01, 5e-5 * some_arm.limits.effort.max())
 
 
 def test_with_the_friction_of_a_motors_side_the_controller_misreads_its_torque_by_a_few_percent_at_most():

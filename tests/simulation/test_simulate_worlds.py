@@ -73,20 +73,20 @@ def test_friction_that_cannot_be_is_refused():
 
 @pytest.mark.parametrize("resolution", [Resolution(), COARSE], ids=["fine", "coarse"])
 @pytest.mark.parametrize("motor_side", [False, True], ids=["joint", "motor"])
-def test_a_log_beyond_is_the_sum_of_the_world_s_parts(any_arm, motor_side, resolution):
-    world = World.beyond(any_arm, 1 + motor_side, motor_side)
-    drift = Drift(np.linspace(0.1, 0.5, any_arm.n), 100.0)
-    world = replace(world, drift=drift, friction=replace(world.friction, load=np.full(any_arm.n, 0.01)))
-    run = Run(motion_of(any_arm), PAYLOAD, world, start=50.0)
-    log = simulate_many(any_arm, [run], rate=1000.0, resolution=resolution)[0]
+def test_a_log_beyond_is_the_sum_of_the_world_s_parts(some_arm, motor_side, resolution):
+    world = World.beyond(some_arm, 1 + motor_side, motor_side)
+    drift = Drift(np.linspace(0.1, 0.5, some_arm.n), 100.0)
+    world = replace(world, drift=drift, friction=replace(world.friction, load=np.full(some_arm.n, 0.01)))
+    run = Run(motion_of(some_arm), PAYLOAD, world, start=50.0)
+    log = simulate_many(some_arm, [run], rate=1000.0, resolution=resolution)[0]
     ddq = CubicSpline(log.t, log.dq)(log.t, 1)
-    rigid = any_arm.with_links(world.links).with_payload(PAYLOAD).torque(log.q, log.dq, ddq)
+    rigid = some_arm.with_links(world.links).with_payload(PAYLOAD).torque(log.q, log.dq, ddq)
     if motor_side:
         rigid = rigid + world.rotor_inertia * ddq
     joint = rigid + world.friction(log.dq, rigid) + world.residual(log.q)
     expected = world.gain * joint + world.sticking(run.seed)(log.dq) + world.offset + drift(50.0 + log.t)
     left = rms(log.tau - expected)
-    assert np.all(left < 2e-4 * rated_effort(any_arm))
+    assert np.all(left < 2e-4 * rated_effort(some_arm))
     assert np.all(rms(log.tau - rigid) > 5e-3 * rms(log.tau - log.tau.mean(axis=0)))
 
 

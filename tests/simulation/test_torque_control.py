@@ -29,10 +29,10 @@ def rms(x) -> float:
 # ---------------------------------------------------------------- the loop
 
 
-def test_with_the_exact_model_nothing_is_left_of_the_tracking_error(any_arm):
-    motion = random_motion(any_arm, 3)
-    law = JointImpedance(any_arm.with_payload(PAYLOAD), motion)
-    log = torque_controlled(any_arm, law, motion.position([0.0])[0], 3.0, PAYLOAD, settle=0.2).recording
+def test_with_the_exact_model_nothing_is_left_of_the_tracking_error(some_arm):
+    motion = random_motion(some_arm, 3)
+    law = JointImpedance(some_arm.with_payload(PAYLOAD), motion)
+    log = torque_controlled(some_arm, law, motion.position([0.0])[0], 3.0, PAYLOAD, settle=0.2).recording
     assert np.ptp(log.q, axis=0).min() > 0.05  # every joint moved
     np.testing.assert_allclose(log.q, motion.position(log.t), rtol=0, atol=1e-13)
 
