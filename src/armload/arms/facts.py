@@ -104,7 +104,7 @@ class ArmFacts:
 
     @property
     def sensors(self) -> dict[str, Any] | None:
-        """What its sensors add, by the names of `armload.simulation.Sensors`; None: nobody has measured them."""
+        """What its sensors add, by the names of `armload.simulation.Sensors`; None: not measured."""
         of_sensors = [entry.name for entry in fields(self) if entry.metadata.get("table") == "sensors"]
         found = {name: getattr(self, name) for name in of_sensors if getattr(self, name) is not None}
         return found or None

@@ -19,7 +19,7 @@ class ArmHealth:
     residual: rms over the joints of the residual's long-run deviation √S, over the one expected of such an arm.
     restlessness: how restless the torques are, of what they were at the tare or in the profile (`posterior.restless`).
         None: there was neither, or torque is motor current.
-    misfit: T of `posterior.drift`, whether the arm is as it was at its tare or in its profile; None: nobody could ask.
+    misfit: T of `posterior.drift`, whether it is as at its tare or in its profile; None: not tested.
     joint: the joint that tells most of it, from 1; 0 where `misfit` is None. changed: whether T is beyond what sound
         logs show.
     """

@@ -52,7 +52,7 @@ class Found(NamedTuple):
         estimate's.
     offset_ratio: how many times the arm's torque offsets are what is expected of them, where that is too often.
     strange_links: by how much the arm's links differ from the model's (`ArmMismatch.links`), where that is too much.
-    unknown_friction: whether the torques hold gear friction that nobody knew of; `friction_found`: that they did.
+    unknown_friction: whether the torques hold unknown gear friction; `friction_found`: that they did.
     known_arm_std: standard deviation (10,) of a method that says what it would be, were the arm known exactly.
     drift: by how much the arm differs from what it was at the tare, of a method that asks.
     another: whether it is another one than at its tare, of a method that asks.

@@ -66,7 +66,7 @@ _OF_MASS = 29.588298445074422 / 12.115665146397816
 class Changes(NamedTuple):
     """times: [s, on the log's clock] at which the payload changes. statistic: the largest T of the whole log.
 
-    of_mass: the largest chi-squared of the mass alone, in units of T at the same level; 0 where nobody asks.
+    of_mass: the largest chi-squared of the mass alone, in units of T at the same level; 0 where not tested.
     """
 
     times: list[float]
@@ -85,11 +85,11 @@ def changes_of_payload(
 
     Args:
         tare, profile: what else is known of the arm, where there is one.
-        kappa: by how much the physics overrates the evidence of this log; None: nobody knows.
+        kappa: by how much the physics overrates the evidence of this log; None: not known.
     """
     kappa = KAPPA_UNKNOWN if kappa is None else kappa * (MOTOR_SIDE if arm.motor_torque else 1.0)
     found = _Search.of(recording, arm, tare, profile, kappa).all()
-    if found.times and not arm.motor_torque:  # friction of gears that nobody knew of looks like a change
+    if found.times and not arm.motor_torque:  # unknown gear friction looks like a change
         physics = SmoothPosteriorLeastSquares(arm)
         physics.run(recording)
         if physics.posterior.torque == "motor":

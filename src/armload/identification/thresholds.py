@@ -38,7 +38,7 @@ HEAVIEST = 3.0
 # (test_where_the_mass_may_be_zero_the_centre_s_interval_is_a_finite_bound)
 FARTHEST = 1.0
 # times 2 % of a link's mass (`Arm.link_spread`): figures so rough are nominal, and a tare is what is missing first.
-# A Panda's have 1, an FR3's 3, those of arms that nobody has identified 10
+# A Panda's have 1, an FR3's 3, those of arms that were never identified 10
 # (test_where_figures_are_nominal_the_first_advice_is_a_tare)
 NOMINAL = 5.0
 # times the standard deviation that counts as determined: what even an arm known exactly would leave beyond lacks
@@ -53,7 +53,7 @@ KNOWN = 1.5
 PAYLOAD_CHANGED = 29.588298445074422
 # T where it may have: the 99 % quantile
 PAYLOAD_MAY_CHANGE = 23.209251158954356
-# by how much the physics overrates a log's evidence, where nobody knows: as of the arms that are least like their
+# by how much the physics overrates a log's evidence, where it is not known: as of the arms that are least like their
 # models, with motor currents and beyond the measured ones (`Calibration.kappa` of them)
 KAPPA_UNKNOWN = 4.5
 # times kappa, where torque is motor current: friction that grows with the load differs from part to part. Sound

@@ -119,7 +119,7 @@ def _check_torque_is_the_arms(recording: Recording, arm: Arm) -> None:
 def _check_for_currents(recording: Recording, arm: Arm, scale: float) -> None:
     """Refuse motor currents in A by name: of a known arm what its torque constants make a sound log of.
 
-    Of an arm whose gears or sensors nobody has described the size alone says so.
+    Of an arm whose gears or sensors are not described, the size says so by itself.
     """
     facts = ARMS.get(arm.known_as or "")
     constants = None if facts is None else facts.torque_constants

@@ -61,7 +61,7 @@ class HybridModel:
         calibration: of the evidence and of the widths.
         arm_name, arm_fingerprint, frame: of its arm (`link_fingerprint`); the prior is about that frame.
         provenance: what else is known of its training, for people.
-        training: what it was trained on and how well it held; None: nobody has checked it.
+        training: what it was trained on and how well it held; None: not checked.
     """
 
     prior: MixturePrior

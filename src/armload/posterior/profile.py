@@ -59,7 +59,7 @@ class Profile:
         drift: (d,) variance of a session's offsets and friction about the mean session.
         repeated: by how much the noise of a log counts for more, as what the features cannot say repeats.
         gain, gain_std: (n,) gamma, by how much the torque sensors are off as a known weight showed it (`torque_gain`),
-            and how well the torque as a whole is known then; None: nobody hung one on.
+            and how well the torque as a whole is known then; None: none was hung on.
         sessions: what it was learned from. poses: (P, n) where the arm was seen [rad].
         gain_joint_std: (n,) standard deviation of each joint's gamma: a joint that hardly bears the weight keeps its
             prior. None: no weight, or a profile of an earlier version.

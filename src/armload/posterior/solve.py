@@ -41,7 +41,7 @@ def threads() -> ThreadpoolController:
 class Solution:
     """The posterior of the accumulated rows, and the same as a state that takes further rows of the last run.
 
-    another: whether the last run is of another arm than the first; None: nobody asked.
+    another: whether the last run is of another arm than the first; None: not tested.
     """
 
     posterior: Posterior

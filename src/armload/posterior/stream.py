@@ -38,7 +38,7 @@ class StreamingPosterior:
         prior_std: of each payload (10,). prior: of the run's payload, where more is known; None: `prior_std` alone.
         tares: what earlier runs said, all with the same mounted; `start`: the scales found from them.
         gain: λ of the lag [1/s]. iterations: of expectation–maximisation in the last solution.
-        same_motion: asks whether the tare shows the run's motion; None: nobody asks.
+        same_motion: asks whether the tare shows the run's motion; None: not tested.
         session: of the run; the tares' is session 0 unless they are of this one.
         test_tare: whether `conclude` asks if the arm is as it was at the tare, or another one, and allows for it if
             not; and if gravity is as it was given.
@@ -158,7 +158,7 @@ class StreamingPosterior:
 
     @property
     def restlessness(self) -> float:
-        """How restless the torques are in the run, of what they were at the tare; 0 where nobody can tell."""
+        """How restless the torques are in the run, of what they were at the tare; 0 where that cannot be found."""
         if len(self.posterior.power) < 2 or self.posterior.torque != "link":
             return 0.0
         return self._restlessness()

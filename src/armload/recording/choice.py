@@ -26,7 +26,7 @@ DATE = "date"  # the unit of a column whose cells are dates
 class TimeColumns:
     """The columns of time: seconds and, where they are apart, nanoseconds.
 
-    unit: as stated in the header, by the tool or by the user, or `DATE`; None: nobody says.
+    unit: as stated in the header, by the tool or by the user, or `DATE`; None: not stated.
     tool: whose rule gave the unit. other: another clock, for files in which this one stands still.
     """
 

@@ -170,7 +170,7 @@ def _joint_count(families: Sequence[Family], given: dict[str, list[int]], where:
 def _scale(header: Header, key: str, places: list[int], spec: ColumnSpec) -> tuple[tuple[float, ...], list[str]] | None:
     """What the columns of a quantity are multiplied with (n,), and a note where that is more than a unit.
 
-    None: they are motor currents, and nobody said how much torque an ampere is.
+    None: they are motor currents, and the torque of an ampere is not known.
     """
     readings = [
         read_name(header.names[place], () if header.arm is None else header.arm.joint_names) for place in places
@@ -218,7 +218,7 @@ def of_currents(where: str, constants: Sequence[float], by: str = "") -> str:
 
 
 def _torque_constants(header: Header, spec: ColumnSpec) -> tuple[float, ...] | None:
-    """Joint torque per motor current (n,) [N·m/A]: the user's, or those of the arm's sheet; None: nobody knows."""
+    """Joint torque per motor current (n,) [N·m/A]: the user's, or those of the arm's sheet; None: not known."""
     arm = header.arm
     facts = None if arm is None else ARMS.get(arm.known_as or arm.name)
     constants = spec.torque_constants or (None if facts is None else facts.torque_constants)

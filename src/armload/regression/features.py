@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armload.runtime.kernels import kernel
 
-# [rad] of the pose, mixed, as nobody knows the one of an arm. Stated priors
+# [rad] of the pose, mixed, as an arm's own is not known. Stated priors
 # (test_pose_features_have_the_kernel_of_a_gaussian_process)
 _LENGTH_SCALES = (0.7, 0.9, 1.1, 1.3, 1.5)
 _SLOW = 0.03  # [rad/s] where the stretched velocity turns from linear to logarithmic: half of the friction's width

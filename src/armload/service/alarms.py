@@ -115,9 +115,7 @@ class Alarms:
         return lost, answer.get("why") or "samples come again", None, None
 
 
-_Found = tuple[
-    bool | None, str, float | None, float | None
-]  # whether it holds (None: nobody knows), text, value, limit
+_Found = tuple[bool | None, str, float | None, float | None]  # whether it holds (None: not known), text, value, limit
 _CONDITIONS: dict[str, Callable[[Alarms, Mapping[str, Any]], _Found]] = {
     "over_rating": Alarms._over_rating,
     "com_out_of_range": Alarms._com_out_of_range,

@@ -54,7 +54,7 @@ class Session:
 
     Attributes:
         sample: the newest that could be used. estimate: the newest. None before the first.
-        history: rows (30,) of phi, half-widths of the 95 % intervals and the truth, NaN where nobody knows it.
+        history: rows (30,) of phi, half-widths of the 95 % intervals and the truth, NaN where it is not known.
         log: what happened, the last 200 entries.
         ended: the source has ended. error: what it ended with, if that was one.
 
@@ -78,7 +78,7 @@ class Session:
         self.source, self.arm, self.tare, self.profile = source, arm, tare, profile
         self._known, self._every = known, every
         self._recorder, self._kept = recorder, -math.inf  # and when it last kept an estimate, on the stream's clock
-        # what was held while the tare was recorded; None: nobody knows
+        # what was held while the tare was recorded; None: not known
         self._tared = InertialParameters.zero(arm.frame) if tare is None else None
         self._identifier = self._made(tare, method) if identifier is None else identifier
         self.sample: Sample | None = None

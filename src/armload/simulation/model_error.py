@@ -18,7 +18,7 @@ from armload.simulation.friction import Friction
 
 _LINK_MOST = 10.0  # a spread of links beyond this many of `LINK_SPREAD` would leave no arm
 _LIGHTEST_LINK = 0.2  # of the model's mass
-_OFFSET, _FRICTION, _RESIDUAL = 0.003, 0.01, 0.0035  # of the rated torque, of an arm that nobody has measured
+_OFFSET, _FRICTION, _RESIDUAL = 0.003, 0.01, 0.0035  # of the rated torque, of an arm that was never measured
 _FRICTION_SPREAD = 0.3
 
 # beyond the measured ones

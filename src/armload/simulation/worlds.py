@@ -10,7 +10,7 @@ that its motor need not (`Stiction`), on arms that are known to measure there. G
 sensor's own.
 
 How large each part is and how it is drawn says `armload.simulation.model_error`. Worlds beyond the measured ones
-(`World.beyond`) are to make a learner and its error bars ready for an arm that nobody has measured.
+(`World.beyond`) are to make a learner and its error bars ready for an arm that was never measured.
 """
 
 from __future__ import annotations

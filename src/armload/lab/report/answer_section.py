@@ -15,7 +15,7 @@ def answer_section(
     """Mass, centre of mass and the inertia about it with their 95 % intervals, what it rests on, and the notes.
 
     Args:
-        result: the answer. truth: what is held, about the same frame; None: nobody knows.
+        result: the answer. truth: what is held, about the same frame; None: not known.
     """
     parts = quantities(result)
     known: dict[str, list[float]] = {}

@@ -1,4 +1,4 @@
-"""The report of a log whose payload nobody knows: how the arm moved, what it felt, what each method made of it."""
+"""The report of a log of an unknown payload: how the arm moved, what it felt, what each method made of it."""
 
 from __future__ import annotations
 
