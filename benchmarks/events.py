@@ -25,8 +25,9 @@ real         five real logs (Panda, UR10e empty and loaded, UR10, KUKA), payload
 real_tared   the Panda's log after its first ten seconds, which are the tare
 real_as_is   the five real logs as they are
 
-A change counts as noticed with its first event from its beginning until a second after its end; all other events are
-false, but those during a push and a second after it, which are counted there. *inside* is the share of masses within
+A change counts as noticed with its first event from its beginning until a second after its end, else as missed; of the
+missed ones those count as late that have an event within five seconds. All other events are false, but those during a
+push and a second after it, which are counted there. *inside* is the share of masses within
 their 95 % interval some time after the end. Of all moments, in tenths of a second, `reliability` says how often a
 probability was right: p_held that something is held, p_change that it is not what the run at work began with or is
 being handed over, p_contact that somebody pushes (but for the first and last fifth of a push, which are hardly felt).
@@ -58,6 +59,7 @@ from armload.online import OnlineIdentifier
 
 SEED = 90_000
 PAGE = ROOT / "docs" / "online.md"
+LATE = 5.0  # [s]
 LOOK = 0.02  # [s] between two looks at what is said
 BINS = np.array([0.0, 0.02, 0.1, 0.3, 0.7, 0.9, 0.98, 1.0])
 FELT = np.array([0.02, *(3 * [0.002])])  # [kg], [kg·m] what is as large is another payload
@@ -129,7 +131,7 @@ def measured(scene: Scene) -> dict[str, Any]:
                     "after_end": own[0]["t"] - end if own else None,
                     "events": [(e["kind"], e["mass"]) for e in own],
                     "inside": None if stream.base is None else inside[at].tolist(),
-                    "error": (table[at, 1] - mass[at]).tolist(),
+                    "error": None if stream.base is None else (table[at, 1] - mass[at]).tolist(),
                     "half_width": (0.5 * (table[at, 3] - table[at, 2])).tolist(),
                 }
             )
@@ -213,10 +215,21 @@ def per_hour(count: int, hours: float) -> dict[str, Any]:
     return rate | {"low": round(float(low), 2), "high": round(float(high), 2)}
 
 
+def late(cell: dict[str, Any]) -> tuple[list[float], list[dict[str, Any]]]:
+    """Delays [s] of a scene's changes that were noticed late, and its false events."""
+    left, delays = list(cell["false"]), []
+    for change in (x for x in cell["changes"] if x["delay"] is None):
+        own = [e for e in left if change["t"] <= e["t"] < change["t"] + LATE]
+        if own:
+            left.remove(own[0])
+            delays.append(own[0]["t"] - change["t"])
+    return delays, [e | {"scene": cell["name"]} for e in left]
+
+
 def of_part(cells: list[dict[str, Any]]) -> dict[str, Any]:
     """The changes, pushes and false events of a part."""
     changes, pushes = ([x for cell in cells for x in cell[name]] for name in ("changes", "pushes"))
-    false = [e | {"scene": cell["name"]} for cell in cells for e in cell["false"]]
+    after_all, false = ([x for cell in cells for x in late(cell)[k]] for k in (0, 1))
     inside = [cell["inside"] for cell in cells if cell["inside"] is not None]
     out: dict[str, Any] = {
         "scenes": len(cells),
@@ -230,6 +243,8 @@ def of_part(cells: list[dict[str, Any]]) -> dict[str, Any]:
         out |= {
             "changes": len(changes),
             "missed": share(len(missed), len(changes)),
+            "late": len(after_all),
+            "late_s": _quantiles(after_all),
             "missed_kg": sorted(round(x["by"], 3) for x in missed),
             "delay_s": _quantiles([x["delay"] for x in changes if x["delay"] is not None]),
             "delay_after_its_end_s": _quantiles([x["after_end"] for x in changes if x["delay"] is not None]),
@@ -300,7 +315,7 @@ def show(result: dict[str, Any], page: Path = PAGE) -> None:
             (
                 said,
                 str(part["changes"]),
-                f"{part['missed']['count']} (≤ {100 * part['missed']['high']:.0f} %)",
+                f"{part['missed']['count']}{_of_them_late(part)} (≤ {100 * part['missed']['high']:.0f} %)",
                 f"{part['false']['count']} ({part['false']['low']:.1f}–{part['false']['high']:.0f})",
                 _seconds(part["delay_s"]),
                 _seconds(part["delay_after_its_end_s"]),
@@ -354,6 +369,10 @@ def show(result: dict[str, Any], page: Path = PAGE) -> None:
 
 def _seconds(quantiles: dict[str, float] | None) -> str:
     return "–" if quantiles is None else f"{quantiles['50 %']:.2f} s, {quantiles['90 %']:.2f} s"
+
+
+def _of_them_late(part: dict[str, Any]) -> str:
+    return f", {part['late']} late" if part["late"] else ""
 
 
 def _events(part: dict[str, Any]) -> str:

@@ -4,11 +4,11 @@
 
 The simulated Panda of closed_loop.py (`World.real_like`, joint impedance with inverse dynamics at 1 kHz, libfranka's
 example stiffness) holds a payload that nobody declared. A live stream of 6 s with the empty arm's 20 s as the tare
-identifies it; then the arm stands, and its controller is told: at once, or by `armload.service.Feedback`, one step every
-0.2 s. Measured while it stands: the largest joint speed, how far the flange is off its place before and after, and of
-the external torque that a momentum observer sees, what it is before and after and its largest change within 20 ms. Then
-the arm follows another motion with what it was told. Writes benchmarks/results/feedback.json and the table in
-docs/service.md.
+identifies it; then the arm stands, and its controller is told: at once, or by `armload.service.Feedback`, one step
+every 0.2 s. Measured while it stands: the largest joint speed, how far the flange is off its place before and after,
+and of the external torque that a momentum observer sees, what it is before and after and its largest change within
+20 ms. Then the arm follows another motion with what it was told. Writes benchmarks/results/feedback.json and the table
+in docs/service.md.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from typing import Any
 import numpy as np
 from closed_loop import OBSERVER, PAYLOADS, errors, follow, residual, rms, tare_of
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 from script import ROOT, markdown_table, options, say, write, write_table
 
-from armload.arms import Arm, arm
+from armload.arms import Arm, arm, payload_regressor
 from armload.devices import Counted, check_writable
 from armload.inertia import InertialParameters
 from armload.motion import StraightMotion, random_motion
 from armload.online import OnlineIdentifier
 from armload.regression import FilteredRegression
-from armload.service import Feedback
-from armload.service.feedback import PAUSE
+from armload.service.feedback import PAUSE, Feedback
 from armload.simulation import JointImpedance, Sensors, World, torque_controlled
 
 BEFORE, AFTER = 1.0, 2.0  # [s] it stands before the first step and after the last
@@ -87,12 +87,14 @@ def standing(robot: Arm, world: World, q: NDArray, held: Any, loads: list[Inerti
     truth = torque_controlled(robot, Switching(laws), q, lasting, held, world=world, settle=2.0).recording
     seen = Sensors.panda(robot).observe(truth, seed)
     off = np.linalg.norm(robot.frame_pose(truth.q)[1] - robot.frame_pose(q[None])[1], axis=1)
-    # the observer subtracts what is declared at the moment: the residual of the empty model less the declared load's
-    external = np.array(
-        [-FilteredRegression(model, OBSERVER)(seen.t, seen.q, seen.dq, seen.tau)[0] for model in models]
-    )
+    # the observer of the model without a load, and the declared load's torque as the observer takes it in
+    still = np.zeros((1, robot.n))
+    W = payload_regressor(robot.frame_motion(q[None]), still, still)[0]
     which = np.searchsorted(times, seen.t, side="right") - 1
-    declared = external[which, np.arange(len(seen.t))]
+    load = np.array([robot.in_frame(x).phi for x in loads])[which] @ W.T
+    keep = np.exp(-OBSERVER / seen.rate)
+    declared = -FilteredRegression(robot, OBSERVER)(seen.t, seen.q, seen.dq, seen.tau)[0]
+    declared = declared + lfilter([1.0 - keep], [1.0, -keep], load, axis=0)
     part, begun = seen.t > 0.5, truth.t > 0.0
     jumps = np.abs(declared[part][WITHIN:] - declared[part][:-WITHIN]).max()
     first, last = (part & (seen.t < BEFORE)), seen.t > seen.t[-1] - 1.0

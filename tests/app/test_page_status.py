@@ -9,7 +9,7 @@ import pytest
 from armload.app.page import tables
 from armload.app.page.page import Page
 from armload.app.page.status import Watcher, waits_for
-from armload.devices import Replay, Simulator, Source
+from armload.devices import Replay, Simulator, Source, open_source
 from armload.errors import SourceError
 from armload.payloads import test_payload
 from armload.service import Session, Unknown
@@ -186,3 +186,32 @@ def test_the_flange_stays_in_the_middle_of_the_picture_or_the_base_where_it_is(s
         assert np.allclose(seen_at[fixed], seen_at[fixed][0], atol=1e-9)
         assert np.ptp(seen_at[moved], axis=0).max() > 0.1
         assert np.allclose(seen_at["flange"], 0.0, atol=1e-9) == close
+
+
+def test_what_a_simulated_arm_holds_can_be_changed_by_hand(panda, page_of):
+    source = Simulator(panda, speed=None, rate=100.0, duration=6.0, ahead=0.1)
+    session = Session(source, panda, method="map")
+    page, truths = page_of(session), []
+    for estimate in session.estimates():
+        if len(truths) == 300:
+            page.take_up(1.2, 0.08)
+        if len(truths) == 500:
+            page.take_up(0.0, 0.0)
+        truths.append(session.truth(estimate.t))
+    session.close()
+    masses = np.array([body.mass for body in truths])
+    assert sorted(set(masses.round(9))) == [0.0, 1.2]
+    assert masses[[299, 350, -1]].tolist() == [0.0, 1.2, 0.0]
+    np.testing.assert_allclose(truths[350].com, (0.0, 0.0, 0.08), atol=1e-12)
+    assert abs(session.history.last(10.0)[1][-1][0]) < 0.2
+
+
+def test_another_process_s_simulator_holds_what_it_is_told_and_the_truth_knows(panda):
+    with open_source("sim", panda, detached=True, rate=100.0) as source:
+        assert source.simulated
+        samples = iter(source)
+        next(samples)
+        since = source.hold(HELD)
+        assert since > 0.0
+        assert source.truth(since - 1e-6).mass == 0.0
+        np.testing.assert_allclose(source.truth(since + 1e-6).phi, HELD.phi)

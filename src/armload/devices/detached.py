@@ -187,6 +187,22 @@ class Detached(Source):
         """
         self._call("set_load", float(mass), np.ravel(com).tolist(), np.ravel(inertia).tolist())
 
+    @property
+    def simulated(self) -> bool:
+        """Whether the source is a simulator."""
+        return self._twin is not None
+
+    def hold(self, payload: InertialParameters, t: float | None = None) -> float:
+        """See `Simulator.hold`, from the next sample on; the twin holds it, too.
+
+        Raises:
+            SourceError: the source is no simulator, or did not answer.
+        """
+        t = float(self._call("hold", payload.phi.tolist()))
+        if self._twin is not None:
+            self._twin.hold(payload, t)
+        return t
+
     def truth(self, t: float) -> InertialParameters | None:
         """What the source knows."""
         return None if self._twin is None else self._twin.truth(t)

@@ -37,9 +37,11 @@ from armload.devices.remote_mover import RemoteMover
 from armload.devices.ring import Ring
 from armload.devices.source import Source
 from armload.errors import ArmloadError, SourceError
+from armload.inertia import InertialParameters
 from armload.runtime.extras import missing
 
-_CALLS = ("read_once", "set_load")  # what may be asked of a source from outside
+_CALLS = ("read_once", "set_load", "hold")  # what may be asked of a source from outside
+_WHO = {"read_once": "a Franka robot", "set_load": "a Franka robot", "hold": "a simulator"}
 _ORDERS = ("begin", "stop", "whereabouts", "put")  # and of a mover
 _PATIENCE = 1.0  # [s] a source may take to end before the process does
 _PR_SET_PDEATHSIG = 1  # of prctl(2): the signal this process gets when the thread that started it ends
@@ -113,8 +115,11 @@ class _Reader:
         try:
             allowed = _ORDERS if isinstance(source, RemoteMover) else _CALLS
             if method not in allowed or not hasattr(source, method):
-                raise SourceError(f"{source.name} has no {method}: only a Franka robot has")
-            value = getattr(source, method)(*command["arguments"])
+                raise SourceError(f"{source.name} has no {method}: only {_WHO[method]} has")
+            given = command["arguments"]
+            if method == "hold":
+                given = [InertialParameters(x) for x in given]
+            value = getattr(source, method)(*given)
             self.report(event="answer", number=command["number"], value=value)
         except ArmloadError as error:
             self.report(event="refused", number=command["number"], message=str(error))

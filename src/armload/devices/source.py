@@ -10,8 +10,9 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from typing import Self
+from typing import Any, Self
 
+from armload.errors import SourceError
 from armload.inertia import InertialParameters
 from armload.recording import Sample
 
@@ -65,6 +66,19 @@ class Source(ABC):
         """
         arrived = self.arrived()
         return 0.0 if arrived is None else max(0.0, time.monotonic() - arrived) * self.speed
+
+    @property
+    def simulated(self) -> bool:
+        """Whether it is a simulator, whose payload can be changed (`hold`)."""
+        return False
+
+    def hold(self, payload: Any, t: float | None = None) -> float:  # noqa: ARG002
+        """See `Simulator.hold`.
+
+        Raises:
+            SourceError: it is no simulator.
+        """
+        raise SourceError(f"{self.name} is no simulator: what it holds cannot be changed from here")
 
     def truth(self, t: float) -> InertialParameters | None:  # noqa: ARG002
         """The payload at time t, where the source knows it (a simulator does)."""

@@ -29,6 +29,7 @@ MODULES = {
     "numba": ("numba", "jit"),
     "rosbags": ("rosbags", "bags"),
     "mcap": ("mcap", "bags"),
+    "paho": ("paho-mqtt", "mqtt"),
     "ruamel": ("rosbags", "bags"),  # which brings it: YAML
     "pylibfranka": ("pylibfranka", "franka"),
     "panda_py": ("panda-python", "panda"),

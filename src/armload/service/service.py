@@ -15,6 +15,7 @@ from armload.arms import arm, rated_mass
 from armload.errors import ArmloadError
 from armload.service.alarms import Alarm, Alarms
 from armload.service.backoff import Backoff
+from armload.service.mqtt import Mqtt
 from armload.service.settings import ArmSettings, ServiceSettings
 from armload.service.spare import Spare, order
 from armload.service.unknown import Unknown
@@ -56,7 +57,11 @@ class Service:
         self._spare = Spare(settings.arms, settings.spare)
         self._listeners: list[Listener] = []
         self._state, self._gone = threading.RLock(), threading.Event()
-        self._webhook = None if settings.webhook is None else Webhook(settings.webhook, settings.headers)
+        self._receivers: list[Webhook | Mqtt] = []  # of alarms
+        if settings.webhook is not None:
+            self._receivers.append(Webhook(settings.webhook, settings.headers))
+        if settings.mqtt is not None:
+            self._receivers.append(Mqtt(settings.mqtt))
         self._threads = [
             threading.Thread(target=self._keep, args=(a,), name=f"armload-{a.name}", daemon=True) for a in settings.arms
         ]
@@ -89,8 +94,8 @@ class Service:
                 thread.join(max(0.0, until - time.monotonic()))
         for process in list(self.processes.values()):
             process.kill()
-        if self._webhook is not None:
-            self._webhook.close()
+        for receiver in self._receivers:
+            receiver.close()
 
     def answer(self, name: str) -> dict[str, Any]:
         """An arm's newest answer, as old as it is now."""
@@ -182,8 +187,8 @@ class Service:
         self._note(f"{alarm.arm}: {alarm.kind} {message['state']}: {alarm.text}")
         for listener in self._listeners:
             listener(message)
-        if self._webhook is not None:
-            self._webhook.post(message)
+        for receiver in self._receivers:
+            receiver.post(message)
 
     def _as_of_now(self, answer: dict[str, Any], name: str) -> dict[str, Any]:
         """The answer with what has passed since it was made; of a process that is silent nothing is known."""

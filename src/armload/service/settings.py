@@ -15,6 +15,7 @@ from urllib.parse import urlsplit
 
 from armload.errors import UsageError
 from armload.identification.arm_options import ArmOptions
+from armload.service.mqtt import checked
 
 if TYPE_CHECKING:
     from armload.arms import Arm
@@ -91,8 +92,9 @@ class ServiceSettings:
     """The whole service.
 
     arms: one process each. every: [s] between two lines of an arm. host, port: of the endpoint; port None: there is
-    none. token: what a request must bring; required beyond loopback. webhook: where alarms go. headers: sent with them.
-    duration: end after so long [s]. spare: whether a process is kept ready for the arm whose process ends next.
+    none. token: what a request must bring; required beyond loopback. webhook: where alarms go. headers: sent with
+    them. mqtt: a broker they go to. duration: end after so long [s]. spare: whether a process is kept ready for the arm
+    whose process ends next.
     """
 
     arms: tuple[ArmSettings, ...]
@@ -102,6 +104,7 @@ class ServiceSettings:
     token: str | None = None
     webhook: str | None = None
     headers: dict[str, str] = field(default_factory=dict)
+    mqtt: str | None = None
     duration: float | None = None
     spare: bool = True
 
@@ -199,4 +202,6 @@ def _checked(said: dict[str, Any], kind: type, where: str, without: tuple[str, .
             raise UsageError(f"{where}: {key} is {value!r}: expected a {fields[key].replace('tuple', 'list')}")
     if "webhook" in said and urlsplit(said["webhook"]).scheme not in ("http", "https"):
         raise UsageError(f"{where}: the webhook is {said['webhook']!r}: expected an address such as https://HOST/PATH")
+    if "mqtt" in said:
+        checked(said["mqtt"])
     return dict(said)

@@ -80,6 +80,7 @@ def parser() -> Parser:
     )
     add("--token-file", type=file_name, metavar="F", help="holds the token that requests must bring")
     add("--webhook", metavar="URL", help="alarms are posted to it")
+    add("--mqtt", metavar="URL", help="a broker that alarms are sent to: mqtt://HOST:1883/PREFIX, mqtts://…")
     add("--duration", type=at_least(0.0, float), metavar="S", help="end after so many seconds")
     return parser
 
@@ -116,14 +117,17 @@ def run(options: argparse.Namespace) -> int | None:
 def settings_of(options: argparse.Namespace) -> ServiceSettings:
     """What a command line asks for."""
     from armload.service import ArmSettings, ServiceSettings, read_settings
+    from armload.service.mqtt import checked
     from armload.service.settings import read_token
 
-    names = ("every", "host", "port", "webhook", "duration")
+    names = ("every", "host", "port", "webhook", "mqtt", "duration")
     over: dict[str, Any] = {name: value for name in names if (value := getattr(options, name)) is not None}
     if options.token_file is not None:
         over["token"] = read_token(options.token_file)
     if options.webhook is not None and not options.webhook.startswith(("http://", "https://")):
         raise UsageError(f"--webhook is {options.webhook!r}: expected an address such as https://HOST/PATH")
+    if options.mqtt is not None:
+        checked(options.mqtt)
     of_arms = ("frame", "gravity", "tare", "profile", "tool", "method")
     if options.sources[0].endswith(".toml"):
         given = [name for name in ("robot", *of_arms, "apply", "mounted") if getattr(options, name) is not None]

@@ -9,19 +9,23 @@ import threading
 import time
 from typing import Any
 
+import numpy as np
+
 from armload.app.page import tables
 from armload.app.page.curves import AXES, GROUPS, HEIGHT, PADDING, Group, bands_of, data_of, legend_of, series_of
 from armload.app.page.download import ENDINGS, file_of
 from armload.app.page.scene import Scene
 from armload.app.page.server import look_at_middle, look_from, serve, stop, url_of
 from armload.app.page.status import Status, Watcher
-from armload.arms import Arm
+from armload.arms import Arm, rated_mass
 from armload.errors import ArmloadError, ModelError
 from armload.identification import METHODS, default_for
+from armload.inertia import InertialParameters
 from armload.service.session import Session
 
 _NUMBERS, _CURVES = 3, 8  # pictures from which on numbers and curves follow
 SPANS = {"last 30 s": 30.0, "last 2 min": 120.0, "last 10 min": 600.0, "last hour": 3600.0, "everything": float("inf")}
+_BALL = 0.05  # [m] radius of what a simulated arm takes up by hand
 _VIEWS = ("payload", "whole arm")
 _KEY = (
     '<div style="font-size:12px;padding:2px 8px;color:var(--mantine-color-dimmed)">line: estimate, shaded: 95 % '
@@ -129,6 +133,26 @@ class Page:
         )
         self._plots.append(plot)
 
+    def _build_hand(self, gui: Any) -> None:
+        """What a simulated arm holds, changed by hand: a ball of some mass, some way from the flange."""
+        most = rated_mass(self.session.arm)
+        with gui.add_folder("Simulated payload"):
+            mass = gui.add_number("Mass [kg]", 1.0, min=0.05, max=float(most), step=0.05)
+            away = gui.add_number("Offset [m]", 0.06, min=0.0, max=0.3, step=0.01, hint="Along z of the flange")
+            hand = gui.add_button_group("  ", ("Take up", "Put down"))
+
+        @hand.on_click
+        def _(event: Any) -> None:
+            taken = event.target.value == "Take up"
+            self.take_up(*((float(mass.value), float(away.value)) if taken else (0.0, 0.0)))
+
+    def take_up(self, mass: float, away: float) -> None:
+        """Let a simulated arm hold a ball of 5 cm radius, of so many kg, so many metres along z; 0 kg: nothing."""
+        body = InertialParameters.zero(self.session.arm.frame)
+        if mass > 0.0:
+            body = InertialParameters.from_com(mass, (0.0, 0.0, away), 0.4 * mass * _BALL**2 * np.eye(3), body.frame)
+        self.session.source.hold(body)
+
     def _build_panel(self, gui: Any) -> None:
         session = self.session
         self._headline = gui.add_html(tables.headline(None))
@@ -140,6 +164,8 @@ class Page:
         with gui.add_folder("Identification"):
             self._method = gui.add_dropdown("Method", methods, initial_value=session.method)
             again = gui.add_button_group(" ", ("Start anew", "Tare"), hint="Tare: what is held now counts as nothing")
+        if session.source.simulated:
+            self._build_hand(gui)
         with gui.add_folder("Export"):
             self._form = gui.add_dropdown("Form", tuple(ENDINGS), initial_value="urdf")
             export = gui.add_button("Download")

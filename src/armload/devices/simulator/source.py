@@ -7,6 +7,7 @@ one before it, from which its lags reach back.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -77,6 +78,7 @@ class Simulator(Source):
         self.name = f"simulated {arm.name}"
         self.n = arm.n
         self.rate = rate
+        self._scheduling = threading.Lock()
         self._times, self._payloads = _schedule(payloads, arm)
         self._world, self._sensors, self._seed = world, sensors, seed
         self._end = None if duration is None else round(duration * rate)
@@ -100,20 +102,31 @@ class Simulator(Source):
         """When the sample handed on last was due; None without a clock."""
         return self._pace.due
 
-    def hold(self, payload: Any | None) -> None:
-        """Another payload from the next sample on that is not computed yet; None: nothing is held.
+    @property
+    def simulated(self) -> bool:
+        """It is."""
+        return True
+
+    def hold(self, payload: Any | None, t: float | None = None) -> float:
+        """Another payload from t [s] on, or from the next sample that is not computed yet; None: nothing is held.
+
+        Returns:
+            From when on [s].
 
         Raises:
             PayloadError: it is none.
         """
-        times, held = _schedule([(self._row / self.rate, payload)], self.arm)
-        before = self._times < times[1]
-        self._payloads = [*(p for p, kept in zip(self._payloads, before, strict=True) if kept), held[1]]
-        self._times = np.append(self._times[before], times[1])
+        with self._scheduling:
+            times, held = _schedule([(self._row / self.rate if t is None else t, payload)], self.arm)
+            before = self._times < times[1]
+            self._payloads = [*(p for p, kept in zip(self._payloads, before, strict=True) if kept), held[1]]
+            self._times = np.append(self._times[before], times[1])
+        return float(times[1])
 
     def truth(self, t: float) -> InertialParameters:
         """What the arm holds at time t; ten zeros where it holds nothing."""
-        return self._payloads[int(np.searchsorted(self._times, t, side="right")) - 1]
+        with self._scheduling:
+            return self._payloads[int(np.searchsorted(self._times, t, side="right")) - 1]
 
     def _pieces(self) -> Iterator[tuple[NDArray, NDArray, NDArray, NDArray]]:
         """The run, as the sensors show it, in pieces that end where the payload changes."""
@@ -123,12 +136,14 @@ class Simulator(Source):
         )
         before = None
         while self._end is None or self._row < self._end:
-            row, changes = self._row, self._changes()
-            k = int(np.searchsorted(changes, row, side="right"))
-            if row and changes[k - 1] == row:
-                run.hold(self._payloads[k - 1])
-            stops = [row + self._piece, *changes[k : k + 1].tolist(), *([] if self._end is None else [self._end])]
-            self._row = min(stops)
+            with self._scheduling:
+                row, changes = self._row, self._changes()
+                k = int(np.searchsorted(changes, row, side="right"))
+                held = self._payloads[k - 1] if row and changes[k - 1] == row else None
+                stops = [row + self._piece, *changes[k : k + 1].tolist(), *([] if self._end is None else [self._end])]
+                self._row = min(stops)
+            if held is not None:
+                run.hold(held)
             exact = run.advance(self._row - row)
             seen, before = (exact, None) if self._sensors is None else self._observed(exact, before, row)
             yield seen

@@ -1,0 +1,89 @@
+"""Alarms to an MQTT broker, through paho-mqtt: it connects again, and keeps what waits meanwhile."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Mapping
+from typing import Any
+from urllib.parse import unquote, urlsplit
+
+from armload.errors import UsageError
+from armload.extras import install
+
+_KEPT = 1000  # messages that wait; then new ones are dropped
+_LONGEST = 60  # [s] between two trials to connect
+_PORTS = {"mqtt": 1883, "mqtts": 8883}
+
+
+class Mqtt:
+    """Publishes messages at least once (quality of service 1); nobody waits for it.
+
+    | topic | what |
+    |---|---|
+    | `PREFIX/ARM/alarm` | each alarm as one JSON object |
+    | `PREFIX/online` | `true` while the service is connected, else `false`, kept by the broker (its will) |
+
+    Args:
+        url: mqtt://[USER:PASSWORD@]HOST[:PORT][/PREFIX], or mqtts:// with TLS. The prefix is "armload" without one.
+
+    Attributes:
+        dropped: messages there was no room for.
+
+    Raises:
+        UsageError: the address is none, or paho-mqtt is not installed.
+    """
+
+    def __init__(self, url: str) -> None:
+        parts = checked(url)
+        try:
+            from paho.mqtt import client as paho
+        except ImportError:
+            raise UsageError(f"MQTT needs paho-mqtt, which is not installed: {install('paho')}") from None
+        self._prefix, self.dropped = parts.path.strip("/") or "armload", 0
+        self._client = client = paho.Client(paho.CallbackAPIVersion.VERSION2)
+        client.max_queued_messages_set(_KEPT)
+        client.reconnect_delay_set(1, _LONGEST)
+        client.will_set(f"{self._prefix}/online", "false", qos=1, retain=True)
+        if parts.username is not None:
+            client.username_pw_set(unquote(parts.username), unquote(parts.password or ""))
+        if parts.scheme == "mqtts":
+            client.tls_set()
+        client.on_connect = self._connected
+        client.connect_async(str(parts.hostname), parts.port or _PORTS[parts.scheme])
+        client.loop_start()
+
+    def post(self, message: Mapping[str, Any]) -> None:
+        """Take a message to be sent; returns at once."""
+        text = json.dumps(message, allow_nan=False)
+        sent = self._client.publish(f"{self._prefix}/{message['arm']}/alarm", text, qos=1)
+        self.dropped += sent.rc == 15  # MQTT_ERR_QUEUE_SIZE; without a connection it waits
+
+    def close(self) -> None:
+        """Say that the service is gone, give what waits two more seconds, and end."""
+        last = self._client.publish(f"{self._prefix}/online", "false", qos=1, retain=True)
+        if self._client.is_connected():
+            with contextlib.suppress(RuntimeError, ValueError):
+                last.wait_for_publish(2.0)
+        self._client.disconnect()
+        self._client.loop_stop()
+
+    def _connected(self, client: Any, *_: Any) -> None:
+        client.publish(f"{self._prefix}/online", "true", qos=1, retain=True)
+
+
+def checked(url: str) -> Any:
+    """The parts of a broker's address.
+
+    Raises:
+        UsageError: it is none.
+    """
+    said = "expected an address such as mqtt://HOST:1883/PREFIX"
+    try:
+        parts = urlsplit(url)
+        parts.port  # noqa: B018 - raises where it is no number
+    except ValueError:
+        raise UsageError(f"the MQTT broker is {url!r}: {said}") from None
+    if parts.scheme not in _PORTS or not parts.hostname or any(x in url for x in "+#"):
+        raise UsageError(f"the MQTT broker is {url!r}: {said}")
+    return parts

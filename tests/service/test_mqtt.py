@@ -1,0 +1,125 @@
+"""Alarms over MQTT, against a broker of another maker.
+
+That is amqtt, which wants other versions of packages than armload's own environment has: it runs in the Python that
+ARMLOAD_BROKER_PYTHON names (`python -m venv broker && broker/bin/pip install amqtt`), else in this one if it is there.
+"""
+
+import contextlib
+import json
+import os
+import queue
+import socket
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+
+from armload.errors import UsageError
+from armload.service.mqtt import Mqtt, checked
+
+PATIENCE = 60.0
+BROKER = os.environ.get("ARMLOAD_BROKER_PYTHON", sys.executable)
+
+
+@contextlib.contextmanager
+def broker(port):
+    """amqtt in a process of its own, killed whatever happens."""
+    program = f"""
+import asyncio, logging
+from amqtt.broker import Broker
+logging.disable()
+plugins = {{"amqtt.plugins.authentication.AnonymousAuthPlugin": {{"allow_anonymous": True}}}}
+async def run():
+    listeners = {{"default": {{"type": "tcp", "bind": "127.0.0.1:{port}"}}}}
+    one = Broker({{"listeners": listeners, "plugins": plugins}})
+    await one.start()
+    print("ready", flush=True)
+    await asyncio.sleep(300)
+asyncio.run(run())
+"""
+    with subprocess.Popen([BROKER, "-c", program], stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout.readline() == "ready\n"
+            yield
+        finally:
+            process.kill()
+
+
+@contextlib.contextmanager
+def subscriber(port):
+    """All that the broker hands on, as (topic, text), from a client that has subscribed."""
+    paho = pytest.importorskip("paho.mqtt.client", reason="paho-mqtt is not installed")
+    heard, there = queue.Queue(), threading.Event()
+    client = paho.Client(paho.CallbackAPIVersion.VERSION2)
+    client.on_message = lambda _client, _data, message: heard.put((message.topic, message.payload.decode()))
+    client.on_connect = lambda client, *_: client.subscribe("cell/#", qos=1)
+    client.on_subscribe = lambda *_: there.set()
+    client.connect("127.0.0.1", port)
+    client.loop_start()
+    try:
+        assert there.wait(PATIENCE)
+        yield heard
+    finally:
+        client.disconnect()
+        client.loop_stop()
+
+
+@pytest.fixture
+def port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def of_topic(heard, topic, count):
+    """So many messages of a topic, in their order."""
+    end, found = time.monotonic() + PATIENCE, []
+    while len(found) < count:
+        name, text = heard.get(timeout=max(0.01, end - time.monotonic()))
+        if name == topic:
+            found.append(text)
+    return found
+
+
+@pytest.mark.skipif(
+    subprocess.run([BROKER, "-c", "import amqtt"], capture_output=True, check=False).returncode != 0,
+    reason="no Python with the broker amqtt: name one with ARMLOAD_BROKER_PYTHON",
+)
+def test_alarms_arrive_in_order_though_the_broker_comes_later(port):
+    pytest.importorskip("paho.mqtt.client", reason="paho-mqtt is not installed")
+    mqtt = Mqtt(f"mqtt://127.0.0.1:{port}/cell")
+    try:
+        for number in range(3):
+            mqtt.post({"arm": "left", "alarm": "over_rating", "number": number})
+        with broker(port), subscriber(port) as heard:
+            early = of_topic(heard, "cell/online", 1)
+            mqtt.post({"arm": "left", "alarm": "over_rating", "number": 3})
+            said = [json.loads(text)["number"] for text in of_topic(heard, "cell/left/alarm", 1)]
+            while said[-1] != 3:  # what was sent before anybody had subscribed is not kept by the broker
+                said += [json.loads(text)["number"] for text in of_topic(heard, "cell/left/alarm", 1)]
+            mqtt.close()
+            assert of_topic(heard, "cell/online", 1) == ["false"]
+        assert early == ["true"]
+        assert said == list(range(said[0], 4))
+        assert mqtt.dropped == 0
+    finally:
+        mqtt.close()
+
+
+@pytest.mark.parametrize("url", ["http://host/x", "mqtt://", "mqtt://host:port", "mqtt://host/a/#"])
+def test_an_address_that_is_none_is_refused(url):
+    with pytest.raises(UsageError, match="expected an address such as mqtt://HOST:1883/PREFIX"):
+        checked(url)
+
+
+def test_what_waits_for_a_broker_that_is_not_there_is_bounded(port):
+    pytest.importorskip("paho.mqtt.client", reason="paho-mqtt is not installed")
+    mqtt = Mqtt(f"mqtt://127.0.0.1:{port}/cell")
+    try:
+        for number in range(1100):
+            mqtt.post({"arm": "left", "number": number})
+        assert mqtt.dropped >= 100
+    finally:
+        mqtt.close()
