@@ -38,6 +38,9 @@ def test_the_table_of_promises_is_that_of_the_committed_benchmark(monkeypatch):
     found = result("kept_promises")["rows"]
     assert {name.split(",")[0] for name in found} == {"panda", "ur10e"}
     assert table(found) in PAGE
+    kept, worlds = result("kept_promises")["kept"], sum(row["worlds"] for row in found.values())
+    assert f"{100 * kept:.0f} % of the {worlds} worlds together" in " ".join(PAGE.split())
+    assert min(row["kept"] for row in found.values()) >= 0.9  # what `--until` relies on
 
 
 def test_the_table_of_ways_to_the_start_is_that_of_the_committed_benchmark(monkeypatch):
@@ -96,3 +99,16 @@ def test_how_far_off_a_centre_of_mass_is_and_in_how_many_worlds_is_what_was_meas
         ("pair", "{:.2g} mm ({:.2g} mm) with an empty run of its own"),
     ):
         assert text.format(1e3 * panda[name]["centre"], 1e3 * ur[name]["centre"]) in words
+
+
+def test_how_good_a_designed_pair_is_and_how_soon_is_what_was_measured():
+    panda, words = result("designed_motions")["arms"]["panda"], " ".join(PAGE.split())
+    same, own = (
+        " · ".join(f"{1e3 * x:.2g}" for x in panda[name]["error"]["2.0"]) for name in ("designed same", "pair")
+    )
+    assert f"With it the designed 2 s leave {same}, and {own} with an empty run of its own" in words
+    soon, mostly = (panda["designed same"][f"reached_{which}_s"] for which in ("median", "90"))
+    assert f"is reached in {soon:g} s (90 %: {mostly:g} s)" in words
+    assert f"reaches it in {100 * panda['excitation']['reached_share']:.0f} % of the worlds" in words
+    assert mostly * 3.0 < 6.0
+    assert panda["excitation"]["reached_median_s"] is None

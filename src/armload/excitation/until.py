@@ -80,9 +80,9 @@ def _check_gain(constraints: Constraints, criterion: Criterion, accuracy: Accura
     if over >= 1.0:
         raise MotionError(
             f"the accuracy asked for is out of reach of any motion: {of_gain_in_words(criterion)}, which of payloads "
-            f"up to {payload.mass:.3g} kg alone leaves {over:.3g} times as much; say how heavy the payload may be (less "
-            f"than {payload.mass / over:.2g} kg would do), ask for less, or learn the gain with a known weight (armload "
-            "profile --mass)"
+            f"up to {payload.mass:.3g} kg alone leaves {over:.3g} times as much; say how heavy the payload may be "
+            f"(less than {payload.mass / over:.2g} kg would do), ask for less, or learn the gain with a known weight "
+            "(armload profile --mass)"
         )
 
 
