@@ -31,6 +31,9 @@ _WINDOWS = (0.5, 1.0, 2.0, 4.0)
 _MOVES = 0.05  # [rad] rms amplitude of a window that can be looked up: with `TOLERANCE`, 5 mrad, a controller's error
 _EVERY = 0.09  # [s] between two searches, one in ten a second on clocks that jitter: each costs a correlation
 _TIE = 2e-3  # [rad] lags whose rms distances differ by no more are equally good: the earliest has most to follow
+# times the tolerance, by which the best lag of the grid may be off for a finer one to be tried: at the tare's ends a
+# finer lag leaves samples out, and gains more than half a step
+_LEEWAY = 3.0
 _EDGE = 1e-3  # [s] by which a sample may lie beyond the other log's ends: shifts are found to 0.1 ms, clocks jitter
 
 
@@ -86,6 +89,8 @@ class MotionTracker:
         self._times = np.arange(tare.t[0], tare.t[-1], 1.0 / _RATE)
         self._grid = _interpolated(self._times, tare.t, tare.q)
         self._far = tolerance * _amplitude(tare.q)  # [rad] beyond which a sample has left the motion
+        # [rad] by which two samples of the tare half a step of the grid apart differ at most, rms over the joints
+        self._between = 0.5 / _RATE * float(np.sqrt(np.max(np.mean(tare.dq**2, axis=1), initial=0.0)))
         self.restart()
 
     def restart(self) -> None:
@@ -149,6 +154,8 @@ class MotionTracker:
         for joint in range(grid.shape[1]):
             square -= 2.0 * np.correlate(grid[:, joint], window[:, joint], "valid")
         mean_square = np.maximum(square, 0.0) / window.size
+        if np.sqrt(mean_square.min()) > self._between + _LEEWAY * self.tolerance * _amplitude(q):
+            return None  # no lag between those of the grid is so much better
         lag = int(np.argmax(mean_square <= mean_square.min() + _TIE**2))
         shift = float(self._times[lag] - at[0])
         for _ in range(8):

@@ -31,7 +31,7 @@ class _File:
         weakref.finalize(self, os.close, self.number)
 
     def rows(self, start: int, stop: int, width: int) -> NDArray[np.float64]:
-        """Some rows (stop − start, width). They are read and not mapped: a process's pages of a file count as its own."""
+        """Some rows (stop − start, width), read and not mapped: a process's pages of a file count as its memory."""
         size = 8 * width
         return np.frombuffer(os.pread(self.number, size * (stop - start), size * start)).reshape(-1, width)
 
@@ -72,7 +72,7 @@ class OnDisk:
             IndexError: there is no such row.
         """
         rows = np.where(rows < 0, rows + len(self), rows)
-        if len(rows) and not (0 <= rows.min() and rows.max() < len(self)):
+        if len(rows) and not (rows.min() >= 0 and rows.max() < len(self)):
             raise IndexError(f"rows {rows.min()} to {rows.max()} of {len(self)}")
         out = np.empty((len(rows), self.shape[1]))
         order = np.argsort(rows, kind="stable")

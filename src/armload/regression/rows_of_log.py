@@ -51,6 +51,8 @@ class RowsOfLog:
             size += rows.X.nbytes
             if size <= _KEPT:
                 self._kept[first] = rows
+            else:
+                self._kept.clear()  # most are made anew in any case
             times.append(rows.t)
             first += len(rows.t)
         self.t = np.concatenate(times)
