@@ -95,9 +95,7 @@ def test_how_well_a_component_fits_counts_as_often_as_beta_says(mixture, beta):
     R = spread(np.random.default_rng(3), 0.3)
     seen = 0.5 * (mixture.means[1] + mixture.means[2])
     found = mixture.posterior(np.linalg.inv(R), np.linalg.solve(R, seen), beta)
-    fits = [
-        multivariate_normal(m, C + R).logpdf(seen) for m, C in zip(mixture.means, mixture.covariances, strict=True)
-    ]
+    fits = [multivariate_normal(m, C + R).logpdf(seen) for m, C in zip(mixture.means, mixture.covariances, strict=True)]
     weights = mixture.weights * np.exp(beta * (np.array(fits) - max(fits)))
     assert found.weights == pytest.approx(weights / weights.sum(), rel=1e-6)
     assert found.log_evidence == pytest.approx(mixture.posterior(np.linalg.inv(R), np.linalg.solve(R, seen), 1.0)[3])

@@ -33,9 +33,11 @@ from armload.identification.thresholds import (
     CUTS_LEAST,
     CUTS_MOST,
     KAPPA_UNKNOWN,
+    MASS_MAY_CHANGE,
     MOTOR_SIDE,
     PART_LEAST,
     PAYLOAD_CHANGED,
+    PAYLOAD_MAY_CHANGE,
     SETTLED,
 )
 from armload.posterior import Profile, SmoothPosteriorLeastSquares
@@ -56,20 +58,22 @@ _LIKELIEST = 2  # cuts of which T is found with the whole model
 # [kg·m, kg·m²] standard deviations of moments and inertia of something light, 0.2 kg within 8 cm of the frame: a stated
 # prior. What is heavier shows in all ten
 _LIGHT = 0.2 * np.array([0.08] * 3 + [0.08**2] * 6)
-# what chi-squared of one at 0.05 % counts for of chi-squared of ten at 0.1 %, the level of `PAYLOAD_CHANGED`: the two
-# tests together are beyond it by chance no more than 0.15 % of the time
-_OF_MASS = 29.588298445074422 / 12.115665146397816
 
 
 class Changes(NamedTuple):
     """times: [s, on the log's clock] at which the payload changes. statistic: the largest T of the whole log.
 
-    of_mass: the largest chi-squared of the mass alone, in units of T at the same level; 0 where nobody asks.
+    of_mass: the largest chi-squared of the mass alone; 0 where nobody asks.
     """
 
     times: list[float]
     statistic: float
     of_mass: float = 0.0
+
+    @property
+    def doubted(self) -> bool:
+        """Whether the payload may change, by one of the two."""
+        return self.statistic > PAYLOAD_MAY_CHANGE or self.of_mass > MASS_MAY_CHANGE
 
 
 def changes_of_payload(
@@ -187,7 +191,7 @@ class _Search:
         T = float(solution.vector @ np.linalg.solve(solution.information + wide, solution.vector)) / self.kappa
         if self.physics.arm.motor_torque or not model.known:
             return T, 0.0  # friction that grows with the load differs from part to part as a weight does
-        return T, _OF_MASS * of_mass(solution.information / self.kappa, solution.vector / self.kappa)
+        return T, of_mass(solution.information / self.kappa, solution.vector / self.kappa)
 
 
 def of_mass(information: np.ndarray, vector: np.ndarray) -> float:
