@@ -74,7 +74,7 @@ def test_the_posterior_is_that_of_importance_sampling(mixture):
     rng = np.random.default_rng(3)
     R = spread(rng, 0.3)
     truth = mixture.means[1]
-    found = mixture.posterior(np.linalg.inv(R), np.linalg.solve(R, truth), beta=1.0)
+    found = replace(mixture, beta=1.0).posterior(np.linalg.inv(R), np.linalg.solve(R, truth))
     counts = rng.multinomial(400_000, mixture.weights)
     draws = np.concatenate(
         [
@@ -94,11 +94,12 @@ def test_how_well_a_component_fits_counts_as_often_as_beta_says(mixture, beta):
     """Oracle: each component's density of a measurement of phi."""
     R = spread(np.random.default_rng(3), 0.3)
     seen = 0.5 * (mixture.means[1] + mixture.means[2])
-    found = mixture.posterior(np.linalg.inv(R), np.linalg.solve(R, seen), beta)
+    evidence = np.linalg.inv(R), np.linalg.solve(R, seen)
+    found = replace(mixture, beta=beta).posterior(*evidence)
     fits = [multivariate_normal(m, C + R).logpdf(seen) for m, C in zip(mixture.means, mixture.covariances, strict=True)]
     weights = mixture.weights * np.exp(beta * (np.array(fits) - max(fits)))
     assert found.weights == pytest.approx(weights / weights.sum(), rel=1e-6)
-    assert found.log_evidence == pytest.approx(mixture.posterior(np.linalg.inv(R), np.linalg.solve(R, seen), 1.0)[3])
+    assert found.log_evidence == pytest.approx(mixture.posterior(*evidence).log_evidence)  # not of beta
 
 
 def test_without_evidence_the_posterior_is_the_prior(mixture):

@@ -53,9 +53,6 @@ KNOWN = 1.5
 PAYLOAD_CHANGED = 29.588298445074422
 # T where it may have: the 99 % quantile
 PAYLOAD_MAY_CHANGE = 23.209251158954356
-# chi-squared of the mass alone where it may have: the 99 % quantile for one degree of freedom. Of 27 sound logs the
-# largest is 2.5, of a real Panda's three windows 1.0 (`benchmarks/wrong_logs.py`)
-MASS_MAY_CHANGE = 6.634896601021213
 # by how much the physics overrates a log's evidence, where nobody knows: as of the arms that are least like their
 # models, with motor currents and beyond the measured ones (`Calibration.kappa` of them)
 KAPPA_UNKNOWN = 4.5
