@@ -32,8 +32,8 @@ _COMPONENTS = 12  # per family: a container's loadings, a box's sizes and places
 # families that a difference is made of: less nothing, or a screw, a payload is what it was
 _BODIES = ("boxes", "shapes", "tools", "container")
 _LITTLE = ("nothing", "light")  # families of an empty hand, or nearly
-# beta: of sound logs of arms that the training did not see, 95 % of the inertias' intervals hold with it, and no smaller
-# one is needed for that; the errors are a little smaller, too (`benchmarks/coarsening.py`)
+# beta: the smaller, the more of the inertias lie inside, at no larger an error; the smallest in steps of 0.1 with which
+# half-widths are about three times the error on sound logs, no more (`benchmarks/coarsening.py`)
 COARSENED = 0.7
 _FLOOR = np.array([2e-3] + [2e-4] * 3 + [2e-5] * 6)  # [kg, kg·m, kg·m²] no component is narrower than this
 
