@@ -14,9 +14,9 @@ from armload.app.cli import main
 from armload.devices import Simulator
 from armload.errors import IdentificationError
 from armload.identification import identify
-from armload.identification.segments import _OF_MASS, changes_of_payload, of_mass
+from armload.identification.segments import MASS_MAY_CHANGE, changes_of_payload, of_mass
 from armload.identification.tare_age import DAY, SESSION, drift_after, drift_since, in_words
-from armload.identification.thresholds import PAYLOAD_MAY_CHANGE
+from armload.identification.thresholds import PAYLOAD_CHANGED, PAYLOAD_MAY_CHANGE
 from armload.inertia import InertialParameters
 from armload.lab.episodes import draw_episodes, simulate_episodes
 from armload.motion import taie2024
@@ -90,10 +90,10 @@ def test_a_light_thing_taken_up_is_doubted_by_its_mass_and_a_sound_log_is_not(pa
     )
     log = Recording(*map(np.array, zip(*source, strict=True)))  # type: ignore[arg-type]
     found = changes_of_payload(log, panda, sound.tare, kappa=1.5)
-    assert found.times or max(found.statistic, found.of_mass) > PAYLOAD_MAY_CHANGE
+    assert found.times or found.doubted
     whole = changes_of_payload(sound.run, panda, sound.tare, kappa=1.5)
     assert not whole.times
-    assert max(whole.statistic, whole.of_mass) < PAYLOAD_MAY_CHANGE
+    assert not whole.doubted
 
 
 def test_the_mass_of_what_was_added_is_chi_squared_of_one_where_nothing_was():
@@ -104,7 +104,12 @@ def test_the_mass_of_what_was_added_is_chi_squared_of_one_where_nothing_was():
     draws = [of_mass(Λ, root @ rng.normal(size=10)) for _ in range(4000)]
     for share in (0.5, 0.9, 0.99):
         assert np.quantile(draws, share) <= 1.15 * chi2.ppf(share, 1)
-    assert pytest.approx(chi2.isf(1e-3, 10) / chi2.isf(5e-4, 1)) == _OF_MASS
+
+
+def test_what_is_found_and_what_is_doubted_are_quantiles_of_what_sound_logs_show():
+    assert pytest.approx(chi2.isf(1e-3, 10)) == PAYLOAD_CHANGED
+    assert pytest.approx(chi2.isf(1e-2, 10)) == PAYLOAD_MAY_CHANGE
+    assert pytest.approx(chi2.isf(1e-2, 1)) == MASS_MAY_CHANGE
 
 
 # ------------------------------------------------------------------ how old a tare is

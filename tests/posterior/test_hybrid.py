@@ -74,7 +74,7 @@ def test_the_posterior_is_that_of_importance_sampling(mixture):
     rng = np.random.default_rng(3)
     R = spread(rng, 0.3)
     truth = mixture.means[1]
-    found = mixture.posterior(np.linalg.inv(R), np.linalg.solve(R, truth))
+    found = replace(mixture, beta=1.0).posterior(np.linalg.inv(R), np.linalg.solve(R, truth))
     counts = rng.multinomial(400_000, mixture.weights)
     draws = np.concatenate(
         [
@@ -87,6 +87,19 @@ def test_the_posterior_is_that_of_importance_sampling(mixture):
     std = np.sqrt(w @ (draws - mean) ** 2 / w.sum())
     assert found.mean / UNIT == pytest.approx(mean / UNIT, abs=0.03)
     assert np.sqrt(np.diag(found.covariance)) / std == pytest.approx(np.ones(10), abs=0.04)
+
+
+@pytest.mark.parametrize("beta", [1.0, 0.5])
+def test_how_well_a_component_fits_counts_as_often_as_beta_says(mixture, beta):
+    """Oracle: each component's density of a measurement of phi."""
+    R = spread(np.random.default_rng(3), 0.3)
+    seen = 0.5 * (mixture.means[1] + mixture.means[2])
+    evidence = np.linalg.inv(R), np.linalg.solve(R, seen)
+    found = replace(mixture, beta=beta).posterior(*evidence)
+    fits = [multivariate_normal(m, C + R).logpdf(seen) for m, C in zip(mixture.means, mixture.covariances, strict=True)]
+    weights = mixture.weights * np.exp(beta * (np.array(fits) - max(fits)))
+    assert found.weights == pytest.approx(weights / weights.sum(), rel=1e-6)
+    assert found.log_evidence == pytest.approx(mixture.posterior(*evidence).log_evidence)  # not of beta
 
 
 def test_without_evidence_the_posterior_is_the_prior(mixture):
@@ -247,7 +260,7 @@ def test_learning_how_far_evidence_is_overrated_makes_answers_and_intervals_bett
         half_widths(fit_calibration(train, mixture, learners=learners), test, mixture) for learners in (TREES, ())
     )
     assert np.mean(error / UNIT) < 0.99 * np.mean(plain / UNIT)
-    assert np.mean(with_bag / UNIT) < 0.95 * np.mean(without / UNIT)
+    assert np.mean(with_bag / UNIT) < 0.97 * np.mean(without / UNIT)
 
 
 def test_evidence_that_claims_too_much_is_found_to_do_so_by_its_own_factor(synthetic, mixture):

@@ -103,6 +103,9 @@ def test_a_pose_of_a_standing_arm_counts_no_longer_than_it_settles():
     still = np.zeros((400, 7))
     rows = FilteredRegression(robot, GAIN, rate=200.0, settling=0.25).rows(t, still, still, still)
     assert rows.h.sum() == pytest.approx(0.25, abs=5e-3)
+    paused = t + 3.0 * (t > 0.1)
+    rows = FilteredRegression(robot, GAIN, rate=200.0, settling=0.25).rows(paused, still, still, still)
+    assert rows.h.sum() == pytest.approx(0.25, abs=6e-3)  # what nobody saw counts for nothing
     moving = np.linspace(0.0, 1.0, 400)[:, None] * np.ones(7)
     rows = FilteredRegression(robot, GAIN, rate=200.0, settling=0.25).rows(t, moving, still, still)
     assert rows.h.sum() == pytest.approx(t[-1])

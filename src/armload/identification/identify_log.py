@@ -21,7 +21,7 @@ from armload.identification.plausibility import check_plausible
 from armload.identification.reporting import answered
 from armload.identification.segments import changes_of_payload
 from armload.identification.tare_age import drift_since
-from armload.identification.thresholds import DECISIVE, HEAVIEST, LOWEST_RATE, PAYLOAD_MAY_CHANGE, SETTLED
+from armload.identification.thresholds import DECISIVE, HEAVIEST, LOWEST_RATE, SETTLED
 from armload.inertia import HELD, Z95, InertialParameters
 from armload.payloads import INERTIA_ASSUMED, Payload, read_payload
 from armload.posterior import Known, KnownCentre, KnownMass, Profile, load_profile
@@ -84,7 +84,8 @@ def identify(
     say("identifying")
     whole = _of_one_payload(recording, arm, tare, mounted, asked, notes)
     of_arm = (None, None) if whole.another else (tare, profile)
-    times, statistic, of_mass = changes_of_payload(recording, arm, *of_arm, whole.kappa)
+    changes = changes_of_payload(recording, arm, *of_arm, whole.kappa)
+    times = changes.times
     edges, answers = [recording.t[0], *times, recording.t[-1]], [whole]
     if times:
         parts = [recording.between(a + SETTLED * (k > 0), b) for k, (a, b) in enumerate(pairwise(edges))]
@@ -94,7 +95,7 @@ def identify(
         answers.append(_of_one_payload(parts[-1], arm, tare, mounted, asked, notes))
         if whole.moves and 2 * sum(answer.moves for answer in answers) > len(answers):
             edges, answers = [edges[0], edges[-1]], [whole]  # there is no rigid body in the parts either: it swings
-    elif max(statistic, of_mass) > PAYLOAD_MAY_CHANGE:
+    elif changes.doubted:
         answers = [replace(whole, interval="approximate", notes=(MAY_CHANGE, *whole.notes))]
     segments = tuple(
         Segment(float(a - recording.t[0]), float(b - recording.t[0]), answer)

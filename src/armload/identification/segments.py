@@ -38,6 +38,7 @@ from armload.identification.thresholds import (
     MOTOR_SIDE,
     PART_LEAST,
     PAYLOAD_CHANGED,
+    PAYLOAD_MAY_CHANGE,
     SETTLED,
 )
 from armload.posterior import Profile, SmoothPosteriorLeastSquares
@@ -58,20 +59,27 @@ _LIKELIEST = 2  # cuts of which T is found with the whole model
 # [kg·m, kg·m²] standard deviations of moments and inertia of something light, 0.2 kg within 8 cm of the frame: a stated
 # prior. What is heavier shows in all ten
 _LIGHT = 0.2 * np.array([0.08] * 3 + [0.08**2] * 6)
-# what chi-squared of one at 0.05 % counts for of chi-squared of ten at 0.1 %, the level of `PAYLOAD_CHANGED`: the two
-# tests together are beyond it by chance no more than 0.15 % of the time
-_OF_MASS = 29.588298445074422 / 12.115665146397816
+
+
+# chi-squared of the mass alone where the payload may change: the 99 % quantile for one degree of freedom, as
+# `PAYLOAD_MAY_CHANGE` is for ten. Of 27 sound simulated logs the largest is 2.5, of three windows of a real Panda's 1.0
+MASS_MAY_CHANGE = 6.634896601021213
 
 
 class Changes(NamedTuple):
     """times: [s, on the log's clock] at which the payload changes. statistic: the largest T of the whole log.
 
-    of_mass: the largest chi-squared of the mass alone, in units of T at the same level; 0 where not tested.
+    of_mass: the largest chi-squared of the mass alone; 0 where not tested.
     """
 
     times: list[float]
     statistic: float
     of_mass: float = 0.0
+
+    @property
+    def doubted(self) -> bool:
+        """Whether the payload may change, by one of the two."""
+        return self.statistic > PAYLOAD_MAY_CHANGE or self.of_mass > MASS_MAY_CHANGE
 
 
 def changes_of_payload(
@@ -171,8 +179,8 @@ class _Search:
         cuts = added_at_cuts(self.rough.known, stretches, self.few, self.weak, self.rough.start)
         best = int(np.argmax([self._tests(*cut)[0] for cut in cuts])) + 1
         parts = [RegressionData.joined(part).of_features(self.few) for part in (stretches[:best], stretches[best:])]
-        said = solve([*self.rough.known, *parts], self.weak, None, SMOOTH, _ITERATIONS, self.rough.start)
-        scales = of_the_log(said.scales, (parts[0].blocks.duration, parts[1].blocks.duration))
+        solution = solve([*self.rough.known, *parts], self.weak, None, SMOOTH, _ITERATIONS, self.rough.start)
+        scales = of_the_log(solution.scales, (parts[0].blocks.duration, parts[1].blocks.duration))
         cuts = added_at_cuts(self.rough.known, stretches, self.few, self.weak, scales)
         return np.array([self._tests(*cut) for cut in cuts])
 
@@ -189,8 +197,8 @@ class _Search:
         parts = [RegressionData.joined(before), RegressionData.joined(after)]
         for part in parts:
             part.session = self.session
-        said = solve([*self.whole.known, *parts], self.weak, None, SMOOTH, _ITERATIONS, self.whole.start)
-        return self._tests(said.information, said.vector)
+        solution = solve([*self.whole.known, *parts], self.weak, None, SMOOTH, _ITERATIONS, self.whole.start)
+        return self._tests(solution.information, solution.vector)
 
     def _tests(self, information: NDArray[np.float64], vector: NDArray[np.float64]) -> tuple[float, float]:
         """T, and the statistic of the mass alone, of what a cut's two sides say."""
@@ -198,7 +206,7 @@ class _Search:
         T = float(vector @ np.linalg.solve(information + wide, vector)) / self.kappa
         if self.physics.arm.motor_torque or not self.whole.known:
             return T, 0.0  # friction that grows with the load differs from part to part as a weight does
-        return T, _OF_MASS * of_mass(information / self.kappa, vector / self.kappa)
+        return T, of_mass(information / self.kappa, vector / self.kappa)
 
 
 def of_mass(information: np.ndarray, vector: np.ndarray) -> float:

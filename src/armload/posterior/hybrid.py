@@ -31,9 +31,6 @@ _REMOVED = 0.1
 # how likely it is, beforehand, that something was taken off and something else put on: as likely. The difference is no
 # body. Sound logs leave it at 0.03 (median), and below 0.5 (`benchmarks/wrong_logs.py`)
 _EXCHANGED = 0.1
-# of the density of the log, were it a body: an exchange that is likelier than that is not excluded by the log, whatever
-# was likely beforehand, and the intervals hold it, too. Odds of 20 to 1, as of an interval of 95 %, a convention
-_EXCLUDED = 0.05
 
 
 class HybridIdentifier(PosteriorLeastSquares):
@@ -152,9 +149,9 @@ def answer(
     other = None
     if differences is not None:
         other = differences.posterior(trusted.information, sign * trusted.vector)
-        excluded = other.log_evidence - found.log_evidence < np.log(_EXCLUDED)
+        fits_better = other.log_evidence > found.log_evidence  # whatever was likely beforehand
         found, exchanged = found.or_else(other, _EXCHANGED)
-        other = None if excluded else (other.mean, calibration.widened(other, trusted))
+        other = (other.mean, calibration.widened(other, trusted)) if fits_better else None
     mean, covariance = found.mean, calibration.widened(found, trusted)
     if not quick:
         covariance = holding(covariance, 0, found.mass_if_any - found.mean[0])

@@ -81,7 +81,9 @@ def _components(precisions, pulls, constants, information, vectors):  # pragma: 
 
 
 @kernel(fastmath={"contract", "reassoc", "nsz"})
-def mixture_posteriors(precisions, pulls, constants, scale, some, information, vectors):  # pragma: no cover - compiled
+def mixture_posteriors(
+    precisions, pulls, constants, before, scale, some, rate, information, vectors
+):  # pragma: no cover - compiled
     """Means (V, 10), covariances (V, 10, 10), weights (V, K), ln p(evidence) + const (V,), the mass of `some` (V,)."""
     (V, d), K = vectors.shape, len(constants)
     Λ, h = np.empty((d, d)), np.empty((V, d))
@@ -97,9 +99,15 @@ def mixture_posteriors(precisions, pulls, constants, scale, some, information, v
         for k in range(K):
             largest = max(largest, w[k])
         for k in range(K):
+            total += np.exp(w[k] - largest)
+        totals[v] = largest + np.log(total)
+        largest, total = -np.inf, 0.0
+        for k in range(K):  # how well a component fits tells less than it seems to
+            w[k] = before[k] + rate * (w[k] - before[k])
+            largest = max(largest, w[k])
+        for k in range(K):
             w[k] = np.exp(w[k] - largest)
             total += w[k]
-        totals[v] = largest + np.log(total)
         for k in range(K):
             w[k] /= total
         share, total = 1e-300, 0.0

@@ -3,7 +3,7 @@
 What the rows are is said in `rows.py`, which owns the states of the lags that are handed over here and changed in
 place:
 
-    clock       (4,) [s] times of the last sample and row, since when the arm rests; what the last row stands for
+    clock       (4,) [s] times of the last sample and row; how long the pose of rest was seen; what the last row is for
     joints      (5, n) lagged torque and last torque; state and last input of the bare arm's lag; the pose of rest
     regressor   (2, n, 10 + p) states of the lags of W and Z, their last inputs
     pose, velocity lags: the same of the features
@@ -64,7 +64,6 @@ def lag_torques(t, tau, settings, clock, joints):  # pragma: no cover - compiled
 
 @kernel
 def make_rows(
-    t,
     q,
     dq,
     torque,
@@ -102,11 +101,12 @@ def make_rows(
         moved = not np.isfinite(clock[2])
         for j in range(n):
             moved |= abs(q[m, j] - joints[4, j]) > _STILL
+        clock[2] += steps[m]  # not what passed while nothing was seen
         if moved:
-            clock[2] = t[m]
+            clock[2] = 0.0
             for j in range(n):
                 joints[4, j] = q[m, j]
-        h[m] = 0.0 if t[m] - clock[2] > settling else steps[m]
+        h[m] = 0.0 if clock[2] > settling else steps[m]
     return h, X, r, weights
 
 

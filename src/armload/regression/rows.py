@@ -107,7 +107,7 @@ class FilteredRegression:
     def reset(self) -> None:
         """Forget the past: the next sample is the first."""
         n, pose, velocity = self.arm.n, 2 * len(self._waves), 2 * len(self._velocity_waves)
-        # times of the last sample, of the last row, since when the arm rests; what the last row stands for
+        # times of the last sample, of the last row; how long the pose of rest was seen; what the last row stands for
         self._clock = np.full(4, -np.inf)
         self._joints = np.full((5, n), np.nan)  # lagged torque, last torque; of the bare arm; the pose of rest
         self._regressor = np.zeros((2, n, self._wide))  # states of the lags, their last inputs
@@ -128,7 +128,7 @@ class FilteredRegression:
         poses, dq, tau = (np.require(np.atleast_2d(x), float, ["C", "W"]) for x in (q, dq, tau))
         index, steps, fresh, torque = lag_torques(times, tau, self._settings, self._clock, self._joints)
         times, poses = times[index], poses[index]
-        return Rows(times, poses, *self._made(times, poses, dq[index], torque, steps, fresh))
+        return Rows(times, poses, *self._made(poses, dq[index], torque, steps, fresh))
 
     def row(self, t: float, q: NDArray, dq: NDArray, tau: NDArray) -> Row | None:
         """The row that a sample completes, if it does; q, dq, tau (n,)."""
@@ -137,7 +137,7 @@ class FilteredRegression:
             return None
         q, dq = _writable(q), _writable(dq)
         step, fresh = self._clock[3:], np.array([done == FRESH])
-        h, X, r, weights = self._made(np.array([t]), q[None], dq[None], self._joints[:1], step, fresh)
+        h, X, r, weights = self._made(q[None], dq[None], self._joints[:1], step, fresh)
         return Row(t, q, h[0], X[0], r[0], weights[0])
 
     def __call__(
@@ -147,10 +147,10 @@ class FilteredRegression:
         rows = self.rows(t, q, dq, tau)
         return rows.r, rows.X
 
-    def _made(self, t: NDArray, q: NDArray, dq: NDArray, torque: NDArray, steps: NDArray, fresh: NDArray) -> tuple:
+    def _made(self, q: NDArray, dq: NDArray, torque: NDArray, steps: NDArray, fresh: NDArray) -> tuple:
         states = (self._clock, self._joints, self._regressor, self._pose, self._velocity)
         arm = (*self._momentum.chain, self._turned, self._links, self._waves, self._velocity_waves)
-        made = make_rows(t, q, dq, torque, steps, fresh, self._settings, *arm, *states)
+        made = make_rows(q, dq, torque, steps, fresh, self._settings, *arm, *states)
         if self._torque_gain is not None:
             made[1][:, :, :10] *= self._torque_gain[:, None]
         return made
