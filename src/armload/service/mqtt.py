@@ -9,7 +9,7 @@ from typing import Any
 from urllib.parse import unquote, urlsplit
 
 from armload.errors import UsageError
-from armload.extras import install
+from armload.runtime.extras import install
 
 _KEPT = 1000  # messages that wait; then new ones are dropped
 _LONGEST = 60  # [s] between two trials to connect
