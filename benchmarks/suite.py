@@ -8,9 +8,9 @@ Python, numba or pytest:
     make .venv/.stamp    the virtual environment, from what pip finds or has kept of the packages
     make test            lint, types, kernels and the tests, with two workers
 
-wall time [s], and processor time [s], user and system, of all their processes. Beside them stand the number of cores
-and how many processes wanted one in the five minutes before (the load average): only on an idle machine the wall times
-mean something. The real logs are those of ARMLOAD_REAL_DATA, or of shared/data beside this checkout.
+wall time [s], and processor time [s], user and system, of all their processes. Beside them stands how many processes
+wanted a core in the five minutes before (the load average): only on an idle machine the wall times mean something. The
+real logs are those of ARMLOAD_REAL_DATA, or of shared/data beside this checkout.
 
 Written to benchmarks/results/suite.json. The sum of the wall times is what `structure.py --test-seconds` takes.
 """
@@ -39,7 +39,6 @@ def main() -> None:
     environment["ARMLOAD_REAL_DATA"] = os.environ.get("ARMLOAD_REAL_DATA", str(ROOT.parent / "shared" / "data"))
     result: dict[str, Any] = {
         "revision": revision,
-        "cores": len(os.sched_getaffinity(0)),
         "load_before": round(os.getloadavg()[1], 2),
     }
     with tempfile.TemporaryDirectory() as folder:
