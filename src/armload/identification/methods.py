@@ -109,7 +109,7 @@ def _hybrid(arm: Arm, tare: Recording | None, profile: Profile | None = None) ->
 
 def _commanded(*_: object) -> Identifier:
     raise IdentificationError(
-        "the method commanded needs the commanded motion, which a log does not hold: in Python, "
+        "the method commanded needs the motion that was commanded, which a log does not hold: in Python, "
         "CommandedLeastSquares(arm, motion); from a log alone use polynomial"
     )
 

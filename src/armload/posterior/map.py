@@ -65,7 +65,7 @@ class PosteriorLeastSquares(Identifier):
     _same_motion: SameMotion | None = None
     test_tare = True  # whether an answer tests that arm and gravity are as stated; episodes of a training do not
     publish = PUBLISH  # [s] between two live answers; a service that speaks ten times a second asks for fewer
-    known: Known | None = None  # of the payload, beside the log
+    known: Known | None = None  # of the payload, apart from the log
     log_only: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None  # then the answer from the log only
     taken = False  # whether the last answer rests on what is known, too
     exchanged = False  # whether the last answer is rather the difference of two bodies, one put on for another
@@ -83,7 +83,8 @@ class PosteriorLeastSquares(Identifier):
         profile: Profile | None = None,
     ) -> None:
         self.arm, self.gain, self.prior, self.profile, self.session = arm, gain, prior, profile, SAME
-        self.features = features or self._own_features()
+        own = JointFeatures(arm.n) if self._smooth else JointFeatures(arm.n, 0, 0)
+        self.features = features or (profile.features if self._smooth and profile is not None else own)
         if same_motion and tare is not None:
             self._same_motion = SameMotion(arm, tare, gain)
         self._weak = payload_prior_std(arm)
@@ -109,11 +110,6 @@ class PosteriorLeastSquares(Identifier):
                 data.add(tare.t, tare.q, tare.dq, tare.tau)
             self._tares.append(data)
         self.reset()
-
-    def _own_features(self) -> JointFeatures:
-        if not self._smooth:
-            return JointFeatures(self.arm.n, 0, 0)
-        return JointFeatures(self.arm.n) if self.profile is None else self.profile.features
 
     def empty_data(self) -> RegressionData:
         """An empty regression of the kind this method accumulates."""
