@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,6 +31,7 @@ _LOOK = 0.02  # [s] between two looks at the accuracy: a tenth of a braking time
 _STILL = 0.2  # [s] for which the arm must have stood before a movement: what was just put on has swung out
 _FRESH = 0.05  # [s] older samples waited somewhere, while somebody mounted the payload, say
 _TO_SETTLE = 5.0  # [s] of waiting for that
+_TO_SWING_OUT = 1.0  # [s] of waiting for an arm that somebody has just stopped
 _WARM_UP = 0.5  # [s] of the tare that the identifier is fed before the arm moves, so that all it compiles is compiled
 
 
@@ -113,7 +113,7 @@ class Procedure:
         for path in (self.folder / "empty.csv", self.folder / "loaded.csv"):
             if path.exists():
                 raise RecordingError(f"{path} exists: a log is never written over; name another folder")
-        at = self._standing()
+        at = self._standing(_TO_SWING_OUT)
         self.plan = plan_of(arm, motion, at, empty_run=tare is None, empty_motion=empty_motion, **self._room)
 
     def run(self, consent: Callable[[Plan], bool], mount: Callable[[], None]) -> Measurement:
@@ -178,16 +178,17 @@ class Procedure:
         plan.check()
         return plan
 
-    def _standing(self, patience: float = 0.0) -> NDArray[np.float64]:
-        """Where the arm is commanded to be; it must not move, or come to rest within `patience` [s]."""
+    def _standing(self, patience: float) -> NDArray[np.float64]:
+        """Where the arm is commanded to be; it must come to rest within `patience` [s] of its own clock."""
         begun: float | None = None  # of the newest stretch of rest, among samples that did not wait anywhere
-        asked = time.monotonic()
+        asked: float | None = None  # the first of these samples
         for sample in self.mover:
             fresh = self.mover.lag() < _FRESH
             begun = None if not fresh or is_moving(sample.dq) else sample.t if begun is None else begun
             if begun is not None and sample.t - begun >= _STILL:
                 return self.mover.commanded()
-            if fresh and begun is None and time.monotonic() - asked > patience:
+            asked = sample.t if asked is None and fresh else asked
+            if fresh and begun is None and asked is not None and sample.t - asked > patience:
                 raise SafetyError(f"{self.mover.name} moves: a measurement begins at rest; stop it first")
         raise SourceError(f"{self.mover.name} ended before its first sample")
 
