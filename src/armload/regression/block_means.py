@@ -98,15 +98,17 @@ class BlockMeans:
     def joined(cls, parts: Sequence[BlockMeans]) -> BlockMeans:
         """The blocks of several stretches of one signal, one after another, to be read and not to be added to."""
         out = cls(parts[0].sums.shape[1:], max(part.block for part in parts))
-        sums = np.concatenate([part.sums[: part._filled + 1] for part in parts])
-        times = np.concatenate([part._times[: part._filled + 1] for part in parts])
-        while len(times) > _MOST_BLOCKS:
-            last = len(times) - len(times) % 2
-            sums = np.concatenate([sums[0:last:2] + sums[1:last:2], sums[last:]])
-            times = np.concatenate([times[0:last:2] + times[1:last:2], times[last:]])
-            out.block *= 2.0
-        out.sums[: len(times)], out._times[: len(times)] = sums, times
-        out._filled = len(times) - 1
+        counts = [part._filled + 1 for part in parts]
+        total, halvings = sum(counts), 0
+        while total > _MOST_BLOCKS << halvings:
+            halvings += 1
+        for part, first, count in zip(parts, np.cumsum([0, *counts]), counts, strict=False):
+            into = (first + np.arange(count)) >> halvings
+            starts = np.flatnonzero(np.diff(into, prepend=-1))
+            out.sums[into[starts]] += np.add.reduceat(part.sums[:count], starts, axis=0)
+            out._times[into[starts]] += np.add.reduceat(part._times[:count], starts)
+        out.block *= 2.0**halvings
+        out._filled = (total - 1) >> halvings
         out._count = sum(part._count for part in parts)
         return out
 
