@@ -85,7 +85,15 @@ def figure(cells: list[dict[str, Any]]) -> None:
                     (x, mass(pooled(c, name))[0]) for k, c in networks.items() if (x := place(*k)) is not None
                 )
                 if len(beside) > 1:
-                    axes.plot(*zip(*beside, strict=True), "s", ls=(0, (4, 2)), ms=4, mfc="white", color=colour)
+                    axes.plot(
+                        *zip(*beside, strict=True),
+                        "s",
+                        ls=(0, (4, 2)),
+                        ms=4,
+                        mfc="white",
+                        color=colour,
+                        label=f"networks over {label}",
+                    )
             rivals = [cell for cell in cells if cell.get("set") == name]
             for method, colour, style in zip(
                 PHYSICS, ("#8A8A8A", *COLOURS[4:]), ("--", ":", "-.", ":", "-"), strict=True
@@ -93,7 +101,8 @@ def figure(cells: list[dict[str, Any]]) -> None:
                 axes.axhline(mass(pooled(rivals, method))[0], color=colour, linestyle=style, label=method)
             axes.set(xscale="log", yscale="log", title=title, xlabel="how many were trained on")
         panels[0].set_ylabel("mean error of the mass [g]")
-        panels[0].set_yticks([10, 20, 50, 100, 200, 500], ["10", "20", "50", "100", "200", "500"])
+        ticks = (10, 20, 50, 100, 200, 500, 1000, 2000)
+        panels[0].set_yticks(ticks, [str(tick) for tick in ticks])
         panels[0].minorticks_off()
         handles, labels = panels[0].get_legend_handles_labels()
         canvas.legend(handles, labels, loc="lower center", ncols=3, fontsize=8)

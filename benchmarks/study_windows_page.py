@@ -77,9 +77,9 @@ def gained(cells: list[dict[str, Any]]) -> str:
             continue
         before, parts = known[f"ridge, {tare}"], []
         for worlds in WORLDS:
-            for columns in (slice(0, 1), slice(1, 4), slice(4, 10)):
+            for columns, digits in ((slice(0, 1), 0), (slice(1, 4), 1), (slice(4, 10), 2)):
                 better = (before[worlds] - errors[worlds])[:, columns].mean(axis=1)
-                parts.append(f"{better.mean():.2g} ± {better.std(ddof=1) / np.sqrt(len(better)):.1g}")
+                parts.append(f"{better.mean():.{digits}f} ± {better.std(ddof=1) / np.sqrt(len(better)):.{digits}f}")
         rows.append([f"{LEARNERS[kind]}, {tare}" + (f", seed {seed}" if seed else ""), *parts])
     heads = [
         f"{title}: {part}" for title in TITLES.values() for part in ("mass [g]", "moments [g·m]", "inertia [g·m²]")
