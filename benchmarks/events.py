@@ -102,7 +102,9 @@ def measured(scene: Scene) -> dict[str, Any]:
         if one.t - last < 0.999 * LOOK:
             continue
         last = one.t
-        back = one.event is not None and one.event.kind == "return"
+        back = 0  # 1: the run before the event goes on, 2: the one before that is taken up again
+        if one.event is not None and one.event.kind == "return":
+            back = 1 + (abs(one.event.mass or 0.0) > FELT[0])
         said.append(
             (
                 *(one.t, one.phi[0], one.low[0], one.high[0], one.interval == "calibrated", one.settling, back),
@@ -169,11 +171,11 @@ def reliability_of(stream: Stream, table: NDArray, held: NDArray, every: NDArray
     t, changed = table[:, 0], np.zeros(len(table), dtype=bool)
     runs = [held[0]]  # what the run at work began with, and those before
     for k in range(1, len(table)):
-        settled, back = table[k - 1, 5] == 1.0 and table[k, 5] == 0.0, table[k, 6] == 1.0
+        settled, back = table[k - 1, 5] == 1.0 and table[k, 5] == 0.0, int(table[k, 6])
         if settled and not back:
             runs.append(held[k])
-        elif back and table[k - 1, 6] == 0.0 and not settled and len(runs) > 1:
-            runs.append(runs[-2])
+        elif back and table[k - 1, 6] == 0.0 and not settled and len(runs) > back:
+            runs.append(runs[-1 - back])
         changed[k] = bool((np.abs(held[k, :4] - runs[-1][:4]) > FELT).any())
     for change in stream.changes:
         changed |= (t >= change.start) & (t <= change.start + change.seconds)
@@ -183,7 +185,7 @@ def reliability_of(stream: Stream, table: NDArray, held: NDArray, every: NDArray
         pushed |= (t > push.start) & (t < push.end)
         edge |= (np.abs(t - push.start) < rise) | (np.abs(t - push.end) < rise + 0.2)
     out = {
-        "p_change": _counted(table[every, 8], changed[every]),
+        "p_changed": _counted(table[every, 8], changed[every]),
         "p_contact": _counted(table[every, 9][~edge[every]], pushed[every][~edge[every]]),
     }
     if stream.base is not None:
@@ -282,8 +284,11 @@ def _quantiles(values: list[float], unit: float = 1.0) -> dict[str, float] | Non
 def reliability(cells: list[dict[str, Any]]) -> dict[str, Any]:
     """Of the moments called so: how often it was, of all parts together."""
     out = {}
-    for name in ("p_held", "p_change", "p_contact"):
-        total = np.sum([cell["reliability"][name] for cell in cells if name in cell["reliability"]], axis=0)
+    for name, key in (("p_held", "p_held"), ("p_change", "p_changed"), ("p_contact", "p_contact")):
+        counted = [cell["reliability"][key] for cell in cells if key in cell["reliability"]]
+        if not counted:  # cells of before a mistake in what counts as changed was mended
+            continue
+        total = np.sum(counted, axis=0)
         out[name] = [
             {"called": round(p / n, 4), "was": round(so / n, 4), "moments": int(n)} for n, p, so in total.tolist() if n
         ]
