@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from armload.runtime.lazy import on_first_use
 
 if TYPE_CHECKING:
-    from armload.devices.counted import Controller, Counted, controller_of
+    from armload.devices.counted import Controller, Counted
     from armload.devices.detached import Detached
     from armload.devices.files.source import Replay
     from armload.devices.forms import CONTROLLERS, FORMS, Form, export_load
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from armload.devices.load import Load, about, read_load
     from armload.devices.mover import Mover, StreamedMover, samples_of_movement
     from armload.devices.opening import open_source
+    from armload.devices.opening_controllers import controller_of
     from armload.devices.opening_movers import open_mover
     from armload.devices.reader import Reader
     from armload.devices.recorder import Recorded, Recorder

@@ -9,7 +9,9 @@ from armload.runtime.lazy import on_first_use
 if TYPE_CHECKING:
     from armload.service.alarms import Alarm, Alarms
     from armload.service.endpoint import Endpoint
+    from armload.service.feedback import Feedback
     from armload.service.history import History
+    from armload.service.mqtt import Mqtt
     from armload.service.reconnecting import Reconnecting
     from armload.service.service import Service
     from armload.service.session import Session
@@ -24,7 +26,9 @@ __all__ = [
     "ArmSettings",
     "Endpoint",
     "Entry",
+    "Feedback",
     "History",
+    "Mqtt",
     "Reconnecting",
     "Service",
     "ServiceSettings",

@@ -37,7 +37,7 @@ class Mqtt:
     def __init__(self, url: str) -> None:
         parts = checked(url)
         try:
-            from paho.mqtt import client as paho
+            from paho.mqtt import client as paho  # type: ignore[import-not-found]
         except ImportError:
             raise UsageError(f"MQTT needs paho-mqtt, which is not installed: {install('paho')}") from None
         self._prefix, self.dropped = parts.path.strip("/") or "armload", 0
