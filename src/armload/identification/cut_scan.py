@@ -6,7 +6,7 @@ unknown then, x̂ and C its mean and covariance, the rows after a cut with the r
     h = Σ_j ∫ W_jᵀ·(r_j − X_j·x̂)/S_j dt,      Λ = Σ_j ∫ W_jᵀ·W_j/S_j dt − U·C·Uᵀ,      U = Σ_j ∫ W_jᵀ·X_j/S_j dt
 
 the same information as a solution of its own for each cut, whose scales are these (a Gaussian's score and its
-information, Bishop 2006, section 2.3), at a hundredth of the work.
+information, Bishop 2006, section 2.3): the unknowns are eliminated once for all cuts.
 """
 
 from __future__ import annotations
