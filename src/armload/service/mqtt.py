@@ -31,17 +31,18 @@ class Mqtt:
         dropped: messages there was no room for.
 
     Raises:
-        UsageError: the address is none, or paho-mqtt is not installed.
+        UsageError: the address is not one, or paho-mqtt is not installed.
     """
 
     def __init__(self, url: str) -> None:
         parts = checked(url)
         try:
-            from paho.mqtt import client as paho  # type: ignore[import-not-found]
+            from paho.mqtt.client import Client
+            from paho.mqtt.enums import CallbackAPIVersion
         except ImportError:
             raise UsageError(f"MQTT needs paho-mqtt, which is not installed: {install('paho')}") from None
         self._prefix, self.dropped = parts.path.strip("/") or "armload", 0
-        self._client = client = paho.Client(paho.CallbackAPIVersion.VERSION2)
+        self._client = client = Client(CallbackAPIVersion.VERSION2)
         client.max_queued_messages_set(_KEPT)
         client.reconnect_delay_set(1, _LONGEST)
         client.will_set(f"{self._prefix}/online", "false", qos=1, retain=True)
