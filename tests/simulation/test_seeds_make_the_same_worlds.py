@@ -10,13 +10,14 @@ from armload.arms import arm
 from armload.motion import random_motion, taie2024
 from armload.simulation import Gains, Sensors, World, moderate_stiffness, simulate
 
-# SHA-256, first 16 digits. Worlds: numbers to 1e-9, coarse enough for another processor's rounding. Logs: to 1e-6.
+# SHA-256, first 16 digits. Worlds and logs: numbers to 1e-6, none of them nearer than 1e-11 to where rounding turns, so that
+# another processor's arithmetic makes the same. Control: to 1e-9.
 WORLDS = {
-    "panda": "84f5411928aad9b8",
-    "fr3": "ab4ee60ce05c03a3",
-    "ur5e": "da7bda9ec0a17665",
-    "ur10e": "34c419b108cd1721",
-    "unknown": "9dbab9f36bef3dfe",
+    "panda": "2dad9629ceae54cb",
+    "fr3": "a30b03d6d468286c",
+    "ur5e": "32e138467c0495d0",
+    "ur10e": "09b7ed5da1aa4e1e",
+    "unknown": "c2c617a59be256c5",
 }
 CONTROL = {
     "panda": "db1aa163e1ebdce0",
@@ -58,7 +59,7 @@ def numbers(world):
 def test_worlds_are_those_the_seeds_always_made(name, tmp_path):
     robot = arm_called(name, tmp_path)
     worlds = [draw(robot, seed) for seed in range(3) for draw in (World.real_like, World.beyond)]
-    assert digest(*(x for world in worlds for x in numbers(world)), digits=9) == WORLDS[name]
+    assert digest(*(x for world in worlds for x in numbers(world)), digits=6) == WORLDS[name]
 
 
 @pytest.mark.parametrize("name", CONTROL)

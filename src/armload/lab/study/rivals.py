@@ -142,7 +142,7 @@ def tuning_runs(basis: Basis, rate: int, sensors: str) -> list[EvaluationRun]:
 def _runs(
     basis: Basis, worlds: Sequence[World], held: Sequence[InertialParameters], rate: int, sensors: str, noise: int
 ) -> list[EvaluationRun]:
-    seen = basis.sensors if sensors == "panda" else Sensors.ideal()
+    seen = Sensors.ideal() if sensors == "none" else basis.sensors
     motion = basis.motion
     loaded = [Run(motion, phi, w, seen, noise + k) for k, (phi, w) in enumerate(zip(held, worlds, strict=True))]
     empty = [Run(motion, None, w, seen, noise + 500 + k) for k, w in enumerate(worlds)]
