@@ -10,7 +10,7 @@ from armload.arms import arm
 from armload.motion import random_motion, taie2024
 from armload.simulation import Gains, Sensors, World, moderate_stiffness, simulate
 
-# SHA-256, first 16 digits. Worlds and logs: numbers to 1e-6, none of them nearer than 1e-11 to where rounding turns, so that
+# SHA-256, first 16 digits. Worlds and logs: numbers to 1e-6, none nearer than 1e-11 to where rounding turns, so that
 # another processor's arithmetic makes the same. Control: to 1e-9.
 WORLDS = {
     "panda": "2dad9629ceae54cb",

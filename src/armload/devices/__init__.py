@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from armload.devices.load import Load, about, read_load
     from armload.devices.mover import Mover, StreamedMover, samples_of_movement
     from armload.devices.opening import open_source
-    from armload.devices.opening_controllers import controller_of
+    from armload.devices.opening_controllers import WITH_CONTROLLER, controller_of
     from armload.devices.opening_movers import open_mover
     from armload.devices.reader import Reader
     from armload.devices.recorder import Recorded, Recorder
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 __all__ = [
     "CONTROLLERS",
     "FORMS",
+    "WITH_CONTROLLER",
     "Controller",
     "Counted",
     "Detached",

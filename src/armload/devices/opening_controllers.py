@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from armload.devices.detached import Detached
 
 
+_FRANKA = ("fr3", "panda")
+WITH_CONTROLLER = (*_FRANKA, "ur")  # schemes of sources whose controller can be told a load
+
+
 def controller_of(spec: str, arm: Arm, present: Callable[[], Detached | None]) -> Controller:
     """The controller behind a source.
 
@@ -25,7 +29,7 @@ def controller_of(spec: str, arm: Arm, present: Callable[[], Detached | None]) -
         SourceError: nothing can be written to this source, or its client is not installed.
     """
     scheme = spec.partition("://")[0]
-    if scheme in ("fr3", "panda"):
+    if scheme in _FRANKA:
         from armload.devices.franka.controller import FrankaController
 
         return FrankaController(present, arm)

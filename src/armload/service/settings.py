@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
+from armload.devices import WITH_CONTROLLER
 from armload.errors import UsageError
 from armload.identification.arm_options import ArmOptions
 from armload.service.mqtt import checked
@@ -51,10 +52,15 @@ class ArmSettings(ArmOptions):
     def __post_init__(self) -> None:
         if self.apply not in (None, "auto"):
             raise UsageError(f'{self.name}: apply is {self.apply!r}: expected "auto"')
-        if self.apply is not None and self.source.partition("://")[0] not in ("fr3", "panda", "ur"):
+        if self.apply is not None and not self._has_controller:
             raise UsageError(
                 f"{self.name}: no load can be written to {self.source}: expected fr3://, panda:// or ur://"
             )
+
+    @property
+    def _has_controller(self) -> bool:
+        scheme, _, rest = self.source.partition("://")
+        return bool(rest) and scheme in WITH_CONTROLLER
 
     @property
     def state(self) -> Path | None:
