@@ -64,8 +64,8 @@ ten-thousandth.
 beside the cells'. A test computes every verdict again from the cells by other code. Filtered RLS agree with an
 implementation of [7] written anew from its formulas.
 
-**Beyond the paper.** [What a learner of raw signals learns](learning.md), and what learners that are tied to no motion
-add to physics.
+**Beyond the paper.** [Which claims travel](paper_travel.md) to another arm and to other payloads; [what a learner of
+raw signals learns](learning.md), and what learners that are tied to no motion add to physics.
 
 **No real Panda with a payload was measured.** `Real-like` arms are simulated arms that differ from their model as
 real ones do. Read "real robot" in a claim as the paper's, "real-like" as ours."""
