@@ -73,7 +73,7 @@ def figure(cells: list[dict[str, Any]]) -> None:
 
     trained, networks = trainings(cells), trainings(cells, "networks")
     with look():
-        canvas, panels = plt.subplots(1, 3, figsize=(8.6, 3.6), sharey=True)
+        canvas, panels = plt.subplots(1, 3, figsize=(8.6, 4.0), sharey=True)
         for axes, (name, title) in zip(panels, SETS.items(), strict=True):
             for (label, place), colour in zip(AXES.items(), COLOURS, strict=False):
                 points = sorted((x, mass(pooled(c, name))) for k, c in trained.items() if (x := place(*k)) is not None)
@@ -106,7 +106,7 @@ def figure(cells: list[dict[str, Any]]) -> None:
         panels[0].minorticks_off()
         handles, labels = panels[0].get_legend_handles_labels()
         canvas.legend(handles, labels, loc="lower center", ncols=3, fontsize=8)
-        canvas.tight_layout(rect=(0, 0.2, 1, 1))
+        canvas.tight_layout(rect=(0, 0.27, 1, 1))
         canvas.savefig(ROOT / "docs" / "pictures" / "learning.png", dpi=110)
         plt.close(canvas)
 
