@@ -90,6 +90,17 @@ def test_the_readme_s_output_is_that_of_its_commands():
     assert f"The true mass is {truth.mass:.3f} kg, the true centre of mass ({com}) mm." in README
 
 
+def test_how_often_intervals_of_the_readme_s_episodes_held_is_committed():
+    result = json.loads((RESULTS / "benchmark_reference.json").read_text())
+    coverage = result["populations"]["reference"]["methods"]["hybrid"]["coverage"]
+    held = []
+    for time in (1.0, 6.0):
+        inside = 100 * np.array(coverage[result["times"].index(time)])
+        held += [f"{inside[group].mean():.0f}" for group in (slice(0, 1), slice(1, 4), slice(4, 10))]
+    words = "{}, {} and {} % do after 1 s, and {}, {} and {} % after 6 s.".format(*held)
+    assert words in " ".join(README.split())
+
+
 def test_how_often_intervals_held_is_that_of_the_committed_benchmark():
     populations = json.loads((RESULTS / "benchmark.json").read_text())["populations"]
     held = {name: 100 * np.mean(found["methods"]["hybrid"]["coverage"]) for name, found in populations.items()}
