@@ -178,11 +178,16 @@ def engine(jobs: int = 1, cluster: str | None = None) -> Iterator[Engine]:
         raise UsageError(
             f"--cluster {cluster!r}: expected local, or the address of a scheduler such as tcp://HOST:8786"
         )
+    import dask  # type: ignore[import-not-found]
     import distributed  # type: ignore[import-not-found]
 
     if cluster == "local":
         settings = {"n_workers": jobs, "threads_per_worker": 1, "dashboard_address": "127.0.0.1:0"}
-        made: Any = distributed.LocalCluster(**settings)
+        # Dask asks malloc to trim at 64 kB, which has every array of some size mapped and unmapped anew
+        spawned = dict(dask.config.get("distributed.nanny.pre-spawn-environ", {}))
+        spawned.pop("MALLOC_TRIM_THRESHOLD_", None)
+        with dask.config.set({"distributed.nanny.pre-spawn-environ": spawned}):
+            made: Any = distributed.LocalCluster(**settings)
     else:
         made = cluster
     try:
