@@ -178,7 +178,7 @@ def engine(jobs: int = 1, cluster: str | None = None) -> Iterator[Engine]:
         raise UsageError(
             f"--cluster {cluster!r}: expected local, or the address of a scheduler such as tcp://HOST:8786"
         )
-    import dask  # type: ignore[import-not-found]
+    import dask.config  # type: ignore[import-not-found]
     import distributed  # type: ignore[import-not-found]
 
     if cluster == "local":
