@@ -106,23 +106,28 @@ def trees(counts: tuple[int, int, int], logs: int, seed: int) -> dict[str, Any]:
     """A training: its cost, and its errors (runs, 10) in each set."""
     started = time.process_time()
     drawn = [training_log(k, counts, seed) for k in range(logs)]
+    return {"counts": counts, "logs": logs} | trained(BaggingEnsemble("tree", seed=seed), drawn, seed, started)
+
+
+def trained(
+    ensemble: BaggingEnsemble, drawn: list[tuple[Recording, NDArray[np.float64]]], seed: int, started: float
+) -> dict[str, Any]:
+    """An ensemble fitted to `ROWS` rows of each log: cost [s] since `started`, and errors (runs, 10) in each set."""
     generator = np.random.default_rng(seed)  # other times in each log: fixed ones would leave the rest of a run unseen
     every = [generator.choice(len(log), ROWS, replace=False) for log, _ in drawn]
     X = np.concatenate([rows_of(log)[rows] for (log, _), rows in zip(drawn, every, strict=True)])
     y = np.repeat([phi for _, phi in drawn], ROWS, axis=0)
     simulated = time.process_time() - started
-    ensemble = BaggingEnsemble("tree", seed=seed).fit(X, y)
-    trained = time.process_time() - started - simulated
+    ensemble.fit(X, y)
+    fitted = time.process_time() - started - simulated
     seen = [ensemble.predict(rows_of(log)).mean(axis=0) - phi for log, phi in drawn[:RUNS]]
     errors = {
         name: [ensemble.predict(rows_of(run)).mean(axis=0) - phi for run, _, phi in judged(name, seed)] for name in SETS
     }
     return {
-        "counts": counts,
-        "logs": logs,
         "rows": len(X),
         "seed": seed,
-        "cost_s": {"simulate": round(simulated, 2), "train": round(trained, 2)},
+        "cost_s": {"simulate": round(simulated, 2), "train": round(fitted, 2)},
         "errors": {"training's own logs": listed(seen, 4)} | {name: listed(found, 4) for name, found in errors.items()},
     }
 

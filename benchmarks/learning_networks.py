@@ -17,13 +17,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from learning_curves import PARTS, ROWS, RUNS, SETS, judged, rows_of, training_log
+from learning_curves import PARTS, trained, training_log
 from numpy.typing import NDArray
 from script import ROOT, options, say, write
 
 from armload.ensembles import BaggingEnsemble, NetworkLearner
 from armload.lab.cells import key_of
-from armload.lab.experiment import Task, listed, run_tasks, source_key
+from armload.lab.experiment import Task, run_tasks, source_key
 from armload.recording import Recording
 
 PLAN = (  # (payloads, motions, arms), the most telling first
@@ -47,33 +47,18 @@ def drawn(counts: tuple[int, int, int], logs: int, seed: int) -> list[tuple[Reco
 def networks(counts: tuple[int, int, int], logs: int, seed: int, cap: int) -> dict[str, Any]:
     """A training: its cost, and its errors (runs, 10) in each set."""
     started = time.process_time()
-    training = drawn(counts, logs, seed)
-    generator = np.random.default_rng(seed)  # the rows that the trees have
-    every = [generator.choice(len(log), ROWS, replace=False) for log, _ in training]
-    X = np.concatenate([rows_of(log)[rows] for (log, _), rows in zip(training, every, strict=True)])
-    y = np.repeat([phi for _, phi in training], ROWS, axis=0)
-    simulated = time.process_time() - started
-    ensemble = BaggingEnsemble(NetworkLearner(max_epochs=cap), seed=seed).fit(X, y)
-    trained = time.process_time() - started - simulated
-    seen = [ensemble.predict(rows_of(log)).mean(axis=0) - phi for log, phi in training[:RUNS]]
-    errors = {
-        name: [ensemble.predict(rows_of(run)).mean(axis=0) - phi for run, _, phi in judged(name, seed)] for name in SETS
-    }
-    return {
-        "counts": counts,
-        "logs": logs,
-        "rows": len(X),
-        "seed": seed,
-        "cap": cap,
-        "epochs": np.ravel(ensemble.epochs_).tolist(),
-        "cost_s": {"simulate": round(simulated, 2), "train": round(trained, 2)},
-        "errors": {"training's own logs": listed(seen, 4)} | {name: listed(found, 4) for name, found in errors.items()},
-    }
+    ensemble = BaggingEnsemble(NetworkLearner(max_epochs=cap), seed=seed)
+    found = trained(ensemble, drawn(counts, logs, seed), seed, started)
+    return {"counts": counts, "logs": logs, "cap": cap, "epochs": np.ravel(ensemble.epochs_).tolist()} | found
 
 
 def tasks(logs: int, seeds: int, cap: int) -> list[Task]:
     """All cells, one seed after the other."""
-    code = source_key(Path(__file__), *(ROOT / "src" / "armload" / part for part in PARTS))
+    code = source_key(
+        Path(__file__),
+        Path(__file__).with_name("learning_curves.py"),
+        *(ROOT / "src" / "armload" / part for part in PARTS),
+    )
     return [
         Task.of_one(
             f"networks-{'-'.join(map(str, counts))}-{seed}",
