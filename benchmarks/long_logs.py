@@ -1,38 +1,51 @@
 """What a survey of one log takes in memory, against the length of the log.
 
-    python benchmarks/long_logs.py [--kinds mcap,parquet] [--seconds 10,60,600,3600] [--rate 1000] [--out out/long-logs]
+    python benchmarks/long_logs.py [--kinds mcap,parquet,…] [--seconds 10,60,600,3600] [--rate 1000] [--out FOLDER]
 
-An empty Panda on an endless motion (`simulate_inverse`, a minute of it again and again, with noise of its own in each),
-without a tare. The peak is of all that one process touches (`ru_maxrss`), start-up included; the slope is that of a
-line through the logs of a minute and more. Printed, and written to benchmarks/results/long_logs.json and a table of
-docs/survey.md.
+kinds: mcap, db3 (ROS 2 bags), bag (ROS 1), parquet, hdf5, npz, csv. An empty Panda on an endless motion
+(`simulate_inverse`, a minute of it again and again, with noise of its own in each), without a tare. The peak is of all
+that one process touches (`ru_maxrss`), start-up included; the slope is that of a line through a kind's logs of a minute
+and more. What was measured stays in FOLDER/done.json: a later call goes on, with other kinds and lengths, too. Printed,
+and all of it written to benchmarks/results/long_logs.json and a table of docs/survey.md.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
 import sys
+import zipfile
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from script import ROOT, markdown_table, options, say, write, write_table
 
-from armload import arm
+from armload import Recording, arm
 from armload.motion import FourierMotion, random_motion
 from armload.simulation import Sensors, simulate_inverse
 
 MINUTE = 60.0  # [s] of motion that is repeated
+ARRAYS = ("t", "q", "dq", "tau")
+Parts = Callable[[], Iterable[Recording]]  # a log, a minute or less at a time, from its beginning on
 
 
-def minutes(rate: float, seconds: float) -> Any:
-    """The log, a minute or less at a time."""
+@cache
+def one_minute(rate: float) -> Recording:
+    """What is repeated."""
     panda = arm("panda")
     motion: FourierMotion = random_motion(panda, 7, duration=MINUTE)
-    base = simulate_inverse(panda, motion, sensors=Sensors.panda(panda).evenly(), rate=rate, duration=MINUTE, seed=1)
+    return simulate_inverse(panda, motion, sensors=Sensors.panda(panda).evenly(), rate=rate, duration=MINUTE, seed=1)
+
+
+def minutes(rate: float, seconds: float) -> Iterator[Recording]:
+    """The log, a minute or less at a time."""
+    base = one_minute(rate)
     steps, rng = round(MINUTE * rate), np.random.default_rng(3)
     for k in range(int(np.ceil(seconds / MINUTE))):
         rows = slice(0, min(steps, round((seconds - k * MINUTE) * rate)))
@@ -41,38 +54,92 @@ def minutes(rate: float, seconds: float) -> Any:
         yield replace(one, t=(k * steps + np.arange(len(one))) / rate, tau=tau)
 
 
-def write_parquet(path: Path, parts: Any) -> None:
-    """A row group for each minute."""
+def tables(parts: Iterable[Recording]) -> Iterator[Any]:
+    """Arrow tables with columns of armload's own names, one for each minute."""
     import pyarrow as pa
-    from pyarrow import parquet
 
     from armload.recording.columns import column_names
 
-    writer = None
     for part in parts:
         columns = np.hstack([part.t[:, None], part.q, part.dq, part.tau]).T
-        table = pa.table(dict(zip(column_names(part.n), map(pa.array, columns), strict=True)))
-        writer = writer or parquet.ParquetWriter(path, table.schema)
-        writer.write_table(table)
-    assert writer is not None
-    writer.close()
+        yield pa.table(dict(zip(column_names(part.n), map(pa.array, columns), strict=True)))
 
 
-def write_mcap(path: Path, parts: Any) -> None:
-    """A ROS 2 bag of JointState messages."""
+def write_parquet(path: Path, parts: Parts) -> None:
+    """A row group for each minute."""
+    from pyarrow import parquet
+
+    first = next(tables(parts()))
+    with parquet.ParquetWriter(path, first.schema) as writer:
+        for table in tables(parts()):
+            writer.write_table(table)
+
+
+def write_csv(path: Path, parts: Parts) -> None:
+    """A line for each sample."""
+    from pyarrow import csv
+
+    first = next(tables(parts()))
+    with csv.CSVWriter(path, first.schema) as writer:
+        for table in tables(parts()):
+            writer.write_table(table)
+
+
+def write_hdf5(path: Path, parts: Parts) -> None:
+    """Arrays t, q, dq, tau that grow."""
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        for part in parts():
+            for name in ARRAYS:
+                values = getattr(part, name)
+                if name not in file:
+                    file.create_dataset(name, (0, *values.shape[1:]), float, maxshape=(None, *values.shape[1:]))
+                data = file[name]
+                data.resize(len(data) + len(values), axis=0)
+                data[-len(values) :] = values
+
+
+def write_npz(path: Path, parts: Parts) -> None:
+    """Packed arrays t, q, dq, tau, one after the other."""
+    rows, n = sum(len(part) for part in parts()), next(iter(parts())).n
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        for name in ARRAYS:
+            shape = (rows,) if name == "t" else (rows, n)
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                about = {"descr": "<f8", "fortran_order": False, "shape": shape}
+                np.lib.format.write_array_header_1_0(member, about)
+                for part in parts():
+                    member.write(np.ascontiguousarray(getattr(part, name), "<f8").tobytes())
+
+
+def write_bag(path: Path, parts: Parts) -> None:
+    """A bag of JointState messages: of ROS 1 (.bag), or of ROS 2 (a folder; MCAP or sqlite3 by its suffix)."""
+    from rosbags.rosbag1 import Writer as Writer1
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
-    kind, store = "sensor_msgs/msg/JointState", get_typestore(Stores.ROS2_HUMBLE)
+    kind, one = "sensor_msgs/msg/JointState", path.suffix == ".bag"
+    store = get_typestore(Stores.ROS1_NOETIC if one else Stores.ROS2_HUMBLE)
     state, header, time = (store.types[x] for x in (kind, "std_msgs/msg/Header", "builtin_interfaces/msg/Time"))
-    names = list(arm("panda").joint_names)
-    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+    plugin = StoragePlugin.MCAP if path.suffix == ".mcap" else StoragePlugin.SQLITE3
+    names, raw = list(arm("panda").joint_names), store.serialize_ros1 if one else store.serialize_cdr
+    with Writer1(path) if one else Writer(path, version=9, storage_plugin=plugin) as writer:
         connection = writer.add_connection("/joint_states", kind, typestore=store)
-        for part in parts:
-            for sample in part:
-                now = 1_790_000_000_000_000_000 + round(sample.t * 1e9)
-                message = state(header(time(now // 10**9, now % 10**9), "base"), names, *sample[1:])
-                writer.write(connection, now, store.serialize_cdr(message, kind))
+        for k, sample in enumerate(sample for part in parts() for sample in part):
+            now = 1_790_000_000_000_000_000 + round(sample.t * 1e9)
+            stamp = time(now // 10**9, now % 10**9)
+            about = header(k, stamp, "base") if one else header(stamp, "base")
+            writer.write(connection, now, raw(state(about, names, *sample[1:]), kind))
+
+
+KINDS: dict[str, Callable[[Path, Parts], None]] = {
+    **dict.fromkeys(("mcap", "db3", "bag"), write_bag),
+    "parquet": write_parquet,
+    "hdf5": write_hdf5,
+    "npz": write_npz,
+    "csv": write_csv,
+}
 
 
 def surveyed(path: Path, folder: Path) -> tuple[float, float]:
@@ -87,24 +154,34 @@ def surveyed(path: Path, folder: Path) -> tuple[float, float]:
     return used.ru_maxrss / 1e3, used.ru_utime + used.ru_stime
 
 
+def measured(kind: str, seconds: float, rate: float, folder: Path) -> dict[str, Any]:
+    """Write a log, survey it, and remove it."""
+    path = folder / f"{seconds:g}.{kind}"
+    for old in folder.glob("*.*"):
+        if old.suffix.removeprefix(".") in KINDS:  # of a call that was stopped
+            shutil.rmtree(old) if old.is_dir() else old.unlink()
+    KINDS[kind](path, lambda: minutes(rate, seconds))
+    size = sum(f.stat().st_size for f in ([path] if path.is_file() else path.iterdir())) / 1e6
+    peak, cpu = surveyed(path, folder)
+    shutil.rmtree(path) if path.is_dir() else path.unlink()
+    return {"kind": kind, "log [s]": seconds, "file [MB]": size, "peak [MB]": peak, "cpu [s]": cpu}
+
+
 def main() -> None:
     asked = options(__doc__, kinds="mcap,parquet", seconds="10,60,600,3600", rate=1000.0, out="out/long-logs")
     folder = Path(asked.out)
     folder.mkdir(parents=True, exist_ok=True)
-    found: list[dict[str, Any]] = []
+    done = folder / "done.json"
+    found: list[dict[str, Any]] = json.loads(done.read_text(encoding="utf-8")) if done.exists() else []
     for kind in asked.kinds.split(","):
         for seconds in map(float, asked.seconds.split(",")):
-            path = folder / (f"{seconds:g}.parquet" if kind == "parquet" else f"{seconds:g}")
-            shutil.rmtree(path, ignore_errors=True)
-            parts = minutes(asked.rate, seconds)
-            (write_parquet if kind == "parquet" else write_mcap)(path, parts)
-            size = sum(f.stat().st_size for f in ([path] if path.is_file() else path.iterdir())) / 1e6
-            peak, cpu = surveyed(path, folder)
-            found.append({"kind": kind, "log [s]": seconds, "file [MB]": size, "peak [MB]": peak, "cpu [s]": cpu})
-            say(str(found[-1]))
-            shutil.rmtree(path) if path.is_dir() else path.unlink()
+            if not any(one["kind"] == kind and one["log [s]"] == seconds for one in found):
+                found.append(measured(kind, seconds, asked.rate, folder))
+                done.write_text(json.dumps(found), encoding="utf-8")
+                say(str(found[-1]))
+    found.sort(key=lambda one: (list(KINDS).index(one["kind"]), one["log [s]"]))
     slopes = {}
-    for kind in asked.kinds.split(","):
+    for kind in dict.fromkeys(one["kind"] for one in found):
         of = [(one["log [s]"], one["peak [MB]"]) for one in found if one["kind"] == kind and one["log [s]"] >= 60.0]
         t, peak = np.array(of).reshape(-1, 2).T
         slopes[kind] = float(np.polyfit(t, peak, 1)[0]) if len(of) > 1 else None
