@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 _MOST_ROWS = 60  # of the table of doubtful logs: the survey itself has them all
 _MOST_ARMS = 24  # that are drawn each in a panel, those with something to do first
 _MOST_DRAWN = 500  # points that are drawn as lines, each: a page of thousands would be slow
-_LONGEST = 110  # characters of a reason in a table
+_LONGEST = 220  # characters of a reason in a table
+_TAIL = 0.01  # share of the dots on either side that may lie beyond a panel: one odd log must not flatten all others
 
 
 def write_survey_report(table: str | Path, out: str | Path) -> list[str]:
@@ -47,7 +48,7 @@ def survey_sections(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFindin
         _what_to_do(rows, findings),
         _payloads(rows, findings),
         _arms(rows, findings, n),
-        _doubts(rows),
+        _doubts(rows, findings),
     ]
 
 
@@ -142,7 +143,10 @@ def _arms(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding], n: int
         figures.append((_drift(rows, shown, n, name), f"{what} of each joint [N·m], beside the model or its tare's."))
     more = len(findings) > _MOST_ARMS
     left = f" The first {_MOST_ARMS} of {len(findings)} arms, those that ask for something first." if more else ""
-    return Section("Drift of the arms", f"A dot is a log.{left}", figures=tuple(figures))
+    scale = (
+        "Arms that ask to be tared anew have a scale of their own, the others share one; a log far off may lie beyond."
+    )
+    return Section("Drift of the arms", f"A dot is a log. {scale}{left}", figures=tuple(figures))
 
 
 def _drift(rows: Sequence[dict[str, Any]], shown: Sequence[ArmFinding], n: int, name: str) -> Figure:
@@ -150,20 +154,27 @@ def _drift(rows: Sequence[dict[str, Any]], shown: Sequence[ArmFinding], n: int, 
     down = -(-len(shown) // across)
     with look():
         figure = new_figure(0.7 + 1.5 * down)
-        panels = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False).ravel()
+        panels = figure.subplots(down, across, sharex=True, squeeze=False).ravel()
+        alike: list[tuple[Any, list[float]]] = []
         for ax, finding in zip(panels, shown, strict=False):
             logs = [
                 of
                 for of in by_log([row for row in rows if row["arm"] == finding.arm])
                 if of[0][f"{name}_1"] is not None
             ]
-            x = _days([of[0] for of in logs])
+            x, drawn = _days([of[0] for of in logs]), []
             for j in range(n):
                 y = [float(np.mean([row[f"{name}_{j + 1}"] for row in of])) for of in logs]
                 ax.plot(x, y, ".", markersize=3, color=COLOURS[j % len(COLOURS)], label=f"joint {j + 1}")
+                drawn += y
+            if finding.retare:  # it has a scale of its own, or the others were flat lines
+                _limit([(ax, drawn)])
+            else:
+                alike.append((ax, drawn))
             _dated(ax, x, 6)
             ax.tick_params(labelsize=7)
             ax.set_title(finding.arm + (" !" if finding.advice else ""), loc="left", fontsize=8.5)
+        _limit(alike)
         for ax in panels[len(shown) :]:
             ax.set_visible(False)
         figure.supxlabel(_time_label(rows), fontsize=9)
@@ -171,34 +182,66 @@ def _drift(rows: Sequence[dict[str, Any]], shown: Sequence[ArmFinding], n: int, 
     return figure
 
 
-def _doubts(rows: Sequence[dict[str, Any]]) -> Section:
-    found = doubtful(rows)
+def _limit(panels: Sequence[tuple[Any, list[float]]]) -> None:
+    """One scale for some panels, by nearly all of their dots."""
+    values = np.concatenate([drawn for _, drawn in panels]) if panels else np.array([])
+    if not len(values):
+        return
+    low, high = np.quantile(values, [_TAIL, 1.0 - _TAIL])
+    aside = 0.3 * max(high - low, 1e-3)
+    for ax, _ in panels:
+        ax.set_ylim(low - aside, high + aside)
+
+
+def _doubts(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) -> Section:
+    """A line for each log, of its first row that is doubted; what is said of its arm already comes last."""
+    known = {f.arm for f in findings if f.retare}
+    of_logs: dict[tuple[str, int | None], dict[str, Any]] = {}
+    for row in sorted(doubtful(rows), key=lambda row: _urgency(row, known)):
+        of_logs.setdefault((row["log"], row["episode"]), row)
+    found = list(of_logs.values())
+    if not found:
+        return Section("Logs in doubt", "None.")
+    folder = _folder([row["log"] for row in found])
     cells = tuple(
         (
-            row["log"] + ("" if row["episode"] is None else f", episode {row['episode']}"),
+            row["log"].removeprefix(folder) + ("" if row["episode"] is None else f", episode {row['episode']}"),
             row["arm"],
             "" if row["t0"] is None else f"{row['t0']:.1f}–{row['t1']:.1f}",
             "" if row["status"] == UNUSABLE else f"{row['mass']:.3f}",
-            _cut(row["reason"].removeprefix(f"{row['log']}").lstrip(" :,") or row["notes"].split(SEPARATOR)[0]),
+            _cut(row["reason"].removeprefix(f"{row['log']}").lstrip(" :,") or _first_doubt(row)),
         )
         for row in found[:_MOST_ROWS]
     )
-    if not found:
-        return Section("Logs in doubt", "None.")
     more = f" The first {_MOST_ROWS} of {len(found)}." if len(found) > _MOST_ROWS else ""
-    columns = ("log", "arm", "time [s]", "mass [kg]", "why")
-    return Section(
-        "Logs in doubt",
-        f"Look at these before anything is concluded from them.{more}",
-        (
-            Table(
-                "Logs that cannot be answered, and answers that are doubted",
-                columns,
-                cells,
-                "The table has the whole text.",
-            ),
-        ),
+    where = f" Logs are in {folder}." if folder else ""
+    table = Table(
+        "Logs that cannot be answered, and answers that are doubted",
+        ("log", "arm", "time [s]", "mass [kg]", "why"),
+        cells,
+        f"The first doubt of each log; the table of the survey has the whole text.{where}",
+        prose=(4,),
     )
+    return Section("Logs in doubt", f"Look at these before anything is concluded from them.{more}", (table,))
+
+
+def _urgency(row: dict[str, Any], known: set[str]) -> int:
+    """What could not be answered first; last what is only of an arm that is not as it was."""
+    if row["status"] == UNUSABLE:
+        return 0
+    return 2 if row["arm"] in known and row["changed"] and row["consistent"] and not row["moves"] else 1
+
+
+def _first_doubt(row: dict[str, Any]) -> str:
+    return row["notes"].split(SEPARATOR)[0] or ("no body has these parameters" if not row["consistent"] else "")
+
+
+def _folder(logs: Sequence[str]) -> str:
+    """What all names begin with, up to a slash."""
+    common = logs[0]
+    while not all(log.startswith(common) for log in logs):
+        common = common[:-1]
+    return common[: common.rfind("/") + 1]
 
 
 def _days(rows: Sequence[dict[str, Any]]) -> np.ndarray:

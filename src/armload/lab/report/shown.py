@@ -40,7 +40,7 @@ class Table:
     """Rows of text under column heads; iterating gives the rows.
 
     title: what is shown. columns: heads, units included. rows: cells. note: what it rests on (split, seeds, spread).
-    baselines: indices of the rows that are baselines, to be set apart.
+    baselines: indices of the rows that are baselines, to be set apart. prose: of the columns that hold sentences.
     """
 
     title: str
@@ -48,6 +48,7 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
     note: str
     baselines: tuple[int, ...] = ()
+    prose: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         if any(len(row) != len(self.columns) for row in self.rows):
