@@ -16,6 +16,7 @@ from armload.runtime.version import __version__
 from armload.survey.logs import Log, filesystem
 from armload.survey.rows import UNUSABLE, answered, unusable
 from armload.survey.settings import Settings
+from armload.survey.sliding import slides_of_parts
 
 
 def answer_log(log: Log, settings: Settings, key: str, stamp: str, content: str) -> dict[str, Any]:
@@ -81,18 +82,20 @@ def _of_episode(log: Log, settings: Settings, path: Path, about: dict[str, Any])
 def _of_one(log: Log, settings: Settings, path: Path, about: dict[str, Any]) -> list[dict[str, Any]]:
     recording = settings.recording(log, path, about["episode"])
     about = about | {"date": recording.date}
+    arm, tare, profile = settings.arm(), settings.tare_of(log.arm), settings.profile_of(log.arm)
     try:
         found = identify(
             recording,
-            settings.arm(),
-            tare=settings.tare_of(log.arm),
-            profile=settings.profile_of(log.arm),
+            arm,
+            tare=tare,
+            profile=profile,
             tool=settings.mounted(),
             method=settings.method,
         )
     except ArmloadError as error:
         return [unusable(str(error), about)]
-    rows, lacking = answered(found, about), settings.lacking(log.arm)
+    known = (None, None) if found.another else (tare, profile)
+    rows, lacking = answered(found, about, slides_of_parts(found, recording, arm, *known)), settings.lacking(log.arm)
     for row in rows:
         row["notes"] = " | ".join([*lacking, row["notes"]]) if lacking else row["notes"]
     return rows

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from armload.survey.looseness import Looseness, looseness
 from armload.survey.rows import ANSWERED, UNUSABLE
 from armload.survey.shift import Shift, shifts
 
@@ -38,6 +39,7 @@ class ArmFinding:
         or the log's name where logs have no date; of a sound arm None.
     joint: that tells most of the change, from 1; 0: none does.
     shift: the most likely day since when the arm is another one, and how likely; None: it was seen on too few days.
+    slide: how far what it holds slides in the gripper, and how surely; None: too few logs tell.
     """
 
     arm: str
@@ -52,6 +54,7 @@ class ArmFinding:
     since: float | str | None = None
     joint: int = 0
     shift: Shift | None = None
+    slide: Looseness | None = None
 
     @property
     def advice(self) -> str:
@@ -63,7 +66,8 @@ class ArmFinding:
                 "tare it or learn its profile anew; if it was exchanged, learn the new one from its own logs alone"
             )
         if self.loose:
-            advice.append("holds things that seem to move: look at its gripper")
+            far = f" by {1e3 * self.slide.gap:.0f} mm either way" if self.slide is not None and self.slide.found else ""
+            advice.append(f"holds things that seem to {'slide' if far else 'move'}{far}: look at its gripper")
         return f"{self.arm} {', and '.join(advice)}" if advice else ""
 
 
@@ -95,6 +99,9 @@ def _of_arm(arm: str, rows: Sequence[dict[str, Any]], shift: Shift | None) -> Ar
     holding = [of for of in logs if any(row["held"] for row in of)]
     changed, since = _lately([any(row["changed"] for row in of) for of in asked], asked, SHARE_CHANGED)
     moves, first = _lately([any(row["moves"] for row in of if row["held"]) for of in holding], holding, SHARE_MOVES)
+    slide = looseness(logs)
+    if first is None and slide is not None and slide.found:
+        first = slide.since
     retare, loose = since is not None, first is not None
     joints = [row["misfit_joint"] for of in asked[-LAST:] for row in of if row["changed"]]
     joint = int(np.bincount(joints).argmax()) if retare and joints else 0
@@ -114,6 +121,7 @@ def _of_arm(arm: str, rows: Sequence[dict[str, Any]], shift: Shift | None) -> Ar
         since if retare else first,
         joint,
         shift,
+        slide,
     )
 
 

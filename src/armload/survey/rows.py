@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from armload.identification import ArmHealth, Identification
 from armload.inertia import NAMES
+from armload.survey.sliding import WAYS, Slide
 
 ANSWERED, UNUSABLE = "answered", "unusable"
 _AXES = ("x", "y", "z")
@@ -25,6 +27,7 @@ def columns(n: int) -> dict[str, str]:
     """
     of_payload = ["mass", *(f"com_{a}" for a in _AXES), *(f"inertia_{p}" for p in _PRODUCTS)]
     of_joints = [f"{name}_{j}" for name in ("offset", "coulomb") for j in range(1, n + 1)]
+    of_ways = [f"{name}_{k}" for name in ("slide", "slide_std") for k in range(1, WAYS + 1)]
     return {
         **dict.fromkeys(("log", "arm"), TEXT),
         **dict.fromkeys(("episode", "part", "parts"), WHOLE),
@@ -39,13 +42,17 @@ def columns(n: int) -> dict[str, str]:
         **dict.fromkeys(("residual", "restlessness", "misfit"), NUMBER),
         "misfit_joint": WHOLE,
         "changed": FLAG,
-        **dict.fromkeys(of_joints, NUMBER),
+        **dict.fromkeys((*of_joints, *of_ways), NUMBER),
         **dict.fromkeys(("version", "key"), TEXT),
     }
 
 
-def answered(found: Identification, where: dict[str, Any]) -> list[dict[str, Any]]:
-    """The rows of a log, one for each part throughout which the payload is the same; `date` becomes the part's own."""
+def answered(found: Identification, where: dict[str, Any], slides: Sequence[Slide | None] = ()) -> list[dict[str, Any]]:
+    """The rows of a log, one for each part throughout which the payload is the same; `date` becomes the part's own.
+
+    slides: what each part tells of sliding; nothing: that was not asked.
+    """
+    of_parts = slides or [None] * len(found.segments)
     date = where.get("date")
     return [
         where
@@ -53,7 +60,8 @@ def answered(found: Identification, where: dict[str, Any]) -> list[dict[str, Any
         | {"date": None if date is None else _number(date + part.start), "status": ANSWERED, "reason": ""}
         | _of_payload(part.answer)
         | _of_arm(part.answer.health)
-        for k, part in enumerate(found.segments)
+        | _of_slide(slide)
+        for k, (part, slide) in enumerate(zip(found.segments, of_parts, strict=True))
     ]
 
 
@@ -98,6 +106,13 @@ def _of_arm(health: ArmHealth | None) -> dict[str, Any]:
         "changed": bool(health.changed),
         **{f"{name}_{j}": _number(x) for name, xs in of_joints.items() for j, x in enumerate(xs, start=1)},
     }
+
+
+def _of_slide(slide: Slide | None) -> dict[str, Any]:
+    if slide is None or not np.isfinite(slide.std).all():
+        return {}
+    both = {"slide": slide.moment, "slide_std": slide.std}
+    return {f"{name}_{k}": _number(x) for name, xs in both.items() for k, x in enumerate(xs, start=1)}
 
 
 def _number(value: Any) -> float | None:
