@@ -23,6 +23,7 @@ def row(arm, day, **more):
     plain |= dict.fromkeys(("held", "moves", "changed"), False)
     plain |= {"log": f"{arm}/{day:02d}.csv", "arm": arm, "episode": None, "parts": 1, "date": 1.79e9 + DAY * day}
     plain |= {"status": "answered", "consistent": True, "mass": 1.0, "mass_low": 0.9, "mass_high": 1.1, "misfit": 10.0}
+    plain |= {name: None for name in plain if name.startswith("slide_")}  # not asked
     return plain | {"t1": 30.0, "determined": "m | mx", "held": True} | more
 
 

@@ -1,16 +1,17 @@
 """Whether what is held slides in the gripper, as one log tells it; `looseness` asks all logs of an arm together.
 
 A body that is held loosely lies against one stop or against the other, d from the middle of its way, whichever is
-lower. With u the direction of the way in the flange's frame and w gravity less the acceleration there,
+lower. With u the direction of the way and g gravity, both in the flange's axes,
 
-    s = d·u·sgn(u·w)        tau = W_mr·(m·s)
+    s = d·u·sgn(u·g)        tau = W_mr·(m·s)
 
 where W_mr are the columns of the first moments. So c = m·d is one more unknown of the regression (`regression.rows`):
 
-    r = W·phi + Z·eta + G·g + c·W_mr·u·sgn(u·w) + e
+    r = W·phi + Z·eta + G·g + c·W_mr·u·F[sgn(u·g)] + e
 
-It is asked of `WAYS` directions across the flange, each alone, all else integrated out under its stated prior. A few
-millimetres are a few hundredths of a newton metre, so that a log alone tells little.
+with F the lag of the rows. It is asked of `WAYS` directions across the flange, each alone, all else integrated out
+under its stated prior. A few millimetres are a few hundredths of a newton metre, so that a log alone tells little.
+What accelerations and the time between the stops do is left out: c is found too small, by a half on quick motions.
 """
 
 from __future__ import annotations
@@ -124,10 +125,13 @@ class _Known(NamedTuple):
         arm, stream = self.physics.arm, self.physics.stream
         regression, shared = stream.regression(), 10 + stream.correction.size
         size = shared + WAYS + stream.features.size
-        sums, seconds = np.zeros((arm.n, size + 1, size + 1)), 0.0
+        sums, seconds, sides = np.zeros((arm.n, size + 1, size + 1)), 0.0, None
         for samples in blocks(len(part)):
             rows = regression.rows(part.t[samples], part.q[samples], part.dq[samples], part.tau[samples])
-            sliding = _columns(arm, rows)
+            if not len(rows.t):
+                continue
+            sides = _sides(arm, rows, self.physics.gain, None if sides is None else sides[-1])
+            sliding = (rows.X[:, :, 1:4] @ _DIRECTIONS.T) * sides[:, None, :]
             seconds += float(rows.h.sum())
             for j in range(arm.n):
                 X = np.c_[rows.X[:, j, :shared], sliding[:, j], rows.X[:, j, shared:], rows.r[:, j]]
@@ -139,8 +143,12 @@ class _Known(NamedTuple):
         return RunInformation(A, A_gz, A_gg, columns_of(sums[:, None, -1, :c], E)[:, 0], sums[:, c:-1, -1]), seconds
 
 
-def _columns(arm: Arm, rows: Rows) -> NDArray[np.float64]:
-    """W_mr·u·sgn(u·g) (M, n, WAYS) of rows: slow motions' accelerations hardly turn w."""
-    down = arm.frame_motion(rows.q).gravity
-    side = np.sign(down @ _DIRECTIONS.T)
-    return (rows.X[:, :, 1:4] @ _DIRECTIONS.T) * side[:, None, :]
+def _sides(arm: Arm, rows: Rows, gain: float, before: NDArray[np.float64] | None) -> NDArray[np.float64]:
+    """sgn(u·g) (M, WAYS) through the rows' own lag; before: of the last row (WAYS,), None at the beginning."""
+    sides = np.sign(arm.frame_motion(rows.q).gravity @ _DIRECTIONS.T)
+    keep = np.exp(-gain * np.diff(rows.t, prepend=rows.t[0] - rows.h[0])).tolist()
+    state = sides[0] if before is None else before
+    for k, share in enumerate(keep):
+        state = share * state + (1.0 - share) * sides[k]
+        sides[k] = state
+    return sides
