@@ -93,9 +93,9 @@ def write_hdf5(path: Path, parts: Parts) -> None:
         for part in parts():
             for name in ARRAYS:
                 values = getattr(part, name)
-                if name not in file:
-                    file.create_dataset(name, (0, *values.shape[1:]), float, maxshape=(None, *values.shape[1:]))
-                data = file[name]
+                data: Any = file.get(name) or file.create_dataset(
+                    name, (0, *values.shape[1:]), float, maxshape=(None, *values.shape[1:])
+                )
                 data.resize(len(data) + len(values), axis=0)
                 data[-len(values) :] = values
 

@@ -60,7 +60,8 @@ def exchanged(records: Records, phi: NDArray[np.float64]) -> Records:
     return replace(
         records,
         truth=truth,
-        vector=records.vector + np.einsum("nij,nj->ni", records.information, truth - records.truth),
+        vector=np.asarray(records.vector)
+        + np.einsum("nij,nj->ni", np.asarray(records.information), truth - records.truth),
     )
 
 

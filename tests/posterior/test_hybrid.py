@@ -16,7 +16,7 @@ from armload.errors import ModelError
 from armload.identification import identify
 from armload.inertia import Z95, InertialParameters, is_consistent
 from armload.lab.episodes import draw_episodes, simulate_episodes
-from armload.lab.training import Records, cross_validated, measure_episodes
+from armload.lab.training import Records, cross_validated, measure_episodes, shards
 from armload.lab.training.calibrating import TREES, fit_calibration, overrating
 from armload.motion import random_motion
 from armload.payloads import draw_payload, random_payloads
@@ -383,6 +383,30 @@ def test_records_read_back_as_they_were_written(synthetic, tmp_path):
     (tmp_path / "bad.npz").write_text("no")
     with pytest.raises(ModelError, match="holds no records"):
         Records.load(tmp_path / "bad.npz")
+
+
+def test_records_that_stay_in_their_files_train_the_same_model_bit_for_bit(synthetic, mixture, tmp_path, monkeypatch):
+    whole, paths, firsts = synthetic.select(synthetic.episode < 150), [], (0, 60, 120)
+    for first in firsts:
+        part = whole.select((whole.episode >= first) & (whole.episode < first + 60))
+        paths.append(replace(part, episode=part.episode - first).save(tmp_path / f"{first}.npz"))
+    stored, read, loaded = shards.stored_records(paths, firsts), shards._chunk, []
+    monkeypatch.setattr(shards, "_chunk", lambda path: loaded.append(path) or read(path))
+    assert np.array_equal(np.asarray(stored.select(stored.episode == 61).vector), whole.vector[122:124])
+    assert set(loaded) == {str(paths[1])}  # the others were not read for it
+    monkeypatch.undo()
+    a, b = (fit_calibration(records, mixture, learners=(), seed=3) for records in (whole, stored))
+    assert np.array_equal(a.widths, b.widths)
+    assert np.array_equal(a.times, b.times)
+    for k in (0, 130, 299):
+        ours, theirs = (c.answer(r.evidence(k), mixture) for c, r in ((a, whole), (b, stored)))
+        assert np.array_equal(ours.mean, theirs.mean)
+        assert np.array_equal(ours.covariance, theirs.covariance)
+    assert shards._chunk.cache_info().currsize <= 2
+    paths[0].unlink()
+    shards._chunk.cache_clear()
+    with pytest.raises(ModelError, match="holds no records"):
+        stored.evidence(0)
 
 
 # ---------------------------------------------------------------------------- on logs

@@ -18,6 +18,7 @@ from armload.lab.episodes import LIGHTEST, POPULATIONS, TOOL_SHARE, Episode, dra
 from armload.lab.training.calibrating import fit_calibration
 from armload.lab.training.coverage import FOLDS, Coverage, cross_validated
 from armload.lab.training.records import TIMES, Records, measure_episodes
+from armload.lab.training.shards import stored_records
 from armload.payloads import draw_payload
 from armload.posterior import TRAITS, HybridModel, MixturePrior, Training
 from armload.regression import payload_prior_std
@@ -127,14 +128,17 @@ def episode_records(
     progress: Callable[[int, int], None] | None = None,
     on: Engine | None = None,
 ) -> Records:
-    """What a training rests on: evidence and truth of its episodes. Arguments as of `train_hybrid`."""
+    """What a training rests on: evidence and truth of its episodes. Arguments as of `train_hybrid`.
+
+    With a folder, what is large of the records stays there (`shards`).
+    """
     parts: list[Records] = []
-    for first in range(0, episodes, CHUNK):
+    paths: list[Path] = []
+    firsts = range(0, episodes, CHUNK)
+    for first in firsts:
         count = min(CHUNK, episodes - first)
         path = None if folder is None else folder / f"episodes-{_key(arm, population, seed, first, count)[:12]}.npz"
-        if path is not None and path.is_file():
-            part = Records.load(path)
-        else:
+        if path is None or not path.is_file():
             drawn = draw_chunk(arm, population, seed, first, count)
 
             def tell(done: int, _: int, first: int = first) -> None:
@@ -142,10 +146,12 @@ def episode_records(
                     progress(first + done, episodes)
 
             part = measure_episodes(drawn, jobs=jobs, on=on, progress=tell)
-            if path is not None:
-                part.save(path)
-        parts.append(replace(part, episode=part.episode + first))
-    return Records.joined(parts)
+            if path is None:
+                parts.append(replace(part, episode=part.episode + first))
+                continue
+            part.save(path)
+        paths.append(path)
+    return Records.joined(parts) if folder is None else stored_records(paths, firsts)
 
 
 def _key(arm: Arm, population: str, seed: int, first: int, count: int) -> str:
