@@ -12,7 +12,6 @@ and all of it written to benchmarks/results/long_logs.json and a table of docs/s
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import subprocess
 import sys
@@ -32,6 +31,14 @@ from armload.simulation import Sensors, simulate_inverse
 
 MINUTE = 60.0  # [s] of motion that is repeated
 ARRAYS = ("t", "q", "dq", "tau")
+# a process's largest memory counts that of whoever began it, too: so a small one begins it
+LAUNCHER = """
+import os, subprocess, sys
+process = subprocess.Popen(sys.argv[1:], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+_, status, used = os.wait4(process.pid, 0)
+print(used.ru_maxrss, used.ru_utime + used.ru_stime)
+sys.exit(status != 0)
+"""
 Parts = Callable[[], Iterable[Recording]]  # a log, a minute or less at a time, from its beginning on
 
 
@@ -147,11 +154,12 @@ def surveyed(path: Path, folder: Path) -> tuple[float, float]:
     table = folder / "table.json"
     shutil.rmtree(table.with_name(f"{table.name}.cells"), ignore_errors=True)
     words = [sys.executable, "-m", "armload", "survey", str(path), "--robot", "panda", "--jobs", "1"]
-    process = subprocess.Popen([*words, "--out", str(table)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    _, status, used = os.wait4(process.pid, 0)
-    assert status == 0, f"the survey of {path} failed"
+    began = [sys.executable, "-I", "-S", "-c", LAUNCHER, *words, "--out", str(table)]
+    done = subprocess.run(began, capture_output=True, text=True)
+    assert done.returncode == 0, f"the survey of {path} failed"
+    peak, cpu = map(float, done.stdout.split()[-2:])
     assert '"answered"' in table.read_text(encoding="utf-8"), table.read_text(encoding="utf-8")[:2000]
-    return used.ru_maxrss / 1e3, used.ru_utime + used.ru_stime
+    return peak / 1e3, cpu
 
 
 def measured(kind: str, seconds: float, rate: float, folder: Path) -> dict[str, Any]:
