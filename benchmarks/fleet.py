@@ -247,6 +247,8 @@ def judge(folder: Path) -> dict[str, Any]:
             "retare": f.retare,
             "loose": f.loose,
             "shift": None if f.shift is None else f.shift.z,
+            "slide": None if f.slide is None else f.slide.z,
+            "slides [mm]": None if f.slide is None else [1e3 * f.slide.gap, 1e3 * f.slide.std],
         }
         | {"since day": None if not isinstance(f.since, float) else round((f.since - BEGAN) / DAY, 2), "joint": f.joint}
         for f in arm_findings(rows)
@@ -349,7 +351,7 @@ def tables(found: dict[str, Any]) -> dict[str, str]:
         of = [f for f in found["arms"] if f["role"] == role]
         if not of:
             continue
-        z = [f["shift"] for f in of if f["shift"] is not None]
+        slides = [f["slides [mm]"] for f in of if f["loose"] and f["slides [mm]"] is not None]
         since = sorted({f["since day"] for f in of if f["since day"] is not None})
         called = [sum(f[what] for f in of) for what in ("retare", "loose")]
         rows.append(
@@ -357,12 +359,13 @@ def tables(found: dict[str, Any]) -> dict[str, str]:
                 role,
                 str(len(of)),
                 *(rate([len(of), k / len(of), *wilson(k, len(of))]) for k in called),
-                f"{min(z):.1f} … {max(z):.1f}" if z else "",
+                *(span_of([f[what] for f in of if f[what] is not None]) for what in ("shift", "slide")),
+                ", ".join(f"{gap:.1f} ± {std:.1f}" for gap, std in slides) if called[1] else "",
                 ", ".join(f"{day:g}" for day in since),
             ]
         )
-    heads = ["arms", "how many", "to re-tare", "look at the gripper", "shift z", "since day"]
-    out = {"payloads": payloads, "arms": markdown_table(heads, "lrrrrr", rows), "files": files(found)}
+    heads = ["arms", "how many", "to re-tare", "look at the gripper", "shift z", "slide z", "slides [mm]", "since day"]
+    out = {"payloads": payloads, "arms": markdown_table(heads, "lrrrrrrr", rows), "files": files(found)}
     each = [
         [
             name,
@@ -374,6 +377,11 @@ def tables(found: dict[str, Any]) -> dict[str, str]:
     ]
     heads = ["arm", "truth", "changes found", "of those found, true", "masses inside", "mass error [g]"]
     return out | {"each": markdown_table(heads, "llrrrr", each)}
+
+
+def span_of(values: list[float]) -> str:
+    """From the smallest to the largest."""
+    return "" if not values else f"{values[0]:.1f}" if len(values) == 1 else f"{min(values):.1f} … {max(values):.1f}"
 
 
 def files(found: dict[str, Any]) -> str:

@@ -105,8 +105,10 @@ def _of_arm(arm: str, rows: Sequence[dict[str, Any]], shift: Shift | None) -> Ar
     retare, loose = since is not None, first is not None
     joints = [row["misfit_joint"] for of in asked[-LAST:] for row in of if row["changed"]]
     joint = int(np.bincount(joints).argmax()) if retare and joints else 0
-    if not retare and shift is not None and shift.found:
-        retare, since, joint = True, shift.since, shift.joint
+    if shift is not None and shift.found:
+        if not retare:
+            joint = shift.joint
+        retare, since = True, min(since, shift.since) if isinstance(since, float) else shift.since
     masses = [row["mass"] for row in rows if row["status"] == ANSWERED and row["held"]]
     return ArmFinding(
         arm,

@@ -26,7 +26,8 @@ MOST = 40
 FEWEST = 5  # logs with something held, at least
 FEIGNED = 0.01  # [kg·m] a stated prior: as much as 5 mm of the heaviest that a small arm holds
 # z beyond which a gripper is loose. Of twelve directions that overlap, about five tell apart: three standard deviations
-# one-sided are exceeded by 0.7 % of sound arms if all that is assumed holds
+# one-sided are exceeded by 0.7 % of sound arms if all that is assumed holds. Of 16 arms of 30 logs (seeds 31–34, some
+# exchanged or walking) none reaches 2.6 held firmly, and 9 are beyond with 5 mm either way, 14 with 10 mm
 LOOSE = 3.0
 
 

@@ -60,7 +60,7 @@ def answered(found: Identification, where: dict[str, Any], slides: Sequence[Slid
         | {"date": None if date is None else _number(date + part.start), "status": ANSWERED, "reason": ""}
         | _of_payload(part.answer)
         | _of_arm(part.answer.health)
-        | _of_slide(slide)
+        | of_slide(slide)
         for k, (part, slide) in enumerate(zip(found.segments, of_parts, strict=True))
     ]
 
@@ -108,7 +108,8 @@ def _of_arm(health: ArmHealth | None) -> dict[str, Any]:
     }
 
 
-def _of_slide(slide: Slide | None) -> dict[str, Any]:
+def of_slide(slide: Slide | None) -> dict[str, Any]:
+    """The columns of what a part of a log tells of sliding; none where it tells nothing."""
     if slide is None or not np.isfinite(slide.std).all():
         return {}
     both = {"slide": slide.moment, "slide_std": slide.std}
