@@ -16,6 +16,7 @@ from armload.posterior import HybridModel, Profile, load_profile
 from armload.recording import ColumnSpec, Recording, read_long
 from armload.runtime.version import __version__
 from armload.survey.logs import Log, file_hash
+from armload.survey.rows import columns
 
 _ARM = "{arm}"
 
@@ -54,11 +55,12 @@ class Settings(ArmOptions):
         return [f"there is no {what} of the arm {arm}" for what in wanted if self.of_arm(what, arm) is None]
 
     def key(self, log: Log, content: str) -> str:
-        """Of all that the rows of a log depend on: its content, the settings, every file they name, the version."""
+        """Of all that the rows of a log depend on: its content, settings, every file they name, version and columns."""
         files = [self.of_arm("tare", log.arm), self.of_arm("profile", log.arm), *self._models()]
         named = [path for path in (self.tool, self.method, self.robot) if path is not None and Path(path).is_file()]
         hashes = [None if file is None else _hash_of(file) for file in [*files, *map(Path, named)]]
-        return key_of(__version__, content, log.name, log.arm, log.episode, asdict(self), hashes)
+        asked = list(columns(self.arm().n))
+        return key_of(__version__, asked, content, log.name, log.arm, log.episode, asdict(self), hashes)
 
     def _models(self) -> list[Path]:
         """The shipped model's file, where one may answer."""
