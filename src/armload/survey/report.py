@@ -13,6 +13,7 @@ from armload.lab.report import Section, write_report
 from armload.lab.report.shown import Table
 from armload.lab.report.style import COLOURS, look, new_figure
 from armload.survey.findings import LAST, SHARE_CHANGED, SHARE_MOVES, ArmFinding, arm_findings, by_log, doubtful
+from armload.survey.looseness import LOOSE
 from armload.survey.rows import ANSWERED, SEPARATOR, UNUSABLE
 from armload.survey.shift import SHIFTED
 from armload.survey.table_file import read_rows
@@ -74,7 +75,7 @@ def _what_to_do(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) 
         "changed",
         "shift",
         "payload moves",
-        "slides [mm]",
+        "slides",
         "since",
     )
     cells = tuple(
@@ -87,15 +88,15 @@ def _what_to_do(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) 
             _share(f.changed, (f.changed or 0.0) >= SHARE_CHANGED),
             "" if f.shift is None else f"{f.shift.z:.1f}{' !' if f.shift.found else ''}",
             _share(f.moves, (f.moves or 0.0) >= SHARE_MOVES),
-            "" if f.slide is None else f"{1e3 * f.slide.gap:.1f} ± {1e3 * f.slide.std:.1f}{' !' * f.slide.found}",
+            "" if f.slide is None else f"{f.slide.z:.1f}{' !' * f.slide.found}",
             _since(f),
         )
         for f in findings
     )
     note = (
         f"changed and payload moves: share of an arm's last {LAST} logs that say so; shift: z of its offsets and "
-        f"friction over the days, beyond {SHIFTED:g} it is another arm; slides: how far to either side what is held "
-        "slides, by the last logs together, and its standard deviation. ! asks for something to be done."
+        f"friction over the days, beyond {SHIFTED:g} it is another arm; slides: z of what is held sliding in the "
+        f"gripper, by the last logs together, beyond {LOOSE:g} it does. ! asks for something to be done."
     )
     return Section("What to do", "\n\n".join(x for x in text if x), (Table("Arms", columns, cells, note),))
 

@@ -71,7 +71,7 @@ def read_rows(path: str | Path) -> tuple[list[dict[str, Any]], int]:
         n = sum(name.startswith(_JOINTS) for name in rows[0])
         kinds = columns(n)
         if set(kinds) != set(rows[0]):
-            raise ValueError("other columns")
+            raise ValueError("its columns are those of another version: run the survey again")
         if path.suffix.lower() == ".csv":
             rows = [{name: _read(row[name], kind) for name, kind in kinds.items()} for row in rows]
         return rows, n
