@@ -6,6 +6,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
+from rosbags.rosbag1 import Reader as Reader1
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
@@ -15,6 +16,7 @@ from armload.app.cli import main
 from armload.arms import arm
 from armload.errors import RecordingError
 from armload.recording import read_recording
+from armload.recording.ros1_index import CompactReader
 
 ROS1, ROS2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
 JOINT_STATE = "sensor_msgs/msg/JointState"
@@ -275,3 +277,23 @@ def test_the_real_ros2_bag_reads(real_data):
     with closing(sqlite3.connect(f"file:{real_data / 'ur10_ros2_bag.db3'}?mode=ro", uri=True)) as database:
         (count,) = database.execute("select count(*) from messages").fetchone()
     assert count == len(log)
+
+
+@pytest.mark.parametrize("asked", [(0, 1), (1, 0), (1,), ()])
+def test_a_compact_index_gives_the_messages_of_rosbags_in_the_same_order(tmp_path, monkeypatch, asked):
+    path, store = tmp_path / "two.bag", get_typestore(Stores.ROS1_NOETIC)
+    times = np.random.default_rng(3).integers(0, 40, size=200)  # many equal, none in order
+    with Writer1(path) as writer:
+        writer.chunk_threshold = 500  # many chunks
+        topics = [writer.add_connection(name, "std_msgs/msg/Header", typestore=store) for name in ("/a", "/b")]
+        for k, time in enumerate(times.tolist()):
+            made = store.types["std_msgs/msg/Header"](k, store.types["builtin_interfaces/msg/Time"](1, 2), "x")
+            writer.write(topics[k % 3 == 0], time + 10**9, store.serialize_ros1(made, "std_msgs/msg/Header"))
+    monkeypatch.setattr("armload.recording.ros1_index._AT_ONCE", 7)
+    found = []
+    for kind in (Reader1, CompactReader):
+        with kind(path) as reader:
+            chosen = [reader.connections[k] for k in asked]
+            found.append([(c.topic, time, raw) for c, time, raw in reader.messages(chosen)])
+    assert found[1] == found[0]
+    assert len(found[0]) == {2: 200, 0: 200, 1: 67}[len(asked)]

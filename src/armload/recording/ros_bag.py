@@ -93,11 +93,12 @@ class _Bag:
 
 
 def _readers(path: Path, where: str, stack: ExitStack, notes: list[str]) -> list[Any]:
-    from rosbags.rosbag1 import Reader as Reader1
     from rosbags.rosbag2 import Reader as Reader2
 
     if path.suffix.lower() == ".bag" and path.is_file():
-        return [Reader1(path)]
+        from armload.recording.ros1_index import CompactReader
+
+        return [CompactReader(path)]
     parts = [path] if path.is_file() else sorted(p for p in path.iterdir() if p.suffix in (".db3", ".mcap"))
     for part in parts:
         if part.suffix.lower() == ".db3":
