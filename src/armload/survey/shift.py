@@ -22,8 +22,8 @@ DAY = 86400.0  # [s]
 # days on either side of a split, at least: fewer may be one odd day
 FEWEST = 2
 # z beyond which an arm is another one. Set on the smallest fleet of `benchmarks/fleet.py`: sound arms reach 6, the
-# exchanged one and the one whose offset walks 17. On a fleet that did not set it: eight sound arms 2.8 to 5.0, a loose
-# gripper 7.4, the exchanged arm 16, the walking one 97
+# exchanged one and the one whose offset walks 17. On a fleet that did not set it: twelve sound arms 2.7 to 5.0, a loose
+# gripper 7.2, the exchanged arm 16, the walking one 102
 SHIFTED = 9.0
 _SPREAD = 1.4826 / np.sqrt(2.0)  # standard deviation over the median of |x − y|, of normal x and y
 
