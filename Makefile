@@ -93,8 +93,9 @@ $(VENV)/.vendors: tests/devices/vendors/requirements.txt | $(VENV)/.stamp
 
 # ROS 2 has an environment of its own: a start-up hook of these wheels runs every Python of it a second time. The rest of
 # what armload needs it finds where the project has it; the name puts the file after the hook.
-$(VENV_ROS)/.stamp: tests/devices/ros/requirements.txt | $(VENV)/.stamp
-	@echo "setting up $(VENV_ROS) (once; a minute)"
+ROS_MESSAGES := tests/devices/ros/build_messages.py $(wildcard ros2/armload_msgs/*/* tests/devices/ros/messages/*/*/*)
+$(VENV_ROS)/.stamp: tests/devices/ros/requirements.txt $(ROS_MESSAGES) | $(VENV)/.stamp
+	@echo "setting up $(VENV_ROS) (once; a minute, and two for messages)"
 	@rm -rf $(VENV_ROS)
 	@$(BIN)/python -m venv $(VENV_ROS)
 	@$(VENV_ROS)/bin/python -m pip --disable-pip-version-check --quiet install --no-deps --only-binary :all: \
@@ -102,4 +103,6 @@ $(VENV_ROS)/.stamp: tests/devices/ros/requirements.txt | $(VENV)/.stamp
 	@$(BIN)/python -c 'import site; print("import site; site.addsitedir(%r)" % site.getsitepackages()[0])' \
 		> "$$($(VENV_ROS)/bin/python -c 'import site; print(site.getsitepackages()[0])')/zz_armload.pth"
 	@$(VENV_ROS)/bin/python -c 'import armload.arms, rclpy; rclpy.init(); rclpy.create_node("armload"); rclpy.shutdown()'
+	@$(VENV_ROS)/bin/python tests/devices/ros/build_messages.py \
+		|| echo "no armload_msgs (C++ compiler and CMake?): the tests of ros2/armload_ros will be skipped" >&2
 	@touch $@
