@@ -30,12 +30,13 @@ def ros_python():
 @pytest.fixture
 def ros(ros_python, tmp_path):
     """Starts programs of the ROS 2 environment, on a network of this test only, and ends them as Ctrl-C does."""
+    packages = str(ROOT / "ros2" / "armload_ros")
     env = os.environ | {
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         "ROS_DOMAIN_ID": str(1 + os.getpid() % 100),
         "ROS_LOG_DIR": str(tmp_path / "log"),
         "OMP_NUM_THREADS": "1",
-        "PYTHONPATH": os.pathsep.join([str(ROOT / "ros2" / "armload_ros"), *filter(None, [os.environ.get("PYTHONPATH")])]),
+        "PYTHONPATH": os.pathsep.join(filter(None, [packages, os.environ.get("PYTHONPATH")])),
     }
     count = iter(range(100))
 

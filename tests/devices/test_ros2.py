@@ -4,23 +4,14 @@ The tests marked full run `armload ros2` and plain rclpy programs (tests/devices
 Python is ARMLOAD_ROS_PYTHON, one that can import rclpy and armload, or else that of `make .venv-ros/.stamp`.
 """
 
-import ast
 import importlib.util
 import json
-import os
-import re
-import signal
-import subprocess
-import sys
 import time
-from contextlib import contextmanager
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
 import pytest
-import yaml
 from rosbags.typesys import Stores, get_typestore
 
 from armload.arms import arm

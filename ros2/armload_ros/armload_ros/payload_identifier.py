@@ -62,7 +62,7 @@ class PayloadIdentifier(LifecycleNode):
         self._applying: Applying | None = None
         self._measuring: Measuring | None = None
         self._outputs: Outputs | None = None
-        self._services: list[Any] = []
+        self._offered: list[Any] = []
         self._subscription: Any = None
         self._taring: deque[Any] | None = None
         self._heard, self._last = 0.0, -np.inf
@@ -84,7 +84,7 @@ class PayloadIdentifier(LifecycleNode):
             self._forget()
             return _FAILED
         self._outputs = Outputs(self)
-        self._services = [
+        self._offered = [
             self.create_service(Trigger, "~/reset", self._reset),
             self.create_service(Trigger, "~/tare", self._tare),
             self.create_service(SetTool, "~/set_tool", self._set_tool),
@@ -115,9 +115,9 @@ class PayloadIdentifier(LifecycleNode):
             self.destroy_timer(self._each_second)
         if self._outputs is not None:
             self._outputs.close()
-        for service in self._services:
+        for service in self._offered:
             self.destroy_service(service)
-        self._outputs, self._services, self._measuring = None, [], None
+        self._outputs, self._offered, self._measuring = None, [], None
         self._forget()
         return _DONE
 

@@ -72,8 +72,12 @@ def build(package: Path, into: Path) -> None:
         "AMENT_PREFIX_PATH": str(PREFIX),
         "PATH": f"{PREFIX / 'bin'}{os.pathsep}{os.environ['PATH']}",
     }
-    configure = ["cmake", "-S", package, "-B", into, f"-DCMAKE_PREFIX_PATH={PREFIX}", f"-DCMAKE_INSTALL_PREFIX={PREFIX}"]
-    for command in ([*configure, f"-DPython3_EXECUTABLE={sys.executable}"], ["cmake", "--build", into, "-t", "install"]):
+    where = (
+        f"-DCMAKE_PREFIX_PATH={PREFIX}",
+        f"-DCMAKE_INSTALL_PREFIX={PREFIX}",
+        f"-DPython3_EXECUTABLE={sys.executable}",
+    )
+    for command in (["cmake", "-S", package, "-B", into, *where], ["cmake", "--build", into, "-t", "install"]):
         done = subprocess.run(list(map(str, command)), env=env, capture_output=True, text=True, check=False)
         if done.returncode:
             sys.exit(f"{package.name}: {(done.stderr or done.stdout)[-2000:]}")

@@ -3,7 +3,7 @@
     drive_services.py NODE
 
 {"apply": {}}, {"set_mass": {"mass": …, "std": …}}, {"set_tool": {"m": …, "z": …, "i": …}}, {"measure": {"mass": …}},
-{"cancel": {…}}: a measurement that is cancelled after its first feedback. Every answer, frame and marker is printed, too.
+{"cancel": {…}}: a measurement that is cancelled after its first feedback. Every answer and frame is printed, too.
 """
 
 import json
