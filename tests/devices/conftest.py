@@ -53,6 +53,8 @@ def ros(ros_python, tmp_path):
         try:
             yield process
         finally:
+            if process.stdin is not None:
+                process.stdin.close()
             if process.poll() is None:
                 process.send_signal(signal.SIGINT)
             try:

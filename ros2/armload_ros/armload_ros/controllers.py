@@ -38,7 +38,8 @@ class ServiceController:
     """A controller behind a service that takes a load and does not tell it: what was told last is what it counts.
 
     Args:
-        node: its client calls, while another thread spins it. kind: see `KINDS`. arm: the bare one, of this thread.
+        node: its client calls, in the group `node.beside`, while another thread spins it. kind: see `KINDS`.
+        arm: the bare one, of this thread.
         velocity: gives the newest dq. end_effector: mass that the controller counts beside the load [kg].
         counted: what it counts before it is told anything.
     """
@@ -59,7 +60,7 @@ class ServiceController:
         self._told = InertialParameters.zero(flange)
         if counted is not None:
             self._told = replace(arm, frame=flange, attached=None).in_frame(counted)
-        self._node, self._client = node, node.create_client(self._type, service)
+        self._node, self._client = node, node.create_client(self._type, service, callback_group=node.beside)
 
     def counted(self) -> Counted:
         """What it was told last."""
@@ -107,7 +108,8 @@ class PlanningScene:
             _imported("geometry_msgs", "msg", "Pose"),
         )
         self._service = "apply_planning_scene"
-        self._node, self._client, self._touch = node, node.create_client(self._type, self._service), touch_links
+        self._node, self._touch = node, touch_links
+        self._client = node.create_client(self._type, self._service, callback_group=node.beside)
 
     def put(self, body: InertialParameters) -> None:
         """Attach it in place of what was attached under its name; a mass of 0 takes that off.

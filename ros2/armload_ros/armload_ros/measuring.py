@@ -14,6 +14,7 @@ from armload_msgs.msg import Payload
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.task import Future
 
+_REACHED = "known as well as asked"
 _PATIENCE = 60.0  # [s] where no timeout is asked for
 _GROUPS = (("mass", slice(0, 1)), ("moment", slice(1, 4)), ("inertia", slice(4, 10)))
 
@@ -38,7 +39,7 @@ class Measuring:
 
     def __init__(self, node: Any) -> None:
         self._node = node
-        self._goals: dict[Any, tuple[Future, float]] = {}
+        self._goals: list[tuple[Any, Future, float]] = []  # the goal, its end, when its time is over
         self._timer = node.create_timer(0.1, self._look, clock=node.steady)
         self._server = ActionServer(
             node, Measure, "~/measure", self._run, goal_callback=self._asked, cancel_callback=self._cancelled
@@ -48,15 +49,15 @@ class Measuring:
     def take(self, payload: Payload) -> None:
         """The newest answer."""
         self._newest = payload
-        for handle, (future, _) in list(self._goals.items()):
+        for handle, future, _ in self._goals:
             ratios = left(handle.request, payload)
             handle.publish_feedback(Measure.Feedback(payload=payload, left=ratios))
             if payload.known and not payload.settling and max(ratios) <= 1.0 and not future.done():
-                future.set_result("known as well as asked")
+                future.set_result(_REACHED)
 
     def end(self, why: str) -> None:
         """No goal goes on: the node is not active any more."""
-        for future, _ in self._goals.values():
+        for _, future, _ in self._goals:
             if not future.done():
                 future.set_result(why)
 
@@ -78,10 +79,10 @@ class Measuring:
         goal, future = handle.request, Future(executor=self._node.executor)
         if goal.forget:
             self._node.reset_stream()
-        self._goals[handle] = future, time.monotonic() + (goal.timeout or _PATIENCE)
+        self._goals.append(asked := (handle, future, time.monotonic() + (goal.timeout or _PATIENCE)))
         text = await future
-        del self._goals[handle]
-        reached = text == "known as well as asked"
+        self._goals.remove(asked)
+        reached = text == _REACHED
         if reached:
             handle.succeed()
         elif handle.is_cancel_requested:
@@ -91,7 +92,7 @@ class Measuring:
         return Measure.Result(success=reached, message=text, payload=self._newest)
 
     def _look(self) -> None:
-        for handle, (future, until) in self._goals.items():
+        for handle, future, until in self._goals:
             if future.done():
                 continue
             if handle.is_cancel_requested:

@@ -19,6 +19,7 @@ import numpy as np
 import rclpy
 from armload_msgs.srv import SetMass, SetTool
 from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.executors import ExternalShutdownException
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
@@ -58,6 +59,7 @@ class PayloadIdentifier(LifecycleNode):
             self.declare_parameter(name, value)
         self.parameters = Parameters(lambda name: self.get_parameter(name).value)
         self.steady = Clock(clock_type=ClockType.STEADY_TIME)  # runs on while simulated time stands
+        self.beside = ReentrantCallbackGroup()  # of what waits for the rest of the node
         self._stream: Stream | None = None
         self._applying: Applying | None = None
         self._measuring: Measuring | None = None
@@ -89,7 +91,7 @@ class PayloadIdentifier(LifecycleNode):
             self.create_service(Trigger, "~/tare", self._tare),
             self.create_service(SetTool, "~/set_tool", self._set_tool),
             self.create_service(SetMass, "~/set_mass", self._set_mass),
-            self.create_service(Trigger, "~/apply", self._apply),
+            self.create_service(Trigger, "~/apply", self._apply, callback_group=self.beside),
         ]
         self._measuring = Measuring(self)
         self._each_second = self.create_timer(1.0, self._diagnose, clock=self.steady)

@@ -25,8 +25,12 @@ rclpy.init()
 node = rclpy.create_node("driver")
 
 
+speaking = threading.Lock()
+
+
 def say(**what):
-    print(json.dumps(what), flush=True)
+    with speaking:
+        print(json.dumps(what), flush=True)
 
 
 def numbers(message):
