@@ -25,7 +25,7 @@ _DECIMALS = (3, 4, 4, 4, 5, 5, 5, 5, 5, 5)
 def headline(
     estimate: OnlineEstimate | None, truth: InertialParameters | None = None, misfit: str | None = None
 ) -> str:
-    """Mass and centre of mass, large, and the state of the identification.
+    """Mass and centre of mass, large, and the state of the identification; grey where the samples are doubted.
 
     Args:
         misfit: a note that is shown elsewhere.
@@ -35,14 +35,20 @@ def headline(
     mass = "—"
     if estimate.determined[0]:
         mass = f"{estimate.phi[0]:.3f} ± {Z95 * estimate.std[0]:.3f} kg"
+    size = f"font-size:22px;{_DIM}" if _doubted(estimate, misfit) else "font-size:22px;font-weight:600"
     lines = [
-        f'<div style="font-size:22px;font-weight:600" data-armload="mass">{mass}</div>',
+        f'<div style="{size}" data-armload="mass">{mass}</div>',
         f'<div data-armload="com">{_com(estimate)}</div>',
         f'<div style="{_DIM}" data-armload="truth">{_truth(truth)}</div>' if truth is not None else "",
         f'<div data-armload="state">{escape(state_of(estimate, misfit))}</div>',
         f'<div style="{_DIM}">{escape(rests_on(estimate))}</div>',
     ]
     return f'<div style="{_TEXT}">{"".join(lines)}</div>'
+
+
+def _doubted(estimate: OnlineEstimate, misfit: str | None) -> bool:
+    """Whether the samples cannot come from this arm: such a doubt is among the answer's notes."""
+    return misfit is not None and misfit in estimate.notes
 
 
 def gone(status: Status) -> str:
@@ -60,7 +66,9 @@ def state_of(estimate: OnlineEstimate, misfit: str | None = None) -> str:
     Args:
         misfit: a note that is shown elsewhere.
     """
-    if estimate.settling:
+    if _doubted(estimate, misfit):
+        words = ["not to be trusted: see below"]
+    elif estimate.settling:
         words = ["the payload has just changed"]
     elif estimate.determined[0]:
         words = ["a payload is held" if estimate.held else "nothing is held"]
