@@ -14,6 +14,7 @@ from armload.recording import Sample
 from armload.service.feedback import Feedback
 
 from .controllers import KINDS, PlanningScene, ServiceController
+from .parameters import Parameters
 
 MOVEIT = "moveit"
 
@@ -96,3 +97,18 @@ class Applying:
 
     def _velocity(self) -> Any:
         return [] if self._sample is None else self._sample.dq
+
+
+def applying_of(node: Any, given: Parameters, bare: Arm) -> Applying:
+    """As the parameters say."""
+    return Applying(
+        node,
+        given.value("apply"),
+        given.bare_arm(),  # of its own: a model computes in a memory that two threads must not share
+        auto=given.value("apply_auto"),
+        mounted=given.mounted(bare),
+        counted=given.counted(bare),
+        end_effector=given.value("end_effector"),
+        touch_links=[name for name in given.value("touch_links") if name],
+        note=node.get_logger().info,
+    )

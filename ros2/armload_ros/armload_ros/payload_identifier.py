@@ -38,7 +38,7 @@ from armload.identification.identify_log import plausible_tool
 from armload.online import OnlineEstimate
 from armload.posterior import Known
 
-from .applying import Applying
+from .applying import Applying, applying_of
 from .diagnostics import status_of, values_of
 from .measuring import Measuring
 from .messages import payload_message
@@ -147,19 +147,8 @@ class PayloadIdentifier(LifecycleNode):
         robot = bare if tool is None else bare.with_payload(tool)
         self._states = JointStates(robot, "joint_states")
         self._identify(robot, given.tare(robot))
-        if not (to := given.value("apply")):
-            return
-        self._applying = Applying(
-            self,
-            to,
-            given.bare_arm(),  # of its own: a model computes in a memory that two threads must not share
-            auto=given.value("apply_auto"),
-            mounted=given.mounted(bare),
-            counted=given.counted(bare),
-            end_effector=given.value("end_effector"),
-            touch_links=[name for name in given.value("touch_links") if name],
-            note=self.get_logger().info,
-        )
+        if given.value("apply"):
+            self._applying = applying_of(self, given, bare)
 
     def _identify(self, robot: Arm, tare: Recording | None, known: Known | None = None) -> None:
         """A new stream in the place of the present one, which stays if it cannot be made."""
