@@ -120,12 +120,12 @@ def parameters(estimate: OnlineEstimate | None, truth: InertialParameters | None
     """The ten parameters with intervals and units; what the stream does not determine is marked."""
     if estimate is None:
         return ""
+    heads = [("", "left"), ("value", "right"), ("± 95 %", "right"), ("truth", "right"), ("unit", "left")]
     head = "".join(
         f'<th style="text-align:{side};font-weight:600;padding:0 4px">{text}</th>'
-        for text, side in (("", "left"), ("value", "right"), ("± 95 %", "right"), ("unit", "left"))
+        for text, side in heads
+        if truth is not None or text != "truth"
     )
-    if truth is not None:
-        head += '<th style="text-align:right;font-weight:600;padding:0 4px">truth</th>'
     rows = []
     for k, name in enumerate(NAMES):
         known, digits, half = bool(estimate.determined[k]), _DECIMALS[k], Z95 * float(estimate.std[k])
@@ -133,14 +133,13 @@ def parameters(estimate: OnlineEstimate | None, truth: InertialParameters | None
             ("left", name),
             ("right", f"{estimate.phi[k]:+.{digits}f}"),
             ("right", f"{half:.{digits}f}" if known and np.isfinite(half) else "undetermined"),
+            *([] if truth is None else [("right", f"{truth.phi[k]:+.{digits}f}")]),
             ("left", UNITS[k]),
         ]
-        if truth is not None:
-            cells.append(("right", f"{truth.phi[k]:+.{digits}f}"))
         row = "".join(f'<td style="text-align:{side};padding:0 4px">{text}</td>' for side, text in cells)
         rows.append(f'<tr data-armload="phi{k}" style="{"" if known else _DIM}">{row}</tr>')
     return (
-        f'<div style="{_TEXT}"><table style="width:100%;border-collapse:collapse;white-space:nowrap">'
+        f'<div style="{_TEXT};overflow-x:auto"><table style="width:100%;border-collapse:collapse;white-space:nowrap">'
         f"<tr>{head}</tr>{''.join(rows)}</table></div>"
     )
 
