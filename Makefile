@@ -3,6 +3,7 @@
 PYTHON ?= python3
 VENV := .venv
 VENV_ROS := .venv-ros
+VENV_BROKER := .venv-broker
 BIN := $(VENV)/bin
 WORKERS ?= 2
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
@@ -50,6 +51,7 @@ test-full: $(VENV)/.stamp parts ## only the tests marked full: the site, the whe
 parts: $(VENV)/.stamp
 	@$(MAKE) --no-print-directory $(VENV)/.vendors || echo "no makers' clients: their tests will be skipped" >&2
 	@$(MAKE) --no-print-directory $(VENV_ROS)/.stamp || echo "no ROS 2 environment: its tests will be skipped" >&2
+	@$(MAKE) --no-print-directory $(VENV_BROKER)/.stamp || echo "no MQTT broker: its test will be skipped" >&2
 
 lint: $(VENV)/.stamp ## ruff (rules and format) and pyright
 	$(BIN)/ruff check .
@@ -69,7 +71,7 @@ lock: ## resolve requirements.lock anew from pyproject.toml (newest versions, Li
 	rm -rf build/lock
 
 clean: ## remove everything that can be made again, the virtual environment included
-	rm -rf $(VENV) $(VENV_ROS) build dist out .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) $(VENV_ROS) $(VENV_BROKER) build dist out .ruff_cache .pytest_cache .hypothesis
 	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # The stamp is touched last: a set-up that was interrupted is taken up again by the next make. Most of what is installed
@@ -91,10 +93,17 @@ $(VENV)/.vendors: tests/devices/vendors/requirements.txt | $(VENV)/.stamp
 	@$(PIP) install --only-binary :all: --requirement tests/devices/vendors/requirements.txt
 	@touch $@
 
+$(VENV_BROKER)/.stamp: tests/service/broker/requirements.txt | $(VENV)/.stamp
+	@$(BIN)/python -m venv $(VENV_BROKER)
+	@$(VENV_BROKER)/bin/python -m pip --disable-pip-version-check --quiet install --no-deps --only-binary :all: \
+		--requirement tests/service/broker/requirements.txt
+	@touch $@
+
 # ROS 2 has an environment of its own: a start-up hook of these wheels runs every Python of it a second time. The rest of
 # what armload needs it finds where the project has it; the name puts the file after the hook.
-$(VENV_ROS)/.stamp: tests/devices/ros/requirements.txt | $(VENV)/.stamp
-	@echo "setting up $(VENV_ROS) (once; a minute)"
+ROS_MESSAGES := tests/devices/ros/build_messages.py $(wildcard ros2/armload_msgs/*/* tests/devices/ros/messages/*/*/*)
+$(VENV_ROS)/.stamp: tests/devices/ros/requirements.txt $(ROS_MESSAGES) | $(VENV)/.stamp
+	@echo "setting up $(VENV_ROS) (once; a minute, and two for messages)"
 	@rm -rf $(VENV_ROS)
 	@$(BIN)/python -m venv $(VENV_ROS)
 	@$(VENV_ROS)/bin/python -m pip --disable-pip-version-check --quiet install --no-deps --only-binary :all: \
@@ -102,4 +111,6 @@ $(VENV_ROS)/.stamp: tests/devices/ros/requirements.txt | $(VENV)/.stamp
 	@$(BIN)/python -c 'import site; print("import site; site.addsitedir(%r)" % site.getsitepackages()[0])' \
 		> "$$($(VENV_ROS)/bin/python -c 'import site; print(site.getsitepackages()[0])')/zz_armload.pth"
 	@$(VENV_ROS)/bin/python -c 'import armload.arms, rclpy; rclpy.init(); rclpy.create_node("armload"); rclpy.shutdown()'
+	@$(VENV_ROS)/bin/python tests/devices/ros/build_messages.py \
+		|| echo "no armload_msgs (C++ compiler and CMake?): the tests of ros2/armload_ros will be skipped" >&2
 	@touch $@

@@ -208,7 +208,7 @@ def test_curves_hold_the_estimates_within_their_intervals(held, group):
     data = data_of(group, t, rows)
     assert len(data) == len(series_of(group))
     for k, place in enumerate(group.places):
-        high, low, value, truth = data[1 + 4 * k : 5 + 4 * k]
+        high, low, truth, value = data[1 + 4 * k : 5 + 4 * k]
         assert np.all(low <= value)
         assert np.all(value <= high)
         assert value[-1] == rows[-1, place]
@@ -238,8 +238,9 @@ def test_a_source_that_knows_no_truth_is_drawn_like_any_other(panda, log):
         assert np.isfinite(np.array(data)).all()
         low, high = min(x.min() for x in data[1:]), max(x.max() for x in data[1:])
         for k, place in enumerate(group.places):
-            assert data[3 + 4 * k][-1] == rows[-1, place]
-            assert np.array_equal(data[4 + 4 * k], data[3 + 4 * k])  # under the line of the value, in its colour
+            assert data[4 + 4 * k][-1] == rows[-1, place]
+            assert np.array_equal(data[3 + 4 * k], data[4 + 4 * k])  # hidden under the line of the value, drawn later
+            assert ["dash" in each for each in series_of(group)[3 + 4 * k : 5 + 4 * k]] == [True, False]
         ends = rows[-1, :10] + np.array([[-1.0], [1.0]]) * rows[-1, 10:20]
         assert low <= ends[0, list(group.places)].min()
         assert high >= ends[1, list(group.places)].max()
@@ -256,7 +257,7 @@ def test_a_truth_that_is_known_late_is_drawn_from_then_on(held):
         data = np.array(data_of(group, t, rows))
         assert np.isfinite(data).all()
         for k, place in enumerate(group.places):
-            assert np.all(data[4 + 4 * k, len(t) // 2 :] == HELD.phi[place])
+            assert np.all(data[3 + 4 * k, len(t) // 2 :] == HELD.phi[place])
 
 
 def test_nothing_yet_and_no_interval_yet_can_be_drawn():

@@ -16,6 +16,7 @@ import threading
 import time
 import urllib.request
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ from armload.app.page.motion_page import MotionPage
 from armload.app.page.page import Page
 from armload.arms import arm as arm_named
 from armload.devices import Replay, Simulator, read_load
+from armload.errors import SourceError
 from armload.motion import taie2024
 from armload.payloads import test_payload
 from armload.recording import read_recording
@@ -144,6 +146,17 @@ def choose(tab, label, option):
     tab.get_by_role("option", name=option, exact=True).click()
 
 
+def of_orange(tab):
+    """How many pixels of the picture's middle have the payload's colour; the picture."""
+    from PIL import Image
+
+    tab.evaluate("document.querySelectorAll('.mantine-Notification-root button').forEach(b => b.click())")
+    time.sleep(2.0)
+    image = Image.open(io.BytesIO(tab.screenshot())).convert("RGB")
+    red, green, blue = np.asarray(image)[:, 420:940].reshape(-1, 3).astype(int).T
+    return np.count_nonzero((red > 150) & (green > red - 110) & (blue < green - 40)), image
+
+
 def test_numbers_move_and_approach_the_truth(served, tab):
     session, *_ = served
     first = until(lambda: tab.locator("[data-armload=mass]").count() and mass(tab))
@@ -163,16 +176,11 @@ def test_numbers_move_and_approach_the_truth(served, tab):
 
 @pytest.mark.parametrize("tab", [LARGE], indirect=True, ids=["large"])
 def test_the_picture_shows_the_arm_and_what_it_holds(holding, tmp_path):
-    from PIL import Image
-
-    tab = holding
-    until(lambda: mass(tab))
-    tab.evaluate("document.querySelectorAll('.mantine-Notification-root button').forEach(b => b.click())")
-    time.sleep(2.0)
-    image = Image.open(io.BytesIO(tab.screenshot())).convert("RGB")
+    until(lambda: mass(holding))
+    orange, image = of_orange(holding)
+    assert orange > 300
     middle = np.asarray(image)[:, 420:940].reshape(-1, 3).astype(int)
     red, green, blue = middle.T
-    assert np.count_nonzero((red > 150) & (green > red - 110) & (blue < green - 40)) > 300  # the payload, orange
     assert np.count_nonzero((np.ptp(middle, axis=1) < 45) & (middle.max(axis=1) < 170)) > 500  # joints, dark grey
     assert np.count_nonzero((green > red + 60) & (green > blue + 10)) > 50  # the truth's edges, green
     folder = Path(os.environ.get("ARMLOAD_PICTURES") or tmp_path)
@@ -248,6 +256,52 @@ def test_curves_are_drawn_of_a_source_that_knows_no_truth(panda, analytic_log, o
             )
             assert np.isfinite(seen).all()
             assert min(low for low, _ in seen) < HELD.mass < max(high for _, high in seen)
+    finally:
+        page.close()
+        server.join()
+        session.close()
+    assert complaints == []
+
+
+class Unplugged(Replay):
+    """A log that ends as a robot does that is lost."""
+
+    def __iter__(self):
+        yield from super().__iter__()
+        raise SourceError("the robot was unplugged")
+
+
+@pytest.mark.parametrize("kind", ["log", "log of the wrong sign", "robot that is lost"])
+def test_without_a_truth_the_picture_shows_what_is_known_and_nothing_old(
+    panda, analytic_log, open_browser, tmp_path, kind
+):
+    pytest.importorskip("viser", reason="the page needs viser")
+    log = analytic_log(panda, HELD, duration=4.0)
+    if kind == "log of the wrong sign":
+        log = replace(log, tau=-log.tau)
+    source = (Unplugged if kind == "robot that is lost" else Replay)(log, panda, speed=None)
+    session, complaints, strangers = Session(source, panda, method="map"), [], []
+    session.start()
+    until(lambda: session.ended)
+    page = Page(session, port=0, period=0.3)
+    server = threading.Thread(target=page.serve)
+    server.start()
+    try:
+        with open_browser(page.url, complaints, strangers, LARGE) as tab:
+            until(lambda: tab.locator("[data-armload=age]").count())
+            orange, image = of_orange(tab)
+            image.save(Path(os.environ.get("ARMLOAD_PICTURES") or tmp_path) / f"{kind.replace(' ', '_')}.png")
+            assert not tab.locator("[data-armload=truth]").count()
+            if kind == "log":
+                assert orange > 300
+                assert mass(tab)[0] == pytest.approx(HELD.mass, abs=0.05)
+                assert "P(held)" in text(tab, "probabilities")
+            elif kind == "robot that is lost":
+                assert orange < 100
+                assert text(tab, "mass") == "—"
+                assert "the robot was unplugged" in text(tab, "waits")
+            else:
+                assert "sign" in text(tab, "misfit")
     finally:
         page.close()
         server.join()

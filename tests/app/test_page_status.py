@@ -116,7 +116,12 @@ def test_torque_of_the_wrong_sign_does_not_fit_and_is_said_once(panda, analytic_
     assert session.doubt is not None
     assert status.misfit == session.doubt
     assert "does not fit:" in tables.status(session.estimate, status)
-    assert session.doubt[:40] not in tables.headline(session.estimate, None, status.misfit)
+    headline = tables.headline(session.estimate, None, status.misfit)
+    assert session.doubt[:40] not in headline
+    assert "not to be trusted: see below" in headline
+    assert "nothing is held</div>" not in headline.split('data-armload="state"')[1]
+    assert "font-weight:600" not in headline  # no large black number of what cannot be so
+    assert "font-weight:600" in tables.headline(session.estimate)
     session.close()
 
 

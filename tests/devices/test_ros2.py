@@ -4,23 +4,14 @@ The tests marked full run `armload ros2` and plain rclpy programs (tests/devices
 Python is ARMLOAD_ROS_PYTHON, one that can import rclpy and armload, or else that of `make .venv-ros/.stamp`.
 """
 
-import ast
 import importlib.util
 import json
-import os
-import re
-import signal
-import subprocess
-import sys
 import time
-from contextlib import contextmanager
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
 import pytest
-import yaml
 from rosbags.typesys import Stores, get_typestore
 
 from armload.arms import arm
@@ -44,8 +35,6 @@ from armload.simulation import simulate
 ROOT = Path(__file__).resolve().parents[2]
 TYPES = get_typestore(Stores.ROS2_JAZZY).types  # the messages' definitions, without ROS
 SECOND = 1_000_000_000
-# what was started in the background of a shell is deaf to Ctrl-C, and so are its children
-HEARS_CTRL_C = ("env", "--default-signal=INT")
 
 
 def ros_type(name):
@@ -303,61 +292,6 @@ def test_without_ros_one_sentence_says_how_to_get_it(panda, capsys):
         assert "install ROS 2" in capsys.readouterr().err
 
 
-@pytest.fixture(scope="session")
-def ros_python():
-    named = os.environ.get("ARMLOAD_ROS_PYTHON")
-    python = Path(named) if named else ROOT / ".venv-ros" / "bin" / "python"
-    if not python.exists():
-        pytest.skip(f"no ROS 2: {python} does not exist; make .venv-ros/.stamp, or set ARMLOAD_ROS_PYTHON")
-    look = "import rclpy, armload.arms, sensor_msgs.msg, geometry_msgs.msg, trajectory_msgs.msg"
-    done = subprocess.run([python, "-c", look], capture_output=True, text=True)
-    if done.returncode:
-        pytest.skip(f"no ROS 2 in {python}: {done.stderr.strip().splitlines()[-1]}")
-    return str(python)
-
-
-@pytest.fixture
-def ros(ros_python, tmp_path):
-    """Starts programs of the ROS 2 environment, on a network of this test only, and ends them as Ctrl-C does."""
-    env = os.environ | {
-        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-        "ROS_DOMAIN_ID": str(1 + os.getpid() % 100),
-        "ROS_LOG_DIR": str(tmp_path / "log"),
-        "OMP_NUM_THREADS": "1",
-    }
-    count = iter(range(100))
-
-    @contextmanager
-    def start(*words):
-        where = tmp_path / f"process{next(count)}"
-        with where.with_suffix(".out").open("w") as out, where.with_suffix(".err").open("w") as err:
-            command = [*HEARS_CTRL_C, ros_python, *map(str, words)]
-            process = subprocess.Popen(command, stdout=out, stderr=err, env=env)
-        process.printed_lines = lambda: where.with_suffix(".out").read_text().splitlines()
-        process.noted = lambda: where.with_suffix(".err").read_text()
-        try:
-            yield process
-        finally:
-            if process.poll() is None:
-                process.send_signal(signal.SIGINT)
-            try:
-                process.wait(20)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
-
-    return start
-
-
-def wait_until(true, seconds, *processes):
-    """Wait for something to become true; the programs' own words if it does not."""
-    until = time.monotonic() + seconds
-    while not true():
-        if time.monotonic() > until:
-            pytest.fail("\n".join(["it did not come:", *(p.noted() for p in processes)]))
-        time.sleep(0.05)
-
-
 def write_log(path, log, names):
     np.savez(path, t=log.t, q=log.q, dq=log.dq, tau=log.tau, names=np.array(names))
     return path
@@ -367,7 +301,7 @@ ARMLOAD = ("-m", "armload", "ros2")
 
 
 @pytest.mark.full
-def test_joint_states_in_and_inertia_out_between_processes(ros, panda, tmp_path):
+def test_joint_states_in_and_inertia_out_between_processes(ros, wait_until, panda, tmp_path):
     """A driver's messages in, read back by plain rclpy: numbers as Pinocchio has them, the frame and the stamp."""
     truth = example_payload().parameters
     log = simulate(panda, taie2024(), truth, rate=200.0)
@@ -401,7 +335,7 @@ def test_joint_states_in_and_inertia_out_between_processes(ros, panda, tmp_path)
 
 
 @pytest.mark.full
-def test_the_default_method_identifies_the_simulated_robots_payload(ros):
+def test_the_default_method_identifies_the_simulated_robots_payload(ros, wait_until):
     truth = example_payload().parameters
     robot = (*ARMLOAD, "simulate", "--robot", "panda", "--payload", "test", "--motion", "taie2024", "--rate", "200")
     with (
@@ -418,7 +352,7 @@ def test_the_default_method_identifies_the_simulated_robots_payload(ros):
 
 
 @pytest.mark.full
-def test_the_simulated_robot_follows_a_trajectory_and_carries_its_payload(ros, panda, tmp_path):
+def test_the_simulated_robot_follows_a_trajectory_and_carries_its_payload(ros, wait_until, panda, tmp_path):
     truth = example_payload().parameters
     start = 0.5 * (panda.limits.position_low + panda.limits.position_high)
     goal = start + np.array([0.5, -0.3, 0.4, -0.4, 0.3, 0.4, -0.5])
@@ -469,7 +403,7 @@ def test_the_simulated_robot_follows_a_trajectory_and_carries_its_payload(ros, p
 
 
 @pytest.mark.full
-def test_a_topic_that_cannot_serve_ends_in_one_sentence(ros, panda, tmp_path):
+def test_a_topic_that_cannot_serve_ends_in_one_sentence(ros, wait_until, panda, tmp_path):
     log = simulate(panda, taie2024(), rate=50.0)
     file = write_log(tmp_path / "log.npz", log, panda.joint_names)
     driver = ROOT / "tests" / "devices" / "ros" / "publish_recording.py"
@@ -485,81 +419,3 @@ def test_a_topic_that_cannot_serve_ends_in_one_sentence(ros, panda, tmp_path):
                 wait_until(lambda node=node: node.poll() is not None, 30, node)
             assert node.returncode == 2, node.noted()
             assert sentence in node.noted().splitlines()[-1]
-
-
-@pytest.mark.full
-def test_the_lifecycle_node_has_states_services_remapping_and_a_namespace(ros, ros_python):
-    look = "import diagnostic_msgs.msg, std_srvs.srv, visualization_msgs.msg, lifecycle_msgs.srv"
-    done = subprocess.run([ros_python, "-c", look], capture_output=True, text=True)
-    if done.returncode:
-        pytest.skip(f"messages are missing: {done.stderr.strip().splitlines()[-1]}")
-    package = ROOT / "ros2" / "armload_ros" / "armload_ros" / "payload_identifier.py"
-    names = ("__ns:=/left", "joint_states:=/joint_states")
-    renamed = [word for name in names for word in ("-r", name)]
-    given = [word for name in ("robot:=panda", "tare_duration:=4.0") for word in ("-p", name)]
-    held = example_payload().parameters
-    with (
-        ros(*ARMLOAD, "simulate", "--robot", "panda", "--payload", "test", "--motion", "taie2024") as robot,
-        ros(package, "--ros-args", *renamed, *given) as node,
-        ros(ROOT / "tests/devices/ros/drive_lifecycle.py", "/left/payload_identifier", 8) as driver,
-    ):
-        wait_until(lambda: driver.poll() is not None, 120, driver, node, robot)
-        said = [json.loads(line) for line in driver.printed_lines()]
-    steps = {line["step"]: (line["success"], line["state"]) for line in said if "step" in line}
-    assert steps == {
-        "configure": (True, "inactive"),
-        "activate": (True, "active"),
-        "deactivate": (True, "inactive"),
-        "cleanup": (True, "unconfigured"),
-    }
-    assert [line["tare"] for line in said if "tare" in line] == [False, True]  # nobody listens before it is active
-    reset = said.index({"reset": True})
-    before, after = said[:reset], said[reset:]
-    *_, body = (line for line in before if "payload" in line)
-    assert body["frame"] == "panda_link8"
-    assert abs(body["payload"] - held.mass) < 0.05
-    *_, answer = (line["answer"] for line in before if "answer" in line)
-    assert answer["phi_low"][0] < held.mass < answer["phi_high"][0]
-    assert np.shape(answer["covariance"]) == (10, 10)
-    assert any(line.get("level") == 0 and "kg, calibrated" in line["diagnostics"] for line in before)
-    assert any("taring" in line.get("diagnostics", "") for line in after)
-    *_, tared = (line["answer"] for line in after if "answer" in line)
-    assert (tared["relative_to"], tared["held"]) == ("tare", False)  # what was mounted at the tare is the arm's
-
-
-@pytest.mark.full
-def test_the_lifecycle_node_stays_unconfigured_with_a_wrong_parameter_and_says_which(ros):
-    package = ROOT / "ros2" / "armload_ros" / "armload_ros" / "payload_identifier.py"
-    with (
-        ros(package, "--ros-args", "-p", "robot:=pandas") as node,
-        ros(ROOT / "tests/devices/ros/drive_lifecycle.py", "/payload_identifier", 1) as driver,
-    ):
-        wait_until(lambda: any("configure" in line for line in driver.printed_lines()), 60, driver, node)
-        (line,) = driver.printed_lines()[:1]
-        assert json.loads(line) == {"step": "configure", "success": False, "state": "unconfigured"}
-        assert "unknown robot 'pandas'" in node.noted()
-
-
-def test_the_ros_package_names_what_it_imports_and_installs_what_it_needs():
-    folder = ROOT / "ros2" / "armload_ros"
-    manifest = ElementTree.parse(folder / "package.xml").getroot()
-    needs = {element.text for element in manifest.iter("exec_depend")}
-    imported = set()
-    for path in [*folder.glob("armload_ros/*.py"), *folder.glob("launch/*.py")]:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.ImportFrom) and node.module is not None:
-                imported.add(node.module.split(".")[0])
-            elif isinstance(node, ast.Import):
-                imported |= {alias.name.split(".")[0] for alias in node.names}
-    ours = {"armload", "numpy", *sys.stdlib_module_names, "__future__"}
-    assert imported - ours == needs
-    assert manifest.findtext("name") == "armload_ros"
-    setup = (folder / "setup.py").read_text(encoding="utf-8")
-    for path in ("launch/payload.launch.py", "config/payload.yaml", "package.xml"):
-        assert path in setup
-        assert (folder / path).exists()
-    parameters = (folder / "config" / "payload.yaml").read_text(encoding="utf-8")
-    source = (folder / "armload_ros" / "payload_identifier.py").read_text(encoding="utf-8")
-    defaults = re.search(r"DEFAULTS.*?= (\{.*?^\})", source, re.DOTALL | re.MULTILINE)
-    assert defaults is not None
-    assert yaml.safe_load(parameters)["/**"]["ros__parameters"] == ast.literal_eval(defaults[1])

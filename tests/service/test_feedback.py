@@ -17,10 +17,12 @@ from armload.arms import arm
 from armload.devices import Counted, Detached, check_writable, controller_of
 from armload.errors import SinkError, SourceError, UsageError
 from armload.inertia import InertialParameters, is_consistent
+from armload.motion import taie2024
 from armload.online import OnlineEstimate, OnlineIdentifier
 from armload.payloads import test_payload
 from armload.service import ArmSettings
 from armload.service.feedback import STEP, Feedback
+from armload.simulation import simulate
 
 SERVERS = Path(__file__).resolve().parents[1] / "devices" / "servers"
 HELD = test_payload().parameters
@@ -269,6 +271,52 @@ def test_a_ur_counts_what_was_identified_through_the_real_control_interface(answ
     assert events.count("payload") > 1
     assert events.count("script") == 1
     assert "moving" not in events
+
+
+@pytest.mark.full
+@pytest.mark.timeout(900)
+def test_a_service_tells_its_robot_what_it_identified_and_reads_it_back(tmp_path):
+    """`armload serve fr3://… --apply auto` beside a loopback robot that moves and rests with a payload, in turns."""
+    pytest.importorskip("pylibfranka", reason="pylibfranka has no wheel for this Python")
+    robot = arm("fr3")
+    held = InertialParameters(0.3 * HELD.phi, robot.frame)
+    moved = simulate(robot, taie2024(), held, rate=1000.0)
+    still, turns, address = 15_000, 6, "127.0.7.79"
+    rest = robot.with_payload(held).torque(moved.q[-1]) + np.random.default_rng(1).normal(0.0, 0.02, (still, 7))
+    once = {
+        "q": np.vstack([moved.q, np.repeat(moved.q[-1:], still, axis=0)]),
+        "dq": np.vstack([moved.dq, np.zeros((still, 7))]),
+        "tau": np.vstack([moved.tau, rest]),
+    }
+    log, urdf = tmp_path / "turns.npz", tmp_path / "robot.urdf"
+    rows = turns * len(once["q"])
+    np.savez(log, t=10.0 + 1e-3 * np.arange(rows), **{key: np.tile(each, (turns, 1)) for key, each in once.items()})
+    limits = r'\1<position_based_velocity_limits velocity_offset="0.2" deceleration_limit="5.0" />'
+    urdf.write_text(re.sub(r"(<limit [^>]*/>)", limits, robot.urdf.replace("fr3_", "")))
+    end = time.monotonic() + 300.0
+    command = [sys.executable, "-m", "armload", "serve", f"fr3://{address}", "--apply", "auto", "--mounted", "nothing"]
+    with (
+        robot_at("franka_server", log, "--address", address, "--version", 10, "--urdf", urdf, "--real-time") as said,
+        subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as service,
+    ):
+        assert service.stdout is not None
+        try:
+            for text in service.stdout:
+                line = json.loads(text)
+                applied = line.get("applied")
+                if applied and applied["waits"] is None and abs(applied["mass"] - held.mass) < 0.1:
+                    break
+                assert line.get("connection") != "ended"
+                assert time.monotonic() < end, line
+        finally:
+            service.terminate()
+            service.wait(60.0)
+        loads = [event["numbers"] for event in said if event["event"] == "load"]
+    masses = [numbers[0] for numbers in loads]
+    assert len(masses) > 2
+    assert masses[-1] == pytest.approx(applied["mass"], abs=1e-5)  # what the service shows was read back
+    np.testing.assert_allclose(loads[-1][1:4], held.com, atol=0.03)
+    assert service.returncode == 0
 
 
 def test_a_refused_step_ends_the_series(answer):

@@ -75,9 +75,10 @@ class _Ahead:
         known = signatures().get(name_of(function), ())
         self._calls = [(_check(kinds), getattr(library, symbol(function, k))) for k, kinds in enumerate(known)]
         self._signature = inspect.signature(function)
+        self._count = len(self._signature.parameters)  # asked for in each call
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
-        if named or len(arguments) != len(self._signature.parameters):
+        if named or len(arguments) != self._count:
             bound = self._signature.bind(*arguments, **named)
             bound.apply_defaults()
             arguments = bound.args

@@ -94,6 +94,13 @@ class Feedback:
             self._thread.join(2.0)
         self._controller.close()
 
+    def finish(self) -> str | None:
+        """Steps until the controller counts what was identified (None), or no more can be told now: why."""
+        while True:
+            self.step()
+            if not self._under_way or self._gone.wait(PAUSE):
+                return self.waits
+
     def step(self) -> None:
         """One look, and one step if it is time for one."""
         try:

@@ -10,10 +10,10 @@ import sys
 import time
 
 import rclpy
+from armload_msgs.msg import Payload
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import InertiaStamped
 from lifecycle_msgs.srv import ChangeState, GetState
-from std_msgs.msg import String
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker
 
@@ -53,7 +53,12 @@ def main(name: str, seconds: float) -> None:
         )
 
     node.create_subscription(InertiaStamped, f"{name}/payload", inertia, 10)
-    node.create_subscription(String, f"{name}/answer", lambda m: say(answer=json.loads(m.data)), 10)
+    node.create_subscription(
+        Payload,
+        f"{name}/estimate",
+        lambda m: say(estimate={"low": m.low[0], "high": m.high[0], "relative_to": m.relative_to, "held": m.held}),
+        10,
+    )
     node.create_subscription(Marker, f"{name}/com", lambda m: say(marker=m.scale.x, action=m.action), 10)
     node.create_subscription(
         DiagnosticArray,

@@ -33,6 +33,7 @@ FIELDS = [
 ]
 ACCELEROMETERS = [("accelerometer_top", 18), ("accelerometer_bottom", 18)]  # version 10
 CONNECT, GET_MODEL = 0, 11
+LATE = 20  # [ms] of packets that are lost, where the robot's time is the real one
 SET_LOAD = {5: 10, 10: 9}
 # idle, other controller, no errors of 41 + 41, robot mode idle; the share of commands that arrived comes last
 END = struct.pack("<2B82?B", 0, 3, *[False] * 82, 1)
@@ -118,12 +119,15 @@ def serve(connection, client, options, log, urdf):
                 answer += urdf.encode()
             connection.sendall(struct.pack("<3I", command, number, 12 + len(answer)) + answer)
         if start is not None and time.monotonic() >= start + tick * 1e-3:
-            if row == len(log["t"]):
+            if options.real_time and (late := int(1e3 * (time.monotonic() - start)) - tick) > LATE:
+                tick, row = tick + late, row + late * moves
+            if row >= len(log["t"]):
                 return
             if not (moves and row in lost):
                 # the message's number is its time in milliseconds
                 number = round(1000 * float(log["t"][0])) + tick
-                start = max(start, time.monotonic() - tick * 1e-3)  # what is late stays late: a robot sends no bursts
+                if not options.real_time:  # what is late stays late: a robot sends no bursts
+                    start = max(start, time.monotonic() - tick * 1e-3)
                 q, dq, tau = (log[name][row] for name in ("q", "dq", "tau"))
                 udp.sendto(state.message(number, q, dq if moves else 0.0 * dq, tau), (client[0], port))
             tick += 1
@@ -138,6 +142,9 @@ def main():
     parser.add_argument("--urdf", help="file with the robot's description, for version 10")
     parser.add_argument(
         "--stand", action="store_true", help="stand still until a line on standard input says go, and again at stop"
+    )
+    parser.add_argument(
+        "--real-time", action="store_true", help="lose the packets that this machine is too busy to send"
     )
     parser.add_argument("--lose", type=int, nargs="*", default=[], help="rows that never arrive")
     options = parser.parse_args()

@@ -38,15 +38,15 @@ GROUPS = (
 
 
 def series_of(group: Group) -> tuple[dict[str, Any], ...]:
-    """uPlot's series: time, then for each parameter the ends of its interval, the value and the truth."""
+    """uPlot's series: time, then for each parameter the ends of its interval, the truth and, above it, the value."""
     out: list[dict[str, Any]] = [{"label": "t [s]"}]
     for colour, place in zip(COLOURS, group.places, strict=False):
         stroke, name = _css(colour), f"{NAMES[place]} [{UNITS[place]}]"
         out += [
             {"label": f"{name} high", "width": 0, "stroke": _css(colour, 0.0), "points": {"show": False}},
             {"label": f"{name} low", "width": 0, "stroke": _css(colour, 0.0), "points": {"show": False}},
+            {"label": f"{name} truth", "width": 2, "stroke": stroke, "dash": (6, 5), "points": {"show": False}},
             {"label": name, "width": 2, "stroke": stroke, "points": {"show": False}},
-            {"label": f"{name} truth", "width": 1.5, "stroke": stroke, "dash": (6, 5), "points": {"show": False}},
         ]
     return tuple(out)
 
@@ -70,8 +70,8 @@ def data_of(group: Group, t: NDArray[np.float64], rows: NDArray[np.float64]) -> 
 
     Intervals are cut to what leaves the curves readable: the range of the values and of the truth, and somewhat more
     than the present intervals. Every number is finite, as one that is not would leave uPlot without a scale: where
-    nobody knows the truth its line lies under that of the value, in the same colour; before the first estimate the
-    values are 0, with intervals as wide as the plot.
+    nobody knows the truth its line lies under that of the value, of the same colour and width, which hides it; before
+    the first estimate the values are 0, with intervals as wide as the plot.
 
     Args:
         t: (N,) [s]. rows: (N, 30).
@@ -88,7 +88,7 @@ def data_of(group: Group, t: NDArray[np.float64], rows: NDArray[np.float64]) -> 
     for k in range(len(places)):
         ends = np.clip([phi[:, k] + half[:, k], phi[:, k] - half[:, k]], lowest, highest)
         value = np.clip(phi[:, k], lowest, highest)
-        out += [ends[0], ends[1], value, np.where(np.isfinite(truth[:, k]), truth[:, k], value)]
+        out += [ends[0], ends[1], np.where(np.isfinite(truth[:, k]), truth[:, k], value), value]
     return tuple(np.ascontiguousarray(x) for x in out)
 
 

@@ -25,7 +25,7 @@ _DECIMALS = (3, 4, 4, 4, 5, 5, 5, 5, 5, 5)
 def headline(
     estimate: OnlineEstimate | None, truth: InertialParameters | None = None, misfit: str | None = None
 ) -> str:
-    """Mass and centre of mass, large, and the state of the identification.
+    """Mass and centre of mass, large, and the state of the identification; grey where the samples are doubted.
 
     Args:
         misfit: a note that is shown elsewhere.
@@ -35,14 +35,20 @@ def headline(
     mass = "—"
     if estimate.determined[0]:
         mass = f"{estimate.phi[0]:.3f} ± {Z95 * estimate.std[0]:.3f} kg"
+    size = f"font-size:22px;{_DIM}" if _doubted(estimate, misfit) else "font-size:22px;font-weight:600"
     lines = [
-        f'<div style="font-size:22px;font-weight:600" data-armload="mass">{mass}</div>',
+        f'<div style="{size}" data-armload="mass">{mass}</div>',
         f'<div data-armload="com">{_com(estimate)}</div>',
         f'<div style="{_DIM}" data-armload="truth">{_truth(truth)}</div>' if truth is not None else "",
         f'<div data-armload="state">{escape(state_of(estimate, misfit))}</div>',
         f'<div style="{_DIM}">{escape(rests_on(estimate))}</div>',
     ]
     return f'<div style="{_TEXT}">{"".join(lines)}</div>'
+
+
+def _doubted(estimate: OnlineEstimate, misfit: str | None) -> bool:
+    """Whether the samples cannot come from this arm: such a doubt is among the answer's notes."""
+    return misfit is not None and misfit in estimate.notes
 
 
 def gone(status: Status) -> str:
@@ -60,7 +66,9 @@ def state_of(estimate: OnlineEstimate, misfit: str | None = None) -> str:
     Args:
         misfit: a note that is shown elsewhere.
     """
-    if estimate.settling:
+    if _doubted(estimate, misfit):
+        words = ["not to be trusted: see below"]
+    elif estimate.settling:
         words = ["the payload has just changed"]
     elif estimate.determined[0]:
         words = ["a payload is held" if estimate.held else "nothing is held"]
@@ -112,12 +120,12 @@ def parameters(estimate: OnlineEstimate | None, truth: InertialParameters | None
     """The ten parameters with intervals and units; what the stream does not determine is marked."""
     if estimate is None:
         return ""
+    heads = [("", "left"), ("value", "right"), ("± 95 %", "right"), ("truth", "right"), ("unit", "left")]
     head = "".join(
         f'<th style="text-align:{side};font-weight:600;padding:0 4px">{text}</th>'
-        for text, side in (("", "left"), ("value", "right"), ("± 95 %", "right"), ("unit", "left"))
+        for text, side in heads
+        if truth is not None or text != "truth"
     )
-    if truth is not None:
-        head += '<th style="text-align:right;font-weight:600;padding:0 4px">truth</th>'
     rows = []
     for k, name in enumerate(NAMES):
         known, digits, half = bool(estimate.determined[k]), _DECIMALS[k], Z95 * float(estimate.std[k])
@@ -125,14 +133,13 @@ def parameters(estimate: OnlineEstimate | None, truth: InertialParameters | None
             ("left", name),
             ("right", f"{estimate.phi[k]:+.{digits}f}"),
             ("right", f"{half:.{digits}f}" if known and np.isfinite(half) else "undetermined"),
+            *([] if truth is None else [("right", f"{truth.phi[k]:+.{digits}f}")]),
             ("left", UNITS[k]),
         ]
-        if truth is not None:
-            cells.append(("right", f"{truth.phi[k]:+.{digits}f}"))
         row = "".join(f'<td style="text-align:{side};padding:0 4px">{text}</td>' for side, text in cells)
         rows.append(f'<tr data-armload="phi{k}" style="{"" if known else _DIM}">{row}</tr>')
     return (
-        f'<div style="{_TEXT}"><table style="width:100%;border-collapse:collapse;white-space:nowrap">'
+        f'<div style="{_TEXT};overflow-x:auto"><table style="width:100%;border-collapse:collapse;white-space:nowrap">'
         f"<tr>{head}</tr>{''.join(rows)}</table></div>"
     )
 

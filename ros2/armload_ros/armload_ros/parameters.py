@@ -1,0 +1,81 @@
+"""The node's parameters, and the arm, tool and tare that they name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from armload import Recording, arm, read_payload, read_recording
+from armload.arms import Arm
+from armload.identification import check_usable
+from armload.identification.identify_log import plausible_tool
+from armload.inertia import InertialParameters
+from armload.posterior import Profile, load_profile
+
+DEFAULTS: dict[str, Any] = {
+    "robot": "panda",
+    "frame": "",
+    "gravity": [0.0, 0.0, -9.81],
+    "method": "",
+    "tool": "",
+    "tare": "",
+    "profile": "",
+    "tare_duration": 20.0,
+    "rate": 10.0,
+    "timeout": 2.0,
+    "com_frame": "payload_com",
+    "apply": "",
+    "apply_auto": False,
+    "mounted": "",
+    "counted": "",
+    "end_effector": 0.0,
+    "touch_links": [""],
+}
+NOTHING = "nothing"  # in the place of a file
+
+
+class Parameters:
+    """Reads them when asked.
+
+    Args:
+        value: gives one by its name.
+    """
+
+    def __init__(self, value: Callable[[str], Any]) -> None:
+        self.value = value
+
+    def bare_arm(self) -> Arm:
+        """The arm without a tool, a new one each time."""
+        return arm(self.value("robot"), self.value("frame") or None, gravity=tuple(self.value("gravity")))
+
+    def tool(self, bare: Arm) -> InertialParameters | None:
+        """What is mounted and known, about the arm's frame."""
+        return self._body("tool", bare)
+
+    def mounted(self, bare: Arm) -> InertialParameters | None:
+        """What answers lack; None: nobody says."""
+        return self._body("mounted" if self.value("mounted") else "tool", bare)
+
+    def counted(self, bare: Arm) -> InertialParameters | None:
+        """What the controller counts before it is told anything."""
+        return self._body("counted", bare)
+
+    def tare(self, robot: Arm) -> Recording | None:
+        """The log of the arm before the payload was mounted."""
+        if not (path := self.value("tare")):
+            return None
+        tare = read_recording(path, robot)
+        check_usable(tare, robot)
+        return tare
+
+    def profile(self) -> Profile | None:
+        """What was learned of the arm from many logs."""
+        return load_profile(self.value("profile")) if self.value("profile") else None
+
+    def _body(self, name: str, bare: Arm) -> InertialParameters | None:
+        path = self.value(name)
+        if not path:
+            return None
+        if path == NOTHING:
+            return InertialParameters.zero(bare.frame)
+        return plausible_tool(bare.in_frame(read_payload(path).parameters), bare)

@@ -1,0 +1,63 @@
+"""One arm's stream: its identifier, and whether the samples can come from that arm at all."""
+
+from __future__ import annotations
+
+import time
+
+from armload.arms import Arm
+from armload.online import OnlineEstimate, OnlineIdentifier
+from armload.posterior import Known, Profile
+from armload.recording import Recording, Sample
+from armload.service.plausible import Plausibility
+from armload.service.recent import Recent
+from armload.service.unknown import Link, why_unknown
+
+
+class Stream:
+    """What `armload serve` knows of an arm, fed sample by sample.
+
+    Args:
+        arm: with its tool. tare, method, profile, known: see `OnlineIdentifier`.
+    """
+
+    def __init__(
+        self,
+        arm: Arm,
+        tare: Recording | None = None,
+        method: str | None = None,
+        profile: Profile | None = None,
+        known: Known | None = None,
+    ) -> None:
+        self.arm, self.tare, self.known = arm, tare, known
+        self._identifier = OnlineIdentifier(arm, tare, method, profile, known)
+        self._recent, self._plausibility = Recent(arm.n), Plausibility(arm, "joint_states")
+        self.estimate: OnlineEstimate | None = None
+        self.sample: Sample | None = None
+        self._left_out = 0
+
+    def update(self, sample: Sample) -> OnlineEstimate:
+        """The answer after one more sample."""
+        estimate = self._identifier.update(*sample)
+        if estimate.health.bad == self._left_out:  # it could be used
+            self._recent.append(sample)
+            self._plausibility.look(sample, estimate.health, self._recent)
+        self._left_out = estimate.health.bad
+        self.sample, self.estimate = sample, self._plausibility.qualified(estimate)
+        return self.estimate
+
+    def why_unknown(self, heard: float) -> str | None:
+        """Why the answer cannot be used, given when the last sample came [s, monotonic]; None: it can."""
+        link = Link("streaming", None, 1, None, heard)
+        why = why_unknown(self.estimate, link, time.monotonic(), self._identifier.trouble, self._plausibility.doubt)
+        return None if why is None else why.text
+
+    def reset(self) -> None:
+        """Forget the samples, not the tare."""
+        self._identifier.reset()
+        self._recent.clear()
+        self._plausibility.reset()
+        self.estimate, self.sample, self._left_out = None, None, 0
+
+    def close(self) -> None:
+        """End its threads."""
+        self._identifier.close()
