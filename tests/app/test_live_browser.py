@@ -14,6 +14,7 @@ import subprocess
 import sys
 import threading
 import time
+import urllib.error
 import urllib.request
 import xml.etree.ElementTree as ET
 from dataclasses import replace
@@ -256,6 +257,27 @@ def test_curves_are_drawn_of_a_source_that_knows_no_truth(panda, analytic_log, o
             )
             assert np.isfinite(seen).all()
             assert min(low for low, _ in seen) < HELD.mass < max(high for _, high in seen)
+    finally:
+        page.close()
+        server.join()
+        session.close()
+    assert complaints == []
+
+
+def test_beyond_this_machine_the_page_opens_with_its_token_and_not_without(panda, analytic_log, open_browser):
+    pytest.importorskip("viser", reason="the page needs viser")
+    session = Session(Replay(analytic_log(panda, HELD, duration=4.0), panda, speed=None), panda, method="map")
+    session.run()
+    page, complaints, strangers = Page(session, host="0.0.0.0", port=0, period=0.3), [], []
+    server = threading.Thread(target=page.serve)
+    server.start()
+    try:
+        here = re.sub("//[^:/]*:", "//127.0.0.1:", page.url)
+        with pytest.raises(urllib.error.HTTPError, match="401"):
+            urllib.request.urlopen(here.partition("?")[0], timeout=10.0)
+        with open_browser(here, complaints, strangers) as tab:
+            until(lambda: abs(mass(tab)[0] - HELD.mass) < 0.2 if mass(tab) else None)
+            assert "token" not in tab.url
     finally:
         page.close()
         server.join()

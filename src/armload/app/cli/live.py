@@ -37,8 +37,8 @@ examples:
   armload live 'ur://192.168.0.10?torque_constants=12,12,10,11,11,11' --robot ur10e
   armload live ros2:///joint_states --robot my_arm.urdf --frame tool0
 
-The page is for this machine only (http://127.0.0.1:8080) unless --host says otherwise: whoever can open it can read
-everything on it, switch the method and tare. Nothing is written to the robot.
+The page is for this machine only (http://127.0.0.1:8080) unless --host says otherwise. Then its address has a token, and
+nobody gets in without it: whoever does can read everything, switch the method and tare. Nothing is written to the robot.
 """
 
 
@@ -95,7 +95,8 @@ def parser() -> Parser:
     )
     add("--loop", action="store_true", help="replay a log again and again")
     add("--duration", type=at_least(0.0, float), metavar="S", help="end after so many seconds of samples")
-    add("--host", default="127.0.0.1", metavar="H", help="interface of the page (127.0.0.1)")
+    add("--host", default="127.0.0.1", metavar="H", help="interface of the page (127.0.0.1); others ask for a token")
+    add("--token-file", type=file_name, metavar="F", help="holds that token (without it, one is drawn for this run)")
     add(
         "--port",
         type=at_least(0, int, 65535),
@@ -208,8 +209,10 @@ def _warn(text: str) -> None:
 
 def _serve(session, options: argparse.Namespace) -> int | None:
     from armload.app.page.page import Page
+    from armload.service.settings import read_token
 
-    page = Page(session, options.host, options.port)
+    token = None if options.token_file is None else read_token(options.token_file)
+    page = Page(session, options.host, options.port, token=token)
     try:
         session.start(options.duration)
         print_note(f"{session.source.name}: {page.url} (Ctrl-C ends it)")

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from armload.app.page.scene import HELD, REGION, TRUTH, DrawnArm
-from armload.app.page.server import look_at_arm, serve, stop, url_of
+from armload.app.page.server import PageServer, look_at_arm
 from armload.arms import PAYLOAD_REACH, Arm
 from armload.errors import MotionError
 from armload.excitation import Surroundings
@@ -56,8 +56,9 @@ class MotionPage:
             raise MotionError(f"the motion {motion.name} moves {motion.n} joints: {arm.name} has {arm.n}")
         self._motion, self._arm, self.period = motion, arm, period
         self._around = Surroundings(arm) if around is None else around
-        self._server = server = serve(host, port, f"armload · {motion.name}", "draw it with --figure")
-        self.url = url_of(server, host)
+        self._page = PageServer(host, port, f"armload · {motion.name}", otherwise="draw it with --figure")
+        self._server = server = self._page.viser
+        self.url = self._page.url
         self._stop, self._one_at_a_time = threading.Event(), threading.Lock()  # whoever moves the slider is a thread
         self.drawn = DrawnArm(server.scene, arm)
         self._draw_around(server.scene)
@@ -97,7 +98,7 @@ class MotionPage:
         """Stop serving; nothing happens the second time."""
         if not self._stop.is_set():
             self._stop.set()
-            stop(self._server)
+            self._page.stop()
 
     # ------------------------------------------------------------------ what is on it
 

@@ -15,7 +15,7 @@ from armload.app.page import tables
 from armload.app.page.curves import AXES, GROUPS, HEIGHT, PADDING, Group, bands_of, data_of, legend_of, series_of
 from armload.app.page.download import ENDINGS, file_of
 from armload.app.page.scene import Scene
-from armload.app.page.server import look_at_middle, look_from, serve, stop, url_of
+from armload.app.page.server import PageServer, look_at_middle, look_from
 from armload.app.page.status import Status, Watcher
 from armload.arms import Arm, rated_mass
 from armload.errors import ArmloadError, ModelError
@@ -41,18 +41,27 @@ class Page:
         session: started by whoever made it.
         host: the interface to listen on. port: if it is taken, the next free one; 0: any.
         period: between two pictures [s].
+        token: that lets in where the host is not this machine alone; None: one is drawn.
 
     Attributes:
-        url: where to find the page.
+        url: where to find the page, with the token if one is needed.
 
     Raises:
         UsageError: viser is not installed, or there is no such interface.
     """
 
-    def __init__(self, session: Session, host: str = "127.0.0.1", port: int = 8080, period: float = 1 / 15) -> None:
+    def __init__(
+        self,
+        session: Session,
+        host: str = "127.0.0.1",
+        port: int = 8080,
+        period: float = 1 / 15,
+        token: str | None = None,
+    ) -> None:
         self.session, self.period = session, period
-        self._server = server = serve(host, port, f"armload · {session.source.name}")
-        self.url = url_of(server, host)
+        self._page = PageServer(host, port, f"armload · {session.source.name}", token)
+        self._server = server = self._page.viser
+        self.url = self._page.url
         self._stop = threading.Event()
         self._ticks, self._watcher = 0, Watcher(session)
         self.scene = Scene(server.scene, session.arm)
@@ -104,7 +113,7 @@ class Page:
         """Stop serving; nothing happens the second time."""
         if not self._stop.is_set():
             self._stop.set()
-            stop(self._server)
+            self._page.stop()
 
     # ------------------------------------------------------------------ what is on it
 

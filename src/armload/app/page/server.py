@@ -1,4 +1,4 @@
-"""The server of a page (viser): on this machine only, silent, looking at the arm."""
+"""The server of a page (viser): on this machine only or behind a token, silent, looking at the arm."""
 
 from __future__ import annotations
 
@@ -6,11 +6,15 @@ import contextlib
 import importlib
 import io
 import math
+import secrets
 import socket
 from typing import Any
+from urllib.parse import quote
 
+from armload.app.page.token_door import TokenDoor
 from armload.errors import UsageError
 from armload.runtime.extras import install
+from armload.service.settings import is_loopback
 
 # [length of all links] from what is looked at to the eye: the whole arm is seen, or the payload and the wrist
 _FROM_AFAR, _FROM_CLOSE = (0.7, -0.7, 0.28), (0.3, -0.3, 0.12)
@@ -18,33 +22,57 @@ _PHONE = 576  # [px] of width below which viser shows all panels as one sheet, o
 _HIGHER = 0.3  # of the picture's height above its middle: the middle of what the sheet leaves
 
 
-def serve(host: str, port: int, label: str, otherwise: str = "use --headless") -> Any:
-    """A viser server that listens at once.
+class PageServer:
+    """A viser server that listens at once, beyond this machine only to who brings a token (`TokenDoor`).
 
     Args:
         host: the interface to listen on. port: if it is taken, the next free one; 0: any. label: title of the page.
-        otherwise: what whoever has no viser can do instead of installing it.
+        token: of 16 characters or more, for a host beyond loopback; None: one is drawn. otherwise: what whoever has no
+            viser can do instead of installing it.
+
+    Attributes:
+        viser: viser's own server. url: where to find the page, with the token that lets in.
 
     Raises:
         UsageError: viser is not installed, or there is no such interface.
     """
-    try:
-        viser: Any = importlib.import_module("viser")
-    except ImportError:
-        raise UsageError(f"the page needs viser, which is not installed: {install('viser')}; or {otherwise}") from None
-    try:
-        socket.create_server((host, 0)).close()  # viser would try one port after another, for ever
-    except OSError as error:
-        raise UsageError(f"no page can be served at {host!r}: {error.strerror or error}; try 127.0.0.1") from None
-    with contextlib.redirect_stdout(io.StringIO()):
-        server = viser.ViserServer(host, port, label, verbose=False)
-    server.request_share_url = lambda *_, **__: None  # the page leaves this machine only if somebody forwards it
-    return server
 
+    def __init__(
+        self, host: str, port: int, label: str, token: str | None = None, otherwise: str = "use --headless"
+    ) -> None:
+        try:
+            viser: Any = importlib.import_module("viser")
+        except ImportError:
+            hint = install("viser")
+            raise UsageError(f"the page needs viser, which is not installed: {hint}; or {otherwise}") from None
+        try:
+            socket.create_server((host, 0)).close()  # viser would try one port after another, for ever
+        except OSError as error:
+            raise UsageError(f"no page can be served at {host!r}: {error.strerror or error}; try 127.0.0.1") from None
+        alone = is_loopback(host)
+        with contextlib.redirect_stdout(io.StringIO()):
+            self.viser = viser.ViserServer(*((host, port) if alone else ("127.0.0.1", 0)), label, verbose=False)
+        self.viser.request_share_url = lambda *_, **__: (
+            None
+        )  # the page leaves this machine only if somebody forwards it
+        self._door: TokenDoor | None = None
+        self.url = f"http://{host}:{self.viser.get_port()}"
+        if not alone:
+            token = secrets.token_urlsafe(24) if token is None else token
+            try:
+                self._door = TokenDoor(host, port, self.viser.get_port(), token)
+            except UsageError:
+                self.stop()
+                raise
+            name = socket.gethostname() if host in ("", "0.0.0.0", "::") else host
+            self.url = f"http://{name}:{self._door.port}/?token={quote(token)}"
 
-def url_of(server: Any, host: str) -> str:
-    """Where to find the page."""
-    return f"http://{'localhost' if host in ('', '0.0.0.0') else host}:{server.get_port()}"
+    def stop(self) -> None:
+        """Stop serving."""
+        if self._door is not None:
+            self._door.close()
+        with contextlib.redirect_stdout(io.StringIO()):  # viser says goodbye on stdout
+            self.viser.stop()
 
 
 def look_at_arm(server: Any, reach: float) -> None:
@@ -75,9 +103,3 @@ def look_from(camera: Any, reach: float, close: bool) -> None:
     seen = 2.0 * math.hypot(x, y, z) * math.tan(0.5 * camera.fov)  # [m] from the lower edge to the upper one
     below = _HIGHER * seen if camera.image_width < _PHONE else 0.0
     camera.position, camera.look_at = (x, y, z - below), (0.0, 0.0, -below)
-
-
-def stop(server: Any) -> None:
-    """Stop serving."""
-    with contextlib.redirect_stdout(io.StringIO()):  # viser says goodbye on stdout
-        server.stop()

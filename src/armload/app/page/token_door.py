@@ -1,0 +1,148 @@
+"""Who may open a page from another machine: whoever brings the token, in the address once and then in a cookie.
+
+viser asks nobody who they are. So it listens to this machine alone, and this stands before it: it reads the first
+request of each connection, and hands the connection on only if it brings the token. Nothing is encrypted.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import hmac
+import threading
+from http import HTTPStatus
+from http.cookies import CookieError, SimpleCookie
+from urllib.parse import parse_qs, quote, unquote, urlsplit
+
+from armload.errors import UsageError
+
+_PATIENCE = 10.0  # [s] for a request's head
+_MOST = 64  # connections at once: a page takes a few for each who looks on
+_PORTS = 100  # tried one after another
+_CHUNK = 1 << 16  # [bytes]
+
+
+class TokenDoor:
+    """A door before a server of this machine, in a thread of its own.
+
+    `http://HOST:PORT/?token=TOKEN` lets a browser in: it answers with a cookie, which no script can read and no other
+    site can have sent along, and sends the browser on to `/`. A request without either is answered 401.
+
+    Args:
+        host: the interface to listen on. port: if it is taken, the next free one; 0: any.
+        behind: port of the server, on 127.0.0.1. token: of ASCII.
+
+    Attributes:
+        port: that it listens on.
+
+    Raises:
+        UsageError: there is no such interface, or no port is free.
+    """
+
+    def __init__(self, host: str, port: int, behind: int, token: str) -> None:
+        self._behind, self._token = behind, token.encode("ascii")
+        self._tasks: set[asyncio.Task] = set()
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._loop.run_forever, name="token door", daemon=True)
+        self._thread.start()
+        try:
+            self._server = asyncio.run_coroutine_threadsafe(self._listen(host, port), self._loop).result()
+        except OSError as error:
+            self._stop()
+            raise UsageError(f"no page can be served at {host!r}: {error.strerror or error}; try 127.0.0.1") from None
+        self.port = self._server.sockets[0].getsockname()[1]
+
+    def close(self) -> None:
+        """Listen no more, and end what is open."""
+        asyncio.run_coroutine_threadsafe(self._end(), self._loop).result()
+        self._stop()
+
+    def _stop(self) -> None:
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+        self._loop.close()
+
+    async def _listen(self, host: str, port: int) -> asyncio.Server:
+        last = port if port == 0 else min(port + _PORTS, 65535)
+        for one in range(port, last):
+            with contextlib.suppress(OSError):
+                return await asyncio.start_server(self._answer, host, one)
+        return await asyncio.start_server(self._answer, host, last)
+
+    async def _end(self) -> None:
+        self._server.close()
+        others = self._tasks - {asyncio.current_task()}
+        for task in others:
+            task.cancel()
+        await asyncio.gather(*others, return_exceptions=True)
+
+    async def _answer(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        task = asyncio.current_task()
+        assert task is not None
+        self._tasks.add(task)
+        gone = (OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError, TimeoutError)  # or it speaks no HTTP
+        try:
+            with contextlib.suppress(*gone):
+                if len(self._tasks) <= _MOST:
+                    await self._let_in(reader, writer)
+        finally:
+            self._tasks.discard(task)
+            await _closed(writer)
+
+    async def _let_in(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), _PATIENCE)
+        target, cookies = _read(head)
+        brought = parse_qs(urlsplit(target).query).get("token", [""])[0]
+        if self._right(brought):
+            cookie = f"{self._cookie}={quote(brought, safe='')}; Path=/; HttpOnly; SameSite=Lax"
+            writer.write(_response(HTTPStatus.SEE_OTHER, "", f"Location: /\r\nSet-Cookie: {cookie}\r\n"))
+            return
+        if not any(self._right(unquote(cookie)) for cookie in cookies.get(self._cookie, ())):
+            writer.write(_response(HTTPStatus.UNAUTHORIZED, "This page asks for the address with ?token=…\n"))
+            return
+        to, through = await asyncio.open_connection("127.0.0.1", self._behind)
+        try:
+            through.write(head)
+            await asyncio.gather(_copy(reader, through), _copy(to, writer))
+        finally:
+            await _closed(through)
+
+    @property
+    def _cookie(self) -> str:
+        return f"armload_{self.port}"  # a browser sends a machine's cookies to all of its ports
+
+    def _right(self, token: str) -> bool:
+        return hmac.compare_digest(token.encode("utf-8", "replace"), self._token)
+
+
+def _read(head: bytes) -> tuple[str, dict[str, list[str]]]:
+    """What a request asks for, and the cookies that it brings, by name."""
+    first, *lines = head.decode("latin-1").split("\r\n")
+    cookies: dict[str, list[str]] = {}
+    for line in lines:
+        name, _, value = line.partition(":")
+        if name.strip().lower() == "cookie":
+            with contextlib.suppress(CookieError):
+                for key, morsel in SimpleCookie(value).items():
+                    cookies.setdefault(key, []).append(morsel.value)
+    return [*first.split(" "), ""][1], cookies
+
+
+def _response(status: HTTPStatus, text: str, more: str = "") -> bytes:
+    body = text.encode()
+    head = f"HTTP/1.1 {status.value} {status.phrase}\r\n{more}Content-Type: text/plain; charset=utf-8\r\n"
+    return f"{head}Content-Length: {len(body)}\r\nCache-Control: no-store\r\nConnection: close\r\n\r\n".encode() + body
+
+
+async def _copy(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    """All that comes, until its end; a reader that is slow slows whoever sends."""
+    while chunk := await reader.read(_CHUNK):
+        writer.write(chunk)
+        await writer.drain()
+    await _closed(writer)
+
+
+async def _closed(writer: asyncio.StreamWriter) -> None:
+    writer.close()
+    with contextlib.suppress(OSError):
+        await writer.wait_closed()

@@ -1,0 +1,102 @@
+"""The door before a page: who brings the token gets what is behind it, byte for byte; nobody else does."""
+
+import contextlib
+import http.client
+import socket
+import threading
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+
+import pytest
+
+from armload.app.page.token_door import TokenDoor
+from armload.errors import UsageError
+
+TOKEN = "of sixteen & more; =%+"
+QUOTED = "of%20sixteen%20%26%20more%3B%20%3D%25%2B"
+BODY = bytes(range(256)) * 4096
+
+
+class Behind(BaseHTTPRequestHandler):
+    """Sends a megabyte, and back what it was sent."""
+
+    def do_GET(self):
+        self.send_response(200)
+        self.end_headers()
+        self.wfile.write(BODY)
+
+    def do_POST(self):
+        sent = self.rfile.read(int(self.headers["Content-Length"]))
+        self.send_response(200)
+        self.end_headers()
+        self.wfile.write(sent[::-1])
+
+    def log_message(self, *_):
+        pass
+
+
+@pytest.fixture(scope="module")
+def door():
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Behind)
+    threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True).start()
+    door = TokenDoor("127.0.0.1", 0, server.server_address[1], TOKEN)
+    yield door
+    door.close()
+    server.shutdown()
+    server.server_close()
+
+
+def ask(door, path, cookie=None, method="GET", body=None):
+    connection = http.client.HTTPConnection("127.0.0.1", door.port, timeout=10.0)
+    try:
+        connection.request(method, path, body, {} if cookie is None else {"Cookie": cookie})
+        answer = connection.getresponse()
+        return answer.status, dict(answer.getheaders()), answer.read()
+    finally:
+        connection.close()
+
+
+def test_the_address_with_the_token_brings_a_cookie_that_opens_all_else(door):
+    status, headers, _ = ask(door, f"/?token={QUOTED}")
+    assert (status, headers["Location"]) == (303, "/")
+    cookie, *flags = headers["Set-Cookie"].split("; ")
+    assert {"HttpOnly", "SameSite=Lax"} <= set(flags)
+    assert ask(door, "/some/file", f"another=1; {cookie}")[::2] == (200, BODY)
+    assert ask(door, "/", cookie, "POST", BODY)[::2] == (200, BODY[::-1])
+
+
+@pytest.mark.parametrize(
+    ("path", "cookie"),
+    [
+        ("/", None),
+        ("/?token=", None),
+        ("/?token=another", None),
+        ("/", "armload_{port}=another"),
+        ("/", "armload_1=" + QUOTED),
+    ],
+)
+def test_without_the_token_nothing_behind_the_door_answers(door, path, cookie):
+    status, _, said = ask(door, path, None if cookie is None else cookie.format(port=door.port))
+    assert status == 401
+    assert b"token" in said
+    assert TOKEN.encode() not in said
+
+
+def test_what_is_no_http_is_dropped(door):
+    with socket.create_connection(("127.0.0.1", door.port), timeout=10.0) as connection:
+        connection.sendall(b"\x00" * 100_000)
+        connection.shutdown(socket.SHUT_WR)
+        with contextlib.suppress(ConnectionResetError):
+            assert connection.recv(1) == b""
+
+
+def test_a_port_that_is_taken_is_followed_by_the_next_free_one(door):
+    other = TokenDoor("127.0.0.1", door.port, 1, TOKEN)
+    try:
+        assert door.port < other.port <= door.port + 100
+    finally:
+        other.close()
+
+
+def test_an_interface_that_is_not_there_is_refused():
+    with pytest.raises(UsageError, match="no page can be served"):
+        TokenDoor("203.0.113.7", 0, 1, TOKEN)
