@@ -249,10 +249,15 @@ class OnlineIdentifier:
         counts, stands = self._judgement.counts(sample.t, run)
         if counts and self._stream.unseen:
             self._stream.forget_pauses()
+        mixed = self._watch is not None and self._watch.mixed
         if fresh:
             self._published = sample.t
+            if mixed:
+                phi, covariance = self._watch.track()
+                estimate = replace(estimate, phi=phi, covariance=covariance)
             self._judge(estimate, run, stands)
-        self._judgement.take(estimate, run)
+        if fresh or not mixed:
+            self._judgement.take(estimate, run)
 
     def _track(self, watch: PayloadWatch, sample: Sample) -> None:
         """While samples are left out: what all that may have happened makes of the payload."""
