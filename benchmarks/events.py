@@ -231,7 +231,8 @@ def late(cell: dict[str, Any]) -> tuple[list[float], list[dict[str, Any]]]:
 def of_part(cells: list[dict[str, Any]]) -> dict[str, Any]:
     """The changes, pushes and false events of a part."""
     changes, pushes = ([x for cell in cells for x in cell[name]] for name in ("changes", "pushes"))
-    after_all, false = ([x for cell in cells for x in late(cell)[k]] for k in (0, 1))
+    lates = [late(cell) for cell in cells]
+    after_all, false = [x for delays, _ in lates for x in delays], [x for _, events in lates for x in events]
     inside = [cell["inside"] for cell in cells if cell["inside"] is not None]
     out: dict[str, Any] = {
         "scenes": len(cells),

@@ -67,7 +67,8 @@ class PayloadWatch:
 
     Attributes:
         runs: those that are kept. phase: what becomes of samples at present. answered: the run that the last estimate
-            is of. event: the last change noticed.
+            is of. event: the last change noticed. mixed: whether an interval of the run alone would leave out more than
+            its 5 %, as the payload may have changed.
     """
 
     def __init__(self, first: PosteriorLeastSquares) -> None:
@@ -83,7 +84,7 @@ class PayloadWatch:
         self.runs.reset()
         self._look.reset()
         self.phase: Phase = FOLLOWING
-        self.answered = self.run
+        self.answered, self.mixed = self.run, False
         self.event: Event | None = None
         self._modes = Modes(self._unit, self.run.stream.correction.effort)
         self._gaussian: tuple[PosteriorLeastSquares, Gaussian] | None = None  # before the row, and of which run
@@ -114,14 +115,11 @@ class PayloadWatch:
         """Whether nothing but the arm as it was and the same payload explains the last rows."""
         return self.phase == FOLLOWING and sum(self.likely) < 1.0 - LIKELY
 
-    @property
-    def mixed(self) -> bool:
-        """Whether an interval of the run alone would leave out more than its 5 %: the payload may have changed."""
-        return self.phase == FOLLOWING and self.likely[0] > UNLIKELY
-
-    def track(self) -> Gaussian:
-        """phi (10,) and its covariance, by the run and by all that the last rows may be besides."""
-        return self._tracker.track(self._modes, self._row_t, (self.run.last.phi, self.run.last.covariance))
+    def track(self, t: float) -> Estimate:
+        """At t [s], by the run and by all that the last rows may be besides."""
+        last = self.run.last
+        phi, covariance = self._tracker.track(self._modes, self._row_t, (last.phi, last.covariance))
+        return replace(last, t=t, phi=phi, covariance=covariance)
 
     def update(self, sample: Sample, held: bool) -> Estimate | None:
         """Take one sample; None while it does not count. `held`: whether anything was, by the last estimate."""
@@ -171,6 +169,8 @@ class PayloadWatch:
             self._weigh(row, h, state)
         if known:
             self._decide(sample, held)
+            changed = self._modes.handing + self._modes.other
+            self.mixed = self.phase == FOLLOWING and changed > UNLIKELY
 
     @property
     def _before_row(self) -> Gaussian:
@@ -277,7 +277,7 @@ class PayloadWatch:
         self._modes.reset()
         self._detector.begin_run()
         self._look.clear()
-        self.phase, self._gave_up = FOLLOWING, False
+        self.phase, self._gave_up, self.mixed = FOLLOWING, False, False
         if dropped is not None:
             self._background.close_run(dropped)
 
