@@ -39,8 +39,9 @@ DRIFT_TIME = 20.0
 DRIFT_RARE = 1000.0
 # [s] mean time between changes, and between contacts: between a cell that works and an arm that stands for hours
 RARE = 100.0
-# [s] mean duration of a hand-over: steps take one lag of the regression, slow ones seconds
-HANDED_OVER = 0.5
+# [s] mean duration of a hand-over: steps take one lag of the regression, slow ones seconds. With 0.5 s, hand-overs
+# within 1 s are more often taken for two (ramps_1, seeds 95000 to 95003)
+HANDED_OVER = 1.5
 # [s] how far apart the moments lie from which another body is weighed: a heavy one shows in a tenth of a second, one of
 # 50 g in two seconds
 STARTS = np.array([0.05, 0.1, 0.2, 0.4, 0.8, 1.6])
