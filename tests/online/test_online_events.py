@@ -323,10 +323,10 @@ def test_threads_do_not_pile_up_with_the_changes():
     def running():
         return sum(thread.name == "armload-scales" for thread in threading.enumerate())
 
-    schedule = [(3.0 + 2.0 * k, None if k % 2 else HALF_KILO) for k in range(8)]
+    schedule = [(3.0 + 3.0 * k, None if k % 2 else HALF_KILO) for k in range(8)]
     identifier, before, most = OnlineIdentifier(arm("panda"), method="map-gp"), running(), 0
     seen = set()
-    for sample in stream(8, schedule, 19.0, 100.0):
+    for sample in stream(8, schedule, 27.0, 100.0):
         estimate = identifier.update(*sample)
         seen.add(estimate.event and estimate.event.t)
         most = max(most, running() - before)
