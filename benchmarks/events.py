@@ -104,7 +104,7 @@ def measured(scene: Scene) -> dict[str, Any]:
         last = one.t
         back = 0  # 1: the run before the event goes on, 2: the one before that is taken up again
         if one.event is not None and one.event.kind == "return":
-            back = 1 + (abs(one.event.mass or 0.0) > FELT[0])
+            back = 1 if one.event.mass == 0.0 else 2
         said.append(
             (
                 *(one.t, one.phi[0], one.low[0], one.high[0], one.interval == "calibrated", one.settling, back),
@@ -172,9 +172,9 @@ def reliability_of(stream: Stream, table: NDArray, held: NDArray, every: NDArray
     runs = [held[0]]  # what the run at work began with, and those before
     for k in range(1, len(table)):
         settled, back = table[k - 1, 5] == 1.0 and table[k, 5] == 0.0, int(table[k, 6])
-        if settled and not back:
+        if settled and back != 1:
             runs.append(held[k])
-        elif back and table[k - 1, 6] == 0.0 and not settled and len(runs) > back:
+        if back and table[k - 1, 6] == 0.0 and (not settled or back == 2) and len(runs) > back:
             runs.append(runs[-1 - back])
         changed[k] = bool((np.abs(held[k, :4] - runs[-1][:4]) > FELT).any())
     for change in stream.changes:
@@ -231,7 +231,8 @@ def late(cell: dict[str, Any]) -> tuple[list[float], list[dict[str, Any]]]:
 def of_part(cells: list[dict[str, Any]]) -> dict[str, Any]:
     """The changes, pushes and false events of a part."""
     changes, pushes = ([x for cell in cells for x in cell[name]] for name in ("changes", "pushes"))
-    after_all, false = ([x for cell in cells for x in late(cell)[k]] for k in (0, 1))
+    lates = [late(cell) for cell in cells]
+    after_all, false = [x for delays, _ in lates for x in delays], [x for _, events in lates for x in events]
     inside = [cell["inside"] for cell in cells if cell["inside"] is not None]
     out: dict[str, Any] = {
         "scenes": len(cells),

@@ -49,8 +49,8 @@ from armload.online.thresholds import (
 from armload.runtime.kernels import kernel
 
 _DRIFT, _CONTACT = 1, 2  # where each kind begins among the probabilities; 0: steady
-_HANDING = _CONTACT + len(PUSH_SIZES)
-_OTHER = _HANDING + len(BODY_SIZES)
+_HANDING, _BODIES = _CONTACT + len(PUSH_SIZES), len(BODY_SIZES["link"])
+_OTHER = _HANDING + _BODIES
 
 
 def body_root() -> NDArray[np.float64]:
@@ -68,11 +68,15 @@ class Modes:
 
     Args:
         mass: of a payload as the arm usually holds [kg]. effort: torque scale of each joint (n,) [N·m].
+
+    Attributes:
+        side: "link" or "motor", where the torque is measured.
     """
 
     def __init__(self, mass: float, effort: NDArray[np.float64]) -> None:
-        n, bodies, starts = len(effort), len(BODY_SIZES), len(STARTS)
+        n, bodies, starts = len(effort), _BODIES, len(STARTS)
         self.root, self.effort = mass * body_root(), effort
+        self.side = "link"
         self._sizes = np.array([DRIFT_SIZE, *PUSH_SIZES])
         self._times = np.array([DRIFT_TIME, *(CONTACT_TIME for _ in PUSH_SIZES)])
         self._weights = np.zeros(_OTHER + starts)
@@ -112,7 +116,7 @@ class Modes:
         if taken:
             self._listen(h, scale * scale / v, scale * d / v)
         row, state = (h, U, d, v, scale, self.effort), (self._b, self._x, self._P, self._A, self._c)
-        known = (self._sizes, self._times, BODY_SIZES, HANDING_TIMES, STARTS)
+        known = (self._sizes, self._times, BODY_SIZES[self.side], HANDING_TIMES[self.side], STARTS)
         rates = (RARE, DRIFT_RARE, CONTACT_LASTS, HANDED_OVER)
         _weigh(*row, self._weights, *state, self._found, self._age, *known, *rates)
 
@@ -165,14 +169,15 @@ class Modes:
         going_on: of those alone by which it may still be changing.
         """
         k = int(self._weights[_HANDING : _OTHER if going_on else None].argmax())
-        if k < len(BODY_SIZES):
+        if k < _BODIES:
             x, P = self._x[k], self._P[k]
         else:
-            k -= len(BODY_SIZES)
+            k -= _BODIES
+            sizes = BODY_SIZES[self.side]
             A, c = self._A[k] + np.tril(self._A[k], -1).T, self._c[k]
-            found = [(s * s * c @ np.linalg.solve(M := np.eye(10) + s * s * A, c), M, s) for s in BODY_SIZES]
+            found = [(s * s * c @ np.linalg.solve(M := np.eye(10) + s * s * A, c), M, s) for s in sizes]
             likely = [square - np.linalg.slogdet(M)[1] for square, M, _ in found]
-            P = np.linalg.inv(A + np.eye(10) / found[int(np.argmax(likely))][2] ** 2)
+            P = np.linalg.inv(A + np.eye(10) / sizes[int(np.argmax(likely))] ** 2)
             x = P @ c
         return self.root @ x, self.root @ P @ self.root.T
 

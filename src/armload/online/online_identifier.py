@@ -121,10 +121,7 @@ class OnlineIdentifier:
     def reset(self) -> None:
         """Forget the stream (not the tare); the next sample is the first."""
         self._gate.reset()
-        if self._watch is None:
-            self._engine.reset()
-        else:
-            self._watch.reset()
+        (self._watch or self._engine).reset()
         self._stream.reset()
         self._internal = 0.0
         self._ended: PosteriorLeastSquares | None = None  # the run before the last change
@@ -249,16 +246,19 @@ class OnlineIdentifier:
         counts, stands = self._judgement.counts(sample.t, run)
         if counts and self._stream.unseen:
             self._stream.forget_pauses()
+        mixed = self._watch is not None and self._watch.mixed
         if fresh:
             self._published = sample.t
+            if self._watch is not None and mixed:
+                estimate = self._watch.track(sample.t)
             self._judge(estimate, run, stands)
-        self._judgement.take(estimate, run)
+        if fresh or not mixed:
+            self._judgement.take(estimate, run)
 
     def _track(self, watch: PayloadWatch, sample: Sample) -> None:
         """While samples are left out: what all that may have happened makes of the payload."""
         self._published, run = sample.t, watch.run
-        phi, covariance = watch.track()
-        estimate = replace(run.last, t=sample.t, phi=phi, covariance=covariance)
+        estimate = watch.track(sample.t)
         self._judgement.follow(estimate)
         if watch.settling or watch.likely[0] > 0.5:  # then phi follows what the samples say
             self._judgement.newest = sample.t

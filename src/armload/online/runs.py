@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.estimators import Estimate
-from armload.online.thresholds import SAME_RUN, TARE_FROM
+from armload.online.thresholds import SAME_RUN, STEP_STD, TARE_FROM
 from armload.posterior import PosteriorLeastSquares
+from armload.regression import payload_prior_std
 
 Gaussian = tuple[NDArray[np.float64], NDArray[np.float64]]
 
@@ -23,6 +24,7 @@ class Runs:
 
     def __init__(self, first: PosteriorLeastSquares) -> None:
         self._first = self.current = first
+        self._unit = float(payload_prior_std(first.arm)[0])  # [kg] of a payload's mass beforehand
         self.previous: PosteriorLeastSquares | None = None
         self.earlier: PosteriorLeastSquares | None = None
 
@@ -53,9 +55,10 @@ class Runs:
         return None if any(run is kept for kept in (self.current, self.previous, self.earlier)) else run
 
     def reference_for_next(self, held: bool) -> PosteriorLeastSquares | None:
-        """The run that the next one takes for a tare: the empty arm's, if there was one for long enough."""
+        """The run that the next one takes for a tare: the empty arm's, if it was known to be empty for long enough."""
         run = self.current
-        if run.reference is None and not held and run.stream.seconds >= TARE_FROM:
+        known = float(run.last.std[0]) <= STEP_STD * self._unit  # else nobody can tell whether anything is held
+        if run.reference is None and known and not held and run.stream.seconds >= TARE_FROM:
             return run
         return run.reference
 

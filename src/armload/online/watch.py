@@ -14,8 +14,7 @@ The watch is in one of three phases, by what the last rows are (`modes.py`):
 
 After a change the new run is *judged* while it is followed: it says what the change was, once its mass is known, and
 gives way to the earlier run if it holds what that one held. The run of the empty arm is a tare of the runs after it,
-beside the one that was given, if one was. Of a run that ends the last rows are taken back: a change is there before it
-is noticed.
+beside the one that was given, if one was. Of a run that ends the last rows are taken back: they show it.
 """
 
 from __future__ import annotations
@@ -45,6 +44,7 @@ from armload.online.thresholds import (
     RETURN_UNTIL,
     SURE,
     TAKEN_BACK,
+    UNLIKELY,
 )
 from armload.online.tracking import Tracker
 from armload.posterior import PosteriorLeastSquares
@@ -67,7 +67,8 @@ class PayloadWatch:
 
     Attributes:
         runs: those that are kept. phase: what becomes of samples at present. answered: the run that the last estimate
-            is of. event: the last change noticed.
+            is of. event: the last change noticed. mixed: whether an interval of the run alone would leave out more than
+            its 5 %, as the payload may have changed.
     """
 
     def __init__(self, first: PosteriorLeastSquares) -> None:
@@ -83,7 +84,7 @@ class PayloadWatch:
         self.runs.reset()
         self._look.reset()
         self.phase: Phase = FOLLOWING
-        self.answered = self.run
+        self.answered, self.mixed = self.run, False
         self.event: Event | None = None
         self._modes = Modes(self._unit, self.run.stream.correction.effort)
         self._gaussian: tuple[PosteriorLeastSquares, Gaussian] | None = None  # before the row, and of which run
@@ -114,10 +115,11 @@ class PayloadWatch:
         """Whether nothing but the arm as it was and the same payload explains the last rows."""
         return self.phase == FOLLOWING and sum(self.likely) < 1.0 - LIKELY
 
-    def track(self) -> Gaussian:
-        """Follow phi (10,) and its covariance to the last rows, which the run did not take."""
+    def track(self, t: float) -> Estimate:
+        """At t [s], by the run and by all that the last rows may be besides."""
         last = self.run.last
-        return self._tracker.track(self._modes, self._row_t, (last.phi, last.covariance))
+        phi, covariance = self._tracker.track(self._modes, self._row_t, (last.phi, last.covariance))
+        return replace(last, t=t, phi=phi, covariance=covariance)
 
     def update(self, sample: Sample, held: bool) -> Estimate | None:
         """Take one sample; None while it does not count. `held`: whether anything was, by the last estimate."""
@@ -130,22 +132,19 @@ class PayloadWatch:
             return None
         if self._look.due(sample.t):
             self._examine(sample, held)
-            if self.phase != FOLLOWING:
-                return None
-        return self._follow(sample, held)
+        return self._follow(sample, held) if self.phase == FOLLOWING else None
 
     def conclude(self) -> Estimate:
         """The estimate of the current run after a last solution."""
         self.hold()
-        self.answered = self.run
-        return self.run.conclude()
+        self.answered = run = self.run
+        return run.conclude()
 
     # ------------------------------------------------------------------ following
 
     def _follow(self, sample: Sample, held: bool) -> Estimate:
         self.answered = self.run
-        before = self.run.stream.rows
-        estimate = self.run.update(sample)
+        before, estimate = self.run.stream.rows, self.run.update(sample)
         if self.run.stream.rows > before and self._look.row(sample.t):
             self._examine(sample, held)
         self._look.seen(sample.t)
@@ -157,11 +156,11 @@ class PayloadWatch:
         """Look at the innovations of the last row, which the run has taken."""
         self._look.clear()
         stream = self.run.stream
-        state, row = stream.state, stream.row
-        if state is None or row is None:
+        if (state := stream.state) is None or (row := stream.row) is None:
             return
-        known = stream.seconds > (FIRST_TARED if stream.tares else FIRST_UNTARED)
+        self._modes.side = stream.posterior.torque
         h, self._row_t = row.t - self._row_t, row.t
+        known = stream.seconds > (FIRST_TARED if stream.tares else FIRST_UNTARED)
         if row.h > 0.0:
             if known:
                 self._modes.take(row.h, state.seen, row.X, state.scale, *self._before_row, True)
@@ -170,13 +169,15 @@ class PayloadWatch:
             self._weigh(row, h, state)
         if known:
             self._decide(sample, held)
+            changed = self._modes.handing + self._modes.other
+            self.mixed = self.phase == FOLLOWING and changed > UNLIKELY
 
     @property
     def _before_row(self) -> Gaussian:
         """phi and covariance before the row, under the weak prior."""
-        if self._gaussian is None or self._gaussian[0] is not self.run:
-            return np.zeros(10), np.diag(payload_prior_std(self.run.arm) ** 2)
-        return self._gaussian[1]
+        if self._gaussian is not None and self._gaussian[0] is self.run:
+            return self._gaussian[1]
+        return np.zeros(10), np.diag(payload_prior_std(self.run.arm) ** 2)
 
     # ------------------------------------------------------------------ doubting
 
@@ -213,8 +214,7 @@ class PayloadWatch:
 
     def _begin_change(self, sample: Sample, held: bool) -> None:
         """A change: the next run is made in the background while it settles."""
-        run = self.run
-        state = run.stream.state
+        run, state = self.run, self.run.stream.state
         assert state is not None
         if self.phase == FOLLOWING:
             self._held_before = held
@@ -251,10 +251,10 @@ class PayloadWatch:
         """The payload stays: the next run begins."""
         self.hold()
         assert self._change is not None
-        change, self._change = self._change, None
-        if change.taken_from is None:
-            change.run.reset()
-        self._watch_anew(self.runs.follow(change.run))
+        if self._change.taken_from is None:
+            self._change.run.reset()
+        run, self._change = self._change.run, None
+        self._watch_anew(self.runs.follow(run))
         self._judging = True
 
     def _judge(self, estimate: Estimate, held: bool) -> None:
@@ -277,7 +277,7 @@ class PayloadWatch:
         self._modes.reset()
         self._detector.begin_run()
         self._look.clear()
-        self.phase, self._gave_up = FOLLOWING, False
+        self.phase, self._gave_up, self.mixed = FOLLOWING, False, False
         if dropped is not None:
             self._background.close_run(dropped)
 
