@@ -37,8 +37,9 @@ examples:
   armload live 'ur://192.168.0.10?torque_constants=12,12,10,11,11,11' --robot ur10e
   armload live ros2:///joint_states --robot my_arm.urdf --frame tool0
 
-The page is for this machine only (http://127.0.0.1:8080) unless --host says otherwise. Then its address has a token, and
-nobody gets in without it: whoever does can read everything, switch the method and tare. Nothing is written to the robot.
+The page is for this machine only (http://127.0.0.1:8080) unless --host says otherwise. Its address then has a token,
+and nobody gets in without: whoever does can read everything, switch the method and tare. Nothing is written to the
+robot.
 """
 
 
