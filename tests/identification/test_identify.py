@@ -371,7 +371,8 @@ def test_a_method_without_a_prior_reports_its_own_interval_of_what_the_log_narro
     half = Z95 * own.std[0]
     assert 0.05 < half < 0.3  # [kg] where what is known of any payload is 3 kg
     answer = identify(log, panda, method="rls-filter")
-    assert answer.determined[0] and answer.held
+    assert answer.determined[0]
+    assert answer.held
     assert [answer.phi_low[0], answer.phi_high[0]] == pytest.approx([own.phi[0] - half, own.phi[0] + half], abs=0.02)
     assert answer.interval == "approximate"
 

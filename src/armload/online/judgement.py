@@ -44,7 +44,7 @@ class Judgement:
 
     def reset(self) -> None:
         """What is known beforehand."""
-        mean, std, _ = self.before
+        mean, std = self.before
         self.estimate = Estimate(0.0, mean, np.diag(std**2), 0, self._frame)
         self.around, self.doubted = mean, False
         self.run: Identifier | None = None
