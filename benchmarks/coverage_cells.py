@@ -9,10 +9,12 @@ payload_intervals.py. Each log has twelve, two of every family, of a rating draw
 logarithm; trays, bars and rings are of 0.3–2 kg. The errors of the torque's scale stay those of its own payload.
 
 Cells by the log (motion, tare, age, world) and by the mass hold the four families that training draws from; those by
-family hold all logs. Intervals are those that `identify` reports, whether it doubts a log or not.
+family hold all logs. Intervals are those that `identify` reports, whether it doubts a log or not. What a log does not
+determine has the interval of what was known before, and does not count here.
 
-inside    share of the true values inside their intervals: mass · first moments · inertia
-width     mean half-width over mean error, the same three
+determined  share of the inertias that are
+inside      share of the true values inside their intervals: mass · first moments · inertia
+width       mean half-width over mean error, the same three
 
 Written to benchmarks/results/coverage_cells.json and a table of docs/hybrid.md, after every kind of log; four minutes
 of one core.
@@ -38,7 +40,7 @@ from armload.posterior.hybrid import answer, std_under_weak_prior
 from armload.regression import payload_prior_std
 
 LOGS = {  # kind of log → what is not as in the first, case of wrong_cases.py, age of the tare [days]
-    "a motion of the reference, a tare near it, of today, an arm like the measured ones": ("", "nothing", 0.0),
+    "the first kind": ("none", "nothing", 0.0),
     "everyday motions": ("motion", "nothing, everyday motions", 0.0),
     "a tare elsewhere": ("tare", "nothing, tare elsewhere", 0.0),
     "a tare along the same motion": ("tare", "nothing, same motion", 0.0),
@@ -56,7 +58,7 @@ GROUPS = (slice(0, 1), slice(1, 4), slice(4, 10))
 
 
 class Judged(NamedTuple):
-    """One payload in one log after so many seconds: error and half-width (10,), and which truths lie inside (10,)."""
+    """One payload in one log after so many seconds: error, half-width, whether inside, whether determined (10,)."""
 
     kind: str
     family: str
@@ -65,6 +67,7 @@ class Judged(NamedTuple):
     error: NDArray[np.float64]
     half: NDArray[np.float64]
     inside: NDArray[np.bool_]
+    told: NDArray[np.bool_]
 
 
 def payloads(k: int, seed: int) -> Iterator[tuple[str, NDArray[np.float64]]]:
@@ -95,14 +98,14 @@ def judged(log: Wrong, kind: str, k: int, seed: int) -> Iterator[Judged]:
             told = determined(std, prior.std, std_under_weak_prior(trusted.information, weak), weak)
             low, high = phi_interval(found.phi, found.phi, std, told, Before(prior.mean, prior.std))
             inside = (low <= phi) & (phi <= high)
-            yield Judged(kind, family, float(phi[0]), t, np.abs(found.phi - phi), 0.5 * (high - low), inside)
+            yield Judged(kind, family, float(phi[0]), t, np.abs(found.phi - phi), 0.5 * (high - low), inside, told)
 
 
 def cells(found: list[Judged]) -> list[dict[str, Any]]:
     """Every cell that has payloads."""
     out = []
     for kind, (what, _, _) in LOGS.items():
-        out += cell(what or "none of it", kind, [x for x in found if x.kind == kind and x.family in TRAINED])
+        out += cell(what, kind, [x for x in found if x.kind == kind and x.family in TRAINED])
     for low, high in CLASSES:
         name = f"{low:g} kg and more" if np.isinf(high) else f"{low:g}–{high:g} kg"
         out += cell("mass", name, [x for x in found if low <= x.mass < high and x.family in TRAINED])
@@ -118,15 +121,23 @@ def cell(what: str, name: str, some: list[Judged]) -> list[dict[str, Any]]:
         now = [x for x in some if x.t == t]
         if not now:
             continue
-        error, half, inside = (np.array([getattr(x, part) for x in now]) for part in ("error", "half", "inside"))
+        error, half, inside, told = (np.array([x[part] for x in now]) for part in range(4, 8))
+        some_told = [told[:, part] for part in GROUPS]
         out.append(
             {
                 "by": what,
                 "cell": name,
                 "t": t,
                 "payloads": len(now),
-                "inside": [round(float(inside[:, part].mean()), 3) for part in GROUPS],
-                "width": [round(float(half[:, part].mean() / error[:, part].mean()), 2) for part in GROUPS],
+                "determined": [round(float(which.mean()), 3) for which in some_told],
+                "inside": [
+                    round(float(inside[:, part][which].mean()), 3) if which.any() else None
+                    for part, which in zip(GROUPS, some_told, strict=True)
+                ],
+                "width": [
+                    round(float(half[:, part][which].mean() / error[:, part][which].mean()), 2) if which.any() else None
+                    for part, which in zip(GROUPS, some_told, strict=True)
+                ],
                 "mass error [g]": round(1e3 * float(error[:, 0].mean()), 1),
             }
         )
@@ -137,11 +148,16 @@ def table(found: list[dict[str, Any]]) -> str:
     """A row for each cell, both times beside each other."""
     rows = []
     for first, last in zip(found[::2], found[1::2], strict=True):
-        shares = [" · ".join(f"{100 * x:.0f}" for x in one["inside"]) for one in (first, last)]
-        widths = [" · ".join(f"{x:.1f}" for x in one["width"]) for one in (first, last)]
-        rows.append([first["by"], first["cell"], str(first["payloads"]), *shares, *widths])
+        told = [f"{100 * one['determined'][2]:.0f}" for one in (first, last)]
+        shares, widths = (
+            [" · ".join("–" if x is None else form.format(x) for x in one[what]) for one in (first, last)]
+            for what, form in (("inside", "{:.0%}"), ("width", "{:.1f}"))
+        )
+        shares = [text.replace("%", "") for text in shares]
+        rows.append([first["by"], first["cell"], str(first["payloads"]), *told, *shares, *widths])
     heads = ["inside [%] 1 s", "6 s", "half-width over error 1 s", "6 s"]
-    return markdown_table(["another", "cell", "payloads", *heads], "llrrrrr", rows)
+    columns = ["another", "cell", "payloads", "inertias determined [%] 1 s", "6 s", *heads]
+    return markdown_table(columns, "llrrrrrrr", rows)
 
 
 def main() -> None:
