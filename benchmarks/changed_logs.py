@@ -1,6 +1,6 @@
 """A payload that changes within a log: how surely `identify` finds it, and how often it is wrong.
 
-    python benchmarks/changed_logs.py [--logs 24] [--seed 0]
+    python benchmarks/changed_logs.py [--logs 24] [--seed 0] [--cases "0.1 kg;0.2 kg"]
 
 sound     logs of the benchmark's populations, with their tares, of which nothing changes: share in which a change is
           found, and share called approximate as one may be there
@@ -8,14 +8,19 @@ changes   a payload of 0.1, 0.2, 0.5 and 1.5 kg taken up or put down somewhere i
           found, share that is found or doubted, and how far off the time is [s, median]; two changes: taken up after
           2 s and put down after 4 s. With a tare of 20 s near the log's poses, and without
 
-Pandas that differ from their model as real ones do, and UR10e where it is said. Written to
-benchmarks/results/changed_logs.json and a table of docs/hybrid.md.
+Pandas that differ from their model as real ones do, and UR10e where it is said. Cases that are named replace their own
+among the results. Written to benchmarks/results/changed_logs.json and a table of docs/hybrid.md, after every case; ten
+minutes of one core.
 """
 
 from __future__ import annotations
 
+import json
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
-from script import ROOT, markdown_table, options, say, write, write_table
+from script import RESULTS, ROOT, markdown_table, options, say, write, write_table
 
 from armload import Arm, Recording, arm, identify
 from armload.devices import Simulator
@@ -66,35 +71,49 @@ def off(case: dict[str, float]) -> str:
     return f"{case['off [s]']:.2f}" if case.get("off [s]") is not None else ""
 
 
+def sound(robot: str, population: str, logs: int, seed: int) -> dict[str, float]:
+    """Nothing changes."""
+    known = arm(robot)
+    drawn = draw_episodes(known, population, logs, 61 + seed, motions=max(5, logs // 4))
+    seen = [looked_at(log.run, known, log.tare) for log in simulate_episodes(drawn)]
+    changed, doubted = np.mean([bool(times) for times, _ in seen]), np.mean([doubt for _, doubt in seen])
+    return {"logs": logs, "found": float(changed), "found or doubted": float(changed + doubted)}
+
+
+def changes(mass: float, twice: bool, tared: bool, logs: int, seed: int) -> dict[str, float]:
+    """A payload is taken up or put down."""
+    right, told, apart = [], [], []
+    for k in range(logs):
+        log, tare, truth = log_with_changes(mass, 1000 * seed + k, twice)
+        times, doubted = looked_at(log, arm("panda"), tare if tared else None)
+        right.append(len(times) == len(truth))
+        told.append(bool(times) or doubted)
+        if right[-1]:
+            apart += [abs(a - b) for a, b in zip(times, truth, strict=True)]
+    off = {"off [s]": float(np.median(apart))} if apart else {}
+    return {"logs": logs, "found": float(np.mean(right)), "found or doubted": float(np.mean(told))} | off
+
+
+CASES: dict[str, Callable[[int, int], dict[str, float]]] = {
+    f"sound, {robot} {population}": partial(sound, robot, population) for robot, population in SOUND
+} | {
+    f"{mass} kg{', up and down' if twice else ''}{'' if tared else ', no tare'}": partial(changes, mass, twice, tared)
+    for tared in (True, False)
+    for mass, twice in (*((mass, False) for mass in MASSES), (MASSES[-1], True))
+}
+
+
 def main() -> None:
-    asked = options(__doc__, logs=24, seed=0)
-    found: dict[str, dict[str, float]] = {}
-    for robot, population in SOUND:
-        known = arm(robot)
-        drawn = draw_episodes(known, population, asked.logs, 61 + asked.seed, motions=max(5, asked.logs // 4))
-        seen = [looked_at(logs.run, known, logs.tare) for logs in simulate_episodes(drawn)]
-        changed, doubted = np.mean([bool(times) for times, _ in seen]), np.mean([doubt for _, doubt in seen])
-        name = f"sound, {robot} {population}"
-        found[name] = {"found": float(changed), "found or doubted": float(changed + doubted)}
+    asked = options(__doc__, logs=24, seed=0, cases="")
+    chosen = [name for name in CASES if not asked.cases or name in asked.cases.split(";")]
+    file = RESULTS / "changed_logs.json"
+    found = json.loads(file.read_text(encoding="utf-8"))["cases"] if asked.cases and file.exists() else {}
+    for name in chosen:
+        found[name] = CASES[name](asked.logs, asked.seed)
         say(f"{name}: {found[name]}")
-    panda = arm("panda")
-    for tared in (True, False):
-        for mass, twice in (*((mass, False) for mass in MASSES), (MASSES[-1], True)):
-            right, told, apart = [], [], []
-            for k in range(asked.logs):
-                log, tare, truth = log_with_changes(mass, 1000 * asked.seed + k, twice)
-                times, doubted = looked_at(log, panda, tare if tared else None)
-                right.append(len(times) == len(truth))
-                told.append(bool(times) or doubted)
-                if right[-1]:
-                    apart += [abs(a - b) for a, b in zip(times, truth, strict=True)]
-            name = f"{mass} kg{', up and down' if twice else ''}{'' if tared else ', no tare'}"
-            found[name] = {"found": float(np.mean(right)), "found or doubted": float(np.mean(told))}
-            if apart:
-                found[name]["off [s]"] = float(np.median(apart))
-            say(f"{name}: {found[name]}")
-    write("changed_logs", {"logs": asked.logs, "seed": asked.seed, "cases": found})
-    write_table(ROOT / "docs" / "hybrid.md", "changed logs", table(found))
+        found = {name: found[name] for name in CASES if name in found}
+        write("changed_logs", {"seed": asked.seed, "cases": found})
+        write_table(ROOT / "docs" / "hybrid.md", "changed logs", table(found))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """An arm over fifteen days: what a profile is worth, with and without a few empty seconds today.
 
-    python benchmarks/life.py [--arms 8] [--seed 11] [--parts days,same-day]
+    python benchmarks/life.py [--arms 8] [--seed 11] [--parts 0.5,1,2,same-day]
 
 Pandas that differ from their model as real ones do. On each of 15 days an empty log of 20 s is recorded, about poses of
 the place where the arm works; offsets and friction of a day differ from the arm's own by (1 sigma) 0.08 0.12 0.06 0.10
@@ -16,16 +16,18 @@ profile, no drift   of the same logs, taken for one session (ablation, at drift 
 profile, 128        with as many features of the pose as a tare (ablation, at drift 1)
 
 same-day: 15 logs of 20 s of one session, about the poses of the place where the arm works or about any, against a tare
-of 20 s elsewhere. Printed, and written to benchmarks/results/life.json and tables of docs/profiles.md.
+of 20 s elsewhere. Parts that are named (a size of the drift, same-day) replace their own among the results. Printed,
+and written to benchmarks/results/life.json and tables of docs/profiles.md, after every part.
 """
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from script import ROOT, markdown_table, options, say, write, write_table
+from script import RESULTS, ROOT, markdown_table, options, say, write, write_table
 
 from armload import Recording, arm
 from armload.inertia import Z95, InertialParameters
@@ -37,7 +39,7 @@ from armload.simulation.resolution import COARSE
 
 OFFSET = np.array([0.08, 0.12, 0.06, 0.10, 0.03, 0.04, 0.01])  # [N·m], 1 sigma of a day
 FRICTION = 0.15
-DRIFTS = (0.5, 1.0, 2.0)
+DRIFTS = ("0.5", "1", "2")
 DAYS, TIMES = 15, (1.0, 6.0)
 RATE = 200.0  # [Hz]
 NEAR = 0.5  # [rad] standard deviation of each joint's mean about the run's: where an arm works
@@ -95,33 +97,30 @@ def gathered(found: dict[str, list]) -> dict[str, Any]:
     return out
 
 
-def days(arms: int, seed: int) -> dict[str, Any]:
-    """Fifteen days, three sizes of drift."""
-    panda, out = arm("panda"), {}
-    for size in DRIFTS:
-        found: dict[str, list] = {}
-        for k, e in enumerate(draw_episodes(panda, "reference", arms, seed, motions=arms)):
-            rng = np.random.default_rng([seed, k, int(10 * size)])
-            worlds = [on_a_day(e.world, size, rng) for _ in range(DAYS)]
-            logs = empty_logs(e, worlds, motions_about(e, "here", k), 20.0, e.seed)
-            today = on_a_day(e.world, size, rng)
-            refresh = empty_logs(e, [today], [e.tare_motion], 5.0, e.seed + 77)[0]
-            load = InertialParameters(e.payload.parameters.phi)
-            runs = [Run(e.motion, load, today, e.sensors, e.seed, e.gains, 60.0)]
-            run = simulate_many(panda, runs, rate=RATE, duration=6.0, workers=1, resolution=COARSE)[0]
-            about = (e, run, e.truth.phi)
-            profile = learn_profile(panda, logs)
-            score(found, "nothing", *about)
-            score(found, "yesterday", *about, tare=logs[-1], age=1.0)
-            score(found, "refresh", *about, tare=refresh)
-            score(found, "profile", *about, profile=profile)
-            score(found, "profile, refresh", *about, profile=profile, tare=refresh)
-            if size == 1.0:
-                score(found, "profile, no drift", *about, profile=learn_profile(panda, logs, sessions=[0] * DAYS))
-                score(found, "profile, 128", *about, profile=narrow(panda, logs))
-            say(f"drift {size:g}, arm {k + 1} of {arms}: {profile.features.pose} features, noise {profile.repeated:g}")
-        out[f"{size:g}"] = gathered(found)
-    return out
+def days(arms: int, seed: int, size: float) -> dict[str, Any]:
+    """Fifteen days of one size of drift."""
+    panda, found = arm("panda"), {}
+    for k, e in enumerate(draw_episodes(panda, "reference", arms, seed, motions=arms)):
+        rng = np.random.default_rng([seed, k, int(10 * size)])
+        worlds = [on_a_day(e.world, size, rng) for _ in range(DAYS)]
+        logs = empty_logs(e, worlds, motions_about(e, "here", k), 20.0, e.seed)
+        today = on_a_day(e.world, size, rng)
+        refresh = empty_logs(e, [today], [e.tare_motion], 5.0, e.seed + 77)[0]
+        load = InertialParameters(e.payload.parameters.phi)
+        runs = [Run(e.motion, load, today, e.sensors, e.seed, e.gains, 60.0)]
+        run = simulate_many(panda, runs, rate=RATE, duration=6.0, workers=1, resolution=COARSE)[0]
+        about = (e, run, e.truth.phi)
+        profile = learn_profile(panda, logs)
+        score(found, "nothing", *about)
+        score(found, "yesterday", *about, tare=logs[-1], age=1.0)
+        score(found, "refresh", *about, tare=refresh)
+        score(found, "profile", *about, profile=profile)
+        score(found, "profile, refresh", *about, profile=profile, tare=refresh)
+        if size == 1.0:
+            score(found, "profile, no drift", *about, profile=learn_profile(panda, logs, sessions=[0] * DAYS))
+            score(found, "profile, 128", *about, profile=narrow(panda, logs))
+        say(f"drift {size:g}, arm {k + 1} of {arms}: {profile.features.pose} features, noise {profile.repeated:g}")
+    return gathered(found)
 
 
 def narrow(panda: Any, logs: list[Recording]) -> Any:
@@ -178,20 +177,19 @@ def table(found: dict[str, Any]) -> str:
 
 
 def main() -> None:
-    asked = options(__doc__, arms=8, seed=11, parts="days,same-day")
-    found: dict[str, Any] = {"arms": asked.arms, "seed": asked.seed}
-    page = ROOT / "docs" / "profiles.md"
-    if "days" in asked.parts.split(","):
-        found["days"] = days(asked.arms, asked.seed)
-        for size, part in found["days"].items():
-            say(table(part))
-            write_table(page, f"drift {size}", table(part))
-    if "same-day" in asked.parts.split(","):
-        found["same day"] = same_day(asked.arms, asked.seed)
-        say(table(found["same day"]))
-        write_table(page, "same day", table(found["same day"]))
-    if asked.arms > 3:
-        write("life", found)
+    asked = options(__doc__, arms=8, seed=11, parts=",".join((*DRIFTS, "same-day")))
+    file, page = RESULTS / "life.json", ROOT / "docs" / "profiles.md"
+    kept = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+    kept = {part: kept.get(part, {}) for part in ("days", "same day")}
+    for part in asked.parts.split(","):
+        if part == "same-day":
+            kept["same day"] = made = same_day(asked.arms, asked.seed)
+        else:
+            kept["days"][part] = made = days(asked.arms, asked.seed, float(part))
+        say(table(made))
+        if asked.arms > 3:
+            write("life", {"arms": asked.arms, "seed": asked.seed, **kept})
+            write_table(page, "same day" if part == "same-day" else f"drift {part}", table(made))
 
 
 if __name__ == "__main__":

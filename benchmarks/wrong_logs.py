@@ -65,6 +65,7 @@ def table(found: dict[str, Any]) -> str:
     rows = [
         [
             name,
+            str(case["logs"]),
             f"{case['mass error [g]']:.1f} ± {case['half-width [g]']:.0f}",
             " · ".join(f"{x:.2f}" for x in case["inside"]),
             f"{100 * case['calibrated']:.0f} %",
@@ -72,7 +73,9 @@ def table(found: dict[str, Any]) -> str:
         ]
         for name, case in found.items()
     ]
-    return markdown_table(["what is wrong", "mass [g]", "inside", "calibrated", "covered or said"], "lrrrr", rows)
+    return markdown_table(
+        ["what is wrong", "logs", "mass [g]", "inside", "calibrated", "covered or said"], "lrrrrr", rows
+    )
 
 
 def main() -> None:

@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from armload.arms import arm, payload_regressor
 from armload.errors import IdentificationError, RecordingError
-from armload.estimators import Estimate
+from armload.estimators import Estimate, FilteredRecursiveLeastSquares
 from armload.identification import METHODS, identify
 from armload.identification.found import Found
 from armload.identification.intervals import Before
@@ -363,6 +363,20 @@ def test_an_undetermined_interval_of_a_method_without_a_prior_holds_its_own(real
     assert answer.phi_high[0] >= answer.phi[0] > Z95 * payload_prior_std(panda)[0]
 
 
+def test_a_method_without_a_prior_reports_its_own_interval_of_what_the_log_narrows(real_like):
+    panda, how = real_like
+    held = InertialParameters.from_com(1.5, (0.0, 0.0, 0.06), np.diag([4e-3, 4e-3, 4e-3]))
+    log = simulate(panda, taie2024(), held, seed=3, **how).between(0.0, 3.0)
+    own = FilteredRecursiveLeastSquares(panda).run(log)
+    half = Z95 * own.std[0]
+    assert 0.05 < half < 0.3  # [kg] where what is known of any payload is 3 kg
+    answer = identify(log, panda, method="rls-filter")
+    assert answer.determined[0]
+    assert answer.held
+    assert [answer.phi_low[0], answer.phi_high[0]] == pytest.approx([own.phi[0] - half, own.phi[0] + half], abs=0.02)
+    assert answer.interval == "approximate"
+
+
 def test_one_sound_log_in_a_thousand_lies_farther_from_all_bodies_than_is_taken():
     assert chi2.sf(MISFIT**2, 10) == pytest.approx(1e-3, rel=1e-12)
 
@@ -377,7 +391,7 @@ def test_an_answer_near_what_the_log_says_spares_the_search_for_the_nearest_body
         covariance = np.outer(unit, unit) * 1e-4 * np.exp(rng.normal()) * np.eye(10)
         mean = body + rng.uniform(0.5, 4.0) * np.sqrt(np.diag(covariance)) * rng.normal(size=10)
         estimate = Estimate(1.0, body, covariance, 1, "f")
-        found = Found(estimate, Before(body, unit, True), "m", "w", unprojected=(mean, covariance))
+        found = Found(estimate, Before(body, unit), "m", "w", unprojected=(mean, covariance))
         verdicts.append(found.explained)
         assert found.explained == (distance_to_body(mean, covariance) <= MISFIT)
     assert len(set(verdicts)) == 2

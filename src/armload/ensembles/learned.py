@@ -8,9 +8,11 @@ from numpy.typing import NDArray
 from armload.arms import Arm
 from armload.ensembles.trained_model import LearnedModel
 from armload.estimators import Estimate, Identifier
-from armload.inertia import SMALL, Z95
 from armload.recording import Recording, Sample
 from armload.runtime.kernels import kernel
+
+# standard deviation of a parameter that did not vary in training: it is not known exactly. A stated prior
+_LEAST = np.array([0.025] + [0.0025] * 9)  # [kg, kg·m, kg·m²]
 
 
 class LearnedIdentifier(Identifier):
@@ -41,8 +43,7 @@ class LearnedIdentifier(Identifier):
         model.check(arm)
         self.model, self.arm, self.single, self.any_motion = model, arm, single, any_motion
         self.name = f"{model.kind} ensemble" + (", single sample" if single else "")
-        # a parameter that did not vary in training is not known exactly
-        self.payload_prior = (model.phi_mean, np.maximum(model.phi_std, SMALL / Z95))
+        self.payload_prior = (model.phi_mean, np.maximum(model.phi_std, _LEAST))
         self._model_variance = (
             np.zeros(10) if model.error_std is None else model.error_std**2
         )  # added to that of the members

@@ -25,13 +25,12 @@ class Choice:
     """A method made ready for an arm.
 
     name: of the method. identifier: it has seen nothing of the run yet.
-    prior: whether it starts from a prior on the payload. why: the trained model's file, if it is one.
+    why: the trained model's file, if it is one.
     error_known: whether its covariance says how large its errors are: how far an ensemble's members disagree does not.
     """
 
     name: str
     identifier: Identifier
-    prior: bool
     why: str = ""
     error_known: bool = True
 
@@ -63,7 +62,7 @@ def choose(
                 f"the method {name} cannot follow a live stream: expected one of {', '.join(LIVE)}, or the file of a "
                 "trained model"
             )
-        return Choice(name, entry.make(arm, tare, profile), entry.prior)
+        return Choice(name, entry.make(arm, tare, profile))
     return _trained(arm, tare, model_file(name, LIVE if live else tuple(METHODS)), profile)
 
 
@@ -72,7 +71,7 @@ def _trained(arm: Arm, tare: Recording | None, file: Path, profile: Profile | No
 
     if HybridModel.wrote(file):
         made = HybridIdentifier(arm, tare, HybridModel.load(file), profile=profile)
-        return Choice(made.name, made, True, str(file))
+        return Choice(made.name, made, str(file))
     from armload.ensembles import LearnedIdentifier, load_model
 
     model = load_model(file)
@@ -83,7 +82,7 @@ def _trained(arm: Arm, tare: Recording | None, file: Path, profile: Profile | No
             f"the trained model {file} cannot use a tare (an empty arm lies outside its training): leave the tare "
             "out, or use the method map"
         )
-    return Choice(model.kind, LearnedIdentifier(model, arm), True, str(file), error_known=model.error_std is not None)
+    return Choice(model.kind, LearnedIdentifier(model, arm), str(file), error_known=model.error_std is not None)
 
 
 def default_for(arm: Arm) -> str:

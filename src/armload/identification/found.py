@@ -156,7 +156,7 @@ def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Foun
     unknown = identifier.payload_prior is None and not arm.motor_torque
     return Found(
         estimate=estimate,
-        before=Before(mean, std, choice.prior),
+        before=Before(mean, std),
         method=choice.name,
         why=choice.why,
         calibrated=identifier.calibrated,

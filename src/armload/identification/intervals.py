@@ -17,11 +17,10 @@ from armload.inertia import Z95, com_interval, inertia_com_std, inertia_matrix, 
 
 
 class Before(NamedTuple):
-    """What was known of the payload before the data: mean and standard deviation (10,); used: as the method's prior."""
+    """What was known of the payload before the data: mean and standard deviation (10,)."""
 
     mean: NDArray[np.float64]
     std: NDArray[np.float64]
-    used: bool
 
 
 class Intervals(NamedTuple):

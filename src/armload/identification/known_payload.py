@@ -38,6 +38,6 @@ def determined_with(
     """
     if known is None:
         return determined
-    given = determined_by(std, before.std if before.used else None) & known.which
+    given = determined_by(std, before.std) & known.which
     given[1:4] &= given[0] | determined[0]
     return determined | given

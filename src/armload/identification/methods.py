@@ -43,7 +43,7 @@ class Method:
     source: primary literature.
     tare: what it makes of a tare: "own equation" (a log of any motion enters its equations), "virtual calibration"
         (what it says of the tare is subtracted, `Tared`), "same motion" (a tare along the run's own motion), "none".
-    prior: whether it starts from a prior on the payload; "determined" then asks how far the log has narrowed it.
+    prior: whether it starts from a prior on the payload.
     needs: what it cannot work without, beside a log: "", "tare", "training" (a trained model's file) or "motion" (the
         commanded motion).
     build: makes the identifier; call `make`. profile: whether it can use a profile of the arm.

@@ -56,7 +56,7 @@ def answered(
     (10,). unsure: a tool whose own inertia is not known.
     """
     estimate, before, weak = found.estimate, found.before, payload_prior_std(arm)
-    determined = determined_by(estimate.std, before.std if before.used else None, found.weak_std, weak)
+    determined = determined_by(estimate.std, before.std, found.weak_std, weak)
     log_only = found.log_only or (estimate.phi, estimate.covariance)  # whether anything is held, only the log tells
     is_held = held(float(log_only[0][0]), float(np.sqrt(log_only[1][0, 0])), bool(determined[0]))
     leaning = np.zeros(10, dtype=bool)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
         pseudo_inertia,
         pseudo_inertia_to_phi,
     )
-    from armload.inertia.determinacy import HELD, LIGHTEST_HELD, SHRINK, SMALL, Z95, determined, held, held_probability
+    from armload.inertia.determinacy import HELD, LIGHTEST_HELD, SHRINK, Z95, determined, held, held_probability
     from armload.inertia.orders import ORDERS, from_order, to_order
     from armload.inertia.parameters import (
         NAMES,
@@ -41,7 +41,6 @@ __all__ = [
     "NAMES",
     "ORDERS",
     "SHRINK",
-    "SMALL",
     "UNITS",
     "Z95",
     "InertialParameters",

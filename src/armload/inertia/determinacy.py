@@ -11,9 +11,6 @@ Z95 = 1.959963984540054  # half-width of a normal 95 % interval, in standard dev
 # times that a parameter's half-width must shrink to count as determined: nine tenths of what is known then come from
 # the log. A convention (test_undetermined_parameters_carry_the_interval_of_what_was_known_before)
 SHRINK = 3.0
-# [kg, kg·m, kg·m²] largest 95 % half-widths of what counts as determined, for a method without a prior: what a
-# controller needs of a payload. A convention
-SMALL = np.array([0.05] + [0.005] * 3 + [0.005] * 6)
 # [standard deviations] of mass above zero before something counts as held: one empty arm in a thousand holds something
 # (test_an_empty_arm_holds_nothing_and_a_light_payload_is_held_with_a_tare)
 HELD = 3.0
@@ -22,7 +19,7 @@ LIGHTEST_HELD = 1e-3  # [kg] less is nothing: a log that is compared with itself
 
 def determined(
     std: NDArray[np.float64],
-    before: NDArray[np.float64] | None,
+    before: NDArray[np.float64],
     unlearned: NDArray[np.float64] | None = None,
     weak: NDArray[np.float64] | None = None,
 ) -> NDArray[np.bool_]:
@@ -30,12 +27,12 @@ def determined(
 
     Args:
         std: standard deviation of the estimate (10,).
-        before: the same before the data; None: the method has no prior.
+        before: the same before the data; of a method without a prior, what anybody knows of a payload.
         unlearned: standard deviation without the learned prior, of a method that has one: bodies of a family are alike,
             so that such a prior derives the rest from the mass, which is no evidence of the log. weak: standard
             deviation before the data, for `unlearned`.
     """
-    out = Z95 * std <= SMALL if before is None else std <= before / SHRINK
+    out = std <= before / SHRINK
     if unlearned is not None and weak is not None:
         out = out & (unlearned <= weak / SHRINK)
     return out

@@ -44,7 +44,7 @@ class Judgement:
 
     def reset(self) -> None:
         """What is known beforehand."""
-        mean, std, _ = self.before
+        mean, std = self.before
         self.estimate = Estimate(0.0, mean, np.diag(std**2), 0, self._frame)
         self.around, self.doubted = mean, False
         self.run: Identifier | None = None
@@ -96,7 +96,7 @@ class Judgement:
             moving: whether the arm moves. stands: whether what was seen lately says nothing new, as it stands.
         """
         std, before = estimate.std, self.before
-        by_samples = determined(std, before.std if before.used else None, run.weak_std, self._weak)
+        by_samples = determined(std, before.std, run.weak_std, self._weak)
         self.determined = determined_with(by_samples, taken_by(run), std, before)
         self.held = held(float(estimate.phi[0]), float(std[0]), bool(self.determined[0]))
         self.p_held = held_probability(float(estimate.phi[0]), float(std[0]), float(self._weak[0]))

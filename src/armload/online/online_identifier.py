@@ -81,7 +81,7 @@ class OnlineIdentifier:
         self._stream = Listening()
         self._weak = payload_prior_std(arm)
         mean, std = first.payload_prior or (np.zeros(10), self._weak)
-        self._judgement = Judgement(str(arm.frame), self._weak, Before(mean, std, choice.prior))
+        self._judgement = Judgement(str(arm.frame), self._weak, Before(mean, std))
         self.reset()
 
     @property
