@@ -212,9 +212,9 @@ def judge(folder: Path) -> dict[str, Any]:
         of = parts[one["log"]]
         if of[0]["status"] != "answered" or one["broken"]:
             if one["broken"] and of[0]["status"] == "answered":
-                missed.append([one["log"], one["broken"]])
+                missed.append([name_of(one["log"]), one["broken"]])
             if not one["broken"]:
-                refused.append([one["log"], of[0]["reason"]])
+                refused.append([name_of(one["log"]), of[0]["reason"].replace(one["log"], name_of(one["log"]))])
             continue
         into: dict[str, list] = {key: [] for key in ("true", "found", "error", "inside", "changed", "moves")}
         true = [t for t, _ in one["held"][1:]]
@@ -263,6 +263,11 @@ def judge(folder: Path) -> dict[str, Any]:
         "sound files refused": refused,
         "arms": findings,
     }
+
+
+def name_of(log: str) -> str:
+    """A log as it is called, wherever the fleet lies."""
+    return "/".join(Path(log).parts[-2:])
 
 
 def summed(of: dict[str, list]) -> dict[str, Any]:

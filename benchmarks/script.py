@@ -35,9 +35,13 @@ def options(about: str | None, **defaults: Any) -> argparse.Namespace:
     return parser.parse_args()
 
 
+PLACES = ("--out", "--cells", "--work")  # options that name a folder on this machine
+
+
 def write(name: str, result: dict[str, Any], indent: int | None = 1) -> None:
-    """Write results/NAME.json, first what it rests on, with the command as it was typed; without indent one line."""
-    command = " ".join(["python", f"benchmarks/{Path(sys.argv[0]).name}", *sys.argv[1:]])
+    """Write results/NAME.json, with what it rests on: the command, but for where it worked. Without indent: one line."""
+    typed = [word for k, word in enumerate(sys.argv) if word not in PLACES and sys.argv[k - 1] not in PLACES]
+    command = " ".join(["python", f"benchmarks/{Path(typed[0]).name}", *typed[1:]])
     content = provenance(command) | result
     path = write_json(RESULTS / f"{name}.json", content, indent)
     if indent is not None:

@@ -504,7 +504,7 @@ def test_a_lost_source_is_told_in_the_terminal_at_once(monkeypatch, capsys):
     class Seen:
         url = "nowhere"
 
-        def __init__(self, session, *_):
+        def __init__(self, session, *_, **__):
             self.session = session
 
         def serve(self):

@@ -14,6 +14,7 @@ from armload.identification.torque_scale import torque_scale
 from armload.inertia import InertialParameters
 from armload.lab.episodes import draw_episodes
 from armload.motion import random_motion, taie2024
+from armload.payloads import draw_payload
 from armload.recording import Recording, read_recording, with_gravity
 from armload.recording.windows import integrals, windows
 from armload.simulation import Run, Sensors, World, simulate, simulate_many
@@ -287,6 +288,20 @@ def test_a_payload_that_is_put_down_within_a_log_is_not_taken_for_exchanged_colu
     seen, other = torque_scale(log, panda), torque_scale(replace(log, tau=log.tau[:, [4, 1, 2, 3, 0, 5, 6]]), panda)
     assert other.misfit < 0.45 * seen.misfit  # it does look so
     check_for_exchanged_torques(log, panda, seen)
+
+
+def test_a_payload_that_is_put_down_is_not_taken_for_no_torque(panda):
+    """2.5 kg put down after 8 s of a slow motion, which look like another share of the arm's own torque."""
+    t, rng = np.arange(0.0, 12.0, 0.02), np.random.default_rng(105)
+    w = np.array([0.2, 0.3, 0.25, 0.3, 0.35, 0.3, 0.4])
+    size, phase = 0.25 * rng.uniform(0.2, 1.0, 7), rng.uniform(0.0, 6.28, 7)
+    centre = np.array([0.0, -0.3, 0.0, -2.0, 0.0, 1.6, 0.8]) + rng.uniform(-0.8, 0.8, 7)
+    angle = w * t[:, None] + phase
+    q, dq, ddq = centre + size * np.sin(angle), size * w * np.cos(angle), -size * w**2 * np.sin(angle)
+    held = panda.with_payload(draw_payload("boxes", 105, 2.5).parameters).torque(q, dq, ddq)
+    log = Recording(t, q, dq, np.where((t < 8.0)[:, None], held, panda.torque(q, dq, ddq)))
+    assert torque_scale(log, panda).is_wrong  # it does look so
+    check_plausible(log, panda)
 
 
 def test_positions_outside_the_limits_are_refused_by_joint_and_row(sound, panda):
