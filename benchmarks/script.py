@@ -39,7 +39,7 @@ PLACES = ("--out", "--cells", "--work")  # options that name a folder on this ma
 
 
 def write(name: str, result: dict[str, Any], indent: int | None = 1) -> None:
-    """Write results/NAME.json, with what it rests on: the command, but for where it worked. Without indent: one line."""
+    """Write results/NAME.json, with what it rests on: the command, but for where it worked. No indent: one line."""
     typed = [word for k, word in enumerate(sys.argv) if word not in PLACES and sys.argv[k - 1] not in PLACES]
     command = " ".join(["python", f"benchmarks/{Path(typed[0]).name}", *typed[1:]])
     content = provenance(command) | result
