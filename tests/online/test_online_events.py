@@ -237,8 +237,10 @@ def test_a_cycle_in_step_with_the_motion_stays_as_good_in_its_second_half_as_in_
     log = stream(22, schedule, 84.0, 100.0, motion)
     estimates, events = said(log, "map-gp")
     assert len(events) == len(changes)
-    for event, t in zip(events, changes, strict=True):
-        assert t < event.t < t + 0.3
+    delays = [event.t - t for event, t in zip(events, changes, strict=True)]
+    assert min(delays) > 0.0
+    assert np.median(delays) < 0.2
+    assert max(delays) < 0.5
     times = np.array([estimate.t for estimate in estimates])
     after = [estimates[np.searchsorted(times, t + 1.0) - 1] for t in changes]
     truth = np.array([0.0 if held is None else payload.mass for _, held in schedule])
