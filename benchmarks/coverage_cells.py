@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from payload_intervals import wide
 from script import ROOT, markdown_table, options, say, write, write_table
 from wrong_cases import CASES, Wrong, changed
+from wrong_logs import GROUPS
 
 from armload import arm
 from armload.identification.intervals import Before, phi_interval
@@ -54,7 +55,6 @@ TRAINED = FAMILIES[:4]
 RATINGS = (0.1, 3.0)  # [kg]
 CLASSES = ((0.0, 0.2), (0.2, 0.7), (0.7, np.inf))  # [kg]
 TIMES = (1.0, 6.0)  # [s]
-GROUPS = (slice(0, 1), slice(1, 4), slice(4, 10))
 
 
 class Judged(NamedTuple):

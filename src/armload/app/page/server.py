@@ -52,9 +52,8 @@ class PageServer:
         alone = is_loopback(host)
         with contextlib.redirect_stdout(io.StringIO()):
             self.viser = viser.ViserServer(*((host, port) if alone else ("127.0.0.1", 0)), label, verbose=False)
-        self.viser.request_share_url = lambda *_, **__: (
-            None
-        )  # the page leaves this machine only if somebody forwards it
+        # the page leaves this machine only if somebody forwards it
+        self.viser.request_share_url = lambda *_, **__: None
         self._door: TokenDoor | None = None
         self.url = f"http://{host}:{self.viser.get_port()}"
         if not alone:
