@@ -169,7 +169,7 @@ class Served:
 
 def in_vain(err):
     """Raise `Late` where a run says that the link was lost."""
-    if any(words in err for words in ("was lost", "stopped by itself", "no state for")):
+    if any(words in err for words in ("was lost", "stopped by itself", "no state for", "did not answer within")):
         raise Late(err)
 
 

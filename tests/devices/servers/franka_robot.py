@@ -45,7 +45,7 @@ def serve(connection, client, address, body, version):
     state, udp = State(version), socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     udp.bind((address, 0))
     udp.setblocking(False)
-    port, start, tick, move, silent, moved = None, None, 0, None, 0, False
+    port, start, tick, move, silent, moved, told = None, None, 0, None, 0, False, False
 
     def reply(command, number, answer):
         connection.sendall(struct.pack("<3I", command, number, 12 + len(answer)) + answer)
@@ -65,7 +65,7 @@ def serve(connection, client, address, body, version):
                     reply(command, number, struct.pack("<BH", 0 if theirs == version else 1, version))
                     start = time.monotonic() + 0.01
                 elif command == MOVE:
-                    move, silent = number, 0
+                    move, silent, told = number, 0, False
                     reply(command, number, bytes([STARTED]))
                 elif command == STOP_MOVE:
                     if move is not None:
@@ -88,7 +88,8 @@ def serve(connection, client, address, body, version):
             with contextlib.suppress(BlockingIOError):
                 while True:
                     newest = COMMANDS[version].unpack(udp.recv(1 << 12))
-            silent = 0 if newest is not None else silent + 1
+            told = told or newest is not None  # one that has not begun to command is starting, not silent
+            silent = silent + 1 if newest is None and told else 0
             if move is not None and newest is not None:
                 body.command(body.target + (np.array(newest[1:8]) - body.target) * CYCLE / FILTER)
                 if newest[FINISHED]:
