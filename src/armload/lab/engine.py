@@ -183,10 +183,14 @@ def engine(jobs: int = 1, cluster: str | None = None) -> Iterator[Engine]:
 
     if cluster == "local":
         settings = {"n_workers": jobs, "threads_per_worker": 1, "dashboard_address": "127.0.0.1:0"}
-        # Dask asks malloc to trim at 64 kB, which has every array of some size mapped and unmapped anew
+        # Dask asks malloc to trim at 64 kB, which has every array of some size mapped and unmapped anew; tasks run in a
+        # thread there, which has an arena of malloc of its own that is trimmed as eagerly: let there be one
         spawned = dict(dask.config.get("distributed.nanny.pre-spawn-environ", {}))
         spawned.pop("MALLOC_TRIM_THRESHOLD_", None)
-        with dask.config.set({"distributed.nanny.pre-spawn-environ": spawned}):
+        spawned["MALLOC_ARENA_MAX"] = "1"
+        # and it looks at the stack of each task a hundred times a second, for its dashboard
+        of_workers = {"distributed.nanny.pre-spawn-environ": spawned, "distributed.worker.profile.enabled": False}
+        with dask.config.set(of_workers):
             made: Any = distributed.LocalCluster(**settings)
     else:
         made = cluster
