@@ -18,7 +18,7 @@ from armload.recording import write_recording
 from armload.simulation import simulate_inverse
 from armload.survey import Settings, find_logs, read_rows, survey
 from armload.survey.answering import answer_log, lost_log
-from armload.survey.run import cells_of
+from armload.survey.logs import cells_of
 
 SETTINGS = Settings("panda", method="map")
 

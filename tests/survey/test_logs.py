@@ -36,6 +36,20 @@ def test_arms_are_told_apart_by_the_folder_or_by_an_expression(folder):
     assert [log.arm for log in find_logs([str(folder)], r"cell-([0-9])")] == ["1", "1", "2"]
 
 
+def test_a_log_that_the_expression_does_not_fit_is_nobodys(folder):
+    assert [log.arm for log in find_logs([str(folder)], r"(cell-1)")] == ["cell-1", "cell-1", ""]
+
+
+def test_tables_of_surveys_that_lie_among_the_logs_are_no_logs(folder):
+    (folder / "old.parquet").write_text("x")
+    (folder / "old.parquet.cells" / "0").mkdir(parents=True)
+    (folder / "old.parquet.cells" / "0" / "cell.npz").write_text("x")
+    (folder / "run.parquet").write_text("x")
+    assert names(find_logs([str(folder)]), folder)[-1] == "run.parquet"
+    assert len(find_logs([str(folder)])) == 4
+    assert len(find_logs([str(folder / "old.parquet")])) == 1  # what is named itself is asked
+
+
 def test_a_bag_is_one_log_and_a_data_set_one_for_each_episode(folder):
     (folder / "bag").mkdir()
     for name in ("metadata.yaml", "bag_0.mcap", "bag_1.mcap"):

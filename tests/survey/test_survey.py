@@ -21,8 +21,8 @@ from armload.payloads import test_payload as make_payload
 from armload.recording import write_recording
 from armload.simulation import World, simulate_inverse
 from armload.survey import Settings, read_rows, survey
+from armload.survey.logs import cells_of
 from armload.survey.rows import columns
-from armload.survey.run import cells_of
 
 BEGAN = 1.79e9  # [s since 1970]
 SETTINGS = Settings("panda", method="map")

@@ -57,6 +57,8 @@ def _anew(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def _rows(log: Log, settings: Settings, about: dict[str, Any]) -> list[dict[str, Any]]:
+    if not log.arm:
+        return [unusable(f"{log.name}: --arm-of names no arm in its path", about)]
     try:
         with _here(log) as path:
             try:

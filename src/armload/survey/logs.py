@@ -29,7 +29,8 @@ _BLOCK = 1 << 20  # bytes that are hashed at a time
 class Log:
     """A unit of work.
 
-    name: path or URL, as it was found. arm: whose log it is. episode: of a data set; None: whatever the file holds.
+    name: path or URL, as it was found. arm: whose log it is; empty: nobody's.
+    episode: of a data set; None: whatever the file holds.
     files: whose content the answer depends on; of a URL none.
     """
 
@@ -64,6 +65,12 @@ class Log:
         if self.remote:
             return self.stamp()
         return hashlib.sha256("".join(file_hash(file) for file in self.files).encode()).hexdigest()
+
+
+def cells_of(table: str | Path) -> Path:
+    """The folder of a survey's cells, beside its table."""
+    table = Path(table)
+    return table.with_name(f"{table.name}.cells")
 
 
 def is_url(path: str) -> bool:
@@ -131,12 +138,13 @@ def find_logs(paths: Sequence[str], arm_of: str | None = None, without: Sequence
     Args:
         paths: files; folders, searched to their bottom for files with the suffix of a log; globs (`**` too); URLs with
             globs; and `@LIST`, a file with one of these on each line. What is named itself is a log whatever its name.
-        arm_of: a regular expression searched in a log's path: its first group names the arm. None: the folder that
-            the log lies in.
-        without: files and folders that are passed over, as the survey's own.
+        arm_of: a regular expression searched in a log's path: its first group names the arm; a log that it does not
+            fit has none. None: the folder that the log lies in.
+        without: files and folders that are passed over, as the survey's own. In folders, the tables of other surveys
+            are, too.
 
     Raises:
-        UsageError: nothing was found, a list cannot be read, or an expression that is none, has no group or fits not.
+        UsageError: nothing was found, a list cannot be read, or an expression is none, has no group or fits no log.
     """
     pattern = _expression(arm_of)
     hidden = {path.resolve() for path in without}
@@ -148,6 +156,8 @@ def find_logs(paths: Sequence[str], arm_of: str | None = None, without: Sequence
         raise UsageError(
             f"no log in {', '.join(paths)}: expected files with the suffix {', '.join(LOG_SUFFIXES)}, or data sets"
         )
+    if not any(log.arm for log in found.values()):
+        raise UsageError(f"--arm-of {arm_of!r} names no arm in {next(iter(found.values())).name}, nor in any other log")
     return [found[key] for key in sorted(found, key=lambda key: (key[0], -1 if key[1] is None else key[1]))]
 
 
@@ -167,9 +177,7 @@ def _arm(name: str, pattern: re.Pattern[str] | None) -> str:
     if pattern is None:
         return PurePosixPath(name).parent.name or Path(name).resolve().parent.name
     match = pattern.search(name)
-    if match is None or match[1] is None:
-        raise UsageError(f"--arm-of {pattern.pattern!r} names no arm in {name}: expected it to fit every log")
-    return match[1]
+    return "" if match is None else match[1] or ""
 
 
 def _expanded(paths: Sequence[str]) -> Iterator[str]:
@@ -213,8 +221,14 @@ def _units(path: str, hidden: set[Path]) -> Iterator[tuple[str, int | None, tupl
     elif here.resolve() not in hidden:
         for inner in sorted(here.iterdir()):
             known = inner.is_dir() or inner.suffix.lower() in LOG_SUFFIXES
-            if known and not inner.name.startswith(".") and inner.resolve() not in hidden:
+            if known and not inner.name.startswith(".") and inner.resolve() not in hidden and not _of_survey(inner):
                 yield from _units(str(inner), hidden)
+
+
+def _of_survey(path: Path) -> bool:
+    """Whether this is the table of a survey, or its folder of cells (`cells_of`)."""
+    table = path.with_suffix("") if path.suffix == ".cells" else path
+    return table.is_file() and cells_of(table).is_dir()
 
 
 def _episodes(folder: Path) -> Iterator[tuple[str, int | None, tuple[Path, ...]]]:

@@ -18,7 +18,7 @@ from typing import Any
 from armload.lab.cells import load_cells
 from armload.lab.experiment import Task, run_tasks
 from armload.survey.answering import answer_log, lost_log
-from armload.survey.logs import Log, find_logs
+from armload.survey.logs import Log, cells_of, find_logs
 from armload.survey.rows import UNUSABLE
 from armload.survey.settings import Settings
 from armload.survey.table_file import check_suffix, write_rows
@@ -38,12 +38,6 @@ class Survey:
     def unusable(self) -> int:
         """Rows of logs, or episodes, that cannot be answered."""
         return sum(row["status"] == UNUSABLE for row in self.rows)
-
-
-def cells_of(out: str | Path) -> Path:
-    """The folder of a survey's cells."""
-    out = Path(out)
-    return out.with_name(f"{out.name}.cells")
 
 
 def survey(
@@ -76,7 +70,8 @@ def survey(
     named = [Path(p) for p in (settings.tool, settings.tare, settings.profile) if p is not None]
     logs = find_logs(paths, arm_of, without=[out, folder, *named])
     n = settings.arm().n
-    for arm in sorted({log.arm for log in logs}):  # what all logs of an arm would fail of, before the first is answered
+    # what all logs of an arm would fail of is said before the first is answered
+    for arm in sorted({log.arm for log in logs} - {""}):
         settings.profile_of(arm)
     settings.mounted()
     say(f"{len(logs)} logs: asking which have changed")
