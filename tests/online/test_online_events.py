@@ -73,6 +73,14 @@ def at(estimates, t):
     return next(estimate for estimate in reversed(estimates) if estimate.t <= t)
 
 
+def pushed(log, force, size):
+    """A log of an arm whose flange is pushed by a force (3,) [N] of the base's axes, times size (N,)."""
+    panda = arm("panda")
+    J, R = panda.frame_motion(log.q).jacobian[:, 3:], panda.frame_pose(log.q)[0]
+    torque = np.einsum("nij,ni->nj", J, np.einsum("nji,j->ni", R, np.array(force)))
+    return Recording(log.t, log.q, log.dq, log.tau - size[:, None] * torque)
+
+
 def covers(estimate, phi):
     return np.abs(estimate.phi - phi) <= 1.96 * estimate.std
 
@@ -197,11 +205,8 @@ def test_nothing_is_put_down_by_an_arm_that_holds_nothing():
 
 def test_while_somebody_pushes_the_arm_a_contact_is_likely_and_nothing_is_called_calibrated():
     log = stream(6, [], 7.0)
-    panda = arm("panda")
     size = np.sin(np.pi * np.clip(log.t - 4.0, 0.0, 1.0)) ** 2
-    J, R = panda.frame_motion(log.q).jacobian[:, 3:], panda.frame_pose(log.q)[0]
-    pushed = size[:, None] * np.einsum("nij,ni->nj", J, R.transpose(0, 2, 1) @ np.array([0.0, 40.0, 0.0]))
-    estimates, events = said(Recording(log.t, log.q, log.dq, log.tau - pushed))
+    estimates, events = said(pushed(log, (0.0, 40.0, 0.0), size))
     assert events == []
     during = [e for e in estimates if 4.3 < e.t < 4.9]
     assert np.median([e.p_contact for e in during]) > 0.99
@@ -282,11 +287,8 @@ DOWN = pytest.param((0.0, 0.0, -40.0), marks=pytest.mark.full)
 def test_a_push_that_ends_gives_the_estimate_back(force):
     log = stream(6, [(3.0, HALF_KILO)], 10.0)
     start, end = 6.0, 7.0
-    panda = arm("panda")
     size = np.sin(np.pi * np.clip((log.t - start) / (end - start), 0.0, 1.0)) ** 2
-    J, R = panda.frame_motion(log.q).jacobian[:, 3:], panda.frame_pose(log.q)[0]
-    pushed = size[:, None] * np.einsum("nij,ni->nj", J, np.einsum("nji,j->ni", R, np.array(force)))
-    estimates, _ = said(Recording(log.t, log.q, log.dq, log.tau - pushed), "map-gp")
+    estimates, _ = said(pushed(log, force, size), "map-gp")
     old = [estimate for estimate in estimates if estimate.age > 0.02]
     assert old
     assert all(any("do not fit" in note for note in estimate.notes) for estimate in old)
@@ -296,6 +298,30 @@ def test_a_push_that_ends_gives_the_estimate_back(force):
     assert after.held
     assert covers(after, HALF_KILO.phi)[0]
     assert after.std[0] < 0.1
+
+
+ASKEW = pytest.param(5, (6.0, 6.0, 0.0), marks=pytest.mark.full)
+
+
+@pytest.mark.parametrize(("seed", "force"), [ASKEW, (6, (0.0, 12.0, 0.0))], ids=["askew", "sideways"])
+def test_a_constant_push_is_not_taken_for_a_drift_of_the_arm(seed, force):
+    log = stream(seed, [], 11.0, 25.0)
+    estimates, events = said(pushed(log, force, (log.t >= 5.0) & (log.t < 10.0)), "map-gp")
+    assert events == []
+    during = [e for e in estimates if 5.5 < e.t < 10.0]
+    assert all(any("do not fit" in note for note in e.notes) for e in during)
+    assert not any(e.interval == "calibrated" for e in during)
+    assert not estimates[-1].held
+    assert covers(estimates[-1], 0.0)[:4].all()
+
+
+@pytest.mark.full  # some seconds
+def test_an_offset_that_jumps_and_stays_is_believed_at_last():
+    log = stream(6, [], 25.0, 25.0)
+    jump = np.outer(log.t >= 8.0, [0.0, 4.0, 0.0, 2.0, 0.0, 0.0, 0.0])  # [N·m]
+    estimates, _ = said(Recording(log.t, log.q, log.dq, log.tau + jump), "map-gp")
+    assert any("do not fit" in note for note in at(estimates, 9.5).notes)
+    assert not any("do not fit" in note for e in estimates if e.t > 23.0 for note in e.notes)
 
 
 @pytest.mark.parametrize(("std", "tare"), [(0.02, True), (2.0, False)])

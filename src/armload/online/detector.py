@@ -29,9 +29,21 @@ class ChangeDetector:
         """The rows that come are of another run."""
         self._since = np.inf  # when the payload was first surely another one
 
+    def steady(self, modes: Modes) -> float:
+        """Probability that the last rows are of the arm as it was and the same payload.
+
+        A drift may be the arm's own, but not one that a contact has turned into: a constant push looks like one as soon
+        as its size is known, while an arm does not jump.
+        """
+        return modes.steady - modes.drift if self._touched else modes.steady
+
+    def believe(self) -> None:
+        """What does not fit has lasted too long for a contact: a drift is the arm's from now on."""
+        self._touched = False
+
     def take(self, modes: Modes, t: float, before: Gaussian) -> bool:
         """Whether a row at t [s] shows a change; `before`: phi and covariance before the row."""
-        if modes.steady > LIKELY:
+        if self.steady(modes) > LIKELY:
             self.steady_t, self._touched = t, False
         self._touched = self._touched or modes.contact > 0.5
         changed = modes.other if self._touched else modes.other + modes.handing

@@ -202,12 +202,12 @@ class PayloadWatch:
         """What becomes of the run, by what the last rows are."""
         if self._detector.take(self._modes, self._row_t, self._before_row):
             self._begin_change(sample, held)
-        elif self._modes.steady > 0.5:
+        elif self._detector.steady(self._modes) > 0.5:
             self.phase, self._gave_up = FOLLOWING, False
-        elif self.phase == DOUBTING:
-            self._gave_up = sample.t - self._doubted_at > PATIENCE
-            self.phase = FOLLOWING if self._gave_up else DOUBTING
-        elif not self._gave_up:
+        elif self.phase == DOUBTING and sample.t - self._doubted_at > PATIENCE:
+            self.phase, self._gave_up = FOLLOWING, True
+            self._detector.believe()
+        elif self.phase == FOLLOWING and not self._gave_up:
             self.phase, self._doubted_at, self._held_before = DOUBTING, sample.t, held
 
     # ------------------------------------------------------------------ a change, and the run after it
