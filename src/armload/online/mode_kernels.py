@@ -93,7 +93,7 @@ def _weigh(h, U, d, v, scale, effort, pushes, sides, rates, p, b, x, P, A, c, si
     starts, found, age = since[0], since[1], since[2]
     rare, drift_rare, lasts, handed = rates[0], rates[1], rates[2], rates[3]
     n, kinds, handing_from, other_from = len(d), len(sizes) - 1, 1 + len(sizes), 1 + len(sizes) + len(bodies)
-    gains, y, L = np.zeros(len(p)), np.empty(10), np.empty((10, 10))
+    gains, y = np.zeros(len(p)), np.empty(10)
     contact, handing, other = p[2:handing_from].sum(), p[handing_from:other_from].sum(), p[other_from:].sum()
     steady, begins, over, done = p[0] + p[1], h / rare, min(h / lasts, 0.5), min(h / handed, 0.5)
     drifts, back = p[0] * h / drift_rare, p[1] * h * 10.0 / drift_rare
@@ -139,8 +139,10 @@ def _weigh(h, U, d, v, scale, effort, pushes, sides, rates, p, b, x, P, A, c, si
             for i in range(10):
                 e -= U[j, i] * x[k, i]
                 y[i] = 0.0
-                for m in range(10):
-                    y[i] += P[k, i, m] * U[j, m]
+            for m in range(10):  # P is symmetric to the last digit: along its rows several are computed at once
+                for i in range(10):
+                    y[i] += P[k, m, i] * U[j, m]
+            for i in range(10):
                 s += U[j, i] * y[i]
             gains[handing_from + k] += 0.5 * (d[j] * d[j] / v[j] - e * e / s - math.log(s / v[j]))
             for i in range(10):
@@ -154,22 +156,54 @@ def _weigh(h, U, d, v, scale, effort, pushes, sides, rates, p, b, x, P, A, c, si
                 c[k, i] += z * d[j]
                 for m in range(i + 1):
                     A[k, i, m] += z * U[j, m]
-        total = -np.inf
-        for size in bodies:  # L·Lᵀ = 1 + s²·A, L·y = s·c
-            log_evidence = -math.log(len(bodies))
-            for i in range(10):
-                y[i] = size * c[k, i]
-                for j in range(i + 1):
-                    z = size * size * A[k, i, j] + (1.0 if i == j else 0.0)
-                    for m in range(j):
-                        z -= L[i, m] * L[j, m]
-                    L[i, j] = math.sqrt(z) if i == j else z / L[j, j]
-                for m in range(i):
-                    y[i] -= L[i, m] * y[m]
-                y[i] /= L[i, i]
-                log_evidence += 0.5 * y[i] * y[i] - math.log(L[i, i])
-            total = np.logaddexp(total, log_evidence)
-        gains[other_from + k], found[k] = total - found[k], total
+    _evidence(A, c, bodies, gains[other_from:], found)
     p *= np.exp(gains - gains.max())
     p += 1e-30
     p /= p.sum()
+
+
+@kernel
+def _evidence(A, c, sizes, gains, found):  # pragma: no cover - compiled
+    """What the last row adds to the log evidence of a body since each moment: L·Lᵀ = 1 + s²·A, L·y = s·c.
+
+    All moments and sizes lie beside each other, and each innermost loop runs over them: several are computed at once.
+    """
+    K, S = len(c), len(sizes)
+    many = K * S
+    L, y, log = np.empty((10, 10, many)), np.empty((10, many)), np.empty(many)
+    for q in range(many):
+        log[q] = -math.log(S)
+    for i in range(10):
+        at = y[i]
+        for k in range(K):
+            for b in range(S):
+                at[k * S + b] = sizes[b] * c[k, i]
+        for j in range(i + 1):
+            out, one = L[i, j], 1.0 if i == j else 0.0
+            for k in range(K):
+                for b in range(S):
+                    out[k * S + b] = sizes[b] * sizes[b] * A[k, i, j] + one
+            for m in range(j):
+                left, right = L[i, m], L[j, m]
+                for q in range(many):
+                    out[q] -= left[q] * right[q]
+            if i == j:
+                for q in range(many):
+                    out[q] = math.sqrt(out[q])
+            else:
+                root = L[j, j]
+                for q in range(many):
+                    out[q] /= root[q]
+        for m in range(i):
+            left, other = L[i, m], y[m]
+            for q in range(many):
+                at[q] -= left[q] * other[q]
+        root = L[i, i]
+        for q in range(many):
+            at[q] /= root[q]
+            log[q] += 0.5 * at[q] * at[q] - math.log(root[q])
+    for k in range(K):
+        total = -np.inf
+        for b in range(S):
+            total = np.logaddexp(total, log[k * S + b])
+        gains[k], found[k] = total - found[k], total
