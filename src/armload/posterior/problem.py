@@ -180,7 +180,7 @@ class Problem:
         )
 
     def _without_features(self, scales: Scales) -> Eliminated:
-        """What is left of the runs once each g_j is integrated out; to be read, as the answer and the state share it."""
+        """The runs with each g_j integrated out; to be read alone: the answer and the state share it."""
         if self._eliminated is None or self._eliminated[0] is not scales:
             self._eliminated = scales, eliminated(self.information, scales.noise, scales.features)
         return self._eliminated[1]

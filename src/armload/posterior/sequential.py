@@ -64,8 +64,7 @@ class SequentialPosterior:
     active: NDArray[np.int64] = field(init=False)
 
     def __post_init__(self) -> None:
-        n, _, Z = self.slope.shape
-        self.seen, self.scale = np.zeros((n, 12)), np.zeros(n)
+        self.seen, self.scale = np.zeros((len(self.C), 12)), np.zeros(len(self.C))
         known = (self.slope != 0.0).any(axis=1)
         self.order, self.active = np.argsort(~known, axis=1, kind="stable"), known.sum(axis=1)
         self.slope = np.ascontiguousarray(np.take_along_axis(self.slope, self.order[:, None], axis=2))
