@@ -87,7 +87,7 @@ class PosteriorLeastSquares(Identifier):
         self.features = features or (profile.features if self._smooth and profile is not None else own)
         if same_motion and tare is not None:
             self._same_motion = SameMotion(arm, tare, gain)
-        self._weak = payload_prior_std(arm)
+        self._weak, self._frame = payload_prior_std(arm), str(arm.frame)
         self._correction = Correction(arm, rated_effort(arm)) if profile is None else profile.correction(arm)
         self.reference: PosteriorLeastSquares | None = None
         self._stream: StreamingPosterior | None = None
@@ -154,7 +154,7 @@ class PosteriorLeastSquares(Identifier):
     @property
     def last(self) -> Estimate:
         """The last answer."""
-        return Estimate(self._now, self._phi, self._covariance, self._count, str(self.arm.frame))
+        return Estimate(self._now, self._phi, self._covariance, self._count, self._frame)
 
     def _take(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
         steps = np.diff(t, prepend=self._now)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
-from armload.posterior.elimination import RunInformation, eliminated
+from armload.posterior.elimination import Eliminated, RunInformation, eliminated
 from armload.posterior.scales import Posterior, Scales
 from armload.posterior.sequential import SequentialPosterior
 from armload.regression import GaussianPrior
@@ -122,6 +122,7 @@ class Problem:
                 E[10 : 10 + d, self._drift(self.sessions.index(run.session))] = np.eye(d)
             self.selections.append(E)
         self.information = [RunInformation.of(run, E) for run, E in zip(runs, self.selections, strict=True)]
+        self._eliminated: tuple[Scales, Eliminated] | None = None  # and of which scales
         group = np.repeat([_POSE, _VELOCITY], [self.features.pose, self.features.velocity])
         self.feature_variance = (np.outer(self.correction.effort, group)) ** 2
 
@@ -143,7 +144,7 @@ class Problem:
 
     def posterior(self, scales: Scales) -> _Gaussian:
         """z and g given the scales."""
-        A, b, own, slope, rest = eliminated(self.information, scales.noise, scales.features)
+        A, b, own, slope, rest = self._without_features(scales)
         root = np.diag(np.sqrt(np.concatenate([scales.payloads, scales.eta, scales.drifts.ravel()])))
         if self.root is not None:
             root[self.last, self.last] = self.root
@@ -153,7 +154,7 @@ class Problem:
 
     def sequential(self, scales: Scales) -> SequentialPosterior:
         """The same posterior as a state that takes further rows of the last run: phi last to be integrated out."""
-        found = eliminated(self.information, scales.noise, scales.features)
+        found = self._without_features(scales)
         first, last = self.last.start, self.last
         shared = np.r_[0:first, last.stop : self.size]
         order = np.r_[last.start : last.stop, shared]
@@ -165,8 +166,8 @@ class Problem:
         slope, own = C @ A[shared][:, last], C @ b[shared]
         Λ, h = A[last, last] - A[last][:, shared] @ slope, b[last] - A[last][:, shared] @ own
         return SequentialPosterior(
-            C=np.ascontiguousarray(found.rest),
-            own=found.own,
+            C=found.rest.copy(),
+            own=found.own.copy(),
             slope=np.ascontiguousarray(found.slope[:, :, order]),
             shared_C=C,
             shared_own=own,
@@ -177,6 +178,12 @@ class Problem:
             tares=first // 10,
             drifts=self.correction.drifting if self.runs[-1].session.drift > 0.0 else 0,
         )
+
+    def _without_features(self, scales: Scales) -> Eliminated:
+        """The runs with each g_j integrated out; to be read alone: the answer and the state share it."""
+        if self._eliminated is None or self._eliminated[0] is not scales:
+            self._eliminated = scales, eliminated(self.information, scales.noise, scales.features)
+        return self._eliminated[1]
 
     def improved(self, scales: Scales, found: _Gaussian) -> Scales:
         """One step of expectation–maximisation, each scale held to its stated value by pseudo-observations."""

@@ -40,6 +40,9 @@ class SequentialPosterior:
     triangles count: half of what a row reads and writes. information Λ (10, 10), vector h (10,).
     noise: S (n,) [N²·m²·s]. tares: payloads of runs before this one, which the rows carry too: 0 or 1. drifts: how many
     unknowns of eta, the first ones, have a deviation of this session, which follows eta in s.
+    order, active: a joint sees no friction but its own and no link before it, so that half of the columns of its slope
+    are zero and stay so. `slope` is kept with those that are not in front: column k is that of z[order[j, k]], and from
+    active[j] on all is zero. It is given in the order of z.
     seen: (n, 12) of each joint's last row, given all before: w (10,), e' and v', so that e' ~ N(w·phi, v').
     scale: (n,) what the last row was multiplied by.
     """
@@ -57,9 +60,14 @@ class SequentialPosterior:
     drifts: int
     seen: NDArray[np.float64] = field(init=False)
     scale: NDArray[np.float64] = field(init=False)
+    order: NDArray[np.int64] = field(init=False)
+    active: NDArray[np.int64] = field(init=False)
 
     def __post_init__(self) -> None:
         self.seen, self.scale = np.zeros((len(self.C), 12)), np.zeros(len(self.C))
+        known = (self.slope != 0.0).any(axis=1)
+        self.order, self.active = np.argsort(~known, axis=1, kind="stable"), known.sum(axis=1)
+        self.slope = np.ascontiguousarray(np.take_along_axis(self.slope, self.order[:, None], axis=2))
 
     def take(self, row: Row) -> None:
         """Condition on one row of each joint."""
@@ -77,7 +85,8 @@ class SequentialPosterior:
         return seen, scale
 
     def _condition(self, row: Row, scale: NDArray, seen: NDArray, condition: bool) -> None:
-        own, shared = (self.C, self.own, self.slope), (self.shared_C, self.shared_own, self.shared_slope)
+        own = (self.C, self.own, self.slope, self.order, self.active)
+        shared = (self.shared_C, self.shared_own, self.shared_slope)
         found = (self.information, self.vector, seen)
         _condition(row.X, row.r, scale, self.tares, self.drifts, *own, *shared, *found, condition)
 
@@ -99,13 +108,14 @@ def _product(lower, x, c):  # pragma: no cover - compiled
 
 @kernel(fastmath={"contract", "reassoc", "nsz"})
 def _condition(
-    X, r, scale, tares, drifts, C, own, slope, shared_C, shared_own, shared_slope, information, vector, seen, condition
-):  # pragma: no cover - compiled
+    X, r, scale, tares, drifts, C, own, slope, order, active,
+    shared_C, shared_own, shared_slope, information, vector, seen, condition
+):  # fmt: skip  # pragma: no cover - compiled
     """Each joint's row freed of its own weights, then of what the joints share; the state changes if `condition`."""
     n, R, Z = C.shape[0], C.shape[1], slope.shape[2]
     m = Z - 10
     known = X.shape[1] - R  # 10 + p
-    x, z, c = np.empty(R), np.empty(Z), np.empty(max(R, m))
+    x, z, some, c = np.empty(R), np.empty(Z), np.empty(Z), np.empty(max(R, m))
     w = np.empty(10)
     for j in range(n):
         a = scale[j]
@@ -126,17 +136,27 @@ def _condition(
         for i in range(R):
             v += x[i] * c[i]
             e -= own[j, i] * x[i]
+        many, at = active[j], order[j]
+        for k in range(many, Z):  # a column that has been zero so far
+            if z[at[k]] != 0.0:
+                at[k], at[many] = at[many], at[k]
+                many += 1
+        active[j] = many
+        for k in range(many):
+            some[k] = z[at[k]]
         for i in range(R):
             xi, row = x[i], slope[j, i]
-            for k in range(Z):
-                z[k] -= row[k] * xi
+            for k in range(many):
+                some[k] -= row[k] * xi
+        for k in range(many):
+            z[at[k]] = some[k]
         if condition:
             for i in range(R):
                 g = c[i] / v
                 own[j, i] += g * e
                 row = slope[j, i]
-                for k in range(Z):
-                    row[k] += g * z[k]
+                for k in range(many):
+                    row[k] += g * some[k]
                 row = C[j, i]
                 for k in range(i + 1):
                     row[k] -= g * c[k]

@@ -33,6 +33,7 @@ class History:
     def __init__(self, columns: int, step: float = 0.1, rows: int = 300, levels: int = 9, factor: int = 4) -> None:
         self._rings = np.full((levels, rows, 1 + columns), np.nan)
         self._steps = step * float(factor) ** np.arange(levels)
+        self._soonest = 0.999 * float(self._steps[0])
         self._lock = threading.Lock()
         self.clear()
 
@@ -46,10 +47,11 @@ class History:
         with self._lock:
             self._written = np.zeros(len(self._steps), dtype=np.int64)
             self._newest = np.full(self._rings.shape[2], np.nan)
+            self._finest = -np.inf  # [s] of the last row in the finest ring
 
     def due(self, t: float) -> bool:
         """Whether a row at time t [s] would be kept in the finest ring, or starts a clock that was set back."""
-        return not 0.0 <= t - self._time_of_last(0) < 0.999 * self._steps[0]
+        return not 0.0 <= t - self._finest < self._soonest
 
     def append(self, t: float, row: ArrayLike) -> None:
         """Keep a row (columns,) at time t [s]; a time before the last one means that the clock was set: all is new."""
@@ -62,6 +64,8 @@ class History:
                     break  # what is too soon for a ring is too soon for the coarser ones
                 self._rings[level, self._written[level] % self._rings.shape[1]] = self._newest
                 self._written[level] += 1
+                if level == 0:
+                    self._finest = float(t)
 
     def last(self, seconds: float = np.inf) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Times (N,) [s] and rows (N, columns) of the last so many seconds, the newest row included."""

@@ -1,0 +1,209 @@
+"""The hypotheses of `modes.py` in machine code: equations there.
+
+A row is one call: what Python pays for each array that it hands over is as much as a hundred products.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from armload.runtime.kernels import kernel
+
+
+@kernel
+def take_row(
+    h, seen, X, scale, mean, covariance, taken, loud, level, listening,
+    root, effort, pushes, sides, rates, p, b, x, P, A, c, since
+):  # fmt: skip  # pragma: no cover - compiled
+    """Take a row; returns the probabilities of each kind, and for how long the likeliest other body has been there [s].
+
+    Args:
+        h … taken: as of `Modes.take`. loud: (2, n) of the present block, Σ N and Σ B. level: how large the noise is,
+            and the block's length so far [s]. listening: what decides about it.
+        root: (10, 10) mass·R. effort: (n,). pushes: sizes and times of drifts and contacts. sides: of bodies. rates:
+            how often each kind begins or ends. p … c: probabilities and states. since: moments, evidence, ages.
+    """
+    shared = 1.0 if taken else 1.0 + 2.0 * listening[0] / h
+    U, d, v = _innovation(seen, X, scale, root, mean, covariance, shared, level[0])
+    if taken:
+        _listen(h, scale, d, v, p[0], loud, level, listening)
+    _weigh(h, U, d, v, scale, effort, pushes, sides, rates, p, b, x, P, A, c, since)
+    handing_from = 1 + pushes.shape[1]
+    other_from = handing_from + sides.shape[1]
+    contact = handing = other = 0.0
+    best = other_from
+    for k in range(2, handing_from):
+        contact += p[k]
+    for k in range(handing_from, other_from):
+        handing += p[k]
+    for k in range(other_from, len(p)):
+        other += p[k]
+        if p[k] > p[best]:
+            best = k
+    return p[0] + p[1], p[1], contact, handing, other, since[2, best - other_from]
+
+
+@kernel
+def _listen(h, scale, d, v, steady, loud, level, listening):  # pragma: no cover - compiled
+    """Follow how large the noise is, in units of what it is held to be: the mean over the joints of (Σ B)²/Σ N."""
+    n = len(d)
+    for j in range(n):
+        loud[0, j] += scale[j] * scale[j] / v[j]
+        loud[1, j] += scale[j] * d[j] / v[j]
+    level[1] += h
+    block, share, outlier, lowest = listening[1], listening[2], listening[3], listening[4]
+    if level[1] < block:
+        return
+    total = 0.0
+    for j in range(n):
+        total += loud[1, j] * loud[1, j] / max(loud[0, j], 1e-12)
+        loud[0, j] = loud[1, j] = 0.0
+    level[1] = 0.0
+    if steady > 0.5:
+        level[0] += share * (min(level[0] * (total / n), outlier * level[0]) - level[0])
+        level[0] = max(level[0], lowest)
+
+
+@kernel
+def _innovation(seen, X, scale, root, mean, covariance, shared, level):  # pragma: no cover - compiled
+    """What one row would see of a body (n, 10), its innovations (n,), their variance (n,); all in units of its noise.
+
+    shared: by how much more than the noise the run's own uncertainty counts.
+    """
+    n = seen.shape[0]
+    U, d, v = np.zeros((n, 10)), np.empty(n), np.empty(n)
+    for j in range(n):
+        d[j], v[j] = seen[j, 10], seen[j, 11]
+        for i in range(10):
+            d[j] -= seen[j, i] * mean[i]
+            for k in range(10):
+                v[j] += seen[j, i] * covariance[i, k] * seen[j, k]
+            for k in range(i, 10):
+                U[j, i] += scale[j] * X[j, k] * root[k, i]
+        v[j] = level * (1.0 + shared * max(v[j] - 1.0, 0.0))
+    return U, d, v
+
+
+@kernel
+def _weigh(h, U, d, v, scale, effort, pushes, sides, rates, p, b, x, P, A, c, since):  # pragma: no cover - compiled
+    """One row: what may have begun and ended (p), how likely each hypothesis is beside steady, and its state."""
+    sizes, times, bodies, slow = pushes[0], pushes[1], sides[0], sides[1]
+    starts, found, age = since[0], since[1], since[2]
+    rare, drift_rare, lasts, handed = rates[0], rates[1], rates[2], rates[3]
+    n, kinds, handing_from, other_from = len(d), len(sizes) - 1, 1 + len(sizes), 1 + len(sizes) + len(bodies)
+    gains, y = np.zeros(len(p)), np.empty(10)
+    contact, handing, other = p[2:handing_from].sum(), p[handing_from:other_from].sum(), p[other_from:].sum()
+    steady, begins, over, done = p[0] + p[1], h / rare, min(h / lasts, 0.5), min(h / handed, 0.5)
+    drifts, back = p[0] * h / drift_rare, p[1] * h * 10.0 / drift_rare
+    p[0] += back - drifts - 3.0 * begins * p[0] + over * contact + 0.2 * done * handing
+    p[1] += drifts - back - 3.0 * begins * p[1]
+    for k in range(2, handing_from):
+        p[k] += begins * (steady + other) / kinds - over * p[k]
+    for k in range(handing_from, other_from):
+        p[k] += begins * (steady + contact + 10.0 * other) / len(bodies) - 0.2 * done * p[k]
+    best = other_from + p[other_from:].argmax()
+    for k in range(len(starts)):
+        p[other_from + k] *= 1.0 - 11.0 * begins
+        age[k] += h
+        if age[k] >= starts[k] and (other_from + k != best or p[best] < 0.01):  # begin it anew
+            p[0] += p[other_from + k]
+            p[other_from + k] = age[k] * (steady / rare + 0.1 * contact / lasts + handing / handed) / len(starts)
+            p[other_from + k] = min(p[other_from + k], 0.1)
+            age[k], found[k] = 0.0, 0.0
+            for i in range(10):
+                c[k, i] = 0.0
+                for m in range(10):
+                    A[k, i, m] = 0.0
+    for k in range(len(sizes)):
+        keep = math.exp(-h / times[k])
+        for j in range(n):
+            size = sizes[k] * effort[j]
+            b[0, k, j] *= keep
+            b[1, k, j] = keep * keep * b[1, k, j] + (1.0 - keep * keep) * size * size
+            g = scale[j] * b[1, k, j]
+            e, s = d[j] - scale[j] * b[0, k, j], scale[j] * g + v[j]
+            gains[1 + k] += 0.5 * (d[j] * d[j] / v[j] - e * e / s - math.log(s / v[j]))
+            b[0, k, j] += g * e / s
+            b[1, k, j] *= v[j] / s
+    for k in range(len(bodies)):
+        keep = math.exp(-h / slow[k])
+        for i in range(10):
+            x[k, i] *= keep
+            for m in range(10):
+                P[k, i, m] *= keep * keep
+            P[k, i, i] += (1.0 - keep * keep) * bodies[k] ** 2
+        for j in range(n):
+            e, s = d[j], v[j]
+            for i in range(10):
+                e -= U[j, i] * x[k, i]
+                y[i] = 0.0
+            for m in range(10):  # P is symmetric to the last digit: along its rows several are computed at once
+                for i in range(10):
+                    y[i] += P[k, m, i] * U[j, m]
+            for i in range(10):
+                s += U[j, i] * y[i]
+            gains[handing_from + k] += 0.5 * (d[j] * d[j] / v[j] - e * e / s - math.log(s / v[j]))
+            for i in range(10):
+                x[k, i] += y[i] * e / s
+                for m in range(10):
+                    P[k, i, m] -= y[i] * y[m] / s
+    for k in range(len(starts)):
+        for j in range(n):
+            for i in range(10):
+                z = U[j, i] / v[j]
+                c[k, i] += z * d[j]
+                for m in range(i + 1):
+                    A[k, i, m] += z * U[j, m]
+    _evidence(A, c, bodies, gains[other_from:], found)
+    p *= np.exp(gains - gains.max())
+    p += 1e-30
+    p /= p.sum()
+
+
+@kernel
+def _evidence(A, c, sizes, gains, found):  # pragma: no cover - compiled
+    """What the last row adds to the log evidence of a body since each moment: L·Lᵀ = 1 + s²·A, L·y = s·c.
+
+    All moments and sizes lie beside each other, and each innermost loop runs over them: several are computed at once.
+    """
+    K, S = len(c), len(sizes)
+    many = K * S
+    L, y, log = np.empty((10, 10, many)), np.empty((10, many)), np.empty(many)
+    for q in range(many):
+        log[q] = -math.log(S)
+    for i in range(10):
+        at = y[i]
+        for k in range(K):
+            for b in range(S):
+                at[k * S + b] = sizes[b] * c[k, i]
+        for j in range(i + 1):
+            out, one = L[i, j], 1.0 if i == j else 0.0
+            for k in range(K):
+                for b in range(S):
+                    out[k * S + b] = sizes[b] * sizes[b] * A[k, i, j] + one
+            for m in range(j):
+                left, right = L[i, m], L[j, m]
+                for q in range(many):
+                    out[q] -= left[q] * right[q]
+            if i == j:
+                for q in range(many):
+                    out[q] = math.sqrt(out[q])
+            else:
+                root = L[j, j]
+                for q in range(many):
+                    out[q] /= root[q]
+        for m in range(i):
+            left, other = L[i, m], y[m]
+            for q in range(many):
+                at[q] -= left[q] * other[q]
+        root = L[i, i]
+        for q in range(many):
+            at[q] /= root[q]
+            log[q] += 0.5 * at[q] * at[q] - math.log(root[q])
+    for k in range(K):
+        total = -np.inf
+        for b in range(S):
+            total = np.logaddexp(total, log[k * S + b])
+        gains[k], found[k] = total - found[k], total
