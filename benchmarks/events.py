@@ -205,6 +205,7 @@ def of_part(cells: list[dict[str, Any]]) -> dict[str, Any]:
         "false": per_hour(len(false), sum(cell["seconds"] for cell in cells) / 3600.0) | {"which": false},
         "inside": round(float(np.mean(inside)), 3) if inside else None,
         "calibrated": round(float(np.mean([cell["calibrated"] for cell in cells])), 3),
+        "p_change": reliability(cells)["p_change"],
     }
     if changes:
         missed = [x for x in changes if x["delay"] is None]
