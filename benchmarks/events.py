@@ -1,6 +1,7 @@
 """What a live stream says while what an arm holds changes, or something else happens: delay, misses, mass.
 
-    python benchmarks/events.py [--scenes 8] [--parts steps,ramps_2,...] [--minutes 0] [--quick] [--jobs 1]
+    python benchmarks/events.py [--scenes 8] [--parts steps,ramps_2,...] [--minutes 0] [--seed 90000] [--quick]
+                                [--jobs 1]
 
 The default method on real-like Pandas (`World.real_like`, the sensors as measured, 8 % of the samples lost) at 200 Hz,
 40 s each, every other one along the published excitation, the rest along random motions. Nothing is held for the first
@@ -29,13 +30,13 @@ A change counts as noticed with its first event from its beginning until a secon
 missed ones those count as late that have an event within five seconds. All other events are false, but those during a
 push and a second after it, which are counted there. *inside* is the share of masses within
 their 95 % interval some time after the end. Of all moments, in tenths of a second, `reliability` says how often a
-probability was right: p_held that something is held, p_change that it is not what the run at work began with or is
-being handed over, p_contact that somebody pushes (but for the first and last fifth of a push, which are hardly felt).
+probability was right; event_truth.py says what was true.
 
-Scenes are cells in out/events: a scene measured once is not measured again while `armload.online` stays as it is. They
-are measured one of each part in turn; --minutes: begin none after so many minutes, and tell of those that are there.
-Written to benchmarks/results/events.json and from there to docs/online.md; --quick: two of each part, printed only.
-Seeds from 90000; constants were set on others.
+Scenes are cells in out/events: a scene measured once is not measured again while `armload.online`, the streams and what
+is true of them stay as they are. They are measured one of each part in turn; --minutes: begin none after so many
+minutes, and tell of those that are there. Written to benchmarks/results/events.json and from there to docs/online.md;
+printed only: --quick, two of each part; some --parts; another --seed to begin with than 90000. Constants were set on
+others.
 """
 
 from __future__ import annotations
@@ -46,8 +47,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from event_scenes import LOOKED, PARTS, RATES, Scene, Stream, streamed
-from numpy.typing import NDArray
+from event_scenes import LOOKED, PARTS, RATES, Scene, streamed
+from event_truth import AS_BEFORE, TAKEN_UP, reliability_of
 from scipy.stats import beta, chi2
 from script import ROOT, markdown_table, options, say, write, write_table
 from threadpoolctl import threadpool_limits
@@ -61,8 +62,6 @@ SEED = 90_000
 PAGE = ROOT / "docs" / "online.md"
 LATE = 5.0  # [s]
 LOOK = 0.02  # [s] between two looks at what is said
-BINS = np.array([0.0, 0.02, 0.1, 0.3, 0.7, 0.9, 0.98, 1.0])
-FELT = np.array([0.02, *(3 * [0.002])])  # [kg], [kg·m] what is as large is another payload
 NAMES = {
     "steps": "at once, 0.2 kg and more",
     "ramps_0.1": "within 0.1 s",
@@ -102,13 +101,13 @@ def measured(scene: Scene) -> dict[str, Any]:
         if one.t - last < 0.999 * LOOK:
             continue
         last = one.t
-        back = 0  # 1: the run before the event goes on, 2: the one before that is taken up again
+        back = 0
         if one.event is not None and one.event.kind == "return":
-            back = 1 if one.event.mass == 0.0 else 2
+            back = AS_BEFORE if one.event.mass == 0.0 else TAKEN_UP
         said.append(
             (
                 *(one.t, one.phi[0], one.low[0], one.high[0], one.interval == "calibrated", one.settling, back),
-                *(one.p_held, one.p_change, one.p_contact),
+                *(one.p_held, one.p_change, one.p_contact, one.since),
             )
         )
     identifier.close()
@@ -166,39 +165,6 @@ def measured(scene: Scene) -> dict[str, Any]:
     }
 
 
-def reliability_of(stream: Stream, table: NDArray, held: NDArray, every: NDArray) -> dict[str, Any]:
-    """Of the moments `every` of a stream: how often its probabilities were right."""
-    t, changed = table[:, 0], np.zeros(len(table), dtype=bool)
-    runs = [held[0]]  # what the run at work began with, and those before
-    for k in range(1, len(table)):
-        settled, back = table[k - 1, 5] == 1.0 and table[k, 5] == 0.0, int(table[k, 6])
-        if settled and back != 1:
-            runs.append(held[k])
-        if back and table[k - 1, 6] == 0.0 and (not settled or back == 2) and len(runs) > back:
-            runs.append(runs[-1 - back])
-        changed[k] = bool((np.abs(held[k, :4] - runs[-1][:4]) > FELT).any())
-    for change in stream.changes:
-        changed |= (t >= change.start) & (t <= change.start + change.seconds)
-    pushed, edge = np.zeros(len(t), dtype=bool), np.zeros(len(t), dtype=bool)
-    for push in stream.pushes:  # as it begins and ends it is hardly felt
-        rise = 0.2 * (push.end - push.start)
-        pushed |= (t > push.start) & (t < push.end)
-        edge |= (np.abs(t - push.start) < rise) | (np.abs(t - push.end) < rise + 0.2)
-    out = {
-        "p_changed": _counted(table[every, 8], changed[every]),
-        "p_contact": _counted(table[every, 9][~edge[every]], pushed[every][~edge[every]]),
-    }
-    if stream.base is not None:
-        out["p_held"] = _counted(table[every, 7], held[every, 0] + stream.base > 0.01)
-    return out
-
-
-def _counted(p: NDArray, true: NDArray) -> list[tuple[int, float, int]]:
-    """Of each bin of probabilities: how many moments, their sum, and how often it was so."""
-    which = np.clip(np.searchsorted(BINS, p, side="right") - 1, 0, len(BINS) - 2)
-    return [(int((x := which == k).sum()), float(p[x].sum()), int(true[x].sum())) for k in range(len(BINS) - 1)]
-
-
 # ---------------------------------------------------------------------- what the cells say
 
 
@@ -239,6 +205,7 @@ def of_part(cells: list[dict[str, Any]]) -> dict[str, Any]:
         "false": per_hour(len(false), sum(cell["seconds"] for cell in cells) / 3600.0) | {"which": false},
         "inside": round(float(np.mean(inside)), 3) if inside else None,
         "calibrated": round(float(np.mean([cell["calibrated"] for cell in cells])), 3),
+        "p_change": reliability(cells)["p_change"],
     }
     if changes:
         missed = [x for x in changes if x["delay"] is None]
@@ -285,9 +252,9 @@ def _quantiles(values: list[float], unit: float = 1.0) -> dict[str, float] | Non
 def reliability(cells: list[dict[str, Any]]) -> dict[str, Any]:
     """Of the moments called so: how often it was, of all parts together."""
     out = {}
-    for name, key in (("p_held", "p_held"), ("p_change", "p_changed"), ("p_contact", "p_contact")):
-        counted = [cell["reliability"][key] for cell in cells if key in cell["reliability"]]
-        if not counted:  # cells of before a mistake in what counts as changed was mended
+    for name in ("p_held", "p_change", "p_contact"):
+        counted = [cell["reliability"][name] for cell in cells if name in cell["reliability"]]
+        if not counted:  # nobody says what is held
             continue
         total = np.sum(counted, axis=0)
         out[name] = [
@@ -387,22 +354,32 @@ def _events(part: dict[str, Any]) -> str:
 
 def main() -> None:
     asked = options(
-        __doc__, quick=False, parts=",".join(PARTS), scenes=8, minutes=0.0, jobs=1, cells=ROOT / "out" / "events"
+        __doc__,
+        quick=False,
+        parts=",".join(PARTS),
+        scenes=8,
+        seed=SEED,
+        minutes=0.0,
+        jobs=1,
+        cells=ROOT / "out" / "events",
     )
-    code = source_key(*sorted(Path(armload.online.__path__[0]).glob("*.py")))
+    here = Path(__file__).parent
+    code = source_key(
+        *sorted(Path(armload.online.__path__[0]).glob("*.py")), here / "event_scenes.py", here / "event_truth.py"
+    )
     parts, tasks = asked.parts.split(","), []
-    for seed in range(SEED, SEED + (2 if asked.quick else asked.scenes)):
+    for seed in range(asked.seed, asked.seed + (2 if asked.quick else asked.scenes)):
         for part in parts:
-            if part != "real_as_is" or seed < SEED + 5:  # there are no more logs
+            if part != "real_as_is" or seed < asked.seed + 5:  # there are no more logs
                 key = key_of(asdict(Scene(part, seed)), code)
                 tasks.append(Task.of_one(f"{part}-{seed}", key, measured, Scene(part, seed)))
     with threadpool_limits(1):
         until = 60.0 * asked.minutes if asked.minutes else None
         cells = run_tasks(tasks, asked.cells, jobs=asked.jobs, until=until, say=say)
     found = {part: [x for name, x in cells.items() if name.rpartition("-")[0] == part] for part in parts}
-    result: dict[str, Any] = {"seeds_from": SEED, "parts": {part: of_part(x) for part, x in found.items() if x}}
+    result: dict[str, Any] = {"seeds_from": asked.seed, "parts": {part: of_part(x) for part, x in found.items() if x}}
     result |= {"in_all": in_all(result["parts"]), "reliability": reliability([x for y in found.values() for x in y])}
-    if asked.quick or set(parts) != set(PARTS):
+    if asked.quick or set(parts) != set(PARTS) or asked.seed != SEED:
         print(json.dumps(result, indent=1))
     else:
         write("events", result)
