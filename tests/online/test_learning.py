@@ -14,6 +14,8 @@ from armload.motion import random_motion
 from armload.online import OnlineIdentifier
 from armload.payloads import draw_payload
 from armload.posterior import learn_profile
+from armload.posterior import stream as stream_module
+from armload.posterior.scales import AnotherArm
 from armload.simulation import Run, Sensors, World, simulate_many
 from armload.simulation.resolution import COARSE
 
@@ -88,6 +90,18 @@ def test_a_light_thing_that_nobody_noticed_does_not_become_the_arm_s(panda, worl
 @pytest.mark.full  # some seconds
 def test_nothing_is_learned_from_another_arm_and_it_is_said_within_a_minute(panda, profile):
     last, learned = streamed(panda, World.real_like(panda, 77), profile, [(0.0, None)])
+    assert learned is None
+    assert not last.calibrated
+    assert any("not as its profile says" in note for note in last.notes)
+
+
+@pytest.mark.full  # some seconds
+def test_an_arm_that_was_once_found_to_be_another_stays_one(panda, world, profile, monkeypatch):
+    answers = iter([True])  # found once; the evidence falls back afterwards
+    monkeypatch.setattr(stream_module, "FROM", 5.0)
+    monkeypatch.setattr(stream_module, "another_arm", lambda *_: AnotherArm(0.0, 9.0, 1.0, -9.0, next(answers, False)))
+    last, learned = streamed(panda, world, profile, [(0.0, None)])
+    assert next(answers, None) is None
     assert learned is None
     assert not last.calibrated
     assert any("not as its profile says" in note for note in last.notes)

@@ -18,6 +18,7 @@ from armload.online.known_payload import denied_by, taken_by
 from armload.online.learning import change_of_arm
 from armload.online.thresholds import STANDS
 from armload.posterior import PosteriorLeastSquares
+from armload.posterior.scales import AnotherArm
 
 _STANDING = "standing: nothing new is learned until the arm moves, or what it holds changes"
 _STANDING_MOTOR = "standing: a change of payload is noticed only when the arm moves"
@@ -35,6 +36,7 @@ class Judgement:
         estimate: the answer. around: (10,) where its intervals are. run: that it is of; None: of no run alone.
         determined: which parameters (10,) the data determine. held: whether anything is. p_held: how probable that is.
         newest: time of the newest sample that counts in it [s]; −∞ before one does.
+        another: that the arm is not the one of its tare or profile, once a run has found so; None: none has.
         doubted: whether something speaks against its error bars. notes: what else there is to say.
     """
 
@@ -48,6 +50,8 @@ class Judgement:
         self.estimate = Estimate(0.0, mean, np.diag(std**2), 0, self._frame)
         self.around, self.doubted = mean, False
         self.run: Identifier | None = None
+        self.another: AnotherArm | None = None
+        self._than: str | None = None  # what it is another one than, as of `OnlineEstimate.relative_to`
         self.newest = -np.inf
         self.determined, self.held, self.p_held = np.zeros(10, dtype=bool), False, 0.0
         self.notes: tuple[str, ...] = ()
@@ -55,7 +59,9 @@ class Judgement:
     def take(self, estimate: Estimate, run: Identifier) -> None:
         """A newer answer, of which the last judgement holds."""
         self.estimate, self.run, self.around = estimate, run, estimate.phi
-        self.doubted = change_of_arm(run) is not None
+        if isinstance(run, PosteriorLeastSquares) and run.stream.another is not None and run.stream.another.found:
+            self.another = run.stream.another
+        self.doubted = change_of_arm(run, another=self.another) is not None
 
     def follow(self, estimate: Estimate) -> None:
         """A newer answer while samples are left out, of no run alone."""
@@ -106,7 +112,9 @@ class Judgement:
         if stands:
             motor = isinstance(run, PosteriorLeastSquares) and run.stream.posterior.torque == "motor"
             notes.append(_STANDING_MOTOR if motor else _STANDING)
-        if (changed := change_of_arm(run, relative_to)) is not None:
+        if self.another is not None:
+            self._than = relative_to = self._than or relative_to
+        if (changed := change_of_arm(run, relative_to, self.another)) is not None:
             notes.append(changed)
         if self.held and (denied := denied_by(run)) is not None:
             notes.append(denied)

@@ -11,14 +11,20 @@ from armload.inertia import HELD
 from armload.online.thresholds import LEARN_FROM
 from armload.posterior import PosteriorLeastSquares, Profile
 from armload.posterior.profile_session import compared, with_session
+from armload.posterior.scales import AnotherArm
 from armload.regression import Correction
 
 
-def change_of_arm(run: Identifier, what: str = "profile") -> str | None:
-    """That a run's arm is not as at its tare or as its profile says; None: it is, as far as anybody can tell."""
+def change_of_arm(run: Identifier, what: str = "profile", another: AnotherArm | None = None) -> str | None:
+    """That a run's arm is not as at its tare or as its profile says; None: it is, as far as anybody can tell.
+
+    Args:
+        what: that is spoken of, "profile" or "tare".
+        another: what was found of the arm in an earlier run of the stream, which has the same arm; None: nothing.
+    """
     if not isinstance(run, PosteriorLeastSquares):
         return None
-    return arm_changed(run.stream.drift, run.stream.another, what)
+    return arm_changed(run.stream.drift, another or run.stream.another, what)
 
 
 def learned_from(profile: Profile, runs: Iterable[PosteriorLeastSquares], name: str) -> Profile | None:

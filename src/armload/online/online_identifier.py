@@ -176,7 +176,7 @@ class OnlineIdentifier:
         if self.profile is None or self._watch is None:
             raise IdentificationError("nothing is learned without a profile: make one with `armload profile`")
         self._watch.hold()
-        return learned_from(self.profile, self._watch.runs, name)
+        return learned_from(self.profile, () if self._judgement.another else self._watch.runs, name)
 
     def close(self) -> None:
         """Stop what runs beside; the identifier may go on."""

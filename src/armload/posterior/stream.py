@@ -266,7 +266,10 @@ class StreamingPosterior:
         if np.isfinite(solution.state.information.sum() + solution.state.vector.sum()):  # else the last one goes on
             self._posterior, self._state = solution.posterior, solution.state
             self.solutions += 1
-            self.another = solution.another or self.another
+            if self.another is None or not self.another.found:
+                # what was found stays: odds of 20 to 1 are passed wrongly, whenever they are asked, in one run of 20 at
+                # most (Ville's inequality), but those of another arm may well come back below them
+                self.another = solution.another or self.another
             if self._asked(solution, self.seconds):
                 self.drift = drift_of(solution.posterior, self.correction, self.session)
         elif self._state is None:
