@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.posterior.accumulation import Accumulation
-from armload.posterior.another_arm import FROM, another_arm, apart
+from armload.posterior.another_arm import FROM, another_arm, apart, found_so_far
 from armload.posterior.drift import ALLOWED, TESTED, Drift, drift_of, drift_since_tare
 from armload.posterior.restless import RESTLESS, restlessness
 from armload.posterior.same_motion import Difference, SameMotion
@@ -266,10 +266,7 @@ class StreamingPosterior:
         if np.isfinite(solution.state.information.sum() + solution.state.vector.sum()):  # else the last one goes on
             self._posterior, self._state = solution.posterior, solution.state
             self.solutions += 1
-            if self.another is None or not self.another.found:
-                # what was found stays: odds of 20 to 1 are passed wrongly, whenever they are asked, in one run of 20 at
-                # most (Ville's inequality), but those of another arm may well come back below them
-                self.another = solution.another or self.another
+            self.another = found_so_far(self.another, solution.another)
             if self._asked(solution, self.seconds):
                 self.drift = drift_of(solution.posterior, self.correction, self.session)
         elif self._state is None:

@@ -175,7 +175,7 @@ def _expression(arm_of: str | None) -> re.Pattern[str] | None:
 
 def _arm(name: str, pattern: re.Pattern[str] | None) -> str:
     if pattern is None:
-        return PurePosixPath(name).parent.name or Path(name).resolve().parent.name
+        return PurePosixPath(name).parent.name or Path(name).resolve().parent.name or "/"
     match = pattern.search(name)
     return "" if match is None else match[1] or ""
 
