@@ -39,8 +39,8 @@ def profile(panda, world):
     return learn_profile(panda, simulate_many(panda, runs, rate=100.0, duration=8.0, workers=1, resolution=COARSE))
 
 
-def streamed(panda, world, profile, held):
-    """A stream of an arm that repeats one motion, `held` being [(from, payload)]."""
+def streamed(panda, world, profile, held, look=None):
+    """A stream of an arm that repeats one motion, `held` being [(from, payload)]; `look` at it after every sample."""
     source = Simulator(
         panda,
         random_motion(panda, 3, duration=8.0),
@@ -55,6 +55,8 @@ def streamed(panda, world, profile, held):
     stream = OnlineIdentifier(panda, profile=profile)
     for sample in source:
         last = stream.update(*sample)
+        if look is not None:
+            look(stream)
     learned = stream.learned("today")
     stream.close()
     return last, learned
@@ -100,8 +102,13 @@ def test_an_arm_that_was_once_found_to_be_another_stays_one(panda, world, profil
     answers = iter([True])  # found once; the evidence falls back afterwards
     monkeypatch.setattr(stream_module, "FROM", 5.0)
     monkeypatch.setattr(stream_module, "another_arm", lambda *_: AnotherArm(0.0, 9.0, 1.0, -9.0, next(answers, False)))
-    last, learned = streamed(panda, world, profile, [(0.0, None)])
+    said = []
+    held = [(0.0, None), (18.0, draw_payload("boxes", 3, 1.5))]  # its new run has not asked yet
+    last, learned = streamed(panda, world, profile, held, lambda stream: said.append(stream.arm_changed is not None))
     assert next(answers, None) is None
+    assert last.held
+    assert said == sorted(said)  # never taken back
+    assert said[-1]
     assert learned is None
     assert not last.calibrated
     assert any("not as its profile says" in note for note in last.notes)

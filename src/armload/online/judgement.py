@@ -63,6 +63,15 @@ class Judgement:
             self.another = run.stream.another
         self.doubted = change_of_arm(run, another=self.another) is not None
 
+    def arm_changed(self, run: Identifier, relative_to: str) -> str | None:
+        """That the arm is not as at its tare or profile, also where an earlier run found it; None: it is.
+
+        Args: as of `judge`.
+        """
+        if self.another is not None:
+            self._than = relative_to = self._than or relative_to
+        return change_of_arm(run, relative_to, self.another)
+
     def follow(self, estimate: Estimate) -> None:
         """A newer answer while samples are left out, of no run alone."""
         self.estimate, self.run, self.around = estimate, None, estimate.phi
@@ -112,9 +121,7 @@ class Judgement:
         if stands:
             motor = isinstance(run, PosteriorLeastSquares) and run.stream.posterior.torque == "motor"
             notes.append(_STANDING_MOTOR if motor else _STANDING)
-        if self.another is not None:
-            self._than = relative_to = self._than or relative_to
-        if (changed := change_of_arm(run, relative_to, self.another)) is not None:
+        if (changed := self.arm_changed(run, relative_to)) is not None:
             notes.append(changed)
         if self.held and (denied := denied_by(run)) is not None:
             notes.append(denied)

@@ -109,6 +109,11 @@ class OnlineIdentifier:
         return self._event
 
     @property
+    def arm_changed(self) -> str | None:
+        """That the arm is not as at its tare or profile; None: it is, as far as anybody can tell."""
+        return self._judgement.arm_changed(self.engine, self.relative_to)
+
+    @property
     def health(self) -> Health:
         """Counts of the stream since `reset`."""
         return self._gate.health

@@ -20,7 +20,6 @@ from armload.devices import Recorder, Source
 from armload.errors import IdentificationError, SourceError
 from armload.inertia import Z95, InertialParameters
 from armload.online import OnlineEstimate, OnlineIdentifier
-from armload.online.learning import change_of_arm
 from armload.posterior import Known, Profile
 from armload.posterior.map import PUBLISH
 from armload.recording import Recording, Sample
@@ -112,7 +111,7 @@ class Session:
     @property
     def arm_changed(self) -> str | None:
         """That the arm is not as at its tare or profile; None: it is, as far as anybody can tell."""
-        return change_of_arm(self._identifier.engine, self._identifier.relative_to)
+        return self._identifier.arm_changed
 
     def save(self, path: str | Path) -> Path:
         """Write the identifier's state (`OnlineIdentifier.save`); only from the thread that runs the loop."""
