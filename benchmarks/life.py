@@ -16,8 +16,9 @@ profile, no drift   of the same logs, taken for one session (ablation, at drift 
 profile, 128        with as many features of the pose as a tare (ablation, at drift 1)
 
 same-day: 15 logs of 20 s of one session, about the poses of the place where the arm works or about any, against a tare
-of 20 s elsewhere. Parts that are named (a size of the drift, same-day) replace their own among the results. Printed,
-and written to benchmarks/results/life.json and tables of docs/profiles.md, after every part.
+of 20 s elsewhere; and a tare of 20 s along the run's own motion, after which hardly anything is left to learn of the
+arm. Parts that are named (a size of the drift, same-day) replace their own among the results. Printed, and written to
+benchmarks/results/life.json and tables of docs/profiles.md, after every part.
 """
 
 from __future__ import annotations
@@ -149,6 +150,8 @@ def same_day(arms: int, seed: int) -> dict[str, Any]:
         about = (e, run, e.truth.phi)
         tare = empty_logs(e, [e.world], [e.tare_motion], 20.0, e.seed + 5)[0]
         score(found, "20 s elsewhere", *about, tare=tare)
+        same = empty_logs(e, [e.world], [e.motion], 20.0, e.seed + 7)[0]
+        score(found, "20 s along the run's motion", *about, tare=same)
         for place in ("here", "anywhere"):
             logs = empty_logs(e, [e.world] * DAYS, motions_about(e, place, k), 20.0, e.seed + 9)
             profile = learn_profile(panda, logs, sessions=[0] * DAYS)

@@ -2,14 +2,15 @@
 
     python benchmarks/soak.py --hours 6
     python benchmarks/soak.py --hours 0.25 --steady    # the same payload all the time
+    python benchmarks/soak.py --hours 24 --rate 50     # fewer samples a second, for longer
 
 One arm of the service (`Session`: gate, rows, posterior, hybrid, checks of the samples, answers ten times a second as
-JSON, the state saved every minute) is fed by a simulated Panda at 200 samples per second whose payload changes every
-15 s of the stream: ten minutes that another process has simulated, again and again, with a second's pause between.
-The memory is set as the service sets its processes' (one arena of malloc). Once a simulated minute the resident size
-of the process is noted. After the first quarter, in which buffers fill, a straight line is fitted to about fifteen
-sizes minutes apart, with its 95 % interval: sizes a minute apart would not be independent. Processor time is of all
-threads. The result is written after every quarter of a simulated hour, so that it can be stopped at any time.
+JSON, the state saved every minute) is fed by a simulated Panda at 200 samples per second (--rate) whose payload changes
+every 15 s of the stream: ten minutes that another process has simulated, again and again, with a second's pause
+between. The memory is set as the service sets its processes' (one arena of malloc). Once a simulated minute the
+resident size of the process is noted. After the first quarter, in which buffers fill, a straight line is fitted to
+about fifteen sizes minutes apart, with its 95 % interval: sizes a minute apart would not be independent. Processor time
+is of all threads. The result is written after every quarter of a simulated hour, so that it can be stopped at any time.
 """
 
 import argparse
@@ -34,20 +35,19 @@ from armload.runtime.atomic import replacing
 from armload.service import Session
 from armload.simulation import Sensors, World
 
-RATE = 200.0
 REPEATED = 600.0  # [s] that are simulated
 PAUSE = 1.0  # [s]
 NOTED = 20  # sizes, about, that stand in the result, and that the line is fitted to
 RESULT = Path(__file__).parent / "results" / "soak.json"
 
 
-def simulated(seconds, steady):
+def simulated(seconds, steady, rate):
     """Samples (N, 22) of a Panda whose payload changes every 15 s, or, steady, never does."""
     panda = arm("panda")
     rated, world = rated_mass(panda), World.real_like(panda, seed=1)
     held = [(15.0 * k, draw_payload("boxes", k, rated=rated) if k % 2 else None) for k in range(1, round(seconds / 15))]
     held = [(0.0, draw_payload("boxes", 1, rated=rated))] if steady else held
-    more = {"rate": RATE, "speed": None, "duration": seconds}
+    more = {"rate": rate, "speed": None, "duration": seconds}
     with Simulator(panda, payloads=held, world=world, sensors=Sensors.of(panda), **more) as source:
         return np.array([np.concatenate([[sample.t], *sample[1:]]) for sample in source])
 
@@ -55,8 +55,8 @@ def simulated(seconds, steady):
 class Again(Source):
     """Samples that come again and again, a pause before each repetition."""
 
-    def __init__(self, rows):
-        self.rows, self.name, self.n, self.rate = rows, "simulated", 7, RATE
+    def __init__(self, rows, rate):
+        self.rows, self.name, self.n, self.rate = rows, "simulated", 7, rate
 
     def __iter__(self):
         for k in itertools.count():
@@ -80,13 +80,13 @@ def slope(hours, megabytes):
     return float(line.slope), float(student.ppf(0.975, len(hours) - 2) * line.stderr)
 
 
-def summary(rows, cpu, saves):
+def summary(rows, rate, cpu, saves):
     noted = [(round(h, 2), round(float(m), 1)) for h, m in rows[:: max(1, len(rows) // NOTED)]]
     late = np.array([row for row in noted if row[0] >= 0.25 * rows[-1][0]])
     mean, half = slope(*late.T) if len(rows) >= 2 * NOTED else (None, None)
     return {
         "hours": rows[-1][0],
-        "rate": RATE,
+        "rate": rate,
         "saves": saves,
         "resident [MB]": {f"{h:.2f} h": m for h, m in noted},
         "last [MB]": rows[-1][1],
@@ -99,16 +99,18 @@ def summary(rows, cpu, saves):
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--hours", type=float, default=24.0)
+    parser.add_argument("--rate", type=float, default=200.0, help="samples a second (default: 200)")
     parser.add_argument("--state", default="/tmp/armload-soak.npz")
     parser.add_argument("--steady", action="store_true")
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
-    out = options.out or RESULT.with_stem("soak_steady" if options.steady else "soak")
+    name = "_".join(["soak", *["steady"] * options.steady, *[f"{options.rate:g}hz"] * (options.rate != 200.0)])
+    out = options.out or RESULT.with_stem(name)
     if os.environ.get("MALLOC_ARENA_MAX") != "1":  # it is read when a process begins
         os.execve(sys.executable, [sys.executable, *sys.argv], {**os.environ, "MALLOC_ARENA_MAX": "1"})
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as beside:
-        samples = beside.submit(simulated, REPEATED, options.steady).result()
-    session = Session(Again(samples), arm("panda"), every=0.1)
+        samples = beside.submit(simulated, REPEATED, options.steady, options.rate).result()
+    session = Session(Again(samples, options.rate), arm("panda"), every=0.1)
     minute, spoken, rows, saves, began, skipped = 1, 0.0, [], 0, 0.0, None
     for estimate in session.estimates(3600.0 * options.hours):
         if estimate.t >= 10.0 and skipped is None:  # what is loaded and compiled once is no cost of an hour
@@ -122,7 +124,7 @@ def main():
             rows.append((estimate.t / 3600.0, resident()))
             if minute % 15 == 0:
                 cpu = (time.process_time() - began) * estimate.t / (estimate.t - skipped)
-                result = summary(rows, cpu, saves)
+                result = summary(rows, options.rate, cpu, saves)
                 print(json.dumps(result), flush=True)
                 with replacing(out) as part:
                     part.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
