@@ -183,15 +183,16 @@ def main() -> None:
     asked = options(__doc__, arms=8, seed=11, parts=",".join((*DRIFTS, "same-day")))
     file, page = RESULTS / "life.json", ROOT / "docs" / "profiles.md"
     kept = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
-    kept = {part: kept.get(part, {}) for part in ("days", "same day")}
+    kept = {part: kept.get(part, {}) for part in ("arms", "days", "same day")}
     for part in asked.parts.split(","):
         if part == "same-day":
             kept["same day"] = made = same_day(asked.arms, asked.seed)
         else:
             kept["days"][part] = made = days(asked.arms, asked.seed, float(part))
+        kept["arms"][part] = asked.arms
         say(table(made))
         if asked.arms > 3:
-            write("life", {"arms": asked.arms, "seed": asked.seed, **kept})
+            write("life", {"seed": asked.seed, **kept})
             write_table(page, "same day" if part == "same-day" else f"drift {part}", table(made))
 
 
