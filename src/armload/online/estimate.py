@@ -95,7 +95,11 @@ class OnlineEstimate(Estimate):
     @property
     def interval(self) -> str:
         """ "calibrated" or "approximate"; of what no body can be it is never calibrated."""
-        return "calibrated" if self.calibrated and is_consistent(self.phi) else "approximate"
+        return self._interval(self.calibrated and is_consistent(self.phi))
+
+    @staticmethod
+    def _interval(calibrated: bool) -> str:
+        return "calibrated" if calibrated else "approximate"
 
     def to_dict(self) -> dict[str, Any]:
         """One JSON object, its names those of `armload identify --json` where they mean the same.
@@ -105,7 +109,7 @@ class OnlineEstimate(Estimate):
         """
         mass = float(self.phi[0])
         com, inertia_com = (None, None) if mass == 0.0 else (x.tolist() for x in phi_to_com(self.phi)[1:])
-        low, high = self._ends
+        (low, high), consistent = self._ends, is_consistent(self.phi)
         return {
             "t": self.t,
             "method": self.method,
@@ -118,12 +122,12 @@ class OnlineEstimate(Estimate):
             "phi": self.phi.tolist(),
             "phi_low": _finite(low),
             "phi_high": _finite(high),
-            "interval": self.interval,
+            "interval": self._interval(self.calibrated and consistent),
             "determined": self.determined.tolist(),
             "mass": mass,
             "com": com,
             "inertia_com": inertia_com,
-            "consistent": bool(is_consistent(self.phi)),
+            "consistent": consistent,
             "held": self.held,
             "p_held": self.p_held,
             "p_change": self.p_change,

@@ -19,12 +19,13 @@ class Runs:
     """The runs of a stream.
 
     Attributes:
-        current: the run at work. previous: the one before it. earlier: the one before that, which may come back.
+        unit: standard deviation of a payload's mass beforehand [kg]. current: the run at work. previous: the one before
+            it. earlier: the one before that, which may come back.
     """
 
     def __init__(self, first: PosteriorLeastSquares) -> None:
         self._first = self.current = first
-        self._unit = float(payload_prior_std(first.arm)[0])  # [kg] of a payload's mass beforehand
+        self.unit = float(payload_prior_std(first.arm)[0])
         self.previous: PosteriorLeastSquares | None = None
         self.earlier: PosteriorLeastSquares | None = None
 
@@ -57,7 +58,7 @@ class Runs:
     def reference_for_next(self, held: bool) -> PosteriorLeastSquares | None:
         """The run that the next one takes for a tare: the empty arm's, if it was known to be empty for long enough."""
         run = self.current
-        known = float(run.last.std[0]) <= STEP_STD * self._unit  # else nobody can tell whether anything is held
+        known = float(run.last.std[0]) <= STEP_STD * self.unit  # else nobody can tell whether anything is held
         if run.reference is None and known and not held and run.stream.seconds >= TARE_FROM:
             return run
         return run.reference

@@ -62,7 +62,7 @@ LEVEL_SHARE = 0.05
 # streams of minutes, no scene or test depends on it
 LEVEL_OUTLIER = 8.0
 
-# ---------------------------------------------------------------------- the phases of a run, `watch.py`
+# --------------------------------------------------------------------- the phases of a run, `watch.py`; a change's name
 
 # probability of a payload that changes or has changed, from which it is an event: one in a thousand may be none, and
 # friction of gears is not what the hypotheses know (test_a_real_arm_that_breaks_away_from_rest_is_no_change_of_payload)

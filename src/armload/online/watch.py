@@ -2,7 +2,7 @@
 
     … run A (empty) ──change──▶ hand-over left out ──▶ run B (tare: A) ──change──▶ … ──▶ run C, or A again if it fits
 
-The watch is in one of three phases, by what the last rows are (`modes.py`):
+The watch is in one of three phases, by what the last rows are (`weighing.py`):
 
     FOLLOWING   the run takes the sample;
                 it is probably not steady → DOUBTING, the payload has surely changed or is changing → SETTLING
@@ -12,9 +12,9 @@ The watch is in one of three phases, by what the last rows are (`modes.py`):
                 and takes what may be of the new payload;
                 that stays → FOLLOWING with the next run, it was none → DOUBTING with the old
 
-After a change the new run is *judged* while it is followed: it says what the change was, once its mass is known, and
-gives way to the earlier run if it holds what that one held. The run of the empty arm is a tare of the runs after it,
-beside the one that was given, if one was. Of a run that ends the last rows are taken back: they show it.
+After a change the new run is *judged* while it is followed (`naming.py`): it says what the change was, once its mass is
+known, and gives way to the earlier run if it holds what that one held. The run of the empty arm is a tare of the runs
+after it, beside the one that was given, if one was. Of a run that ends the last rows are taken back: they show it.
 """
 
 from __future__ import annotations
@@ -27,31 +27,15 @@ import numpy as np
 from armload.estimators import Estimate
 from armload.online.background import Background
 from armload.online.change import Change, next_run
-from armload.online.detector import ChangeDetector
-from armload.online.event import Event, kind_of
-from armload.online.modes import Modes
-from armload.online.runs import Gaussian, Runs
+from armload.online.event import Event
+from armload.online.naming import Naming
+from armload.online.runs import Runs
 from armload.online.schedule import Deferred
-from armload.online.thresholds import (
-    FIRST_TARED,
-    FIRST_UNTARED,
-    KIND_FROM,
-    KIND_LATEST,
-    KIND_STD,
-    LIKELY,
-    PATIENCE,
-    RETURN_STD,
-    RETURN_UNTIL,
-    SURE,
-    TAKEN_BACK,
-    UNLIKELY,
-)
+from armload.online.thresholds import LIKELY, PATIENCE, SURE, TAKEN_BACK, UNLIKELY
 from armload.online.tracking import Tracker
+from armload.online.weighing import Weighing
 from armload.posterior import PosteriorLeastSquares
-from armload.posterior.sequential import SequentialPosterior
-from armload.recording import GAP, Sample
-from armload.regression import payload_prior_std
-from armload.regression.rows import Row
+from armload.recording import Sample
 
 Phase = Literal["following", "doubting", "settling"]
 FOLLOWING: Phase = "following"
@@ -73,9 +57,9 @@ class PayloadWatch:
 
     def __init__(self, first: PosteriorLeastSquares) -> None:
         self.runs = Runs(first)
-        self._unit = float(payload_prior_std(first.arm)[0])
         self._look = Deferred()
         self._background = Background()
+        self._weighing = Weighing(first)
         self.reset()
 
     def reset(self) -> None:
@@ -85,20 +69,21 @@ class PayloadWatch:
         self._look.reset()
         self.phase: Phase = FOLLOWING
         self.answered, self.mixed = self.run, False
-        self.event: Event | None = None
-        self._modes = Modes(self._unit, self.run.stream.correction.effort)
-        self._gaussian: tuple[PosteriorLeastSquares, Gaussian] | None = None  # before the row, and of which run
-        self._detector, self._tracker = ChangeDetector(self._unit), Tracker()
-        self._row_t = self._doubted_at = -np.inf  # of the last row, of the doubt
+        self._naming, self._tracker = Naming(self.runs.unit), Tracker()
+        self._weighing.reset(self.run)
+        self._doubted_at = -np.inf
         self._gave_up = False  # doubting: what does not fit is believed until it fits again
         self._change: Change | None = None
-        self._judging = self._unnamed = False  # whether the run is new, and may give way; whether its kind is not known
-        self._held_before = False  # the change, or the doubt
 
     @property
     def run(self) -> PosteriorLeastSquares:
         """The identifier of the current run."""
         return self.runs.current
+
+    @property
+    def event(self) -> Event | None:
+        """The last change noticed."""
+        return self._naming.event
 
     @property
     def settling(self) -> bool:
@@ -107,8 +92,8 @@ class PayloadWatch:
 
     @property
     def likely(self) -> tuple[float, float, float]:
-        """Probabilities that the payload is not what the run holds, or changes; of a contact; of a drift of the arm."""
-        return self._modes.handing + self._modes.other, self._modes.contact, self._modes.drift
+        """Probabilities as of `Weighing.likely`."""
+        return self._weighing.likely
 
     @property
     def sure(self) -> bool:
@@ -118,7 +103,7 @@ class PayloadWatch:
     def track(self, t: float) -> Estimate:
         """At t [s], by the run and by all that the last rows may be besides."""
         last = self.run.last
-        phi, covariance = self._tracker.track(self._modes, self._row_t, (last.phi, last.covariance))
+        phi, covariance = self._tracker.track(self._weighing.modes, self._weighing.row_t, (last.phi, last.covariance))
         return replace(last, t=t, phi=phi, covariance=covariance)
 
     def update(self, sample: Sample, held: bool) -> Estimate | None:
@@ -127,7 +112,7 @@ class PayloadWatch:
             self._settle(sample)
             return None
         if self.phase == DOUBTING:
-            if self._looked(sample, self.run.stream.state):
+            if self._weighing.passed_over(sample, self.run, self.run.stream.state):
                 self._decide(sample, held)
             return None
         if self._look.due(sample.t):
@@ -148,67 +133,30 @@ class PayloadWatch:
         if self.run.stream.rows > before and self._look.row(sample.t):
             self._examine(sample, held)
         self._look.seen(sample.t)
-        if self._judging and self.run.fresh:
-            self._judge(estimate, held)
+        if self._naming.judging and self.run.fresh and self._naming.judge(self.runs, estimate, held):
+            self._watch_anew(self.runs.go_back())
         return estimate
 
     def _examine(self, sample: Sample, held: bool) -> None:
         """Look at the innovations of the last row, which the run has taken."""
         self._look.clear()
-        stream = self.run.stream
-        if (state := stream.state) is None or (row := stream.row) is None:
-            return
-        self._modes.side = stream.posterior.torque
-        h, self._row_t = row.t - self._row_t, row.t
-        known = stream.seconds > (FIRST_TARED if stream.tares else FIRST_UNTARED)
-        if row.h > 0.0:
-            if known:
-                self._modes.take(row.h, state.seen, row.X, state.scale, *self._before_row, True)
-            self._gaussian = (self.run, stream.answer())
-        elif known and 0.0 < h <= GAP and stream.posterior.torque == "link":  # at rest, where friction hides no load
-            self._weigh(row, h, state)
-        if known:
+        if self._weighing.taken(self.run):
             self._decide(sample, held)
-            changed = self._modes.handing + self._modes.other
-            self.mixed = self.phase == FOLLOWING and changed > UNLIKELY
-
-    @property
-    def _before_row(self) -> Gaussian:
-        """phi and covariance before the row, under the weak prior."""
-        if self._gaussian is not None and self._gaussian[0] is self.run:
-            return self._gaussian[1]
-        return np.zeros(10), np.diag(payload_prior_std(self.run.arm) ** 2)
+            self.mixed = self.phase == FOLLOWING and self.likely[0] > UNLIKELY
 
     # ------------------------------------------------------------------ doubting
 
-    def _looked(self, sample: Sample, state: SequentialPosterior | None) -> bool:
-        """Look at a sample that the run does not take; whether it completed a row that says something."""
-        assert state is not None
-        row = self.run.stream.look(*sample)
-        if row is None:
-            return False
-        h, self._row_t = row.t - self._row_t, row.t
-        if not 0.0 < h <= GAP:
-            return False
-        self._weigh(row, h, state)
-        return True
-
-    def _weigh(self, row: Row, h: float, state: SequentialPosterior) -> None:
-        """Weigh a row that the run did not take, for as long as it stands."""
-        seen, scale = state.predict(row._replace(h=h))
-        self._modes.take(h, seen, row.X, scale, *self._before_row, False)
-
     def _decide(self, sample: Sample, held: bool) -> None:
         """What becomes of the run, by what the last rows are."""
-        if self._detector.take(self._modes, self._row_t, self._before_row):
+        if self._weighing.changed(self.run):
             self._begin_change(sample, held)
-        elif self._detector.steady(self._modes) > 0.5:
+        elif self._weighing.steady > 0.5:
             self.phase, self._gave_up = FOLLOWING, False
         elif self.phase == DOUBTING and sample.t - self._doubted_at > PATIENCE:
             self.phase, self._gave_up = FOLLOWING, True
-            self._detector.believe()
+            self._weighing.believe()
         elif self.phase == FOLLOWING and not self._gave_up:
-            self.phase, self._doubted_at, self._held_before = DOUBTING, sample.t, held
+            self.phase, self._doubted_at, self._naming.held_before = DOUBTING, sample.t, held
 
     # ------------------------------------------------------------------ a change, and the run after it
 
@@ -217,34 +165,35 @@ class PayloadWatch:
         run, state = self.run, self.run.stream.state
         assert state is not None
         if self.phase == FOLLOWING:
-            self._held_before = held
-        began = max(self._detector.steady_t, sample.t - PATIENCE)
+            self._naming.held_before = held
+        began = max(self._weighing.steady_t, sample.t - PATIENCE)
         until = began - max(sample.t - began, TAKEN_BACK)
-        self.event, self._judging, self._unnamed = Event("change", sample.t, began, None), False, True
-        following = self._background.submit(next_run, run, self.runs.reference_for_next(self._held_before), until)
+        self._naming.begin(sample.t, began)
+        reference = self.runs.reference_for_next(self._naming.held_before)
+        following = self._background.submit(next_run, run, reference, until)
         self._change, self.phase = Change(sample.t, began, state, following), SETTLING
 
     def _settle(self, sample: Sample) -> None:
         """A sample while the payload may go on changing; then the next run begins, or the run before goes on."""
-        change, modes = self._change, self._modes
+        change, modes = self._change, self._weighing.modes
         assert change is not None
-        looked = self._looked(sample, change.state)
+        looked = self._weighing.passed_over(sample, self.run, change.state)
         if looked and modes.steady + modes.contact > SURE:
             self._call_off()
             return
         if looked:
-            change.looked(sample.t, modes, self._row_t)
+            change.looked(sample.t, modes, self._weighing.row_t)
         change.take(sample)
-        if sample.t - change.t > PATIENCE or (looked and modes.other > LIKELY and change.stays(modes, self._row_t)):
+        stays = looked and modes.other > LIKELY and change.stays(modes, self._weighing.row_t)
+        if stays or sample.t - change.t > PATIENCE:
             self._take_up_the_next()
 
     def _call_off(self) -> None:
         """The payload is what it was: the run before goes on."""
         assert self._change is not None
-        assert self.event is not None
         change, self._change = self._change, None
         self._background.close_run(change.run)
-        self.event = replace(self.event, kind="return", mass=0.0)
+        self._naming.call_off()
         self.phase, self._doubted_at, self._gave_up = DOUBTING, change.t, False
 
     def _take_up_the_next(self) -> None:
@@ -255,27 +204,11 @@ class PayloadWatch:
             self._change.run.reset()
         run, self._change = self._change.run, None
         self._watch_anew(self.runs.follow(run))
-        self._judging = True
-
-    def _judge(self, estimate: Estimate, held: bool) -> None:
-        """Say what the change was once the new run can tell, and take up the earlier run where it fits."""
-        assert self.event is not None
-        seconds, std = self.run.stream.seconds, float(estimate.std[0]) / self._unit
-        if seconds < KIND_FROM:
-            return
-        self._judging = seconds <= RETURN_UNTIL
-        if std <= RETURN_STD and self.runs.is_earlier(estimate):
-            self._watch_anew(self.runs.go_back())
-            self._judging = False
-            self.event = replace(self.event, kind="return")
-        elif self._unnamed and (std <= KIND_STD or seconds > KIND_LATEST or self.run.stream.stands):
-            self._unnamed = False
-            self.event = replace(self.event, kind=kind_of(self._held_before, held))
+        self._naming.judging = True
 
     def _watch_anew(self, dropped: PosteriorLeastSquares | None) -> None:
         """Begin to watch the current run; one that is not wanted any more has its thread stopped."""
-        self._modes.reset()
-        self._detector.begin_run()
+        self._weighing.begin_run()
         self._look.clear()
         self.phase, self._gave_up, self.mixed = FOLLOWING, False, False
         if dropped is not None:

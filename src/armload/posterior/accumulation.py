@@ -25,7 +25,9 @@ from armload.regression.rows import Row, Rows
 # every so many, 10 s: the second thread takes 2 % of a core
 _REFITS = (20, 60, 100, 150, 200, 300, 400, 600, 800, 1200, 1600, 2400)
 _REFIT_EVERY = 2000
-_CHUNK = 50  # [rows] handed over at once in between: one matrix product of 0.25 s
+# [rows] handed over at once in between, 1 s: the fewer times a run's squares (3.5 MB) are read and written, the less it
+# costs; where the tare may show the same motion that is asked so often, 0.25 s
+_CHUNK, _COMPARED = 200, 50
 _LATE = 100  # [rows] that can be taken back, 0.5 s: a slow hand-over begins so long before it is noticed
 
 
@@ -41,6 +43,7 @@ class Accumulation:
 
     def __init__(self, empty: RegressionData, same_motion: SameMotion | None) -> None:
         self.run, self._same_motion = empty, same_motion
+        self._chunk = _CHUNK if same_motion is None else _COMPARED
         self._waiting: list[Row] = []
         self._handover = Handover()
 
@@ -73,7 +76,7 @@ class Accumulation:
             result = work.take()
             if result[0] is not None:
                 return result
-        if due or len(self._waiting) >= _CHUNK + _LATE:
+        if due or len(self._waiting) >= self._chunk + _LATE:
             rows, self._waiting = self._waiting[:-_LATE], self._waiting[-_LATE:]
             if due:
                 work.begin_solution(count, self._solved, rows, self._waiting.copy(), covariance, solve)

@@ -12,6 +12,10 @@ A row (x, y) of joint j, of unit variance, is first freed of g_j, then of s:
     c = C·u_s,    v' = v + u_s·c,  w = u_phi − slopeᵀ·u_s,   e' = e − own·u_s
         likewise;  Λ += w·wᵀ/v',  h += w·e'/v'
 
+C_j and slope_j are changed for some rows at once; until then c and u of these rows are taken into account:
+
+    C_j·x_g − Σ c·(c·x_g)/v,    slope_jᵀ·x_g + Σ u·(c·x_g)/v
+
 One row of one joint costs R² + R·(10 + p) multiplications, a posterior from the accumulated information a thousand
 times as many: so the answer is always new, and only the scales wait for the next solution.
 
@@ -20,6 +24,7 @@ Source: recursive least squares by conditioning, Anderson & Moore 1979, ch. 5.
 
 from __future__ import annotations
 
+import math
 from copy import deepcopy
 from dataclasses import dataclass, field
 from typing import Self
@@ -29,6 +34,10 @@ from numpy.typing import NDArray
 
 from armload.regression.rows import Row
 from armload.runtime.kernels import kernel
+
+# [rows] whose changes of C and slope, a megabyte, are made at once: to read and write it costs more than the products.
+# A multiple of 4 (`_add`); changes no answer by more than rounding
+_LATE = 8
 
 
 @dataclass(eq=False)
@@ -43,6 +52,7 @@ class SequentialPosterior:
     order, active: a joint sees no friction but its own and no link before it, so that half of the columns of its slope
     are zero and stay so. `slope` is kept with those that are not in front: column k is that of z[order[j, k]], and from
     active[j] on all is zero. It is given in the order of z.
+    late (n, K, R + 10 + m), waiting (1,): c/√v and u/√v of the last rows, as many as wait: C and slope lack them.
     seen: (n, 12) of each joint's last row, given all before: w (10,), e' and v', so that e' ~ N(w·phi, v').
     scale: (n,) what the last row was multiplied by.
     """
@@ -62,11 +72,15 @@ class SequentialPosterior:
     scale: NDArray[np.float64] = field(init=False)
     order: NDArray[np.int64] = field(init=False)
     active: NDArray[np.int64] = field(init=False)
+    late: NDArray[np.float64] = field(init=False)
+    waiting: NDArray[np.int64] = field(init=False)
 
     def __post_init__(self) -> None:
         self.seen, self.scale = np.zeros((len(self.C), 12)), np.zeros(len(self.C))
         known = (self.slope != 0.0).any(axis=1)
         self.order, self.active = np.argsort(~known, axis=1, kind="stable"), known.sum(axis=1)
+        n, R, Z = self.slope.shape
+        self.late, self.waiting = np.zeros((n, _LATE, R + Z)), np.zeros(1, dtype=np.int64)
         self.slope = np.ascontiguousarray(np.take_along_axis(self.slope, self.order[:, None], axis=2))
 
     def take(self, row: Row) -> None:
@@ -85,7 +99,7 @@ class SequentialPosterior:
         return seen, scale
 
     def _condition(self, row: Row, scale: NDArray, seen: NDArray, condition: bool) -> None:
-        own = (self.C, self.own, self.slope, self.order, self.active)
+        own = (self.C, self.own, self.slope, self.order, self.active, self.late, self.waiting)
         shared = (self.shared_C, self.shared_own, self.shared_slope)
         found = (self.information, self.vector, seen)
         _condition(row.X, row.r, scale, self.tares, self.drifts, *own, *shared, *found, condition)
@@ -97,26 +111,73 @@ class SequentialPosterior:
 
 @kernel(fastmath={"contract", "reassoc", "nsz"})
 def _product(lower, x, c):  # pragma: no cover - compiled
-    """c = C·x from the lower triangle of a symmetric C."""
-    for i in range(x.shape[0]):
-        total, row, xi = 0.0, lower[i], x[i]
+    """c = C·x from the lower triangle of a symmetric C, four rows at once as far as they go."""
+    R = x.shape[0]
+    whole = R - R % 4
+    for i in range(0, whole, 4):
+        p, q, s, t = lower[i], lower[i + 1], lower[i + 2], lower[i + 3]
+        xp, xq, xs, xt = x[i], x[i + 1], x[i + 2], x[i + 3]
+        cp = cq = cs = ct = 0.0
         for k in range(i):
-            total += row[k] * x[k]
-            c[k] += row[k] * xi
-        c[i] = total + row[i] * xi
+            cp += p[k] * x[k]
+            cq += q[k] * x[k]
+            cs += s[k] * x[k]
+            ct += t[k] * x[k]
+            c[k] += p[k] * xp + q[k] * xq + s[k] * xs + t[k] * xt
+        c[i], c[i + 1], c[i + 2], c[i + 3] = cp, cq, cs, ct
+        for a in range(i, i + 4):
+            for k in range(i, a):
+                c[a] += lower[a, k] * x[k]
+                c[k] += lower[a, k] * x[a]
+            c[a] += lower[a, a] * x[a]
+    for i in range(whole, R):
+        total = 0.0
+        for k in range(i):
+            total += lower[i, k] * x[k]
+            c[k] += lower[i, k] * x[i]
+        c[i] = total + lower[i, i] * x[i]
+
+
+@kernel(fastmath={"contract", "reassoc", "nsz"})
+def _take_off(slope, x, some, many):  # pragma: no cover - compiled
+    """some −= slopeᵀ·x, its first entries, four rows at once as far as they go."""
+    R = x.shape[0]
+    whole = R - R % 4
+    for i in range(0, whole, 4):
+        p, q, s, t = slope[i], slope[i + 1], slope[i + 2], slope[i + 3]
+        xp, xq, xs, xt = x[i], x[i + 1], x[i + 2], x[i + 3]
+        for k in range(many):
+            some[k] -= p[k] * xp + q[k] * xq + s[k] * xs + t[k] * xt
+    for i in range(whole, R):
+        for k in range(many):
+            some[k] -= slope[i, k] * x[i]
+
+
+@kernel(fastmath={"contract", "reassoc", "nsz"})
+def _add(changes, R, many, lower, slope):  # pragma: no cover - compiled
+    """lower −= Σ c·cᵀ (its triangle), slope += Σ c·uᵀ, of changes (K, R + ·): each c and u, of K a multiple of 4."""
+    for first in range(0, changes.shape[0], 4):
+        p, q, s, t = changes[first], changes[first + 1], changes[first + 2], changes[first + 3]
+        pu, qu, su, tu = p[R:], q[R:], s[R:], t[R:]
+        for i in range(R):
+            a, b, c, d, row, other = p[i], q[i], s[i], t[i], lower[i], slope[i]
+            for k in range(i + 1):
+                row[k] -= a * p[k] + b * q[k] + c * s[k] + d * t[k]
+            for k in range(many):
+                other[k] += a * pu[k] + b * qu[k] + c * su[k] + d * tu[k]
 
 
 @kernel(fastmath={"contract", "reassoc", "nsz"})
 def _condition(
-    X, r, scale, tares, drifts, C, own, slope, order, active,
+    X, r, scale, tares, drifts, C, own, slope, order, active, late, waiting,
     shared_C, shared_own, shared_slope, information, vector, seen, condition
 ):  # fmt: skip  # pragma: no cover - compiled
     """Each joint's row freed of its own weights, then of what the joints share; the state changes if `condition`."""
     n, R, Z = C.shape[0], C.shape[1], slope.shape[2]
-    m = Z - 10
+    m, K, wait = Z - 10, late.shape[1], waiting[0]
     known = X.shape[1] - R  # 10 + p
-    x, z, some, c = np.empty(R), np.empty(Z), np.empty(Z), np.empty(max(R, m))
-    w = np.empty(10)
+    x, z, some, c, w = np.empty(R), np.empty(Z), np.empty(Z), np.empty(max(R, m)), np.empty(10)
+    shared = np.zeros((n + 3 - (n + 3) % 4, m + 10))  # changes of what the joints share, a multiple of 4
     for j in range(n):
         a = scale[j]
         for k in range(10):
@@ -132,10 +193,6 @@ def _condition(
         e, v = a * r[j], 1.0
         for i in range(R):
             x[i] = a * X[j, known + i]
-        _product(C[j], x, c)
-        for i in range(R):
-            v += x[i] * c[i]
-            e -= own[j, i] * x[i]
         many, at = active[j], order[j]
         for k in range(many, Z):  # a column that has been zero so far
             if z[at[k]] != 0.0:
@@ -144,44 +201,61 @@ def _condition(
         active[j] = many
         for k in range(many):
             some[k] = z[at[k]]
-        for i in range(R):
-            xi, row = x[i], slope[j, i]
+        _product(C[j], x, c)
+        _take_off(slope[j], x, some, many)
+        for p in range(wait):
+            change, g = late[j, p], 0.0
+            for i in range(R):
+                g += change[i] * x[i]
+            for i in range(R):
+                c[i] -= g * change[i]
             for k in range(many):
-                some[k] -= row[k] * xi
+                some[k] -= g * change[R + k]
+        for i in range(R):
+            v += x[i] * c[i]
+            e -= own[j, i] * x[i]
         for k in range(many):
             z[at[k]] = some[k]
         if condition:
+            change, root = late[j, wait], 1.0 / math.sqrt(v)
             for i in range(R):
-                g = c[i] / v
-                own[j, i] += g * e
-                row = slope[j, i]
-                for k in range(many):
-                    row[k] += g * some[k]
-                row = C[j, i]
-                for k in range(i + 1):
-                    row[k] -= g * c[k]
+                own[j, i] += c[i] / v * e
+                change[i] = root * c[i]
+            for k in range(Z):
+                change[R + k] = root * some[k] if k < many else 0.0
+            if wait + 1 == K:
+                _add(late[j], R, many, C[j], slope[j])
         _product(shared_C, z[10:], c)
         for k in range(10):
             w[k] = z[k]
         for i in range(m):
             u = z[10 + i]
-            v += u * c[i]
             e -= shared_own[i] * u
             for k in range(10):
                 w[k] -= shared_slope[i, k] * u
+        for p in range(j if condition else 0):
+            change, g = shared[p], 0.0
+            for i in range(m):
+                g += change[i] * z[10 + i]
+            for i in range(m):
+                c[i] -= g * change[i]
+            for k in range(10):
+                w[k] -= g * change[m + k]
+        for i in range(m):
+            v += z[10 + i] * c[i]
         seen[j, 10], seen[j, 11] = e, v
         for k in range(10):
             seen[j, k] = w[k]
         if condition:
+            change, root = shared[j], 1.0 / math.sqrt(v)
             for i in range(m):
-                g = c[i] / v
-                shared_own[i] += g * e
-                for k in range(10):
-                    shared_slope[i, k] += g * w[k]
-                row = shared_C[i]
-                for k in range(i + 1):
-                    row[k] -= g * c[k]
-            for i in range(10):
-                vector[i] += w[i] * e / v
-                for k in range(10):
-                    information[i, k] += w[i] * w[k] / v
+                shared_own[i] += c[i] / v * e
+                change[i] = root * c[i]
+            for k in range(10):
+                change[m + k] = root * w[k]
+                vector[k] += w[k] * e / v
+                for i in range(10):
+                    information[k, i] += w[k] * w[i] / v
+    if condition:
+        _add(shared, m, 10, shared_C, shared_slope)
+        waiting[0] = (wait + 1) % K

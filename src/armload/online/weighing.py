@@ -1,0 +1,104 @@
+"""Is it a change? Each row weighed by what it may be (`modes.py`), whether a run has taken it or not."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from armload.online.detector import ChangeDetector
+from armload.online.modes import Modes
+from armload.online.runs import Gaussian
+from armload.online.thresholds import FIRST_TARED, FIRST_UNTARED
+from armload.posterior import PosteriorLeastSquares
+from armload.posterior.sequential import SequentialPosterior
+from armload.recording import GAP, Sample
+from armload.regression import payload_prior_std
+from armload.regression.rows import Row
+
+
+class Weighing:
+    """What the last rows of a stream are, whichever run they are of.
+
+    Args:
+        run: the first run of the stream.
+
+    Attributes:
+        modes: the probabilities. row_t: time of the last row [s].
+    """
+
+    def __init__(self, run: PosteriorLeastSquares) -> None:
+        self._unit = float(payload_prior_std(run.arm)[0])
+        self.reset(run)
+
+    def reset(self, run: PosteriorLeastSquares) -> None:
+        """Forget the stream; the next row is the first of a run."""
+        self.modes = Modes(self._unit, run.stream.correction.effort)
+        self._detector = ChangeDetector(self._unit)
+        self._gaussian: tuple[PosteriorLeastSquares, Gaussian] | None = None  # before the row, and of which run
+        self.row_t = -np.inf
+
+    def begin_run(self) -> None:
+        """The rows that come are of another run."""
+        self.modes.reset()
+        self._detector.begin_run()
+
+    @property
+    def likely(self) -> tuple[float, float, float]:
+        """Probabilities that the payload is not what the run holds, or changes; of a contact; of a drift of the arm."""
+        return self.modes.handing + self.modes.other, self.modes.contact, self.modes.drift
+
+    @property
+    def steady(self) -> float:
+        """Probability that the last rows are of the arm as it was and the same payload."""
+        return self._detector.steady(self.modes)
+
+    @property
+    def steady_t(self) -> float:
+        """Time of the last row of a steady arm with the same payload [s]."""
+        return self._detector.steady_t
+
+    def changed(self, run: PosteriorLeastSquares) -> bool:
+        """Whether the last row shows that the payload is surely another one than the run's."""
+        return self._detector.take(self.modes, self.row_t, self._before_row(run))
+
+    def believe(self) -> None:
+        """What does not fit has lasted too long for a contact."""
+        self._detector.believe()
+
+    def taken(self, run: PosteriorLeastSquares) -> bool:
+        """Weigh the innovations of the run's last row, which it has taken; whether the run knows enough to tell."""
+        stream = run.stream
+        if (state := stream.state) is None or (row := stream.row) is None:
+            return False
+        self.modes.side = stream.posterior.torque
+        h, self.row_t = row.t - self.row_t, row.t
+        known = stream.seconds > (FIRST_TARED if stream.tares else FIRST_UNTARED)
+        if row.h > 0.0:
+            if known:
+                self.modes.take(row.h, state.seen, row.X, state.scale, *self._before_row(run), True)
+            self._gaussian = (run, stream.answer())
+        elif known and 0.0 < h <= GAP and stream.posterior.torque == "link":  # at rest, where friction hides no load
+            self._weigh(row, h, state, run)
+        return known
+
+    def passed_over(self, sample: Sample, run: PosteriorLeastSquares, state: SequentialPosterior | None) -> bool:
+        """Weigh a sample that the run does not take, by its `state`; whether a row came of it that says something."""
+        assert state is not None
+        row = run.stream.look(*sample)
+        if row is None:
+            return False
+        h, self.row_t = row.t - self.row_t, row.t
+        if not 0.0 < h <= GAP:
+            return False
+        self._weigh(row, h, state, run)
+        return True
+
+    def _weigh(self, row: Row, h: float, state: SequentialPosterior, run: PosteriorLeastSquares) -> None:
+        """Weigh a row that the run did not take, for as long as it stands."""
+        seen, scale = state.predict(row._replace(h=h))
+        self.modes.take(h, seen, row.X, scale, *self._before_row(run), False)
+
+    def _before_row(self, run: PosteriorLeastSquares) -> Gaussian:
+        """phi and covariance before the row, under the weak prior."""
+        if self._gaussian is not None and self._gaussian[0] is run:
+            return self._gaussian[1]
+        return np.zeros(10), np.diag(payload_prior_std(run.arm) ** 2)
