@@ -161,6 +161,8 @@ class PayloadWatch:
         self._modes.side = stream.posterior.torque
         h, self._row_t = row.t - self._row_t, row.t
         known = stream.seconds > (FIRST_TARED if stream.tares else FIRST_UNTARED)
+        if self.run.reference is not None:  # its scales are of that run's rows: what they leave out, it leaves out
+            self.run.louder = self._modes.level
         if row.h > 0.0:
             if known:
                 self._modes.take(row.h, state.seen, row.X, state.scale, *self._before_row, True)
