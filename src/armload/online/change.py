@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
+from armload.online.lasting import Lasting
 from armload.online.modes import Modes
 from armload.online.thresholds import LAG, LONG_ENOUGH
 from armload.posterior import PosteriorLeastSquares
@@ -31,6 +33,7 @@ class Change:
     Attributes:
         t: when it was noticed [s]. began: when it began [s]. state: the posterior of the run before, which samples are
             looked at with. following: the run after it. taken_from: since when that run takes samples [s], if it does.
+        lasting: whether those show that the change goes on.
     """
 
     t: float
@@ -38,6 +41,7 @@ class Change:
     state: SequentialPosterior
     following: Future[PosteriorLeastSquares] | PosteriorLeastSquares
     taken_from: float | None = None
+    lasting: Lasting = field(default_factory=Lasting)
 
     @property
     def run(self) -> PosteriorLeastSquares:
@@ -56,12 +60,15 @@ class Change:
     def begin(self, t: float) -> None:
         """The run takes samples from t [s] on."""
         self.run.reset()
-        self.taken_from = t
+        self.taken_from, self.lasting = t, Lasting()
 
-    def take(self, sample: Sample) -> None:
-        """A sample, for the run if it takes samples."""
+    def take(self, sample: Sample, louder: float) -> None:
+        """A sample, for the run if it takes samples; `louder`: as of `Lasting.take`."""
         if self.taken_from is not None:
+            before = self.run.stream.rows
             self.run.update(sample)
+            if self.run.stream.rows > before:
+                self.lasting.take(self.run.stream, louder)
 
     def stays(self, modes: Modes, row_t: float) -> bool:
         """Whether the payload has been the same for so long that it would show, had it gone on changing.
@@ -71,3 +78,14 @@ class Change:
         (shift, spread), T = modes.shift(), modes.stays
         seen = abs(float(shift[0])) * T / (row_t - self.began) > 3.0 * np.sqrt(12.0 * float(spread[0, 0]))
         return T >= LAG and (seen or T > LONG_ENOUGH)
+
+    def ended(self, modes: Modes, before: NDArray[np.float64]) -> Lasting:
+        """The payload stays, and the run is taken up: what its rows say of a hand-over that goes on all the same.
+
+        before: standard deviations of phi (10,).
+        """
+        if self.taken_from is None:
+            self.begin(self.t)
+        assert self.taken_from is not None
+        self.lasting.begin(modes.shift()[0], self.taken_from - self.began, before)
+        return self.lasting

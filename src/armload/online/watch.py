@@ -73,7 +73,8 @@ class PayloadWatch:
 
     def __init__(self, first: PosteriorLeastSquares) -> None:
         self.runs = Runs(first)
-        self._unit = float(payload_prior_std(first.arm)[0])
+        self._weak = payload_prior_std(first.arm)
+        self._unit = float(self._weak[0])
         self._look = Deferred()
         self._background = Background()
         self.reset()
@@ -108,7 +109,8 @@ class PayloadWatch:
     @property
     def likely(self) -> tuple[float, float, float]:
         """Probabilities that the payload is not what the run holds, or changes; of a contact; of a drift of the arm."""
-        return self._modes.handing + self._modes.other, self._modes.contact, self._modes.drift
+        changed = self._modes.handing + self._modes.other + self._modes.steady * self._tracker.goes_on
+        return changed, self._modes.contact, self._modes.drift
 
     @property
     def sure(self) -> bool:
@@ -163,6 +165,7 @@ class PayloadWatch:
         known = stream.seconds > (FIRST_TARED if stream.tares else FIRST_UNTARED)
         if self.run.reference is not None:  # its scales are of that run's rows: what they leave out, it leaves out
             self.run.louder = self._modes.level
+        self._tracker.row(stream, self._modes.level, self.run.last)
         if row.h > 0.0:
             if known:
                 self._modes.take(row.h, state.seen, row.X, state.scale, *self._before_row, True)
@@ -172,7 +175,7 @@ class PayloadWatch:
         if known:
             self._decide(sample, held)
             changed = self._modes.handing + self._modes.other
-            self.mixed = self.phase == FOLLOWING and changed > UNLIKELY
+            self.mixed = self.phase == FOLLOWING and (changed > UNLIKELY or self._tracker.behind)
 
     @property
     def _before_row(self) -> Gaussian:
@@ -236,7 +239,7 @@ class PayloadWatch:
             return
         if looked:
             change.looked(sample.t, modes, self._row_t)
-        change.take(sample)
+        change.take(sample, modes.level)
         if sample.t - change.t > PATIENCE or (looked and modes.other > LIKELY and change.stays(modes, self._row_t)):
             self._take_up_the_next()
 
@@ -253,10 +256,9 @@ class PayloadWatch:
         """The payload stays: the next run begins."""
         self.hold()
         assert self._change is not None
-        if self._change.taken_from is None:
-            self._change.run.reset()
-        run, self._change = self._change.run, None
-        self._watch_anew(self.runs.follow(run))
+        change, self._change = self._change, None
+        self._tracker.lasting = change.ended(self._modes, self._weak)
+        self._watch_anew(self.runs.follow(change.run))
         self._judging = True
 
     def _judge(self, estimate: Estimate, held: bool) -> None:
@@ -267,6 +269,7 @@ class PayloadWatch:
             return
         self._judging = seconds <= RETURN_UNTIL
         if std <= RETURN_STD and self.runs.is_earlier(estimate):
+            self._tracker.lasting = None
             self._watch_anew(self.runs.go_back())
             self._judging = False
             self.event = replace(self.event, kind="return")
