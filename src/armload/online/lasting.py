@@ -21,10 +21,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.online.thresholds import HOLDS, LAG, PATIENCE, STARTS, UNLIKELY
+from armload.online.thresholds import HOLDS, PATIENCE, UNLIKELY
 from armload.posterior.stream import StreamingPosterior
 
-_ENDS = 4.0 * STARTS  # [s] T, each for those since the one before: 0.2 to 6.4 s, as what is sought shows within seconds
+# [s] T, each for those since the one before: 0.1 to 6.4 s, a third of an octave apart. With whole octaves an
+# interval of ±10 g left out three of ten (test_a_run_that_a_hand_over_goes_on_in_has_the_truth_in_its_interval)
+_ENDS = HOLDS * 2.0 ** (np.arange(19) / 3.0)
 
 
 class Lasting:
@@ -44,13 +46,15 @@ class Lasting:
         self._before, self._prior = np.zeros((10, 10)), np.zeros(n + 1)
         self.seconds, self.goes_on, self.ahead = 0.0, 0.0, (np.zeros(10), np.zeros((10, 10)))
 
-    def begin(self, shift: NDArray[np.float64], seconds: float, before: NDArray[np.float64]) -> None:
-        """The run is taken up: phi (10,) has changed by `shift` within `seconds` before its first row.
+    def begin(self, shift: NDArray[np.float64], lasted: float, stayed: float, before: NDArray[np.float64]) -> None:
+        """The run is taken up.
 
-        before: standard deviations of phi (10,).
+        Args:
+            shift: by how much phi (10,) has changed. lasted: within how long [s]; one lag of the rows at least.
+            stayed: for how long it seemed to stay when the run began [s]. before: standard deviations of phi (10,).
         """
-        lasted = max(seconds - LAG, HOLDS)  # no run takes a sample before its payload has stayed for a `LAG`
-        goes_on = 0.5 * lasted / (lasted + LAG + np.array([0.0, *_ENDS[:-1]]))
+        lasted = max(lasted, HOLDS)
+        goes_on = 0.5 * lasted / (lasted + stayed + np.array([0.0, *_ENDS[:-1]]))
         self._prior = np.array([*(goes_on[:-1] - goes_on[1:]), goes_on[-1], 1.0 - goes_on[0]])
         self._begun, self._pace, self._before = True, shift / lasted, np.diag(before**-2.0)
         self._weigh()

@@ -6,13 +6,12 @@ from statistics import NormalDist
 
 import numpy as np
 
-from armload.estimators import Estimate
 from armload.inertia import Z95
 from armload.online.lasting import Lasting
 from armload.online.modes import Modes
 from armload.online.runs import Gaussian
 from armload.online.thresholds import LAG, UNLIKELY
-from armload.posterior.stream import StreamingPosterior
+from armload.posterior import PosteriorLeastSquares
 
 
 class Tracker:
@@ -27,20 +26,17 @@ class Tracker:
         self.lasting: Lasting | None = None
 
     @property
-    def behind(self) -> bool:
-        """Whether the run alone may be behind."""
-        return self.lasting is not None
-
-    @property
     def goes_on(self) -> float:
         """Probability that the hand-over before the run goes on."""
         return 0.0 if self.lasting is None else self.lasting.goes_on
 
-    def row(self, stream: StreamingPosterior, louder: float, last: Estimate) -> None:
-        """The run has taken a row, and answered `last`; `louder`: as of `Lasting.take`."""
+    def row(self, run: PosteriorLeastSquares, louder: float) -> None:
+        """A run has taken a row; `louder`: how large the noise is, in units of what it is taken for."""
+        if run.reference is not None:  # its scales are of that run's rows: what they leave out, it leaves out
+            run.louder = louder
         if self.lasting is not None:
-            self.lasting.take(stream, louder)
-            if self.lasting.over(float(last.covariance[0, 0])):
+            self.lasting.take(run.stream, louder)
+            if self.lasting.over(float(run.last.covariance[0, 0])):
                 self.lasting = None
 
     def track(self, modes: Modes, t: float, last: Gaussian) -> Gaussian:

@@ -29,6 +29,7 @@ from armload.online.background import Background
 from armload.online.change import Change, next_run
 from armload.online.detector import ChangeDetector
 from armload.online.event import Event, kind_of
+from armload.online.lasting import Lasting
 from armload.online.modes import Modes
 from armload.online.runs import Gaussian, Runs
 from armload.online.schedule import Deferred
@@ -73,8 +74,7 @@ class PayloadWatch:
 
     def __init__(self, first: PosteriorLeastSquares) -> None:
         self.runs = Runs(first)
-        self._weak = payload_prior_std(first.arm)
-        self._unit = float(self._weak[0])
+        self._unit = float(payload_prior_std(first.arm)[0])
         self._look = Deferred()
         self._background = Background()
         self.reset()
@@ -163,9 +163,7 @@ class PayloadWatch:
         self._modes.side = stream.posterior.torque
         h, self._row_t = row.t - self._row_t, row.t
         known = stream.seconds > (FIRST_TARED if stream.tares else FIRST_UNTARED)
-        if self.run.reference is not None:  # its scales are of that run's rows: what they leave out, it leaves out
-            self.run.louder = self._modes.level
-        self._tracker.row(stream, self._modes.level, self.run.last)
+        self._tracker.row(self.run, self._modes.level)
         if row.h > 0.0:
             if known:
                 self._modes.take(row.h, state.seen, row.X, state.scale, *self._before_row, True)
@@ -174,8 +172,8 @@ class PayloadWatch:
             self._weigh(row, h, state)
         if known:
             self._decide(sample, held)
-            changed = self._modes.handing + self._modes.other
-            self.mixed = self.phase == FOLLOWING and (changed > UNLIKELY or self._tracker.behind)
+            changed = self._modes.handing + self._modes.other > UNLIKELY
+            self.mixed = self.phase == FOLLOWING and (changed or self._tracker.lasting is not None)
 
     @property
     def _before_row(self) -> Gaussian:
@@ -257,8 +255,8 @@ class PayloadWatch:
         self.hold()
         assert self._change is not None
         change, self._change = self._change, None
-        self._tracker.lasting = change.ended(self._modes, self._weak)
-        self._watch_anew(self.runs.follow(change.run))
+        lasting = change.ended(self._modes)
+        self._watch_anew(self.runs.follow(change.run), lasting)
         self._judging = True
 
     def _judge(self, estimate: Estimate, held: bool) -> None:
@@ -269,7 +267,6 @@ class PayloadWatch:
             return
         self._judging = seconds <= RETURN_UNTIL
         if std <= RETURN_STD and self.runs.is_earlier(estimate):
-            self._tracker.lasting = None
             self._watch_anew(self.runs.go_back())
             self._judging = False
             self.event = replace(self.event, kind="return")
@@ -277,12 +274,13 @@ class PayloadWatch:
             self._unnamed = False
             self.event = replace(self.event, kind=kind_of(self._held_before, held))
 
-    def _watch_anew(self, dropped: PosteriorLeastSquares | None) -> None:
+    def _watch_anew(self, dropped: PosteriorLeastSquares | None, lasting: Lasting | None = None) -> None:
         """Begin to watch the current run; one that is not wanted any more has its thread stopped."""
         self._modes.reset()
         self._detector.begin_run()
         self._look.clear()
-        self.phase, self._gave_up, self.mixed = FOLLOWING, False, False
+        self.phase, self._gave_up, self.mixed = FOLLOWING, False, lasting is not None
+        self._tracker.lasting = lasting
         if dropped is not None:
             self._background.close_run(dropped)
 
