@@ -38,7 +38,7 @@ def told(all_rows, lasted=5.0, stayed=0.2, pace=PACE):
 
 
 def by_all_rows(all_rows, ends, prior):
-    """The mixture over ends of the Gaussian of (phi, a), from all rows at once: phi at the last row, and a = 0 alone."""
+    """The mixture over ends of the Gaussian of (phi, a), from all rows at once: phi at the last row; a = 0 alone."""
     t = np.repeat([r[0] for r in all_rows], 3)
     W, e, v = (np.concatenate([r[k] for r in all_rows]) for k in (1, 2, 3))
     found, log = [], []

@@ -255,8 +255,7 @@ class PayloadWatch:
         self.hold()
         assert self._change is not None
         change, self._change = self._change, None
-        lasting = change.ended(self._modes)
-        self._watch_anew(self.runs.follow(change.run), lasting)
+        self._watch_anew(self.runs.follow(change.run), change.ended(self._modes))
         self._judging = True
 
     def _judge(self, estimate: Estimate, held: bool) -> None:
