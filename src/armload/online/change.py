@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from armload.online.lasting import Lasting
 from armload.online.modes import Modes
 from armload.online.thresholds import LAG, LONG_ENOUGH
 from armload.posterior import PosteriorLeastSquares
 from armload.posterior.sequential import SequentialPosterior
 from armload.recording import Sample
+from armload.regression import payload_prior_std
 
 
 def next_run(
@@ -31,6 +33,8 @@ class Change:
     Attributes:
         t: when it was noticed [s]. began: when it began [s]. state: the posterior of the run before, which samples are
             looked at with. following: the run after it. taken_from: since when that run takes samples [s], if it does.
+        stayed: for how long the payload seems to have been the same by then [s]. lasting: what those say of a change
+            that goes on.
     """
 
     t: float
@@ -38,6 +42,8 @@ class Change:
     state: SequentialPosterior
     following: Future[PosteriorLeastSquares] | PosteriorLeastSquares
     taken_from: float | None = None
+    stayed: float = 0.0
+    lasting: Lasting = field(default_factory=Lasting)
 
     @property
     def run(self) -> PosteriorLeastSquares:
@@ -51,17 +57,20 @@ class Change:
         if modes.other < 0.5 or modes.stays < LAG:
             self.taken_from = None
         elif self.taken_from is None or self.taken_from < row_t - modes.stays:
-            self.begin(t)
+            self.begin(t, modes.stays)
 
-    def begin(self, t: float) -> None:
-        """The run takes samples from t [s] on."""
+    def begin(self, t: float, stayed: float) -> None:
+        """The run takes samples from t [s] on, when the payload seems to have stayed for so long [s]."""
         self.run.reset()
-        self.taken_from = t
+        self.taken_from, self.stayed, self.lasting = t, stayed, Lasting()
 
-    def take(self, sample: Sample) -> None:
-        """A sample, for the run if it takes samples."""
+    def take(self, sample: Sample, louder: float) -> None:
+        """A sample, for the run if it takes samples; `louder`: as of `Lasting.take`."""
         if self.taken_from is not None:
+            before = self.run.stream.rows
             self.run.update(sample)
+            if self.run.stream.rows > before:
+                self.lasting.take(self.run.stream, louder)
 
     def stays(self, modes: Modes, row_t: float) -> bool:
         """Whether the payload has been the same for so long that it would show, had it gone on changing.
@@ -71,3 +80,12 @@ class Change:
         (shift, spread), T = modes.shift(), modes.stays
         seen = abs(float(shift[0])) * T / (row_t - self.began) > 3.0 * np.sqrt(12.0 * float(spread[0, 0]))
         return T >= LAG and (seen or T > LONG_ENOUGH)
+
+    def ended(self, modes: Modes) -> Lasting:
+        """The payload stays, and the run is taken up: what its rows say of a hand-over that goes on all the same."""
+        if self.taken_from is None:
+            self.begin(self.t, 0.0)
+        assert self.taken_from is not None
+        lasted = self.taken_from - self.stayed - self.began
+        self.lasting.begin(modes.shift()[0], lasted, self.stayed, payload_prior_std(self.run.arm))
+        return self.lasting

@@ -28,6 +28,7 @@ from armload.estimators import Estimate
 from armload.online.background import Background
 from armload.online.change import Change, next_run
 from armload.online.event import Event
+from armload.online.lasting import Lasting
 from armload.online.naming import Naming
 from armload.online.runs import Runs
 from armload.online.schedule import Deferred
@@ -92,8 +93,9 @@ class PayloadWatch:
 
     @property
     def likely(self) -> tuple[float, float, float]:
-        """Probabilities as of `Weighing.likely`."""
-        return self._weighing.likely
+        """Probabilities that the payload is not what the run holds, or changes; of a contact; of a drift of the arm."""
+        changed, contact, drift = self._weighing.likely
+        return changed + self._weighing.modes.steady * self._tracker.goes_on, contact, drift
 
     @property
     def sure(self) -> bool:
@@ -140,9 +142,11 @@ class PayloadWatch:
     def _examine(self, sample: Sample, held: bool) -> None:
         """Look at the innovations of the last row, which the run has taken."""
         self._look.clear()
+        self._tracker.row(self.run, self._weighing.modes.level)
         if self._weighing.taken(self.run):
             self._decide(sample, held)
-            self.mixed = self.phase == FOLLOWING and self.likely[0] > UNLIKELY
+            changed = self._weighing.likely[0] > UNLIKELY
+            self.mixed = self.phase == FOLLOWING and (changed or self._tracker.lasting is not None)
 
     # ------------------------------------------------------------------ doubting
 
@@ -183,7 +187,7 @@ class PayloadWatch:
             return
         if looked:
             change.looked(sample.t, modes, self._weighing.row_t)
-        change.take(sample)
+        change.take(sample, modes.level)
         stays = looked and modes.other > LIKELY and change.stays(modes, self._weighing.row_t)
         if stays or sample.t - change.t > PATIENCE:
             self._take_up_the_next()
@@ -200,17 +204,16 @@ class PayloadWatch:
         """The payload stays: the next run begins."""
         self.hold()
         assert self._change is not None
-        if self._change.taken_from is None:
-            self._change.run.reset()
-        run, self._change = self._change.run, None
-        self._watch_anew(self.runs.follow(run))
+        change, self._change = self._change, None
+        self._watch_anew(self.runs.follow(change.run), change.ended(self._weighing.modes))
         self._naming.judging = True
 
-    def _watch_anew(self, dropped: PosteriorLeastSquares | None) -> None:
+    def _watch_anew(self, dropped: PosteriorLeastSquares | None, lasting: Lasting | None = None) -> None:
         """Begin to watch the current run; one that is not wanted any more has its thread stopped."""
         self._weighing.begin_run()
         self._look.clear()
-        self.phase, self._gave_up, self.mixed = FOLLOWING, False, False
+        self.phase, self._gave_up, self.mixed = FOLLOWING, False, lasting is not None
+        self._tracker.lasting = lasting
         if dropped is not None:
             self._background.close_run(dropped)
 

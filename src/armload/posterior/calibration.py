@@ -59,9 +59,12 @@ class Calibration:
         """c (10,) after t seconds: linear in log t, constant beyond the calibrated times."""
         return _between(self.widths[kind], self.times, t)
 
-    def trusted(self, evidence: Evidence) -> Evidence:
-        """Evidence as far as it can be trusted: Λ/kappa, h/kappa."""
-        kappa = self.kappa(evidence.traits)
+    def trusted(self, evidence: Evidence, louder: float = 1.0) -> Evidence:
+        """Evidence as far as it can be trusted: Λ/kappa, h/kappa.
+
+        louder: how large the noise is seen to be, in units of what the evidence takes it for.
+        """
+        kappa = louder * self.kappa(evidence.traits)
         Λ, h = evidence.information / kappa, evidence.vector / kappa
         return Evidence(Λ, h, evidence.gain_std, evidence.traits, evidence.t, evidence.kind)
 

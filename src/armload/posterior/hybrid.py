@@ -102,7 +102,7 @@ class HybridIdentifier(PosteriorLeastSquares):
         return self._payloads.mean, np.diag(self._payloads.std**2)
 
     def _answer(self, elapsed: float, concluded: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        self._trusted = self.model.calibration.trusted(self.evidence(elapsed))
+        self._trusted = self.model.calibration.trusted(self.evidence(elapsed), self.louder)
         tool = self.arm.attached is not None or self.stream.without_tare
         found = answer(self._trusted, self.model.calibration, self._payloads, tool, not concluded, self.known)
         self.exchanged, self.log_only, self.taken = found.exchanged, found.log_only, found.taken

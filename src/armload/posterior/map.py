@@ -65,6 +65,7 @@ class PosteriorLeastSquares(Identifier):
     _same_motion: SameMotion | None = None
     test_tare = True  # whether an answer tests that arm and gravity are as stated; episodes of a training do not
     publish = PUBLISH  # [s] between two live answers; a service that speaks ten times a second asks for fewer
+    louder = 1.0  # how large the noise is seen to be, in units of what the scales say; whoever watches the rows tells
     known: Known | None = None  # of the payload, apart from the log
     log_only: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None  # then the answer from the log only
     taken = False  # whether the last answer rests on what is known, too
@@ -183,7 +184,7 @@ class PosteriorLeastSquares(Identifier):
         concluded: bool = False,  # noqa: ARG002
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """phi and covariance from the stream as it stands, `elapsed` seconds after the run began."""
-        phi, covariance = self.stream.answer()
+        phi, covariance = self.stream.answer(self.louder)
         if self.known is None:
             return phi, covariance
         self.log_only, given = (phi, covariance), self.known.given(phi, covariance)

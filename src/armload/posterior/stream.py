@@ -191,10 +191,10 @@ class StreamingPosterior:
         """Λ·phi_ML (10,)."""
         return self._current.vector
 
-    def answer(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """phi (10,) and its covariance (10, 10) under the Gaussian prior, as `solve` gives them."""
-        state, gain = self._current, self.posterior.gain_std**2
-        return under_prior(state.information, state.vector, *self._gaussian, self.noise.overrated, gain)
+    def answer(self, louder: float = 1.0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """phi (10,) and its covariance (10, 10) under the Gaussian prior, as `solve` gives them; noise is `louder`."""
+        state, about = self._current, (louder * self.noise.overrated, self.posterior.gain_std**2)
+        return under_prior(state.information, state.vector, *self._gaussian, *about)
 
     @property
     def _current(self) -> SequentialPosterior:
