@@ -86,6 +86,6 @@ class Change:
         if self.taken_from is None:
             self.begin(self.t, 0.0)
         assert self.taken_from is not None
-        lasted = self.taken_from - self.stayed - self.began
+        lasted = max(self.taken_from - self.stayed, self.t) - self.began  # what is slow is noticed late
         self.lasting.begin(modes.shift()[0], lasted, self.stayed, payload_prior_std(self.run.arm))
         return self.lasting
