@@ -9,6 +9,7 @@ sound        nothing, in five populations
 a day        offsets and friction by what is expected of a day, 1 sigma (`Correction.daily_std`)
 a third, old offsets by ±0.1 (wrist 0.03) N·m and friction by 10 %; by ±0.3 (wrist 0.1) N·m and 30 %
 other arm    the tare is of another arm of the same kind
+FR3          its joints rub 2.5 times as much as a Panda's, of what they are rated for
 
 Each log is answered by the hybrid (or `map-gp`, where none is shipped) with and without the tests of
 `armload.posterior.drift` and `armload.posterior.another_arm`; arms that measure motor current are not asked. doubted:
@@ -46,8 +47,10 @@ CASES = {  # name → arm, population, what has changed
     "old": ("panda", "reference", 1.0),
     "old, along the same motion": ("panda", "same-motion", 1.0),
     "other arm": ("panda", "reference", "other"),
+    "sound, FR3": ("fr3", "reference", None),
+    "old, FR3": ("fr3", "reference", 1.0),
 }
-OLD_OFFSET = np.array([0.3, 0.3, 0.3, 0.3, 0.1, 0.1, 0.1])  # [N·m] of a Panda
+OLD_OFFSET = np.array([0.3, 0.3, 0.3, 0.3, 0.1, 0.1, 0.1])  # [N·m] of a Panda and an FR3
 OLD_FRICTION = 0.3
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from armload import arm
+from armload.arms import FRICTION_WIDTH
 from armload.identification import identify
 from armload.inertia import Z95
 from armload.lab.episodes import draw_episodes, simulate_episodes
@@ -16,6 +17,7 @@ from armload.posterior import HybridIdentifier, SmoothPosteriorLeastSquares
 from armload.posterior.drift import CHANGED
 from armload.posterior.problem import Problem
 from armload.simulation import World
+from armload.simulation.friction import Friction
 
 OFFSET = np.array([0.3, -0.3, 0.3, -0.3, 0.1, -0.1, 0.1])  # [N·m]
 
@@ -63,6 +65,28 @@ def test_a_tare_of_another_arm_is_noticed(panda):
         identifier = HybridIdentifier(panda, log.tare)
         identifier.run(log.run)
         assert identifier.stream.drift.changed
+
+
+@pytest.mark.full  # some seconds
+def test_joints_that_rub_more_than_most_are_asked_and_motor_currents_are_not(panda):
+    def rubbing(share, offset):
+        friction = Friction(share * panda.limits.effort, np.full(panda.n, FRICTION_WIDTH))
+        now = replace(episode.world, friction=friction)
+        e = replace(episode, world=now, tare_world=replace(now, offset=now.offset - offset))
+        return next(iter(simulate_episodes([e])))
+
+    episode = draw_episodes(panda, "reference", 1, seed=81, motions=3)[0]
+    found = {}
+    for share, offset in ((0.015, OFFSET), (0.015, 0.0 * OFFSET), (0.06, OFFSET)):
+        log = rubbing(share, offset)
+        identifier = HybridIdentifier(panda, log.tare)
+        identifier.run(log.run)
+        assert identifier.posterior.torque == "motor"  # as far as the gain's width goes
+        found[share, offset.any()] = identifier.stream.drift
+    assert found[0.015, True].changed
+    assert found[0.015, True].offset[:4] == pytest.approx(OFFSET[:4], abs=0.2)
+    assert not found[0.015, False].changed
+    assert found[0.06, True] is None
 
 
 @pytest.mark.full  # some seconds

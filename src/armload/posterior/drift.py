@@ -9,7 +9,8 @@ is small where nothing else has changed. It is large for a tare of another day, 
 With a profile, E is the drift of the arm's own sessions, and T is large where this one is not of their kind.
 
 Motor currents cannot be asked: friction differs from run to run on a sound arm, too, by more than T allows (T = 1000 of
-the real UR10e pair, though what its gears lose is an unknown).
+the real UR10e pair, though what its gears lose is an unknown). They are told by friction that only gears have
+(`Posterior.gears`): an arm with much friction behind its gears, or more of it at the tare, is asked all the same.
 """
 
 from __future__ import annotations

@@ -19,6 +19,7 @@ from armload.posterior.scales import Posterior, Scales
 from armload.posterior.sequential import SequentialPosterior
 from armload.regression import GaussianPrior
 from armload.regression.information import RegressionData
+from armload.regression.mismatch import LEAST_FRICTION
 from armload.regression.noise import NoiseModel, share_of_noise, whole_noise
 
 # [m, m²] standard deviation of first moments and inertia per kilogram of what was mounted at a tare, so that its
@@ -232,6 +233,7 @@ class Problem:
         drift = self._drift(0) if self.runs[-1].session.drift > 0.0 else slice(0, 0)
         friction = float(np.median(np.abs(self.correction.coulomb(eta)) / self.correction.effort))
         torque = "motor" if self.correction.arm.motor_torque or friction > _MOTOR_SIDE else "link"
+        gears = self.correction.arm.motor_torque or friction > LEAST_FRICTION
         precision = np.linalg.inv(covariance)
         if self.root is None:
             before, pull = np.diag(1.0 / self.payload_variance[self.last]), np.zeros(10)
@@ -257,6 +259,7 @@ class Problem:
                 ]
             ),
             torque=torque,
+            gears=gears,
             gain_std=gain,
             scales=scales,
             ratios=self._ratios(scales, eta),

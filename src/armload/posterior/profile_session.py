@@ -123,8 +123,7 @@ def compared(known: Profile, correction: Correction, data: RegressionData) -> tu
     arm = correction.arm
     runs = [known.data(correction, GAIN, SMOOTH.block), data]
     found = solve(runs, payload_prior_std(arm), None, SMOOTH, 3, known.scales)
-    sensed = found.torque == "link"  # friction of gears differs from run to run
-    another = sensed and another_arm(runs, payload_prior_std(arm), None, SMOOTH, found).found
+    another = not found.gears and another_arm(runs, payload_prior_std(arm), None, SMOOTH, found).found
     return found, drift_of(found, correction, data.session), another
 
 

@@ -51,6 +51,7 @@ class Posterior:
     residual: √S (n,) of the run [N·m·√s].
     power: (K, n) mean square of each run's residual [N²·m²].
     torque: "link" or "motor", the side the torque seems to be measured on.
+    gears: whether friction of gears is surely in the torque, so that it differs from run to run on a sound arm.
     gain_std: relative standard deviation of the torque's calibration.
     scales: what expectation–maximisation found; another solution may start there.
     ratios: the scales (n,) of "noise", "pose", "velocity" and "friction", and the squared offsets ("offset"), over what
@@ -69,6 +70,7 @@ class Posterior:
     residual: NDArray[np.float64]
     power: NDArray[np.float64]
     torque: str
+    gears: bool
     gain_std: float
     scales: Scales
     ratios: dict[str, NDArray[np.float64]]

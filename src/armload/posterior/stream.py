@@ -221,7 +221,7 @@ class StreamingPosterior:
         self.drift = self.another = None
         about = (self.prior_std, self.prior, self.noise)
         self._adopt(self._solved(runs, self.start, self.iterations - 1))
-        if self.tares and self._test_tare and self.posterior.torque == "link":
+        if self.tares and self._test_tare and not self.posterior.gears:
             self.drift = drift_since_tare(runs, *about, self.posterior)
             if self.drift.changed:
                 run.session = replace(self.session, number=1, drift=max(ALLOWED, self.session.drift))
@@ -257,9 +257,9 @@ class StreamingPosterior:
 
         Not before `FROM`: what pushes or pulls for a few seconds is no other arm.
         """
-        torque, drifts = solution.posterior.torque, solution.posterior.drift.size > 0
+        drifts = solution.posterior.drift.size > 0
         asked = self._test_tare and self.session.drift >= TESTED and seconds >= FROM
-        return asked and torque == "link" and drifts
+        return asked and drifts and not solution.posterior.gears
 
     def _adopt(self, solution: Solution) -> None:
         self._early, self.without_tare = None, False

@@ -48,7 +48,7 @@ _MOTOR_FRICTION = {"coulomb": 5.0, "viscous": 5.0}
 _LOSS = 0.08
 # [effort limits] friction surely in a motor current's torque: 0.03 to 0.06 of a UR10e's joints. With it, |torque| of a
 # joint that mostly rubs would be its friction, and a loss all that it transmits
-_LEAST_FRICTION = 0.02
+LEAST_FRICTION = 0.02
 # times that the variance of a joint's residual is larger at rest than in motion, link and motor side: friction is
 # anything below stiction there. √10 and √250 of a residual of 1e-3 effort limits are a third of the friction expected
 _PRESLIDING, _MOTOR_PRESLIDING = 10.0, 250.0
@@ -138,7 +138,7 @@ class Correction:
     @property
     def least_friction(self) -> NDArray[np.float64]:
         """c (n,) [N·m], friction that is surely in the measured torque; 0 where gears are not."""
-        return self.arm.motor_torque * _LEAST_FRICTION * self.effort
+        return self.arm.motor_torque * LEAST_FRICTION * self.effort
 
     def regressor(self, q: ArrayLike, dq: ArrayLike, torque: ArrayLike) -> MomentumRegressor:
         """Momentum form of Z for samples (N, n), torque being measured: two arrays (N, n, p)."""
