@@ -7,7 +7,8 @@ between tare and run:
 
 sound        nothing, in five populations
 a day        offsets and friction by what is expected of a day, 1 sigma (`Correction.daily_std`)
-a third, old offsets by ±0.1 (wrist 0.03) N·m and friction by 10 %; by ±0.3 (wrist 0.1) N·m and 30 %
+a third, old offsets by ±0.1 (wrist 0.03) N·m and friction by 10 %; by ±0.3 (wrist 0.1) N·m and 30 %,
+             or one of the two alone
 other arm    the tare is of another arm of the same kind
 FR3          its joints rub 2.5 times as much as a Panda's, of what they are rated for
 
@@ -45,6 +46,8 @@ CASES = {  # name → arm, population, what has changed
     "a day": ("panda", "reference", "day"),
     "a third": ("panda", "reference", 0.33),
     "old": ("panda", "reference", 1.0),
+    "old, offsets alone": ("panda", "reference", "offsets"),
+    "old, friction alone": ("panda", "reference", "friction"),
     "old, along the same motion": ("panda", "same-motion", 1.0),
     "other arm": ("panda", "reference", "other"),
     "sound, FR3": ("fr3", "reference", None),
@@ -68,8 +71,9 @@ def before(episode: Episode, change: Any, k: int) -> Episode:
         level = np.maximum(world.friction.level + drift[1], 0.3 * world.friction.level)
         then = replace(world, offset=world.offset + drift[0], friction=replace(world.friction, level=level))
     else:
-        level = world.friction.level * (1.0 + change * OLD_FRICTION)
-        offset = world.offset + change * rng.choice([-1.0, 1.0], episode.arm.n) * OLD_OFFSET
+        slips, shifts = {"offsets": (0.0, 1.0), "friction": (1.0, 0.0)}.get(change, (change, change))
+        level = world.friction.level * (1.0 + slips * OLD_FRICTION)
+        offset = world.offset + shifts * rng.choice([-1.0, 1.0], episode.arm.n) * OLD_OFFSET
         then = replace(world, offset=offset, friction=replace(world.friction, level=level))
     return replace(episode, tare_world=then)
 
