@@ -50,7 +50,7 @@ def by_all_rows(all_rows, ends, prior):
         K = P0 @ X.T @ np.linalg.inv(S)
         to_now = np.column_stack([np.eye(10), s[-1] * PACE])
         found.append((to_now @ K @ e, to_now @ (P0 - K @ X @ P0) @ to_now.T))
-        log.append(multivariate_normal(np.zeros(len(e)), S).logpdf(e))
+        log.append(multivariate_normal(np.zeros(len(e)), S).logpdf(e))  # type: ignore[arg-type]
     p = prior * np.exp(np.array(log) - max(log))
     p /= p.sum()
     mean = sum(x * m for x, (m, _) in zip(p, found, strict=True))
