@@ -102,7 +102,7 @@ def wilson(hits: int, of: int) -> list[float]:
 
 
 def followed(e: Episode, profile: Profile, log: Recording, held: np.ndarray) -> tuple[Profile | None, float, float]:
-    """What a stream teaches, when it is said that the arm is not the profile's [s] (inf: never), and the share wrong."""
+    """What a stream teaches, when the arm is said not to be the profile's [s] (inf: never), the share wrong."""
     stream, said, wrong = OnlineIdentifier(e.arm, profile=profile), np.inf, 0
     try:
         for sample, mass in zip(log, held, strict=True):
