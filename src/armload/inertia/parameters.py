@@ -23,6 +23,7 @@ UNITS = ("kg", "kg·m", "kg·m", "kg·m", "kg·m²", "kg·m²", "kg·m²", "kg·
 
 _ROWS = np.array([0, 0, 0, 1, 1, 2])
 _COLUMNS = np.array([0, 1, 2, 1, 2, 2])
+_SIX = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])  # where each entry of the matrix is among the six
 
 
 def skew(v: ArrayLike) -> NDArray[np.float64]:
@@ -41,11 +42,7 @@ def vech(inertia: ArrayLike) -> NDArray[np.float64]:
 
 def inertia_matrix(six: ArrayLike) -> NDArray[np.float64]:
     """The symmetric matrices (..., 3, 3) of six numbers (..., 6) in the order xx, xy, xz, yy, yz, zz."""
-    six = np.asarray(six, dtype=float)
-    out = np.empty((*six.shape[:-1], 3, 3))
-    out[..., _ROWS, _COLUMNS] = six
-    out[..., _COLUMNS, _ROWS] = six
-    return out
+    return np.asarray(six, dtype=float)[..., _SIX]
 
 
 def com_to_phi(mass: float, com: ArrayLike, inertia_com: ArrayLike) -> NDArray[np.float64]:

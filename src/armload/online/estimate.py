@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -145,4 +146,4 @@ class OnlineEstimate(Estimate):
 
 
 def _finite(values: NDArray[np.float64]) -> list[float | None]:
-    return [x if np.isfinite(x) else None for x in values.tolist()]
+    return [x if math.isfinite(x) else None for x in values.tolist()]

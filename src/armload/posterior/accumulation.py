@@ -21,10 +21,10 @@ from armload.posterior.solve import Solution
 from armload.regression.information import RegressionData
 from armload.regression.rows import Row, Rows
 
-# [rows] after which the scales are found anew (0.1, 0.3, … 12 s): they change with the logarithm of the time. Then
-# every so many, 10 s: the second thread takes 2 % of a core
-_REFITS = (20, 60, 100, 150, 200, 300, 400, 600, 800, 1200, 1600, 2400)
-_REFIT_EVERY = 2000
+# [rows] after which the scales are found anew (0.1, 0.3, … 30 s): they change with the logarithm of the time. And after
+# every so many, 20 s: another arm, which is asked for then, is to be told within a minute
+_REFITS = (20, 60, 100, 150, 200, 300, 400, 600, 800, 1200, 1600, 2400, 6000)
+_REFIT_EVERY = 4000
 # [rows] handed over at once in between, 1 s: the fewer times a run's squares (3.5 MB) are read and written, the less it
 # costs; where the tare may show the same motion that is asked so often, 0.25 s
 _CHUNK, _COMPARED = 200, 50
