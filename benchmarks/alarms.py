@@ -69,7 +69,8 @@ def stream_of(e: Episode, case: str, k: int, i: int) -> tuple[Recording, np.ndar
         friction = replace(world.friction, level=1.4 * world.friction.level)
         world = replace(world, offset=world.offset + off, friction=friction)
     mass = MASSES.get(case, 0.0)
-    body = InertialParameters(draw_payload("boxes", 31 * k + i, mass).parameters.phi) if mass else None
+    drawn = draw_payload("boxes", 31 * k + i).parameters.phi
+    body = InertialParameters(drawn * mass / drawn[0]) if mass else None  # a box of so much, evenly filled
     runs = [Run(motion, body, world, e.sensors, int(rng.integers(1 << 30)), e.gains)]
     if case == "hand-over":
         runs.append(replace(runs[0], payload=None))

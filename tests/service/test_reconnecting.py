@@ -152,5 +152,5 @@ def test_a_session_goes_on_where_it_was_after_its_reader_was_killed(panda, sourc
             break
     session.close()
     assert estimate.n_samples > used  # nothing was forgotten
-    assert len(lags) > 2
+    assert len(lags) > 1  # it waits for 0.1 s at least, and says so every 0.1 s
     assert all(late > early for early, late in itertools.pairwise(lags))
