@@ -29,15 +29,14 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from bodies import body_of
 from life import OFFSET, empty_logs, motions_about, on_a_day
 from script import RESULTS, ROOT, markdown_table, options, say, write, write_table
 
 from armload import Recording, arm
-from armload.inertia import InertialParameters
 from armload.lab.episodes import Episode, draw_episodes
 from armload.lab.episodes.motion_kinds import MotionSource
 from armload.online import OnlineIdentifier
-from armload.payloads import draw_payload
 from armload.posterior import Profile, learn_profile
 from armload.simulation import Run, World, simulate_many
 from armload.simulation.resolution import COARSE
@@ -69,8 +68,7 @@ def stream_of(e: Episode, case: str, k: int, i: int) -> tuple[Recording, np.ndar
         friction = replace(world.friction, level=1.4 * world.friction.level)
         world = replace(world, offset=world.offset + off, friction=friction)
     mass = MASSES.get(case, 0.0)
-    drawn = draw_payload("boxes", 31 * k + i).parameters.phi
-    body = InertialParameters(drawn * mass / drawn[0]) if mass else None  # a box of so much, evenly filled
+    body = body_of(mass, 31 * k + i).parameters if mass else None
     runs = [Run(motion, body, world, e.sensors, int(rng.integers(1 << 30)), e.gains)]
     if case == "hand-over":
         runs.append(replace(runs[0], payload=None))

@@ -20,6 +20,7 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
+from bodies import body_of
 from script import RESULTS, ROOT, markdown_table, options, say, write, write_table
 
 from armload import Arm, Recording, arm, identify
@@ -28,7 +29,6 @@ from armload.identification.notes import MAY_CHANGE
 from armload.lab.episodes import draw_episodes, simulate_episodes
 from armload.lab.episodes.motion_kinds import MotionSource
 from armload.motion import random_motion, taie2024
-from armload.payloads import draw_payload
 from armload.simulation import Sensors, World, simulate
 
 SOUND = (("panda", "reference"), ("panda", "everyday"), ("panda", "beyond"), ("ur10e", "reference"))
@@ -39,7 +39,7 @@ def log_with_changes(mass: float, seed: int, twice: bool = False) -> tuple[Recor
     """A log of 6 s, a tare, and when the payload changes."""
     panda, rng = arm("panda"), np.random.default_rng([seed, 3])
     motion = taie2024() if seed % 2 else random_motion(panda, seed + 40, duration=6.0)
-    payload, when = draw_payload("boxes", seed, mass), float(rng.uniform(1.5, 4.5))
+    payload, when = body_of(mass, seed), float(rng.uniform(1.5, 4.5))
     held = [(0.0, payload), (when, None)] if rng.random() < 0.5 else [(0.0, None), (when, payload)]
     if twice:
         held = [(0.0, None), (2.0, payload), (4.0, None)]

@@ -38,6 +38,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from bodies import body_of
 from event_scenes import Push
 from threadpoolctl import threadpool_limits
 from watching import matched, step, watched
@@ -51,7 +52,6 @@ from armload.identification import identify
 from armload.inertia import InertialParameters
 from armload.motion import random_motion
 from armload.online import OnlineIdentifier
-from armload.payloads import Payload, draw_payload
 from armload.regression import Correction
 from armload.simulation import Sensors, World, simulate
 
@@ -168,7 +168,7 @@ class Stream:
 
 def streams() -> list[Stream]:
     """All scenes; each is another arm."""
-    light, box, other = (Payload(f"{m} kg", body(m, k)) for k, m in enumerate((0.2, 1.2, 0.7)))
+    light, box, other = (body_of(m, k) for k, m in enumerate((0.2, 1.2, 0.7)))
     flange = [Push(4.5, 5.5, "panda_link8", np.array([25.0, -20.0, 15.0]))]
     long = [Push(4.0, 7.0, "panda_link8", np.array([-10.0, 30.0, 40.0]))]
     return [
@@ -181,7 +181,7 @@ def streams() -> list[Stream]:
         scene("nothing happens", 250, 8, [(-1, None)]),
         scene("push, loaded", 250, 8, [(-1, None), (2.5, other)], flange),
         scene("long push, after a tare", 250, 9, [(-1, None)], long, tared=True),
-        scene("UR10e", 250, 8, [(-1, None), (4.5, Payload("4 kg", body(4.0, 3)))], robot="ur10e"),
+        scene("UR10e", 250, 8, [(-1, None), (4.5, body_of(4.0, 3))], robot="ur10e"),
     ]
 
 
@@ -212,12 +212,6 @@ def scene(
 def _sensors(known: Any) -> Sensors:
     """As measured on a Panda, or of any arm."""
     return Sensors.panda(known) if known.n == 7 else Sensors.generic(known)
-
-
-def body(mass: float, seed: int) -> InertialParameters:
-    """A body of that mass [kg]: a random one, made heavier or lighter."""
-    drawn = draw_payload("boxes", seed, 3.0).parameters
-    return InertialParameters(drawn.phi * (mass / drawn.mass))
 
 
 def on_streams(scenes: list[Stream]) -> tuple[dict[str, Any], list[bytes]]:
@@ -311,12 +305,12 @@ def logged(
     known, seed = arm(robot) if isinstance(robot, str) else robot, SEED + 500 + k
     world = World.real_like(replace(known, motor_torque=True) if motor else known, seed)
     how = {"world": world, "sensors": _sensors(known), "rate": 250.0}
-    carried, held = np.zeros(10) if mass == 0.0 else body(mass, k).phi, InertialParameters(np.zeros(10))
+    carried, held = np.zeros(10) if mass == 0.0 else body_of(mass, k).parameters.phi, InertialParameters(np.zeros(10))
     told: dict[str, Any] = {}
     if tool:
-        told["tool"] = body(tool, 7)
+        told["tool"] = body_of(tool, 7).parameters
     with_tool = carried + (told["tool"].phi if tool else 0.0)
-    before = body(left, k) if left else told["tool"] if mounted else held
+    before = body_of(left, k).parameters if left else told["tool"] if mounted else held
     if tared:
         other = random_motion(known, seed + 100, duration=6.0, harmonics=6)
         told["tare"] = simulate(known, other, before if before.mass else None, seed=seed + 100, **how)
@@ -385,7 +379,7 @@ def aged(k: int, days: float, said: float | None, other: bool = False) -> Aged:
     then = replace(world, offset=world.offset + walk[:n], friction=replace(world.friction, level=level))
     if other:
         then = World.real_like(known, seed + 50)
-    how, held = {"sensors": _sensors(known), "rate": 250.0}, body(1.0, k)
+    how, held = {"sensors": _sensors(known), "rate": 250.0}, body_of(1.0, k).parameters
     path = random_motion(known, seed + 100, duration=6.0, harmonics=6)
     tare = simulate(known, path, None, seed=seed + 100, world=then, **how)
     log = simulate(known, random_motion(known, seed, duration=4.0), held, seed=seed, world=world, **how)

@@ -8,6 +8,7 @@ from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
+from bodies import body_of
 from numpy.typing import NDArray
 from tare_drift import before
 
@@ -114,7 +115,7 @@ def taken_up(mass: float | None, count: int, seed: int) -> Iterator[Wrong]:
     """Taken up or put down at once in the middle of the log: the truth is what is held at the end."""
     for k, (e, log) in enumerate(zip(episodes(count, seed), sound("reference", count, seed), strict=True)):
         rng = np.random.default_rng([seed, k, 3])
-        payload = e.payload if mass is None else draw_payload("boxes", seed + k, mass)
+        payload = e.payload if mass is None else body_of(mass, seed + k)
         when, up = float(rng.uniform(1.5, 4.5)), rng.random() < 0.5
         held = [(0.0, None), (when, payload)] if up else [(0.0, payload), (when, None)]
         how = {"world": e.world, "sensors": e.sensors, "rate": RATE}
