@@ -93,10 +93,14 @@ def answered(known: Arm, episodes: list[Episode]) -> dict[str, Any]:
             half[tested].append(float(Z95 * estimate.std[0]))
             if tested:
                 drift, another = identifier.stream.drift, identifier.stream.another
-                asked = drift is not None and another is not None  # not where torque seems to be motor current
-                doubted.append(asked and (drift.changed or another.found))
-                statistics.append(drift.statistic if asked else 0.0)
-                others.append((another.found, another.surprise, another.log_odds) if asked else (False, 0.0, -100.0))
+                if drift is None or another is None:  # not asked where torque seems to be motor current
+                    doubted.append(False)
+                    statistics.append(0.0)
+                    others.append((False, 0.0, -100.0))
+                else:
+                    doubted.append(drift.changed or another.found)
+                    statistics.append(drift.statistic)
+                    others.append((another.found, another.surprise, another.log_odds))
     out: dict[str, Any] = {"episodes": len(doubted), "doubted": round(float(np.mean(doubted)), 3)}
     out["statistic, quantiles 0.5 0.9 1"] = np.quantile(statistics, [0.5, 0.9, 1.0]).round(1).tolist()
     found, surprise, odds = np.array(others, dtype=float).T
