@@ -304,6 +304,18 @@ def test_a_payload_that_is_put_down_is_not_taken_for_no_torque(panda):
     check_plausible(log, panda)
 
 
+def test_a_rated_payload_that_is_put_down_is_not_taken_for_another_robot(panda):
+    """3 kg put down in the middle of a motion, which as a whole fit no payload."""
+    t = np.arange(0.0, 6.0, 0.02)
+    q, dq, ddq = random_motion(panda, 1, duration=6.0)(t)
+    heavy = InertialParameters.from_com(3.0, (0.0, 0.0, 0.12), 0.01 * np.eye(3))
+    held = panda.with_payload(heavy).torque(q, dq, ddq)
+    log = Recording(t, q, dq, np.where((t < 3.2)[:, None], held, panda.torque(q, dq, ddq)))
+    seen = torque_scale(log, panda)
+    assert seen.misfit > 2.5 and not seen.is_wrong  # it does look so
+    check_plausible(log, panda)
+
+
 def test_positions_outside_the_limits_are_refused_by_joint_and_row(sound, panda):
     log = sound["panda"][1][0]
     q = log.q.copy()

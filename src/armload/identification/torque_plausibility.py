@@ -98,7 +98,9 @@ def _check_torque_is_the_arms(recording: Recording, arm: Arm) -> None:
     if fit is None:
         return
     check_for_exchanged_torques(recording, arm, fit)
-    if fit.is_wrong and not _sound_in_parts(recording, arm, fit):
+    if (fit.is_wrong or fit.misfit > MODEL_MISFIT) and _sound_in_parts(recording, arm, fit):
+        return
+    if fit.is_wrong:
         _check_for_currents(recording, arm, fit.scale)
         _check_for_compensation(recording, arm, fit)
         if fit.is_negative:
@@ -121,8 +123,8 @@ def _check_torque_is_the_arms(recording: Recording, arm: Arm) -> None:
 def _sound_in_parts(recording: Recording, arm: Arm, seen: TorqueScale) -> bool:
     """Whether a log is sound in all of its thirds but one, and fits far better there than as a whole.
 
-    A payload that changes within a log of a small motion may look like any share of the arm's own torque, but not in
-    the parts before and after; what is wrong with a log's unit or robot is wrong in its parts, too.
+    A payload that changes within a log may look like any share of the arm's own torque in a small motion, and like no
+    arm in a large one, but not in the parts before and after; what is wrong with a log's unit or robot is wrong in its parts, too.
     """
     edges = np.linspace(recording.t[0], recording.t[-1], 4)
     fits = [torque_scale(recording.between(begin, end), arm) for begin, end in pairwise(edges)]
