@@ -124,7 +124,8 @@ def _sound_in_parts(recording: Recording, arm: Arm, seen: TorqueScale) -> bool:
     """Whether a log is sound in all of its thirds but one, and fits far better there than as a whole.
 
     A payload that changes within a log may look like any share of the arm's own torque in a small motion, and like no
-    arm in a large one, but not in the parts before and after; what is wrong with a log's unit or robot is wrong in its parts, too.
+    arm in a large one, but not in the parts before and after; what is wrong with a log's unit or robot is wrong in its
+    parts, too.
     """
     edges = np.linspace(recording.t[0], recording.t[-1], 4)
     fits = [torque_scale(recording.between(begin, end), arm) for begin, end in pairwise(edges)]
