@@ -39,10 +39,15 @@ class Tracker:
             if self.lasting.over(float(run.last.covariance[0, 0])):
                 self.lasting = None
 
+    def of_now(self, last: Gaussian) -> Gaussian:
+        """What the run says, and by how much a hand-over that may go on in it is ahead."""
+        if self.lasting is None:
+            return last
+        return last[0] + self.lasting.ahead[0], last[1] + self.lasting.ahead[1]
+
     def track(self, modes: Modes, t: float, last: Gaussian) -> Gaussian:
         """phi (10,) and its covariance at a row at t [s]; `last`: what the run says, which did not take the row."""
-        if self.lasting is not None:
-            last = last[0] + self.lasting.ahead[0], last[1] + self.lasting.ahead[1]
+        last = self.of_now(last)
         (shift, spread), p = modes.shift(going_on=True), modes.handing + modes.other
         self._lagged = self._lagged + min((t - self._t) / LAG, 1.0) * (shift - self._lagged)
         self._t, late = t, p * (shift - self._lagged)

@@ -122,10 +122,12 @@ class PayloadWatch:
         return self._follow(sample, held) if self.phase == FOLLOWING else None
 
     def conclude(self) -> Estimate:
-        """The estimate of the current run after a last solution."""
+        """The estimate of the current run after a last solution, and of a hand-over that may go on in it."""
         self.hold()
-        self.answered = run = self.run
-        return run.conclude()
+        self.answered = self.run
+        last = self.run.conclude()
+        phi, covariance = self._tracker.of_now((last.phi, last.covariance))
+        return replace(last, phi=phi, covariance=covariance)
 
     # ------------------------------------------------------------------ following
 
