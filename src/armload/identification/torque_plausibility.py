@@ -120,17 +120,20 @@ def _check_torque_is_the_arms(recording: Recording, arm: Arm) -> None:
         )
 
 
-def _sound_in_parts(recording: Recording, arm: Arm, seen: TorqueScale) -> bool:
-    """Whether a log is sound in all of its thirds but one, and fits far better there than as a whole.
+def _sound_in_parts(recording: Recording, arm: Arm, seen: TorqueScale, deeper: bool = True) -> bool:
+    """Whether a log fits far better in its thirds than as a whole, all but one, and that one likewise in its thirds.
 
     A payload that changes within a log may look like any share of the arm's own torque in a small motion, and like no
     arm in a large one, but not in the parts before and after; what is wrong with a log's unit or robot is wrong in its
-    parts, too.
+    parts, too, and what goes wrong within a log is wrong in all that follows.
     """
     edges = np.linspace(recording.t[0], recording.t[-1], 4)
-    fits = [torque_scale(recording.between(begin, end), arm) for begin, end in pairwise(edges)]
-    sound = [fit for fit in fits if fit is not None and not fit.is_wrong]
-    return len(sound) > 1 and sorted(fit.misfit for fit in sound)[1] < PARTS_SHARE * seen.misfit
+    parts = [recording.between(begin, end) for begin, end in pairwise(edges)]
+    fits = [torque_scale(part, arm) for part in parts]
+    told = [fit is not None and not fit.is_wrong and fit.misfit < PARTS_SHARE * seen.misfit for fit in fits]
+    untold = [fit is None and not deeper for fit in fits]  # a ninth may be too short to say anything
+    other = [part for part, a, b in zip(parts, told, untold, strict=True) if not (a or b)]
+    return not other or (len(other) == 1 and (not deeper or _sound_in_parts(other[0], arm, seen, False)))
 
 
 def _check_for_currents(recording: Recording, arm: Arm, scale: float) -> None:
