@@ -46,15 +46,18 @@ class Late(Exception):
 
 
 def in_time(test):
-    """Tried with a new robot, twice more at most, where a link was lost that nobody had cut."""
+    """Tried with a new robot, three times more at most, where a link was lost that nobody had cut.
+
+    What made one late may last: each time a while after the one before.
+    """
 
     @functools.wraps(test)
     def wrapped(serve):
-        for _ in range(2):
+        for wait in (2.0, 10.0, 30.0):
             try:
                 return test(serve())
             except Late:
-                continue
+                time.sleep(wait)
         return test(serve())
 
     del wrapped.__wrapped__  # pytest asks for the arguments of what was wrapped
