@@ -317,6 +317,17 @@ def test_a_rated_payload_that_is_put_down_is_not_taken_for_another_robot(panda):
     check_plausible(log, panda)
 
 
+@pytest.mark.parametrize("turns", [6.1, 7.0])
+def test_a_sign_that_turns_within_a_log_is_not_taken_for_a_payload_that_changes(panda, turns):
+    """What follows has the misfit of no payload, where a log that is as wrong as a whole is looked at in parts."""
+    t = np.arange(0.0, 12.0, 0.02)
+    q, dq, ddq = random_motion(panda, 1, duration=6.0)(t)
+    tau = panda.torque(q, dq, ddq)
+    log = Recording(t, q, dq, np.where((t < turns)[:, None], tau, -tau))
+    with pytest.raises(RecordingError, match="does not fit panda with any payload"):
+        check_plausible(log, panda)
+
+
 def test_positions_outside_the_limits_are_refused_by_joint_and_row(sound, panda):
     log = sound["panda"][1][0]
     q = log.q.copy()

@@ -68,6 +68,9 @@ def test_how_far_the_run_is_behind_is_what_all_rows_at_once_say():
     mean, covariance, (alone, own) = by_all_rows(some, ends, prior)
     ahead, spread = lasting.ahead
     assert alone + ahead == pytest.approx(mean, abs=1e-6)
+    tracker = Tracker()
+    tracker.lasting = lasting
+    assert tracker.of_now((alone, own))[0] == pytest.approx(mean, abs=1e-6)
     # the mixture of what is given each end: its spread about the mean is the run's, and what is between the ends
     assert np.diag(own + spread) == pytest.approx(np.diag(covariance), rel=1e-4)
 

@@ -125,7 +125,7 @@ def _sound_in_parts(recording: Recording, arm: Arm, seen: TorqueScale, deeper: b
 
     A payload that changes within a log may look like any share of the arm's own torque in a small motion, and like no
     arm in a large one, but not in the parts before and after; what is wrong with a log's unit or robot is wrong in its
-    parts, too, and what goes wrong within a log is wrong in all that follows.
+    parts, too, and what goes wrong within a log is wrong in what follows, where that is long enough to tell.
     """
     edges = np.linspace(recording.t[0], recording.t[-1], 4)
     parts = [recording.between(begin, end) for begin, end in pairwise(edges)]
