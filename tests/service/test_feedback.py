@@ -17,7 +17,7 @@ from armload.arms import arm
 from armload.devices import Counted, Detached, check_writable, controller_of
 from armload.errors import SinkError, SourceError, UsageError
 from armload.inertia import InertialParameters, is_consistent
-from armload.motion import taie2024
+from armload.motion import FourierMotion, save_motion, taie2024
 from armload.online import OnlineEstimate, OnlineIdentifier
 from armload.payloads import test_payload
 from armload.service import ArmSettings
@@ -189,11 +189,12 @@ def test_only_a_robot_s_source_can_be_told():
 
 
 @contextlib.contextmanager
-def robot_at(program, *arguments):
-    """A loopback robot's process, killed whatever happens, and what it says."""
+def robot_at(program, *arguments, orders=""):
+    """A loopback robot's process, killed whatever happens, and what it says; it gets `orders` once it is ready."""
     command = [sys.executable, str(SERVERS / f"{program}.py"), *map(str, arguments)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
+        assert process.stdin is not None
         said, ready = [], threading.Event()
 
         def hear():
@@ -205,6 +206,8 @@ def robot_at(program, *arguments):
         thread.start()
         try:
             assert ready.wait(60.0)
+            process.stdin.write(orders)
+            process.stdin.flush()
             yield said
         finally:
             process.kill()
@@ -316,6 +319,49 @@ def test_a_service_tells_its_robot_what_it_identified_and_reads_it_back(tmp_path
     assert len(masses) > 2
     assert masses[-1] == pytest.approx(applied["mass"], abs=1e-5)  # what the service shows was read back
     np.testing.assert_allclose(loads[-1][1:4], held.com, atol=0.03)
+    assert service.returncode == 0
+
+
+@pytest.mark.full
+@pytest.mark.timeout(900)
+def test_a_service_tells_a_ur_between_two_motions_of_its_program_what_it_identified(tmp_path):
+    """`armload serve ur://… --apply auto` beside a loopback UR whose own program moves and rests, through ur-rtde."""
+    pytest.importorskip("rtde_control", reason="ur-rtde has no wheel for this Python")
+    centre, address = np.array([0.3, -1.2, 1.4, -1.0, 1.3, 0.4]), "127.0.7.80"
+    sine = 0.25 * np.array([[1.0, 0.3, -1.6 / 3]] * 6) * np.linspace(0.5, 1.0, 6)[:, None]
+    cosine = 0.2 * np.array([[1.0, -1.0, 1.0 / 3]] * 6) * np.linspace(1.0, 0.6, 6)[:, None]
+    motion = FourierMotion(centre, sine, cosine, 6.0, "program").smooth()
+    program = tmp_path / "program.json"
+    save_motion(program, motion)
+    at = ",".join(f"{x:.6f}" for x in motion.position([0.0])[0])
+    command = [sys.executable, "-m", "armload", "serve", f"ur://{address}", "--robot", "ur10e"]
+    command += ["--apply", "auto", "--mounted", "nothing"]
+    end = time.monotonic() + 400.0
+    with (
+        robot_at("ur_robot", "--address", address, "--", at, orders=f"mount\nwork {program}\n") as said,
+        subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as service,
+    ):
+        assert service.stdout is not None
+        try:
+            for text in service.stdout:
+                line = json.loads(text)
+                applied = line.get("applied")
+                if applied and applied["waits"] is None and applied["mass"] > 0.5 * HELD.mass:
+                    break
+                assert line.get("connection") != "ended"
+                assert time.monotonic() < end, line
+        finally:
+            service.terminate()
+            service.wait(60.0)
+        scripts = [event for event in said if event["event"] == "script"]
+        loads = [event["numbers"] for event in said if event["event"] == "payload"]
+    assert len(loads) > 2
+    assert loads[-1][0] == pytest.approx(applied["mass"], abs=1e-5)  # what the service shows was read back
+    assert loads[-1][0] == pytest.approx(HELD.mass, abs=0.3)
+    np.testing.assert_allclose(loads[-1][1:4], HELD.com, atol=0.03)
+    assert scripts
+    assert all(event["speed"] < 0.02 for event in scripts), scripts  # [rad/s]
+    assert "moving" not in [event["event"] for event in said]  # no script commanded a motion
     assert service.returncode == 0
 
 

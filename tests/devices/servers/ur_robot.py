@@ -7,7 +7,8 @@ for done. A client that is gone, or silent for longer than the watchdog allows, 
 itself.
 
 It prints one JSON line per event: ready, script, moving, stopped, ended, mounted, payload, lost, rest. A line on
-standard input says mount.
+standard input says mount, or `work FILE`: from then on a program of its own follows the motion in that file and rests
+for a while, in turns. A client's script takes that program's place; after it, the program begins anew.
 """
 
 import argparse
@@ -26,8 +27,10 @@ from ur_server import CONTROLLER, DATA, FORMS, INPUTS, OUTPUTS, PAUSE, START, VE
 from ur_server import kind as kind_of_output
 
 from armload.arms import ARMS
+from armload.motion import load_motion
 
 CYCLE = 2e-3
+BREAK = 20.0  # [s] its own program rests after each motion
 FILTER = 0.08  # [s] servoj follows its targets so much later: it looks 0.1 s ahead
 ANSWERS = {
     "PolyscopeVersion": "URSoftware 5.12.0.1101534 (Nov 01 2023)",
@@ -58,6 +61,7 @@ class Robot:
         self.state = {}
         self.payload = [0.0] * 10
         self.tick = 0
+        self.work, self.worked = None, 0.0
 
     def run(self):
         begun = time.monotonic()
@@ -73,6 +77,9 @@ class Robot:
         body = self.body
         if self.target is not None:
             body.command(body.target + (self.target - body.target) * CYCLE / FILTER)
+        elif self.work is not None and not self.running:
+            self.worked = (self.worked + CYCLE) % (self.work.duration + BREAK)
+            body.command(self.work.position([min(self.worked, self.work.duration)])[0])
         else:
             body.stay()
         before = body.rests
@@ -184,8 +191,10 @@ def script(connection, robot):
         received += more
         if received.endswith(b"end\n"):
             with robot.lock:
-                robot.running, robot.ready, robot.heard = True, 1, time.monotonic()
-            say("script", size=len(received))
+                robot.running, robot.ready, robot.heard, robot.worked = True, 1, time.monotonic(), 0.0
+                speed = float(np.abs(robot.body.speed).max())
+                robot.body.halt()
+            say("script", size=len(received), speed=speed)
 
 
 def serve(address, port, how, robot):
@@ -216,10 +225,13 @@ def main():
         serve(options.address, port, how, robot)
     say("ready")
     for line in sys.stdin:
-        if line.strip() == "mount":
-            with robot.lock:
+        word, _, file = line.strip().partition(" ")
+        with robot.lock:
+            if word == "mount":
                 robot.body.mount()
-            say("mounted")
+                say("mounted")
+            elif word == "work":
+                robot.work = load_motion(file)
 
 
 if __name__ == "__main__":
