@@ -116,8 +116,8 @@ class Resting(Motion):
 
     name = "resting"
 
-    def __init__(self, motion: Motion, stops: tuple[float, ...]) -> None:
-        self.motion, self.stops = motion, stops
+    def __init__(self, motion: Motion, stops: tuple[float, ...], rounds: int = 7) -> None:
+        self.motion, self.stops, self.rounds = motion, stops, rounds
 
     @property
     def n(self) -> int:
@@ -126,8 +126,8 @@ class Resting(Motion):
 
     @property
     def duration(self) -> float:
-        """Some rounds of the motion, and the stops [s]."""
-        return 7.0 * self.motion.duration + 5.0 * len(self.stops)
+        """So many rounds of the motion, and the stops [s]."""
+        return self.rounds * self.motion.duration + 5.0 * len(self.stops)
 
     def _clock(self, t: NDArray, order: int) -> NDArray:
         """s(t) and its derivatives: the pace falls from 1 to 0 and rises again along 1 − 3x² + 2x³."""
@@ -183,7 +183,7 @@ def streamed(scene: Scene) -> Stream:
         log = _simulated(scene, seconds, changes)
         tau = log.tau
     if added:
-        tau = tau + _torque(panda, log, Stream(panda, log, changes, counted, []))
+        tau = tau + torque_of(panda, log, Stream(panda, log, changes, counted, []))
     if scene.part == "drift":
         tau = tau + np.sin(2.0 * np.pi * log.t / 80.0)[:, None] * rng.choice([-0.5, 0.5], panda.n)
     if scene.part == "pushes":
@@ -275,7 +275,7 @@ def _simulated(scene: Scene, seconds: float, held: list[Change]) -> Recording:
     return Recording(*map(np.array, zip(*source, strict=True)))  # type: ignore[arg-type]
 
 
-def _torque(robot: Arm, log: Recording, stream: Stream) -> NDArray[np.float64]:
+def torque_of(robot: Arm, log: Recording, stream: Stream) -> NDArray[np.float64]:
     """What the payloads of a stream add to a log's torque (N, n)."""
     step = float(np.median(np.diff(log.t)))
     even = np.arange(log.t[0], log.t[-1] + 0.5 * step, step)
@@ -318,5 +318,5 @@ def _real(scene: Scene, rng: np.random.Generator) -> Stream:
         changes.append(Change(float(t), 0.0, phi))
         t += rng.uniform(4.0, 6.0)
     stream = Stream(known, log, changes, [True] * len(changes), [], base, tare)
-    loaded = Recording(log.t, log.q, log.dq, log.tau + _torque(known, log, stream))
+    loaded = Recording(log.t, log.q, log.dq, log.tau + torque_of(known, log, stream))
     return Stream(known, loaded, changes, stream.counted, [], base, tare)

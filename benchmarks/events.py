@@ -47,7 +47,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from event_scenes import LOOKED, PARTS, RATES, Scene, streamed
+from event_scenes import LOOKED, PARTS, RATES, Scene, Stream, streamed
 from event_truth import AS_BEFORE, TAKEN_UP, reliability_of
 from scipy.stats import beta, chi2
 from script import ROOT, markdown_table, options, say, write, write_table
@@ -92,7 +92,11 @@ NAMES = {
 
 def measured(scene: Scene) -> dict[str, Any]:
     """One scene as a cell's numbers."""
-    stream = streamed(scene)
+    return measured_stream(streamed(scene))
+
+
+def measured_stream(stream: Stream) -> dict[str, Any]:
+    """What the default method says of a stream, as a cell's numbers."""
     identifier, said, events, last = OnlineIdentifier(stream.robot, stream.tare), [], {}, -np.inf
     for sample in stream.log:
         one = identifier.update(*sample)
