@@ -93,16 +93,43 @@ def _weigh(h, U, d, v, scale, effort, pushes, sides, rates, p, b, x, P, A, c, si
     starts, found, age = since[0], since[1], since[2]
     rare, drift_rare, lasts, handed = rates[0], rates[1], rates[2], rates[3]
     n, kinds, handing_from, other_from = len(d), len(sizes) - 1, 1 + len(sizes), 1 + len(sizes) + len(bodies)
-    gains, y = np.zeros(len(p)), np.empty(10)
+    gains, y, gone = np.zeros(len(p)), np.empty(10), np.empty(len(bodies))
+    for k in range(len(bodies)):
+        keep, far = math.exp(-h / slow[k]), 0.0
+        for i in range(10):
+            x[k, i] *= keep
+            for m in range(10):
+                P[k, i, m] *= keep * keep
+            P[k, i, i] += (1.0 - keep * keep) * bodies[k] ** 2
+        for j in range(n):
+            e, s = d[j], v[j]
+            for i in range(10):
+                e -= U[j, i] * x[k, i]
+                y[i] = 0.0
+            for m in range(10):  # P is symmetric to the last digit: along its rows several are computed at once
+                for i in range(10):
+                    y[i] += P[k, m, i] * U[j, m]
+            for i in range(10):
+                s += U[j, i] * y[i]
+            far = max(far, (d[j] - e) ** 2 / max(s - v[j], 1e-12))
+            gains[handing_from + k] += 0.5 * (d[j] * d[j] / v[j] - e * e / s - math.log(s / v[j]))
+            for i in range(10):
+                x[k, i] += y[i] * e / s
+                for m in range(10):
+                    P[k, i, m] -= y[i] * y[m] / s
+        gone[k] = math.exp(-0.5 * far)
     contact, handing, other = p[2:handing_from].sum(), p[handing_from:other_from].sum(), p[other_from:].sum()
     steady, begins, over, done = p[0] + p[1], h / rare, min(h / lasts, 0.5), min(h / handed, 0.5)
     drifts, back = p[0] * h / drift_rare, p[1] * h * 10.0 / drift_rare
-    p[0] += back - drifts - 3.0 * begins * p[0] + over * contact + 0.2 * done * handing
+    nothing = 0.0  # of what was handed over, as likely as its torque on the joint that tells most can be none
+    for k in range(len(bodies)):
+        nothing += gone[k] * p[handing_from + k]
+    p[0] += back - drifts - 3.0 * begins * p[0] + over * contact + 0.2 * done * nothing
     p[1] += drifts - back - 3.0 * begins * p[1]
     for k in range(2, handing_from):
         p[k] += begins * (steady + other) / kinds - over * p[k]
     for k in range(handing_from, other_from):
-        p[k] += begins * (steady + contact + 10.0 * other) / len(bodies) - 0.2 * done * p[k]
+        p[k] += begins * (steady + contact + 10.0 * other) / len(bodies) - 0.2 * done * gone[k - handing_from] * p[k]
     best = other_from + p[other_from:].argmax()
     for k in range(len(starts)):
         p[other_from + k] *= 1.0 - 11.0 * begins
@@ -127,28 +154,6 @@ def _weigh(h, U, d, v, scale, effort, pushes, sides, rates, p, b, x, P, A, c, si
             gains[1 + k] += 0.5 * (d[j] * d[j] / v[j] - e * e / s - math.log(s / v[j]))
             b[0, k, j] += g * e / s
             b[1, k, j] *= v[j] / s
-    for k in range(len(bodies)):
-        keep = math.exp(-h / slow[k])
-        for i in range(10):
-            x[k, i] *= keep
-            for m in range(10):
-                P[k, i, m] *= keep * keep
-            P[k, i, i] += (1.0 - keep * keep) * bodies[k] ** 2
-        for j in range(n):
-            e, s = d[j], v[j]
-            for i in range(10):
-                e -= U[j, i] * x[k, i]
-                y[i] = 0.0
-            for m in range(10):  # P is symmetric to the last digit: along its rows several are computed at once
-                for i in range(10):
-                    y[i] += P[k, m, i] * U[j, m]
-            for i in range(10):
-                s += U[j, i] * y[i]
-            gains[handing_from + k] += 0.5 * (d[j] * d[j] / v[j] - e * e / s - math.log(s / v[j]))
-            for i in range(10):
-                x[k, i] += y[i] * e / s
-                for m in range(10):
-                    P[k, i, m] -= y[i] * y[m] / s
     for k in range(len(starts)):
         for j in range(n):
             for i in range(10):

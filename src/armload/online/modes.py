@@ -13,7 +13,8 @@ R·Rᵀ = E[phi·phiᵀ] of a body (`body_root`) the hypotheses are
 of several sizes and times each. Each is a Gaussian filter, so that the likelihood of a row is in closed form; of
 another body it is that of all rows since its moment, ½·cᵀ·(A + s⁻²)⁻¹·c − ½·ln|1 + s²·A| over steady's, with
 A = Σ Rᵀ·Wᵀ·W·R/v, c = Σ Rᵀ·Wᵀ·d/v. Probabilities follow from how often each begins and how long it lasts, as in a
-hidden Markov model. Rows that are withheld from a run share the errors of its predictions, and count for less.
+hidden Markov model; a hand-over ends in what was held before only as far as x may be nothing. Rows that are withheld
+from a run share the errors of its predictions, and count for less.
 
 Sources: interacting multiple models, Blom & Bar-Shalom, IEEE T-AC 1988; change points, Adams & MacKay 2007.
 """
