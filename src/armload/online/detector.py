@@ -38,7 +38,7 @@ class ChangeDetector:
         return modes.steady - modes.drift if self._touched else modes.steady
 
     def believed(self, lasted: float) -> bool:
-        """Whether what has not fitted for so long [s] is believed: from then on nothing touches, a drift is the arm's."""
+        """Whether what has not fitted for so long [s] is believed: then a drift is the arm's."""
         if lasted <= (CONTACT_LONGEST if self._touched else PATIENCE):
             return False
         self._touched = False
