@@ -316,12 +316,24 @@ def test_a_constant_push_is_not_taken_for_a_drift_of_the_arm(seed, force):
 
 
 @pytest.mark.full  # some seconds
+def test_a_push_of_half_a_minute_leaves_the_run_as_it_was():
+    log = stream(6, [], 45.0, 25.0)
+    estimates, events = said(pushed(log, (0.0, 12.0, 0.0), (log.t >= 8.0) & (log.t < 40.0)), "map-gp")
+    assert events == []
+    before, after = at(estimates, 7.9), at(estimates, 40.5)
+    assert all(any("do not fit" in note for note in e.notes) for e in estimates if 9.0 < e.t < 39.9)
+    assert not after.notes
+    assert abs(after.phi[0] - before.phi[0]) < 0.5 * before.std[0]
+    assert covers(estimates[-1], 0.0)[:4].all()
+
+
+@pytest.mark.full  # some seconds
 def test_an_offset_that_jumps_and_stays_is_believed_at_last():
-    log = stream(6, [], 25.0, 25.0)
+    log = stream(6, [], 75.0, 25.0)  # an arm that was knocked: longer than anybody pushes
     jump = np.outer(log.t >= 8.0, [0.0, 4.0, 0.0, 2.0, 0.0, 0.0, 0.0])  # [N·m]
     estimates, _ = said(Recording(log.t, log.q, log.dq, log.tau + jump), "map-gp")
     assert any("do not fit" in note for note in at(estimates, 9.5).notes)
-    assert not any("do not fit" in note for e in estimates if e.t > 23.0 for note in e.notes)
+    assert not any("do not fit" in note for e in estimates if e.t > 73.0 for note in e.notes)
 
 
 @pytest.mark.parametrize(("std", "tare"), [(0.02, True), (2.0, False)])

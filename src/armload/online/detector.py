@@ -6,7 +6,7 @@ import numpy as np
 
 from armload.online.modes import Modes
 from armload.online.runs import Gaussian
-from armload.online.thresholds import AFTER_CONTACT, HOLDS, LIGHT, LIKELY, SURE
+from armload.online.thresholds import AFTER_CONTACT, CONTACT_LONGEST, HOLDS, LIGHT, LIKELY, PATIENCE, SURE
 
 
 class ChangeDetector:
@@ -37,9 +37,12 @@ class ChangeDetector:
         """
         return modes.steady - modes.drift if self._touched else modes.steady
 
-    def believe(self) -> None:
-        """What does not fit has lasted too long for a contact: a drift is the arm's from now on."""
+    def believed(self, lasted: float) -> bool:
+        """Whether what has not fitted for so long [s] is believed: then a drift is the arm's."""
+        if lasted <= (CONTACT_LONGEST if self._touched else PATIENCE):
+            return False
         self._touched = False
+        return True
 
     def take(self, modes: Modes, t: float, before: Gaussian) -> bool:
         """Whether a row at t [s] shows a change; `before`: phi and covariance before the row."""

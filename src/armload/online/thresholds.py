@@ -83,9 +83,13 @@ AFTER_CONTACT = 0.3
 # [payloads] below nothing that a mass may seem to be: a tool or a light thing, 75 g of a Panda, may have been held from
 # the start and be part of the empty arm
 LIGHT = 0.05
-# [s] of rows that do not fit that are left out at most, and of a hand-over: a hand that leads the arm. Then what does
-# not fit is believed: it may be the arm (test_a_pose_first_seen_shortly_after_a_change_is_not_another_change)
+# [s] of rows that do not fit that are left out at most where nothing touches the arm, and of a hand-over. Then what
+# does not fit is believed: it may be the arm (test_a_pose_first_seen_shortly_after_a_change_is_not_another_change)
 PATIENCE = 10.0
+# [s] of rows of a contact that are left out at most: nobody leads or leans on an arm for longer, while one that was
+# knocked stays as it is
+# (test_an_offset_that_jumps_and_stays_is_believed_at_last, test_a_push_of_half_a_minute_leaves_the_run_as_it_was)
+CONTACT_LONGEST = 60.0
 # [s] before a change that are taken back from the run that ends, at least as long as it took to notice it: what a
 # payload does before it shows (test_a_cycle_in_step_with_the_motion_stays_as_good_in_its_second_half_as_in_its_first)
 TAKEN_BACK = 0.2

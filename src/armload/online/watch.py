@@ -158,9 +158,8 @@ class PayloadWatch:
             self._begin_change(sample, held)
         elif self._weighing.steady > 0.5:
             self.phase, self._gave_up = FOLLOWING, False
-        elif self.phase == DOUBTING and sample.t - self._doubted_at > PATIENCE:
+        elif self.phase == DOUBTING and self._weighing.believed(sample.t - self._doubted_at):
             self.phase, self._gave_up = FOLLOWING, True
-            self._weighing.believe()
         elif self.phase == FOLLOWING and not self._gave_up:
             self.phase, self._doubted_at, self._naming.held_before = DOUBTING, sample.t, held
 

@@ -60,9 +60,9 @@ class Weighing:
         """Whether the last row shows that the payload is surely another one than the run's."""
         return self._detector.take(self.modes, self.row_t, self._before_row(run))
 
-    def believe(self) -> None:
-        """What does not fit has lasted too long for a contact."""
-        self._detector.believe()
+    def believed(self, lasted: float) -> bool:
+        """Whether what has not fitted for so long [s] is believed from now on."""
+        return self._detector.believed(lasted)
 
     def taken(self, run: PosteriorLeastSquares) -> bool:
         """Weigh the innovations of the run's last row, which it has taken; whether the run knows enough to tell."""
