@@ -19,7 +19,7 @@ def rows_of_a_standing_arm(shift, seconds, rng):
 def test_what_is_steadily_another_payload_s_torque_is_not_thought_to_have_gone_again():
     """A hand-over ends in what was held before only if what was handed over may be nothing: odds of e^1000 are against.
 
-    Else the steady arm, fed from the hand-over with every row, would keep ten times as much.
+    Else the steady arm, fed from the hand-over with every row, would keep seven times as much.
     """
     modes, rng = Modes(1.5, np.full(7, 50.0)), np.random.default_rng(3)
     shift = 0.6 * np.r_[1.0, 0.0, 0.0, 0.05, np.zeros(6)]  # up to 2.4 times the noise of one row
@@ -30,7 +30,7 @@ def test_what_is_steadily_another_payload_s_torque_is_not_thought_to_have_gone_a
         if k * H > 1.5:
             kept.append(modes.steady)
     assert odds > 1000.0
-    assert np.mean(kept) < 1e-6
+    assert np.mean(kept) < 3e-6
 
 
 def test_what_was_handed_over_and_taken_back_is_steady_again():

@@ -320,7 +320,7 @@ def test_a_push_of_half_a_minute_leaves_the_run_as_it_was():
     log = stream(6, [], 45.0, 25.0)
     estimates, events = said(pushed(log, (0.0, 12.0, 0.0), (log.t >= 8.0) & (log.t < 40.0)), "map-gp")
     assert events == []
-    before, after = at(estimates, 7.9), at(estimates, 40.5)
+    before, after = at(estimates, 7.9), at(estimates, 41.0)
     assert all(any("do not fit" in note for note in e.notes) for e in estimates if 9.0 < e.t < 39.9)
     assert not after.notes
     assert abs(after.phi[0] - before.phi[0]) < 0.5 * before.std[0]

@@ -23,7 +23,7 @@ def take_row(
         h … taken: as of `Modes.take`. loud: (2, n) of the present block, Σ N and Σ B. level: how large the noise is,
             and the block's length so far [s]. listening: what decides about it.
         root: (10, 10) mass·R. effort: (n,). pushes: sizes and times of drifts and contacts. sides: of bodies. rates:
-            how often each kind begins or ends. p … c: probabilities and states. since: moments, evidence, ages.
+            how often each kind begins or ends, and how. p … c: probabilities, states. since: moments, evidence, ages.
     """
     shared = 1.0 if taken else 1.0 + 2.0 * listening[0] / h
     U, d, v = _innovation(seen, X, scale, root, mean, covariance, shared, level[0])
@@ -117,7 +117,7 @@ def _weigh(h, U, d, v, scale, effort, pushes, sides, rates, p, b, x, P, A, c, si
                 x[k, i] += y[i] * e / s
                 for m in range(10):
                     P[k, i, m] -= y[i] * y[m] / s
-        gone[k] = math.exp(-0.5 * far)
+        gone[k] = max(math.exp(-0.5 * far), rates[4])
     contact, handing, other = p[2:handing_from].sum(), p[handing_from:other_from].sum(), p[other_from:].sum()
     steady, begins, over, done = p[0] + p[1], h / rare, min(h / lasts, 0.5), min(h / handed, 0.5)
     drifts, back = p[0] * h / drift_rare, p[1] * h * 10.0 / drift_rare

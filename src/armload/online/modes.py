@@ -13,7 +13,7 @@ R·Rᵀ = E[phi·phiᵀ] of a body (`body_root`) the hypotheses are
 of several sizes and times each. Each is a Gaussian filter, so that the likelihood of a row is in closed form; of
 another body it is that of all rows since its moment, ½·cᵀ·(A + s⁻²)⁻¹·c − ½·ln|1 + s²·A| over steady's, with
 A = Σ Rᵀ·Wᵀ·W·R/v, c = Σ Rᵀ·Wᵀ·d/v. Probabilities follow from how often each begins and how long it lasts, as in a
-hidden Markov model; a hand-over ends in what was held before only as far as x may be nothing. Rows that are withheld
+hidden Markov model; a hand-over seldom ends in what was held before unless x may be nothing. Rows that are withheld
 from a run share the errors of its predictions, and count for less.
 
 Sources: interacting multiple models, Blom & Bar-Shalom, IEEE T-AC 1988; change points, Adams & MacKay 2007.
@@ -36,6 +36,7 @@ from armload.online.thresholds import (
     DRIFT_TIME,
     HANDED_OVER,
     HANDING_TIMES,
+    LETS_GO,
     LEVEL,
     LEVEL_BLOCK,
     LEVEL_OUTLIER,
@@ -83,7 +84,7 @@ class Modes:
         # what is handed to compiled code comes in few arrays: each costs as much as a hundred products
         self._pushes = np.array([[DRIFT_SIZE, *PUSH_SIZES], [DRIFT_TIME, *(CONTACT_TIME for _ in PUSH_SIZES)]])
         self._sides = {side: np.array([BODY_SIZES[side], HANDING_TIMES[side]]) for side in BODY_SIZES}
-        self._rates = np.array([RARE, DRIFT_RARE, CONTACT_LASTS, HANDED_OVER])
+        self._rates = np.array([RARE, DRIFT_RARE, CONTACT_LASTS, HANDED_OVER, LETS_GO])
         self._weights = np.zeros(_OTHER + starts)
         self._b = np.zeros((2, len(self._pushes[0]), n))  # mean and variance of each joint's torque
         self._x, self._P = np.zeros((bodies, 10)), np.zeros((bodies, 10, 10))

@@ -40,6 +40,10 @@ DRIFT_RARE = 1000.0
 RARE = 100.0
 # [s] mean duration of a hand-over: steps take one lag of the regression, slow ones seconds
 HANDED_OVER = 0.5
+# share of hand-overs that end in what was held before, whatever seemed to be handed over: a hand that lets go. With
+# none, the end of a push stays a hand-over for seconds (test_a_push_of_half_a_minute_leaves_the_run_as_it_was); with
+# all, a light change is not sure (test_what_is_steadily_another_payload_s_torque_is_not_thought_to_have_gone_again)
+LETS_GO = 0.03
 # [s] how far apart the moments lie from which another body is weighed: a heavy one shows in a tenth of a second, one of
 # 50 g in two seconds
 STARTS = np.array([0.05, 0.1, 0.2, 0.4, 0.8, 1.6])
