@@ -144,6 +144,15 @@ def test_a_slow_hand_over_is_one_grasp_and_the_answer_follows_it():
 
 
 @pytest.mark.full  # some seconds
+def test_a_hand_over_of_many_seconds_is_one_event_of_the_whole_mass():
+    log, _ = handed_over(stream(12, [], 24.0), 6.0, 12.0, HALF_KILO)
+    estimates, events = said(log)
+    assert [event.kind for event in events] == ["grasp"]
+    assert events[0].mass == pytest.approx(0.5, abs=0.05)
+    assert len({e.since for e in estimates if e.t > events[0].t}) > 1  # it began anew on the way
+
+
+@pytest.mark.full  # some seconds
 def test_while_a_light_thing_is_not_sure_to_be_there_the_interval_is_of_both_payloads():
     """From 1 in 20 on the interval holds what the run says and what would be held; it is the truth's, too."""
     log = stream(31, [(8.0, box(0.08))], 11.0)

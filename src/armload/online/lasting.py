@@ -33,7 +33,8 @@ class Lasting:
     """What a run's rows say of a hand-over that may go on.
 
     Attributes:
-        seconds: since the run's first row [s]. goes_on: probability that the hand-over still does.
+        seconds: since the run's first row [s]. goes_on: probability that the hand-over still does; went_on: that it
+            did at the run's first row.
         ahead: by how much phi (10,) is ahead of the run, and the covariance of that.
     """
 
@@ -44,7 +45,7 @@ class Lasting:
         self._start: float | None = None  # of the first row [s]
         self._begun, self._pace = False, np.zeros(10)
         self._before, self._prior = np.zeros((10, 10)), np.zeros(n + 1)
-        self.seconds, self.goes_on, self.ahead = 0.0, 0.0, (np.zeros(10), np.zeros((10, 10)))
+        self.seconds, self.goes_on, self.went_on, self.ahead = 0.0, 0.0, 0.0, (np.zeros(10), np.zeros((10, 10)))
 
     def begin(self, shift: NDArray[np.float64], lasted: float, stayed: float, before: NDArray[np.float64]) -> None:
         """The run is taken up.
@@ -97,5 +98,6 @@ class Lasting:
         p = p[:-1] / p.sum()
         ahead = np.minimum(self.seconds, _ENDS)[:, None] * b - Pk
         mean = (p * a) @ ahead
+        self.went_on = float(p.sum())
         self.goes_on = float(p[:-1][_ENDS[:-1] > self.seconds].sum() + p[-1])
         self.ahead = mean, (ahead.T * (p * (a * a + 1.0 / c))) @ ahead - np.outer(mean, mean)

@@ -24,16 +24,19 @@ class Naming:
     def __init__(self, unit: float) -> None:
         self._unit = unit
         self.event: Event | None = None
-        self.judging = self._unnamed = self.held_before = False
+        self.judging = self._unnamed = self.held_before = self._held = self._rest = False
 
-    def begin(self, t: float, began: float) -> None:
-        """A change is noticed at t [s]; nobody knows yet which."""
-        self.event, self.judging, self._unnamed = Event("change", t, began, None), False, True
+    def begin(self, t: float, began: float, rest: bool) -> None:
+        """A change is noticed at t [s]; nobody knows yet which. `rest`: it is that of the last one, which went on."""
+        self._rest, self.judging, self._unnamed = rest, False, True
+        if not rest:
+            self._held = self.held_before
+        self.event = replace(self.event) if rest and self.event else Event("change", t, began, None)
 
     def call_off(self) -> None:
         """It was none: the payload is what it was."""
         assert self.event is not None
-        self.event = replace(self.event, kind="return", mass=0.0)
+        self.event = replace(self.event) if self._rest else replace(self.event, kind="return", mass=0.0)
 
     def judge(self, runs: Runs, estimate: Estimate, held: bool) -> bool:
         """Say what the change was once the new run can tell; whether that holds what the earlier run held."""
@@ -48,5 +51,5 @@ class Naming:
             return True
         if self._unnamed and (std <= KIND_STD or stream.seconds > KIND_LATEST or stream.stands):
             self._unnamed = False
-            self.event = replace(self.event, kind=kind_of(self.held_before, held))
+            self.event = replace(self.event, kind=kind_of(self._held, held))
         return False

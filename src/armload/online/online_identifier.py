@@ -275,7 +275,9 @@ class OnlineIdentifier:
         assert watch.event is not None
         event, shift, run = watch.event, self._stream.clock - now, watch.run
         if watch.settling:
-            self._ended, self._since, self._published = run, self._stream.clock, -np.inf
+            if self._event is None or event.t + shift != self._event.t:  # else the rest of that hand-over
+                self._ended = run
+            self._since, self._published = self._stream.clock, -np.inf
             self._stream.forget_pauses()
         elif event.mass is None and self._ended is not None:
             event = replace(event, mass=mass_step(self._ended, run, float(self._weak[0])))

@@ -22,7 +22,7 @@ import numpy as np
 from armload.errors import IdentificationError
 from armload.runtime.atomic import replacing
 
-FORMAT = 12
+FORMAT = 13
 _PACKAGE = "armload."
 _NOT_SAVED = ("_worker", "_data", "_model")  # threads, and what Pinocchio makes anew
 _MADE_ANEW = (

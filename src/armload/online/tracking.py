@@ -10,7 +10,7 @@ from armload.inertia import Z95
 from armload.online.lasting import Lasting
 from armload.online.modes import Modes
 from armload.online.runs import Gaussian
-from armload.online.thresholds import LAG, UNLIKELY
+from armload.online.thresholds import LAG, LIKELY, UNLIKELY
 from armload.posterior import PosteriorLeastSquares
 
 
@@ -29,6 +29,11 @@ class Tracker:
     def goes_on(self) -> float:
         """Probability that the hand-over before the run goes on."""
         return 0.0 if self.lasting is None else self.lasting.goes_on
+
+    @property
+    def went_on(self) -> bool:
+        """Whether the run began amid a hand-over: what changes now is its rest."""
+        return self.lasting is not None and self.lasting.went_on > LIKELY
 
     def row(self, run: PosteriorLeastSquares, louder: float) -> None:
         """A run has taken a row; `louder`: how large the noise is, in units of what it is taken for."""

@@ -173,7 +173,7 @@ class PayloadWatch:
             self._naming.held_before = held
         began = max(self._weighing.steady_t, sample.t - PATIENCE)
         until = began - max(sample.t - began, TAKEN_BACK)
-        self._naming.begin(sample.t, began)
+        self._naming.begin(sample.t, began, self._tracker.went_on)
         reference = self.runs.reference_for_next(self._naming.held_before)
         following = self._background.submit(next_run, run, reference, until)
         self._change, self.phase = Change(sample.t, began, state, following), SETTLING
