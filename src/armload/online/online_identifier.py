@@ -28,7 +28,7 @@ from armload.online.judgement import CHANGING, LEFT_OUT, Judgement
 from armload.online.learning import learned_from
 from armload.online.listening import Listening
 from armload.online.presenting import presented
-from armload.online.restoring import load_identifier, save_identifier
+from armload.online.state import load_state, save_state
 from armload.online.step import mass_step
 from armload.online.thresholds import KIND_LATEST, MOVING, RECENT, SELDOM
 from armload.online.watch import PayloadWatch
@@ -197,7 +197,7 @@ class OnlineIdentifier:
         if self._watch is not None:
             self._watch.hold()
         state = {k: v for k, v in vars(self).items() if k not in ("arm", "tare", "profile", "_every")}
-        return save_identifier(state, self.arm, self.method, self._engine, path)
+        return save_state(path, state, self.arm, self.method, self._engine)
 
     @classmethod
     def restore(
@@ -220,7 +220,7 @@ class OnlineIdentifier:
         """
         new = cls(arm, method=method, profile=profile, known=known, every=every)
         try:
-            saved = load_identifier(path, arm, new.method, new._engine)
+            saved = load_state(path, arm, new.method, new._engine)
         finally:
             new.close()
         new.__dict__.update(saved)

@@ -25,7 +25,6 @@ from typing import Literal
 import numpy as np
 
 from armload.estimators import Estimate
-from armload.online.background import Background
 from armload.online.change import Change, next_run
 from armload.online.event import Event
 from armload.online.lasting import Lasting
@@ -36,6 +35,7 @@ from armload.online.thresholds import LIKELY, PATIENCE, SURE, TAKEN_BACK, UNLIKE
 from armload.online.tracking import Tracker
 from armload.online.weighing import Weighing
 from armload.posterior import PosteriorLeastSquares
+from armload.posterior.worker import Worker
 from armload.recording import Sample
 
 Phase = Literal["following", "doubting", "settling"]
@@ -59,7 +59,7 @@ class PayloadWatch:
     def __init__(self, first: PosteriorLeastSquares) -> None:
         self.runs = Runs(first)
         self._look = Deferred()
-        self._background = Background()
+        self._background = Worker()
         self._weighing = Weighing(first)
         self.reset()
 
@@ -198,7 +198,7 @@ class PayloadWatch:
         """The payload is what it was: the run before goes on."""
         assert self._change is not None
         change, self._change = self._change, None
-        self._background.close_run(change.run)
+        self._background.submit(change.run.close)
         self._naming.call_off()
         self.phase, self._doubted_at, self._gave_up = DOUBTING, change.t, False
 
@@ -217,7 +217,7 @@ class PayloadWatch:
         self.phase, self._gave_up, self.mixed = FOLLOWING, False, lasting is not None
         self._tracker.lasting = lasting
         if dropped is not None:
-            self._background.close_run(dropped)
+            self._background.submit(dropped.close)
 
     def hold(self) -> None:
         """Wait for what is done in the background."""
