@@ -29,7 +29,6 @@ from armload.online.learning import learned_from
 from armload.online.listening import Listening
 from armload.online.presenting import presented
 from armload.online.state import load_state, save_state
-from armload.online.step import mass_step
 from armload.online.thresholds import KIND_LATEST, MOVING, RECENT, SELDOM
 from armload.online.watch import PayloadWatch
 from armload.posterior import Known, PosteriorLeastSquares, Profile
@@ -129,7 +128,6 @@ class OnlineIdentifier:
         (self._watch or self._engine).reset()
         self._stream.reset()
         self._internal = 0.0
-        self._ended: PosteriorLeastSquares | None = None  # the run before the last change
         self._moved = self._published = -np.inf
         self._since: float | None = None
         self._event: Event | None = None
@@ -273,12 +271,10 @@ class OnlineIdentifier:
     def _noticed(self, watch: PayloadWatch, now: float) -> None:
         """A change of payload, or what it was."""
         assert watch.event is not None
-        event, shift, run = watch.event, self._stream.clock - now, watch.run
+        event, shift = watch.event, self._stream.clock - now
         if watch.settling:
-            self._ended, self._since, self._published = run, self._stream.clock, -np.inf
+            self._since, self._published = self._stream.clock, -np.inf
             self._stream.forget_pauses()
-        elif event.mass is None and self._ended is not None:
-            event = replace(event, mass=mass_step(self._ended, run, float(self._weak[0])))
         self._event = replace(event, t=event.t + shift, began=event.began + shift)
 
     def _judge(self, estimate: Estimate, run: Identifier, stands: bool = False) -> None:

@@ -26,9 +26,8 @@ import numpy as np
 
 from armload.estimators import Estimate
 from armload.online.change import Change, next_run
-from armload.online.event import Event
+from armload.online.event import Event, Naming
 from armload.online.lasting import Lasting
-from armload.online.naming import Naming
 from armload.online.runs import Runs
 from armload.online.schedule import Deferred
 from armload.online.thresholds import LIKELY, PATIENCE, SURE, TAKEN_BACK, UNLIKELY
@@ -70,7 +69,7 @@ class PayloadWatch:
         self._look.reset()
         self.phase: Phase = FOLLOWING
         self.answered, self.mixed = self.run, False
-        self._naming, self._tracker = Naming(self.runs.unit), Tracker()
+        self._naming, self._tracker = Naming(), Tracker()
         self._weighing.reset(self.run)
         self._doubted_at = -np.inf
         self._gave_up = False  # doubting: what does not fit is believed until it fits again
@@ -137,7 +136,7 @@ class PayloadWatch:
         if self.run.stream.rows > before and self._look.row(sample.t):
             self._examine(sample, held)
         self._look.seen(sample.t)
-        if self._naming.judging and self.run.fresh and self._naming.judge(self.runs, estimate, held):
+        if self._naming.judging and self.run.fresh and self._naming.judge(self.runs, held):
             self._watch_anew(self.runs.go_back())
         return estimate
 
