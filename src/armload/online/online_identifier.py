@@ -27,7 +27,6 @@ from armload.online.gate import Gate, Health, all_finite
 from armload.online.judgement import CHANGING, LEFT_OUT, Judgement
 from armload.online.learning import learned_from
 from armload.online.listening import Listening
-from armload.online.presenting import presented
 from armload.online.state import load_state, save_state
 from armload.online.thresholds import KIND_LATEST, MOVING, RECENT, SELDOM
 from armload.online.watch import PayloadWatch
@@ -56,6 +55,9 @@ class OnlineIdentifier:
         every: [s] between two new answers of a payload whose run has begun 1.5 s ago, at most 0.1; changes are looked
             for in each row all the same.
 
+    Attributes:
+        method: its name. event: the last change of payload that was noticed, on the stream's clock.
+
     Raises:
         ArmloadError: an unknown method, one that cannot use what is known, or a model or tare of another arm.
     """
@@ -78,9 +80,9 @@ class OnlineIdentifier:
         self.method = self.engine.name
         self._gate = Gate(arm)
         self._stream = Listening()
-        self._weak = payload_prior_std(arm)
-        mean, std = first.payload_prior or (np.zeros(10), self._weak)
-        self._judgement = Judgement(str(arm.frame), self._weak, Before(mean, std))
+        weak = payload_prior_std(arm)
+        mean, std = first.payload_prior or (np.zeros(10), weak)
+        self._judgement = Judgement(arm, weak, Before(mean, std))
         self.reset()
 
     @property
@@ -101,11 +103,6 @@ class OnlineIdentifier:
         if self.profile is not None:
             return "profile"
         return "arm" if self.arm.attached is None else "tool"
-
-    @property
-    def event(self) -> Event | None:
-        """The last change of payload that was noticed, on the stream's clock."""
-        return self._event
 
     @property
     def arm_changed(self) -> str | None:
@@ -130,7 +127,7 @@ class OnlineIdentifier:
         self._internal = 0.0
         self._moved = self._published = -np.inf
         self._since: float | None = None
-        self._event: Event | None = None
+        self.event: Event | None = None
         self._judgement.reset()
 
     def __repr__(self) -> str:
@@ -163,11 +160,10 @@ class OnlineIdentifier:
         if self._watch is not None and self._watch.settling:
             return self._present()
         if self.health.used:
-            estimate = self._engine.conclude() if self._watch is None else self._watch.conclude()
+            estimate = (self._watch or self._engine).conclude()
             if all_finite(estimate.phi):
-                run = self._engine if self._watch is None else self._watch.answered
-                self._judge(estimate, run)
-                self._judgement.conclude(estimate, run, self.arm, self._internal)
+                self._judge(estimate, self.engine)
+                self._judgement.conclude(estimate, self.engine, self._internal)
         return self._present()
 
     def learned(self, name: str = "stream") -> Profile | None:
@@ -227,58 +223,53 @@ class OnlineIdentifier:
         return new
 
     def _identify(self, sample: Sample) -> None:
-        run: Identifier = self._engine
-        if self._watch is None:
+        watch, judgement, run = self._watch, self._judgement, self._engine
+        if watch is None:
             estimate, fresh = run.update(sample), not 0.0 <= sample.t - self._published < self._every
         else:
-            known, now = self._watch.event, self._watch.run
+            event, now = watch.event, watch.run
             now.publish = self._every if now.stream.seconds > KIND_LATEST else PUBLISH
-            estimate = self._watch.update(sample, self._judgement.held)
-            if self._watch.event is not known:
-                self._noticed(self._watch, sample.t)
+            estimate = watch.update(sample, judgement.held)
+            if watch.event is not None and watch.event is not event:
+                self._noticed(watch.event, watch.settling, self._stream.clock - sample.t)
             if estimate is None:
                 if sample.t - self._published > PUBLISH:
-                    self._track(self._watch, sample)
+                    self._track(watch, sample)
                 return
-            run = self._watch.answered
-            fresh = run.fresh
-            if not fresh and run is not self._judgement.run and math.isfinite(run.data_t):
+            run, fresh = watch.answered, watch.answered.fresh
+            if not fresh and run is not judgement.run and math.isfinite(watch.answered.data_t):
                 return  # a run just taken up again: until it answers anew, its answer is of long ago
-        if (fresh or self._watch is None) and not all_finite(estimate.phi):
+        if (fresh or watch is None) and not all_finite(estimate.phi):
             return
-        counts, stands = self._judgement.counts(sample.t, run)
+        counts, stands = judgement.counts(sample.t, run)
         if counts and self._stream.unseen:
             self._stream.forget_pauses()
-        mixed = self._watch is not None and self._watch.mixed
+        mixed = watch is not None and watch.mixed
         if fresh:
             self._published = sample.t
-            if self._watch is not None and mixed:
-                estimate = self._watch.track(sample.t)
+            estimate = watch.track(sample.t) if watch is not None and mixed else estimate
             self._judge(estimate, run, stands)
         if fresh or not mixed:
-            self._judgement.take(estimate, run)
+            judgement.take(estimate, run)
 
     def _track(self, watch: PayloadWatch, sample: Sample) -> None:
         """While samples are left out: what all that may have happened makes of the payload."""
-        self._published, run = sample.t, watch.run
-        estimate = watch.track(sample.t)
-        self._judgement.follow(estimate)
+        self._published, estimate = sample.t, watch.track(sample.t)
+        self._judgement.take(estimate, None)
         if watch.settling or watch.likely[0] > 0.5:  # then phi follows what the samples say
             self._judgement.newest = sample.t
-        self._judge(estimate, run)
-        self._judgement.notes = (*self._judgement.notes, CHANGING if watch.settling else LEFT_OUT)
+        self._judge(estimate, watch.run)
+        self._judgement.notes += (CHANGING if watch.settling else LEFT_OUT,)
 
-    def _noticed(self, watch: PayloadWatch, now: float) -> None:
-        """A change of payload, or what it was."""
-        assert watch.event is not None
-        event, shift = watch.event, self._stream.clock - now
-        if watch.settling:
+    def _noticed(self, event: Event, settling: bool, shift: float) -> None:
+        """A change of payload, or what it was; the stream's clock is ahead of its by `shift` [s]."""
+        if settling:
             self._since, self._published = self._stream.clock, -np.inf
             self._stream.forget_pauses()
-        self._event = replace(event, t=event.t + shift, began=event.began + shift)
+        self.event = replace(event, t=event.t + shift, began=event.began + shift)
 
     def _judge(self, estimate: Estimate, run: Identifier, stands: bool = False) -> None:
-        stands = stands and self._stream.trouble is None
+        stands = stands and self.trouble is None
         self._judgement.judge(estimate, run, self.relative_to, self._moving, stands)
 
     @property
@@ -286,16 +277,30 @@ class OnlineIdentifier:
         return self._internal + self._stream.ahead - self._moved < RECENT
 
     def _present(self) -> OnlineEstimate:
-        stream, sure = self._stream, self._watch is None or self._watch.sure
-        fields = {
-            "t": stream.clock,
-            "age": float(stream.unseen + stream.ahead + self._judgement.age(self._internal)),
-            "since": stream.clock if self._since is None else self._since,
-            "relative_to": self.relative_to,
-            "method": self.method,
-            "calibrated": self.engine.calibrated and not self._judgement.doubted and sure,
-            "moving": self._moving,
-            "event": self._event,
-            "health": self._gate.health,
-        }
-        return presented(self._judgement, self._watch, stream.trouble, fields)
+        stream, judged, watch = self._stream, self._judgement, self._watch
+        change, contact, drift = (None, None, None) if watch is None else watch.likely
+        return OnlineEstimate.of(
+            {
+                **vars(judged.estimate),
+                "t": stream.clock,
+                "age": float(stream.unseen + stream.ahead + judged.age(self._internal)),
+                "lag": 0.0,
+                "since": stream.clock if self._since is None else self._since,
+                "relative_to": self.relative_to,
+                "method": self.method,
+                "determined": judged.determined,
+                "held": judged.held,
+                "around": judged.around,
+                "before": judged.before,
+                "calibrated": self.engine.calibrated and not judged.doubted and (watch is None or watch.sure),
+                "p_held": judged.p_held,
+                "p_change": change,
+                "p_contact": contact,
+                "p_drift": drift,
+                "moving": self._moving,
+                "settling": watch is not None and watch.settling,
+                "event": self.event,
+                "health": self.health,
+                "notes": judged.notes if stream.trouble is None else (*judged.notes, stream.trouble),
+            }
+        )
