@@ -23,7 +23,7 @@ from armload.identification.intervals import Before
 from armload.identification.known_payload import know
 from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
-from armload.online.gate import Gate, Health, all_finite
+from armload.online.gate import Health, all_finite
 from armload.online.judgement import CHANGING, LEFT_OUT, Judgement
 from armload.online.learning import learned_from
 from armload.online.listening import Listening
@@ -78,8 +78,7 @@ class OnlineIdentifier:
         self._watch = PayloadWatch(first) if isinstance(first, PosteriorLeastSquares) else None
         self._every = min(max(every, PUBLISH), SELDOM)
         self.method = self.engine.name
-        self._gate = Gate(arm)
-        self._stream = Listening()
+        self._stream = Listening(arm)
         weak = payload_prior_std(arm)
         mean, std = first.payload_prior or (np.zeros(10), weak)
         self._judgement = Judgement(arm, weak, Before(mean, std))
@@ -112,7 +111,7 @@ class OnlineIdentifier:
     @property
     def health(self) -> Health:
         """Counts of the stream since `reset`."""
-        return self._gate.health
+        return self._stream.gate.health
 
     @property
     def trouble(self) -> str | None:
@@ -121,7 +120,6 @@ class OnlineIdentifier:
 
     def reset(self) -> None:
         """Forget the stream (not the tare); the next sample is the first."""
-        self._gate.reset()
         (self._watch or self._engine).reset()
         self._stream.reset()
         self._internal = 0.0
@@ -139,12 +137,10 @@ class OnlineIdentifier:
         Args:
             t: [s], on any clock. q, dq, tau: (n,) [rad, rad/s, N·m]; tau = rigid body + friction, gravity in it.
         """
-        sample = self._gate.take(t, q, dq, tau)
+        sample = self._stream.take(t, q, dq, tau)
         if sample is None:
-            self._stream.left_out(self._gate, t, q, dq, tau)
             return self._present()
         self._internal = sample.t
-        self._stream.used(self._gate, float(t))
         if self._since is None:
             self._since = self._stream.clock
         if sample.t - self._moved > 0.1 * RECENT and np.abs(sample.dq).max() > MOVING:

@@ -38,7 +38,7 @@ def save_state(path: str | PathLike[str], state: dict[str, Any], arm: Arm, metho
         raise IdentificationError(f"a live identifier of this kind cannot be saved: {error}") from None
     text = {"format": FORMAT, "origin": _origin(arm, method, engine), "tree": tree, "objects": packer.objects}
     arrays = {f"a{k}": array for k, array in enumerate(packer.arrays)}
-    with replacing(path) as part, part.open("wb") as file:
+    with replacing(Path(path)) as part, part.open("wb") as file:
         np.savez(file, allow_pickle=False, tree=np.frombuffer(json.dumps(text).encode(), dtype=np.uint8), **arrays)
     return Path(path)
 
