@@ -72,7 +72,7 @@ class Gate:
 
     Attributes:
         health: counts of the stream. reason: why the last sample that was left out was. now: time of the last sample of
-            all [s], NaN if it had none. shift: what our own clock is ahead of the stream's, as it leaves pauses out [s].
+            all [s], NaN if it had none. shift: what our own clock, without pauses, is ahead of the stream's [s].
     """
 
     def __init__(self, arm: Arm) -> None:
