@@ -19,6 +19,7 @@ from armload.inertia import determined, held, held_probability
 from armload.online.thresholds import STANDS
 from armload.posterior import PosteriorLeastSquares
 from armload.posterior.scales import AnotherArm
+from armload.regression import payload_prior_std
 
 _STANDING = "standing: nothing new is learned until the arm moves, or what it holds changes"
 _STANDING_MOTOR = "standing: a change of payload is noticed only when the arm moves"
@@ -30,9 +31,10 @@ class Judgement:
     """The last answer and what is said of it.
 
     Args:
-        arm: whose payload it is. weak: standard deviation (10,) of the weak prior. before: what is known beforehand.
+        arm: whose payload it is. prior: as of `Identifier.payload_prior`.
 
     Attributes:
+        before: what is known beforehand.
         estimate: the answer. around: (10,) where its intervals are. run: that it is of; None: of no run alone.
         determined: which parameters (10,) the data determine. held: whether anything is. p_held: how probable that is.
         newest: time of the newest sample that counts in it [s]; −∞ before one does.
@@ -40,8 +42,9 @@ class Judgement:
         doubted: whether something speaks against its error bars. notes: what else there is to say.
     """
 
-    def __init__(self, arm: Arm, weak: NDArray[np.float64], before: Before) -> None:
-        self._arm, self._weak, self.before = arm, weak, before
+    def __init__(self, arm: Arm, prior: tuple[NDArray[np.float64], NDArray[np.float64]] | None) -> None:
+        self._arm, self._weak = arm, payload_prior_std(arm)
+        self.before = Before(*(prior or (np.zeros(10), self._weak)))
         self.reset()
 
     def reset(self) -> None:

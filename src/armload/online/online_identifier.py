@@ -19,7 +19,6 @@ from armload.arms import Arm
 from armload.errors import IdentificationError
 from armload.estimators import Estimate, Identifier
 from armload.identification.choice import choose
-from armload.identification.intervals import Before
 from armload.identification.known_payload import know
 from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
@@ -33,7 +32,6 @@ from armload.online.watch import PayloadWatch
 from armload.posterior import Known, PosteriorLeastSquares, Profile
 from armload.posterior.map import PUBLISH
 from armload.recording import Recording, Sample
-from armload.regression import payload_prior_std
 
 
 class OnlineIdentifier:
@@ -72,16 +70,13 @@ class OnlineIdentifier:
         every: float = PUBLISH,
     ) -> None:
         self.arm, self.tare, self.profile, self._tared = arm, tare, profile, tare is not None
-        choice = choose(arm, tare, method, live=True, profile=profile)
-        self._engine = first = choice.identifier
+        self._engine = first = choose(arm, tare, method, live=True, profile=profile).identifier
         know(first, known)
         self._watch = PayloadWatch(first) if isinstance(first, PosteriorLeastSquares) else None
         self._every = min(max(every, PUBLISH), SELDOM)
         self.method = self.engine.name
         self._stream = Listening(arm)
-        weak = payload_prior_std(arm)
-        mean, std = first.payload_prior or (np.zeros(10), weak)
-        self._judgement = Judgement(arm, weak, Before(mean, std))
+        self._judgement = Judgement(arm, first.payload_prior)
         self.reset()
 
     @property
