@@ -9,6 +9,7 @@ payload counted to the last link.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -46,12 +47,18 @@ class ForwardDynamics:
 
     def __init__(self, arm: Arm) -> None:
         self.arm = arm
-        self._model = arm._model.copy()  # its own: the last link's inertia changes with the payload
-        self._data = self._model.createData()
         self._last = self._model.inertias[arm.n].toDynamicParameters()
         placement = arm._frame_placement
         moved = frame_change_matrix(placement.rotation, placement.translation)
         self._payload = np.array([to_order(InertialParameters(column), "pinocchio") for column in moved.T]).T
+
+    @cached_property
+    def _model(self) -> pin.Model:
+        return self.arm._model.copy()  # its own: the last link's inertia changes with the payload
+
+    @cached_property
+    def _data(self) -> pin.Data:
+        return self._model.createData()
 
     def __call__(self, q: NDArray, dq: NDArray, tau: NDArray, phi: NDArray) -> NDArray[np.float64]:
         """q̈ (n,) [rad/s²] at q, q̇, tau (n,) with a payload phi (10,), a body that can exist."""

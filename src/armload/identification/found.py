@@ -95,14 +95,8 @@ class Found(NamedTuple):
 
     @property
     def explained(self) -> bool:
-        """Whether a body lies within `MISFIT` standard deviations of what the log says: most often the answer does."""
-        mean, covariance = self.unprojected or (self.estimate.phi, self.estimate.covariance)
-        away = self.estimate.phi - mean
-        if is_consistent(self.estimate.phi) and (
-            not away.any() or away @ np.linalg.solve(covariance, away) <= MISFIT**2
-        ):
-            return True  # the nearest body is nearer still, and need not be found
-        return distance_to_body(mean, covariance) <= MISFIT
+        """Whether a body explains what the log says."""
+        return explained(self.estimate, self.unprojected)
 
     def with_error(self, covariance: NDArray[np.float64]) -> Found:
         """The same with one more error of phi, of that covariance (10, 10): of a tool that is not known exactly."""
@@ -116,6 +110,15 @@ class Found(NamedTuple):
         known = self.known and self.known.with_tool(np.zeros(10))
         estimate = replace(self.estimate, phi=self.estimate.phi - tool)
         return self._replace(estimate=estimate, unprojected=unprojected, known=known, log_only=log_only)
+
+
+def explained(estimate: Estimate, unprojected: tuple[NDArray[np.float64], NDArray[np.float64]] | None) -> bool:
+    """Whether a body lies within `MISFIT` standard deviations of what a log says: most often the answer does."""
+    mean, covariance = unprojected or (estimate.phi, estimate.covariance)
+    away = estimate.phi - mean
+    if is_consistent(estimate.phi) and (not away.any() or away @ np.linalg.solve(covariance, away) <= MISFIT**2):
+        return True  # the nearest body is nearer still, and need not be found
+    return distance_to_body(mean, covariance) <= MISFIT
 
 
 def found_in(recording: Recording, arm: Arm, tare: Recording | None, asked: Asked) -> Found:

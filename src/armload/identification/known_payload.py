@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from armload.errors import IdentificationError
 from armload.estimators import Identifier
 from armload.identification.intervals import Before
+from armload.identification.notes import other_than_given
 from armload.inertia import determined as determined_by
 from armload.posterior import Known, PosteriorLeastSquares
 
@@ -25,6 +26,12 @@ def know(identifier: Identifier, known: Known | None) -> None:
             f"the method {identifier.name} cannot use a known mass or centre: leave --mass and --com out, or use "
             "hybrid, map-gp or map"
         )
+
+
+def denied_by(known: Known | None, log_only: tuple[NDArray[np.float64], NDArray[np.float64]] | None) -> str | None:
+    """That what a log says, mean (10,) and covariance (10, 10), is not what is known; None: it may be it."""
+    denied = None if known is None or log_only is None else known.denied(*log_only)
+    return None if denied is None or log_only is None else other_than_given(denied, *log_only)
 
 
 def determined_with(

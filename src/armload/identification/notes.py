@@ -152,6 +152,13 @@ def gravity_doubted(arm: Arm, tilt: Tilt | None, torque: str) -> str | None:
     )
 
 
+def leaning(arm: Arm, tilt: Tilt | None, torque: str) -> str | None:
+    """That the base leans, or may; None: there is no reason to think so. Args: as of `gravity_doubted`."""
+    if tilt is not None and tilt.found:
+        return gravity_turned(arm.gravity, arm.leaning(tilt.angles).gravity, False)
+    return gravity_doubted(arm, tilt, torque)
+
+
 def not_rigid(restlessness: float) -> str:
     """That what is held seems to move on its own."""
     return (

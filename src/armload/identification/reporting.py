@@ -12,16 +12,15 @@ from armload.arms import Arm
 from armload.identification.answer import Identification, body_of, is_removal
 from armload.identification.found import Found
 from armload.identification.intervals import about_com, intervals, phi_interval
-from armload.identification.known_payload import determined_with
+from armload.identification.known_payload import denied_by, determined_with
 from armload.identification.notes import (
     another_model,
     arm_changed,
-    gravity_doubted,
     gravity_turned,
     lacking,
+    leaning,
     leaning_on_prior,
     not_rigid,
-    other_than_given,
 )
 from armload.identification.thresholds import LEANS
 from armload.inertia import InertialParameters, held, is_consistent, vech
@@ -32,7 +31,7 @@ from armload.regression import payload_prior_std
 from armload.regression.prior import REACH
 
 _CHECK = "check the robot, the base (--gravity), what is mounted and the torques' signs"
-NO_BODY = f"no body fits within the error bars: {_CHECK}"  # this and the next are also what a concluded stream says
+NO_BODY = f"no body fits within the error bars: {_CHECK}"
 EXCHANGED = (
     "something seems to have been taken off since the tare, and something else put on: the answer is the difference of "
     "the two, which need be no body; record a tare with what is mounted now, or believe --method map-gp if nothing was "
@@ -59,14 +58,12 @@ def answered(
     determined = determined_by(estimate.std, before.std, found.weak_std, weak)
     log_only = found.log_only or (estimate.phi, estimate.covariance)  # whether anything is held, only the log tells
     is_held = held(float(log_only[0][0]), float(np.sqrt(log_only[1][0, 0])), bool(determined[0]))
-    leaning = np.zeros(10, dtype=bool)
+    leans = np.zeros(10, dtype=bool)
     if found.weak_std is not None:
-        leaning = determined & (found.weak_std > LEANS * estimate.std)
+        leans = determined & (found.weak_std > LEANS * estimate.std)
     if found.known is not None:  # what was given is known, whatever the log tells, and does not rest on the prior
-        determined, leaning = (
-            determined_with(determined, found.known, estimate.std, before),
-            leaning & ~found.known.which,
-        )
+        determined = determined_with(determined, found.known, estimate.std, before)
+        leans = leans & ~found.known.which
     phi = body_of(estimate, determined[0], found.exchanged)
     low, high = phi_interval(phi, estimate.phi, estimate.std, determined, before, otherwise)
     if unsure is not None:
@@ -80,7 +77,7 @@ def answered(
         )
     if is_held or not determined[0]:  # an empty hand has no inertia to be determined
         every_note += lacking(arm, tared, determined, found.known_arm_std, weak)
-        every_note += leaning_on_prior(leaning)
+        every_note += leaning_on_prior(leans)
     consistent = is_consistent(phi)
     trusted = found.calibrated and not doubts and consistent and otherwise is None and unsure is None
     mass, com, inertia_com = about_com(phi)
@@ -100,7 +97,7 @@ def answered(
         consistent=consistent,
         held=is_held,
         **found_of._asdict(),
-        rests_on_prior=~determined | leaning,
+        rests_on_prior=~determined | leans,
         torque_gain_std=found.gain_std,
         gain_known=found.gain_known,
         notes=tuple(every_note),
@@ -119,10 +116,8 @@ def _doubts(found: Found, arm: Arm, mass_determined: bool, relative_to: str) -> 
     leans = None
     if found.gravity is not None:
         leans = gravity_turned(arm.gravity, found.gravity, True)
-    elif found.tilt is not None and found.tilt.found:
-        leans = gravity_turned(arm.gravity, arm.leaning(found.tilt.angles).gravity, False)
     else:
-        leans = gravity_doubted(arm, found.tilt, "motor" if arm.motor_torque or found.friction_found else "link")
+        leans = leaning(arm, found.tilt, "motor" if arm.motor_torque or found.friction_found else "link")
     return [doubt for doubt in (leans, _doubt(found, arm, mass_determined, relative_to)) if doubt is not None]
 
 
@@ -138,23 +133,33 @@ def _doubt(found: Found, arm: Arm, mass_determined: bool, relative_to: str) -> s
             "the mass is negative: less is mounted than the model of the arm and its tool assume, or the torque's "
             "sign is turned"
         )
-    if found.exchanged:
-        return EXCHANGED
-    if not found.explained:
-        return NO_BODY
-    if (changed := arm_changed(found.drift, found.another, relative_to)) is not None:
-        return changed
-    if found.restlessness > RESTLESS:
-        return not_rigid(found.restlessness)
-    if found.known is not None and found.log_only is not None:
-        denied = found.known.denied(*found.log_only)
-        if denied is not None:
-            return other_than_given(denied, *found.log_only)
+    changed = arm_changed(found.drift, found.another, relative_to)
+    doubt = doubt_of(found.exchanged, found.exchanged or found.explained, changed, found.restlessness)
+    if doubt is not None:
+        return doubt
+    if (denied := denied_by(found.known, found.log_only)) is not None:
+        return denied
     if found.strange_links and relative_to in ("arm", "tool"):  # a tare tells what the links are
         return another_model(arm.name, found.strange_links)
     if found.offset_ratio:
         return f"the torques are {found.offset_ratio:.0f} times as far off as those of an arm should be: {_CHECK}"
     return None
+
+
+def doubt_of(exchanged: bool, explained: bool, changed: str | None, restlessness: float) -> str | None:
+    """What the answer of a log, or of a stream that has ended, shows against itself, most telling first.
+
+    Args:
+        exchanged: see `PosteriorLeastSquares`. explained: whether a body explains it. changed: that the arm has.
+        restlessness: of the torques (`posterior.restless`).
+    """
+    if exchanged:
+        return EXCHANGED
+    if not explained:
+        return NO_BODY
+    if changed is not None:
+        return changed
+    return not_rigid(restlessness) if restlessness > RESTLESS else None
 
 
 def _with_any_inertia(

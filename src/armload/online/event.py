@@ -1,16 +1,15 @@
-"""A change of payload, as it is reported."""
+"""A change of payload, as it is reported, and what it was: it gets its name once the run after it can tell."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-KINDS = ("change", "grasp", "release", "swap", "return")
+from armload.online.runs import Runs
+from armload.online.thresholds import KIND_FROM, KIND_LATEST, KIND_STD, RETURN_STD, RETURN_UNTIL
+from armload.posterior import PosteriorLeastSquares
 
-
-def kind_of(before: bool, after: bool) -> str:
-    """The kind of a change, by whether anything is held before and after it."""
-    return {(False, True): "grasp", (True, False): "release", (True, True): "swap"}.get((before, after), "change")
+_KINDS = {(False, True): "grasp", (True, False): "release", (True, True): "swap", (False, False): "change"}
 
 
 @dataclass(frozen=True)
@@ -31,7 +30,58 @@ class Event:
 
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
-        return {"kind": self.kind, "t": self.t, "began": self.began, "mass": self.mass}
+        return vars(self).copy()
 
     def __str__(self) -> str:
         return f"{self.kind} at {self.t:.2f} s" + ("" if self.mass is None else f": {self.mass:+.2f} kg")
+
+
+class Naming:
+    """The last change noticed, and whether the run after it is still judged.
+
+    Attributes:
+        event: the last change; None: there was none. judging: whether the run is new, and may give way to the earlier
+            one. held_before: whether anything was held before the change, or the doubt.
+    """
+
+    def __init__(self) -> None:
+        self.event: Event | None = None
+        self.judging = self._unnamed = self.held_before = self._held = self._rest = False
+        self._ended: PosteriorLeastSquares | None = None
+
+    def begin(self, t: float, began: float, run: PosteriorLeastSquares, rest: bool) -> None:
+        """A change is noticed at t [s]; nobody knows yet which.
+
+        Args:
+            t, began: as of `Event`. run: that ends. rest: it is that of the last change, which went on in this run.
+        """
+        self._rest, self.judging, self._unnamed = rest and self.event is not None, False, True
+        if self.event is not None and self._rest:
+            self.event = replace(self.event, mass=None)
+        else:
+            self.event, self._ended, self._held = Event("change", t, began, None), run, self.held_before
+
+    def call_off(self, runs: Runs) -> None:
+        """It was none, or the last change did not go on: the payload is what it was."""
+        assert self.event is not None
+        kind, mass = (self.event.kind, runs.mass_step(self._ended)) if self._rest else ("return", 0.0)
+        self._name(kind, mass)
+
+    def judge(self, runs: Runs, held: bool) -> bool:
+        """Say what the change was once the new run can tell; whether that holds what the earlier run held."""
+        stream, std = runs.current.stream, float(runs.current.last.std[0]) / runs.unit
+        if stream.seconds < KIND_FROM:
+            return False
+        self.judging = stream.seconds <= RETURN_UNTIL
+        if std <= RETURN_STD and runs.earlier is not None and runs.is_earlier():
+            self.judging = False
+            self._name("return", runs.mass_step(self._ended, runs.earlier))
+            return True
+        if self._unnamed and (std <= KIND_STD or stream.seconds > KIND_LATEST or stream.stands):
+            self._unnamed = False
+            self._name(_KINDS[self._held, held], runs.mass_step(self._ended))
+        return False
+
+    def _name(self, kind: str, mass: float | None) -> None:
+        assert self.event is not None
+        self.event = replace(self.event, kind=kind, mass=mass)

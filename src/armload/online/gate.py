@@ -69,12 +69,14 @@ class Gate:
 
     Args:
         arm: the arm.
-        gap: a longer pause between samples counts as an interruption [s].
+
+    Attributes:
+        health: counts of the stream. reason: why the last sample that was left out was. now: time of the last sample of
+            all [s], NaN if it had none. shift: what our own clock, without pauses, is ahead of the stream's [s].
     """
 
-    def __init__(self, arm: Arm, gap: float = GAP) -> None:
-        limits, n = arm.limits, arm.n
-        self.n, self.gap, self._shape = n, gap, (n,)
+    def __init__(self, arm: Arm) -> None:
+        limits, self.n = arm.limits, arm.n
         known, bounded = np.isfinite(limits.velocity), np.isfinite(limits.effort)
         # in one array, as each array that is handed to compiled code costs as much as the comparisons with it
         self._limits = np.array(
@@ -91,24 +93,19 @@ class Gate:
     def reset(self) -> None:
         """Forget the stream and its counts."""
         self.health = Health()
-        self.reason = REASONS[0]  # why the last sample that was left out was
-        self._shift = 0.0  # of the stream's clock against our own
+        self.reason, self.now, self.shift = REASONS[0], math.nan, 0.0
         self._t, self._q = np.nan, np.zeros(self.n)  # of the last sample, on the stream's clock; NaN: there is none
         self._elsewhere: tuple[float, NDArray] | None = None  # where the arm seems to have jumped to, and since when
 
-    @property
-    def shift(self) -> float:
-        """What our own clock, which leaves pauses out, is ahead of the stream's [s]."""
-        return self._shift
-
     def take(self, t: Any, q: Any, dq: Any, tau: Any) -> Sample | None:
         """A sample as it came, on a clock of its own that always rises; None if left out (`health` counts why)."""
+        self.now = math.nan
         try:
-            now = float(t)
+            now = self.now = float(t)
             q, dq, tau = np.array(q, float), np.array(dq, float), np.array(tau, float)  # copies: buffers are used again
         except Exception:  # an array of another library raises what it likes
             return self._leave_out("wrong size")
-        if q.shape != self._shape or dq.shape != self._shape or tau.shape != self._shape:
+        if not q.shape == dq.shape == tau.shape == (self.n,):
             return self._leave_out("wrong size")
         found = _look(now, q, dq, tau, self._limits, self._t, self._q)
         if _NOTHING < found < _JUMPED:
@@ -117,20 +114,20 @@ class Gate:
         set_back = step < 0.0  # far enough not to be late
         if set_back:
             self.health.clock_jumps += 1
-            self._shift += _PAUSE - step
+            self.shift += _PAUSE - step
             step = _PAUSE
         if found == _JUMPED:
             if not self._believed(now, q):
                 self._t = now if set_back else self._t
                 return self._leave_out("jump")
-            self._shift += max(_PAUSE - step, 0.0)
-        elif step > self.gap:
+            self.shift += max(_PAUSE - step, 0.0)
+        elif step > GAP:
             self.health.pauses += 1
-            self._shift -= max(step - _PAUSE, 0.0)  # an arm that was switched off gave no information meanwhile
+            self.shift -= max(step - _PAUSE, 0.0)  # an arm that was switched off gave no information meanwhile
         self._elsewhere = None
         self._t, self._q = now, q
         self.health.used += 1
-        return Sample(now + self._shift, q, dq, tau)
+        return Sample(now + self.shift, q, dq, tau)
 
     def _believed(self, t: float, q: NDArray) -> bool:
         """Whether the arm has been where it seems to have jumped to for long enough."""
@@ -152,7 +149,7 @@ class Gate:
             return f"expected a time and three times {self.n} numbers"
         names = ("position", "velocity", "torque")
         for name, x in zip(names, parts, strict=True):
-            if x.shape != self._shape:
+            if x.shape != (self.n,):
                 return f"expected {self.n} joints, found {name} of shape {x.shape}"
         if reason == "not finite":
             for name, x in zip(names[::-1], parts[::-1], strict=True):

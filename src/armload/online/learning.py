@@ -5,26 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from armload.arms import rated_effort
-from armload.estimators import Identifier
 from armload.identification.notes import arm_changed
 from armload.inertia import HELD
 from armload.online.thresholds import LEARN_FROM
 from armload.posterior import PosteriorLeastSquares, Profile
 from armload.posterior.profile_session import compared, with_session
-from armload.posterior.scales import AnotherArm
 from armload.regression import Correction
-
-
-def change_of_arm(run: Identifier, what: str = "profile", another: AnotherArm | None = None) -> str | None:
-    """That a run's arm is not as at its tare or as its profile says; None: it is, as far as anybody can tell.
-
-    Args:
-        what: that is spoken of, "profile" or "tare".
-        another: what was found of the arm in an earlier run of the stream, which has the same arm; None: nothing.
-    """
-    if not isinstance(run, PosteriorLeastSquares):
-        return None
-    return arm_changed(run.stream.drift, another or run.stream.another, what)
 
 
 def learned_from(profile: Profile, runs: Iterable[PosteriorLeastSquares], name: str) -> Profile | None:
@@ -47,13 +33,7 @@ def learned_from(profile: Profile, runs: Iterable[PosteriorLeastSquares], name: 
 
 
 def _is_empty(run: PosteriorLeastSquares) -> bool:
-    stream = run.stream
-    if (
-        run.reference is not None
-        or stream.seconds < LEARN_FROM
-        or not stream.solutions
-        or stream.difference is not None
-    ):
-        return False
-    mass, std = float(run.last.phi[0]), float(run.last.std[0])
-    return abs(mass) <= HELD * std and change_of_arm(run) is None
+    stream, last = run.stream, run.last
+    told = run.reference is None and stream.solutions > 0 and stream.difference is None
+    as_it_was = arm_changed(stream.drift, stream.another) is None
+    return told and as_it_was and stream.seconds >= LEARN_FROM and abs(last.phi[0]) <= HELD * last.std[0]

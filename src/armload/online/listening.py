@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
+from armload.arms import Arm
 from armload.online.gate import ANY_TIME, REASONS, Gate
 from armload.online.thresholds import BAD_IN_A_ROW, PAUSES_IN_A_ROW, SILENT
+from armload.recording import GAP, Sample
 
 UNUSED = "no sample could be used"  # how `trouble` begins while samples are left out one after the other
 
@@ -15,66 +16,68 @@ class Listening:
     """The clock of a stream, whose samples may be bad.
 
     Attributes:
-        clock: time of the last sample [s], also of one that was left out if it rises.
+        gate: which samples count. clock: time of the last sample [s], also of one that was left out if it rises.
         ahead: for how long no sample could be used [s]. unseen: pauses since `forget_pauses`, as far as the gate's
             own clock leaves them out [s].
         trouble: what keeps samples from being used; None while nothing does.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, arm: Arm) -> None:
+        self.gate = Gate(arm)
         self.reset()
 
     def reset(self) -> None:
         """Forget the stream."""
+        self.gate.reset()
         self.clock = self.ahead = self.unseen = 0.0
         self.trouble: str | None = None
         self._used: float | None = None  # time of the last sample that could be used, or of the first of all
         self._shift = 0.0
-        self._pauses, self._apart = 0, 0  # pauses so far; in a row
-        self._number, self._reported = 0, 0  # bad samples in a row; tenths of a second of them that were reported
-        self._before: tuple[int, ...] = ()  # counts of each reason before these
+        self._apart = self._number = 0  # pauses and bad samples in a row
 
-    def used(self, gate: Gate, t: float) -> None:
-        """The gate let a sample through."""
-        if gate.shift != self._shift:
-            self.unseen += max(self._shift - gate.shift, 0.0)
-            self._shift = gate.shift
-        if gate.health.pauses > self._pauses:
-            self._pauses, self._apart = gate.health.pauses, self._apart + 1
+    def take(self, t: Any, q: Any, dq: Any, tau: Any) -> Sample | None:
+        """A sample as it came, as `Gate.take` lets it through; None: it is left out."""
+        pauses = self.gate.health.pauses
+        sample = self.gate.take(t, q, dq, tau)
+        if sample is None:
+            self._left_out(self.gate.now, t, q, dq, tau)
+        else:
+            self._use(self.gate.now, self.gate.health.pauses > pauses)
+        return sample
+
+    def _use(self, t: float, paused: bool) -> None:
+        self.unseen += max(self._shift - self.gate.shift, 0.0)
+        self._shift = self.gate.shift
+        if paused or self._apart or self._number:
+            self._apart = self._apart + 1 if paused else 0
             self._number, self.trouble = 0, None
             if self._apart >= PAUSES_IN_A_ROW and self._used is not None:
                 self.trouble = (
-                    f"samples come {t - self._used:.3g} s apart: those farther apart than {gate.gap:g} s tell nothing; "
+                    f"samples come {t - self._used:.3g} s apart: those farther apart than {GAP:g} s tell nothing; "
                     "are their times in seconds?"
                 )
-        elif self._apart or self._number:
-            self._apart, self._number, self.trouble = 0, 0, None
         self._used = self.clock = t
         self.ahead = 0.0
 
-    def left_out(self, gate: Gate, t: Any, q: Any, dq: Any, tau: Any) -> None:
-        """The gate left a sample out: its time, if it has one, goes on all the same."""
-        try:
-            now = float(t)
-        except Exception:  # an array of another library raises what it likes
-            now = math.nan
+    def _left_out(self, now: float, t: Any, q: Any, dq: Any, tau: Any) -> None:
+        """The time of a sample that was left out, if it has one, goes on all the same."""
         if abs(now) < ANY_TIME:
             if self._used is None:
                 self._used = now
             if now > self._used:
                 self.ahead = now - self._used
             self.clock = self._used + self.ahead
-        counts = tuple(gate.health.left_out.values())
         if self._number == 0:
-            own = REASONS.index(gate.reason)
-            self._before, self._reported = tuple(c - (k == own) for k, c in enumerate(counts)), 0
+            self._bad = dict.fromkeys(REASONS, 0)  # of those in a row
+            self._reported = 0  # tenths of a second of them
         self._number += 1
+        self._bad[self.gate.reason] += 1
         tenths = int(self.ahead / SILENT)
         if tenths > self._reported or self._number % BAD_IN_A_ROW == 0:
             self._reported = tenths
-            most = max(range(len(REASONS)), key=lambda k: counts[k] - self._before[k])
             since = f" for {self.ahead:.1f} s" if tenths else ""
-            why = gate.why(REASONS[most], t, q, dq, tau)
+            most = max(REASONS, key=lambda reason: self._bad[reason])
+            why = self.gate.why(most, t, q, dq, tau)
             self.trouble = f"{UNUSED}{since} ({self._number} left out): {why}"
 
     def forget_pauses(self) -> None:

@@ -19,23 +19,19 @@ from armload.arms import Arm
 from armload.errors import IdentificationError
 from armload.estimators import Estimate, Identifier
 from armload.identification.choice import choose
-from armload.identification.intervals import Before
 from armload.identification.known_payload import know
 from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
-from armload.online.gate import Gate, Health, all_finite
+from armload.online.gate import Health, all_finite
 from armload.online.judgement import CHANGING, LEFT_OUT, Judgement
 from armload.online.learning import learned_from
 from armload.online.listening import Listening
-from armload.online.presenting import presented
-from armload.online.restoring import load_identifier, save_identifier
-from armload.online.step import mass_step
+from armload.online.state import load_state, save_state
 from armload.online.thresholds import KIND_LATEST, MOVING, RECENT, SELDOM
 from armload.online.watch import PayloadWatch
 from armload.posterior import Known, PosteriorLeastSquares, Profile
 from armload.posterior.map import PUBLISH
 from armload.recording import Recording, Sample
-from armload.regression import payload_prior_std
 
 
 class OnlineIdentifier:
@@ -57,6 +53,9 @@ class OnlineIdentifier:
         every: [s] between two new answers of a payload whose run has begun 1.5 s ago, at most 0.1; changes are looked
             for in each row all the same.
 
+    Attributes:
+        method: its name. event: the last change of payload that was noticed, on the stream's clock.
+
     Raises:
         ArmloadError: an unknown method, one that cannot use what is known, or a model or tare of another arm.
     """
@@ -71,17 +70,13 @@ class OnlineIdentifier:
         every: float = PUBLISH,
     ) -> None:
         self.arm, self.tare, self.profile, self._tared = arm, tare, profile, tare is not None
-        choice = choose(arm, tare, method, live=True, profile=profile)
-        self._engine = first = choice.identifier
+        self._engine = first = choose(arm, tare, method, live=True, profile=profile).identifier
         know(first, known)
         self._watch = PayloadWatch(first) if isinstance(first, PosteriorLeastSquares) else None
         self._every = min(max(every, PUBLISH), SELDOM)
         self.method = self.engine.name
-        self._gate = Gate(arm)
-        self._stream = Listening()
-        self._weak = payload_prior_std(arm)
-        mean, std = first.payload_prior or (np.zeros(10), self._weak)
-        self._judgement = Judgement(str(arm.frame), self._weak, Before(mean, std))
+        self._stream = Listening(arm)
+        self._judgement = Judgement(arm, first.payload_prior)
         self.reset()
 
     @property
@@ -104,11 +99,6 @@ class OnlineIdentifier:
         return "arm" if self.arm.attached is None else "tool"
 
     @property
-    def event(self) -> Event | None:
-        """The last change of payload that was noticed, on the stream's clock."""
-        return self._event
-
-    @property
     def arm_changed(self) -> str | None:
         """That the arm is not as at its tare or profile; None: it is, as far as anybody can tell."""
         return self._judgement.arm_changed(self.engine, self.relative_to)
@@ -116,7 +106,7 @@ class OnlineIdentifier:
     @property
     def health(self) -> Health:
         """Counts of the stream since `reset`."""
-        return self._gate.health
+        return self._stream.gate.health
 
     @property
     def trouble(self) -> str | None:
@@ -125,14 +115,12 @@ class OnlineIdentifier:
 
     def reset(self) -> None:
         """Forget the stream (not the tare); the next sample is the first."""
-        self._gate.reset()
         (self._watch or self._engine).reset()
         self._stream.reset()
         self._internal = 0.0
-        self._ended: PosteriorLeastSquares | None = None  # the run before the last change
         self._moved = self._published = -np.inf
         self._since: float | None = None
-        self._event: Event | None = None
+        self.event: Event | None = None
         self._judgement.reset()
 
     def __repr__(self) -> str:
@@ -144,12 +132,10 @@ class OnlineIdentifier:
         Args:
             t: [s], on any clock. q, dq, tau: (n,) [rad, rad/s, N·m]; tau = rigid body + friction, gravity in it.
         """
-        sample = self._gate.take(t, q, dq, tau)
+        sample = self._stream.take(t, q, dq, tau)
         if sample is None:
-            self._stream.left_out(self._gate, t, q, dq, tau)
             return self._present()
         self._internal = sample.t
-        self._stream.used(self._gate, float(t))
         if self._since is None:
             self._since = self._stream.clock
         if sample.t - self._moved > 0.1 * RECENT and np.abs(sample.dq).max() > MOVING:
@@ -165,11 +151,10 @@ class OnlineIdentifier:
         if self._watch is not None and self._watch.settling:
             return self._present()
         if self.health.used:
-            estimate = self._engine.conclude() if self._watch is None else self._watch.conclude()
+            estimate = (self._watch or self._engine).conclude()
             if all_finite(estimate.phi):
-                run = self._engine if self._watch is None else self._watch.answered
-                self._judge(estimate, run)
-                self._judgement.conclude(estimate, run, self.arm, self._internal)
+                self._judge(estimate, self.engine)
+                self._judgement.conclude(estimate, self.engine, self._internal)
         return self._present()
 
     def learned(self, name: str = "stream") -> Profile | None:
@@ -197,7 +182,7 @@ class OnlineIdentifier:
         if self._watch is not None:
             self._watch.hold()
         state = {k: v for k, v in vars(self).items() if k not in ("arm", "tare", "profile", "_every")}
-        return save_identifier(state, self.arm, self.method, self._engine, path)
+        return save_state(path, state, self.arm, self.method, self._engine)
 
     @classmethod
     def restore(
@@ -220,7 +205,7 @@ class OnlineIdentifier:
         """
         new = cls(arm, method=method, profile=profile, known=known, every=every)
         try:
-            saved = load_identifier(path, arm, new.method, new._engine)
+            saved = load_state(path, arm, new.method, new._engine)
         finally:
             new.close()
         new.__dict__.update(saved)
@@ -229,62 +214,53 @@ class OnlineIdentifier:
         return new
 
     def _identify(self, sample: Sample) -> None:
-        run: Identifier = self._engine
-        if self._watch is None:
+        watch, judgement, run = self._watch, self._judgement, self._engine
+        if watch is None:
             estimate, fresh = run.update(sample), not 0.0 <= sample.t - self._published < self._every
         else:
-            known, now = self._watch.event, self._watch.run
+            event, now = watch.event, watch.run
             now.publish = self._every if now.stream.seconds > KIND_LATEST else PUBLISH
-            estimate = self._watch.update(sample, self._judgement.held)
-            if self._watch.event is not known:
-                self._noticed(self._watch, sample.t)
+            estimate = watch.update(sample, judgement.held)
+            if watch.event is not None and watch.event is not event:
+                self._noticed(watch.event, watch.settling, self._stream.clock - sample.t)
             if estimate is None:
                 if sample.t - self._published > PUBLISH:
-                    self._track(self._watch, sample)
+                    self._track(watch, sample)
                 return
-            run = self._watch.answered
-            fresh = run.fresh
-            if not fresh and run is not self._judgement.run and math.isfinite(run.data_t):
+            run, fresh = watch.answered, watch.answered.fresh
+            if not fresh and run is not judgement.run and math.isfinite(watch.answered.data_t):
                 return  # a run just taken up again: until it answers anew, its answer is of long ago
-        if (fresh or self._watch is None) and not all_finite(estimate.phi):
+        if (fresh or watch is None) and not all_finite(estimate.phi):
             return
-        counts, stands = self._judgement.counts(sample.t, run)
+        counts, stands = judgement.counts(sample.t, run)
         if counts and self._stream.unseen:
             self._stream.forget_pauses()
-        mixed = self._watch is not None and self._watch.mixed
+        mixed = watch is not None and watch.mixed
         if fresh:
             self._published = sample.t
-            if self._watch is not None and mixed:
-                estimate = self._watch.track(sample.t)
+            estimate = watch.track(sample.t) if watch is not None and mixed else estimate
             self._judge(estimate, run, stands)
         if fresh or not mixed:
-            self._judgement.take(estimate, run)
+            judgement.take(estimate, run)
 
     def _track(self, watch: PayloadWatch, sample: Sample) -> None:
         """While samples are left out: what all that may have happened makes of the payload."""
-        self._published, run = sample.t, watch.run
-        estimate = watch.track(sample.t)
-        self._judgement.follow(estimate)
+        self._published, estimate = sample.t, watch.track(sample.t)
+        self._judgement.take(estimate, None)
         if watch.settling or watch.likely[0] > 0.5:  # then phi follows what the samples say
             self._judgement.newest = sample.t
-        self._judge(estimate, run)
-        self._judgement.notes = (*self._judgement.notes, CHANGING if watch.settling else LEFT_OUT)
+        self._judge(estimate, watch.run)
+        self._judgement.notes += (CHANGING if watch.settling else LEFT_OUT,)
 
-    def _noticed(self, watch: PayloadWatch, now: float) -> None:
-        """A change of payload, or what it was."""
-        assert watch.event is not None
-        event, shift, run = watch.event, self._stream.clock - now, watch.run
-        if watch.settling:
-            if self._event is None or event.t + shift != self._event.t:  # else the rest of that hand-over
-                self._ended = run
+    def _noticed(self, event: Event, settling: bool, shift: float) -> None:
+        """A change of payload, or what it was; the stream's clock is ahead of its by `shift` [s]."""
+        if settling:
             self._since, self._published = self._stream.clock, -np.inf
             self._stream.forget_pauses()
-        elif event.mass is None and self._ended is not None:
-            event = replace(event, mass=mass_step(self._ended, run, float(self._weak[0])))
-        self._event = replace(event, t=event.t + shift, began=event.began + shift)
+        self.event = replace(event, t=event.t + shift, began=event.began + shift)
 
     def _judge(self, estimate: Estimate, run: Identifier, stands: bool = False) -> None:
-        stands = stands and self._stream.trouble is None
+        stands = stands and self.trouble is None
         self._judgement.judge(estimate, run, self.relative_to, self._moving, stands)
 
     @property
@@ -292,16 +268,30 @@ class OnlineIdentifier:
         return self._internal + self._stream.ahead - self._moved < RECENT
 
     def _present(self) -> OnlineEstimate:
-        stream, sure = self._stream, self._watch is None or self._watch.sure
-        fields = {
-            "t": stream.clock,
-            "age": float(stream.unseen + stream.ahead + self._judgement.age(self._internal)),
-            "since": stream.clock if self._since is None else self._since,
-            "relative_to": self.relative_to,
-            "method": self.method,
-            "calibrated": self.engine.calibrated and not self._judgement.doubted and sure,
-            "moving": self._moving,
-            "event": self._event,
-            "health": self._gate.health,
-        }
-        return presented(self._judgement, self._watch, stream.trouble, fields)
+        stream, judged, watch = self._stream, self._judgement, self._watch
+        change, contact, drift = (None, None, None) if watch is None else watch.likely
+        return OnlineEstimate.of(
+            {
+                **vars(judged.estimate),
+                "t": stream.clock,
+                "age": float(stream.unseen + stream.ahead + judged.age(self._internal)),
+                "lag": 0.0,
+                "since": stream.clock if self._since is None else self._since,
+                "relative_to": self.relative_to,
+                "method": self.method,
+                "determined": judged.determined,
+                "held": judged.held,
+                "around": judged.around,
+                "before": judged.before,
+                "calibrated": self.engine.calibrated and not judged.doubted and (watch is None or watch.sure),
+                "p_held": judged.p_held,
+                "p_change": change,
+                "p_contact": contact,
+                "p_drift": drift,
+                "moving": self._moving,
+                "settling": watch is not None and watch.settling,
+                "event": self.event,
+                "health": self.health,
+                "notes": judged.notes if stream.trouble is None else (*judged.notes, stream.trouble),
+            }
+        )

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.estimators import Estimate
 from armload.online.thresholds import SAME_RUN, STEP_STD, TARE_FROM
 from armload.posterior import PosteriorLeastSquares
 from armload.regression import payload_prior_std
@@ -63,16 +62,33 @@ class Runs:
             return run
         return run.reference
 
-    def is_earlier(self, estimate: Estimate) -> bool:
-        """Whether an estimate's mass and first moments are those of the earlier run."""
-        earlier, current = self.earlier, self.current
-        if earlier is None:
+    def is_earlier(self) -> bool:
+        """Whether the mass and first moments of the current run are those of the earlier one."""
+        step = None if self.earlier is None else _step(self.earlier, self.current)
+        if step is None:
             return False
-        if current.reference is earlier:
-            then = np.zeros(10), np.zeros((10, 10))
-        elif current.reference is earlier.reference:
-            then = earlier.last.phi, earlier.last.covariance
-        else:
-            return False
-        phi, covariance = (estimate.phi - then[0])[:4], (estimate.covariance + then[1])[:4, :4]
+        phi, covariance = step[0][:4], step[1][:4, :4]
         return bool(phi @ np.linalg.solve(covariance, phi) < SAME_RUN)
+
+    def mass_step(self, before: PosteriorLeastSquares | None, run: PosteriorLeastSquares | None = None) -> float | None:
+        """By how much the mass of a run, else the current one, differs from one before [kg].
+
+        None where either is not known well enough.
+        """
+        run = run or self.current
+        if before is None or run is before or np.hypot(run.last.std[0], before.last.std[0]) > STEP_STD * self.unit:
+            return None
+        step = _step(before, run)
+        return None if step is None else float(step[0][0])
+
+
+def _step(before: PosteriorLeastSquares, run: PosteriorLeastSquares) -> Gaussian | None:
+    """By how much phi (10,) differs from one run to another, and its covariance; None: they have no arm in common."""
+    now, then = run.last, before.last
+    if run.reference is before:
+        return now.phi, now.covariance
+    if before.reference is run:
+        return -then.phi, then.covariance
+    if run.reference is before.reference:
+        return now.phi - then.phi, now.covariance + then.covariance
+    return None

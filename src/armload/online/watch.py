@@ -12,7 +12,7 @@ The watch is in one of three phases, by what the last rows are (`weighing.py`):
                 and takes what may be of the new payload;
                 that stays → FOLLOWING with the next run, it was none → DOUBTING with the old
 
-After a change the new run is *judged* while it is followed (`naming.py`): it says what the change was, once its mass is
+After a change the new run is *judged* while it is followed (`event.py`): it says what the change was, once its mass is
 known, and gives way to the earlier run if it holds what that one held. The run of the empty arm is a tare of the runs
 after it, beside the one that was given, if one was. Of a run that ends the last rows are taken back: they show it.
 """
@@ -25,17 +25,16 @@ from typing import Literal
 import numpy as np
 
 from armload.estimators import Estimate
-from armload.online.background import Background
 from armload.online.change import Change, next_run
-from armload.online.event import Event
+from armload.online.event import Event, Naming
 from armload.online.lasting import Lasting
-from armload.online.naming import Naming
 from armload.online.runs import Runs
 from armload.online.schedule import Deferred
 from armload.online.thresholds import LIKELY, PATIENCE, SURE, TAKEN_BACK, UNLIKELY
 from armload.online.tracking import Tracker
 from armload.online.weighing import Weighing
 from armload.posterior import PosteriorLeastSquares
+from armload.posterior.worker import Worker
 from armload.recording import Sample
 
 Phase = Literal["following", "doubting", "settling"]
@@ -59,7 +58,7 @@ class PayloadWatch:
     def __init__(self, first: PosteriorLeastSquares) -> None:
         self.runs = Runs(first)
         self._look = Deferred()
-        self._background = Background()
+        self._background = Worker()
         self._weighing = Weighing(first)
         self.reset()
 
@@ -70,7 +69,7 @@ class PayloadWatch:
         self._look.reset()
         self.phase: Phase = FOLLOWING
         self.answered, self.mixed = self.run, False
-        self._naming, self._tracker = Naming(self.runs.unit), Tracker()
+        self._naming, self._tracker = Naming(), Tracker()
         self._weighing.reset(self.run)
         self._doubted_at = -np.inf
         self._gave_up = False  # doubting: what does not fit is believed until it fits again
@@ -137,7 +136,7 @@ class PayloadWatch:
         if self.run.stream.rows > before and self._look.row(sample.t):
             self._examine(sample, held)
         self._look.seen(sample.t)
-        if self._naming.judging and self.run.fresh and self._naming.judge(self.runs, estimate, held):
+        if self._naming.judging and self.run.fresh and self._naming.judge(self.runs, held):
             self._watch_anew(self.runs.go_back())
         return estimate
 
@@ -173,7 +172,7 @@ class PayloadWatch:
             self._naming.held_before = held
         began = max(self._weighing.steady_t, sample.t - PATIENCE)
         until = began - max(sample.t - began, TAKEN_BACK)
-        self._naming.begin(sample.t, began, self._tracker.went_on)
+        self._naming.begin(sample.t, began, run, self._tracker.went_on)
         reference = self.runs.reference_for_next(self._naming.held_before)
         following = self._background.submit(next_run, run, reference, until)
         self._change, self.phase = Change(sample.t, began, state, following), SETTLING
@@ -197,8 +196,8 @@ class PayloadWatch:
         """The payload is what it was: the run before goes on."""
         assert self._change is not None
         change, self._change = self._change, None
-        self._background.close_run(change.run)
-        self._naming.call_off()
+        self._background.submit(change.run.close)
+        self._naming.call_off(self.runs)
         self.phase, self._doubted_at, self._gave_up = DOUBTING, change.t, False
 
     def _take_up_the_next(self) -> None:
@@ -216,7 +215,7 @@ class PayloadWatch:
         self.phase, self._gave_up, self.mixed = FOLLOWING, False, lasting is not None
         self._tracker.lasting = lasting
         if dropped is not None:
-            self._background.close_run(dropped)
+            self._background.submit(dropped.close)
 
     def hold(self) -> None:
         """Wait for what is done in the background."""

@@ -1,13 +1,25 @@
-"""Is it a change? Each row weighed by what it may be (`modes.py`), whether a run has taken it or not."""
+"""Is it a change? Each row weighed by what it may be (`modes.py`), whether a run has taken it or not.
+
+A change is detected once it has been sure for `HOLDS`; after a contact, once the new payload also stays.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from armload.online.detector import ChangeDetector
 from armload.online.modes import Modes
 from armload.online.runs import Gaussian
-from armload.online.thresholds import FIRST_TARED, FIRST_UNTARED
+from armload.online.thresholds import (
+    AFTER_CONTACT,
+    CONTACT_LONGEST,
+    FIRST_TARED,
+    FIRST_UNTARED,
+    HOLDS,
+    LIGHT,
+    LIKELY,
+    PATIENCE,
+    SURE,
+)
 from armload.posterior import PosteriorLeastSquares
 from armload.posterior.sequential import SequentialPosterior
 from armload.recording import GAP, Sample
@@ -22,7 +34,8 @@ class Weighing:
         run: the first run of the stream.
 
     Attributes:
-        modes: the probabilities. row_t: time of the last row [s].
+        modes: the probabilities. row_t: time of the last row [s]. steady_t: of the last one of a steady arm with the
+            same payload [s].
     """
 
     def __init__(self, run: PosteriorLeastSquares) -> None:
@@ -32,14 +45,15 @@ class Weighing:
     def reset(self, run: PosteriorLeastSquares) -> None:
         """Forget the stream; the next row is the first of a run."""
         self.modes = Modes(self._unit, run.stream.correction.effort)
-        self._detector = ChangeDetector(self._unit)
+        self._touched = False  # whether something has touched the arm since it was steady
+        self._sure_since = np.inf  # when the payload was first surely another one
         self._gaussian: tuple[PosteriorLeastSquares, Gaussian] | None = None  # before the row, and of which run
-        self.row_t = -np.inf
+        self.row_t = self.steady_t = -np.inf
 
     def begin_run(self) -> None:
         """The rows that come are of another run."""
         self.modes.reset()
-        self._detector.begin_run()
+        self._sure_since = np.inf
 
     @property
     def likely(self) -> tuple[float, float, float]:
@@ -48,21 +62,37 @@ class Weighing:
 
     @property
     def steady(self) -> float:
-        """Probability that the last rows are of the arm as it was and the same payload."""
-        return self._detector.steady(self.modes)
+        """Probability that the last rows are of the arm as it was and the same payload.
 
-    @property
-    def steady_t(self) -> float:
-        """Time of the last row of a steady arm with the same payload [s]."""
-        return self._detector.steady_t
+        A drift may be the arm's own, but not one that a contact has turned into: a constant push looks like one as soon
+        as its size is known, while an arm does not jump.
+        """
+        return self.modes.steady - self.modes.drift if self._touched else self.modes.steady
 
     def changed(self, run: PosteriorLeastSquares) -> bool:
         """Whether the last row shows that the payload is surely another one than the run's."""
-        return self._detector.take(self.modes, self.row_t, self._before_row(run))
+        modes = self.modes
+        if self.steady > LIKELY:
+            self.steady_t, self._touched = self.row_t, False
+        self._touched = self._touched or modes.contact > 0.5
+        changed = modes.other if self._touched else modes.other + modes.handing
+        lasting = not self._touched or modes.stays >= AFTER_CONTACT
+        sure = changed > SURE and lasting and self._possible(run)
+        self._sure_since = min(self._sure_since, self.row_t) if sure else np.inf
+        return self.row_t - self._sure_since >= HOLDS
+
+    def _possible(self, run: PosteriorLeastSquares) -> bool:
+        """Whether what would be held now has a mass that can be."""
+        (mean, covariance), (shift, spread) = self._before_row(run), self.modes.shift()
+        std = float(np.sqrt(covariance[0, 0] + spread[0, 0]))
+        return float(mean[0] + shift[0]) > -LIGHT * self._unit - std
 
     def believed(self, lasted: float) -> bool:
-        """Whether what has not fitted for so long [s] is believed from now on."""
-        return self._detector.believed(lasted)
+        """Whether what has not fitted for so long [s] is believed: then a drift is the arm's."""
+        if lasted <= (CONTACT_LONGEST if self._touched else PATIENCE):
+            return False
+        self._touched = False
+        return True
 
     def taken(self, run: PosteriorLeastSquares) -> bool:
         """Weigh the innovations of the run's last row, which it has taken; whether the run knows enough to tell."""

@@ -28,7 +28,7 @@ class Handover:
     """
 
     def __init__(self) -> None:
-        self._worker: Worker | None = None
+        self._worker = Worker()
         self.adopt_at = 0
         self._clear()
 
@@ -43,8 +43,6 @@ class Handover:
 
     def begin(self, rows: int, task: Callable[..., Result], *arguments: Any) -> None:
         """Begin `task(*arguments)` at this number of rows."""
-        if self._worker is None:
-            self._worker = Worker()
         self.adopt_at = rows + ADOPTED
         self._future = self._worker.submit(task, *arguments)
 
@@ -85,9 +83,7 @@ class Handover:
 
     def close(self) -> None:
         """Stop the second thread."""
-        if self._worker is not None:
-            self._worker.stop()
-            self._worker = None
+        self._worker.stop()
 
     def _end_following(self) -> None:
         if self._following is not None:

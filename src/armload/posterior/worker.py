@@ -8,27 +8,43 @@ from queue import SimpleQueue
 from threading import Thread
 from typing import Any
 
+_Tasks = SimpleQueue[tuple[Future, Callable, tuple] | None]
+
 
 class Worker:
-    """One thread that does what it is given, in order; a program may end while it waits."""
+    """One thread that does what it is given, in order; a program may end while it waits.
 
-    def __init__(self) -> None:
-        self._tasks: SimpleQueue[tuple[Future, Callable, tuple] | None] = SimpleQueue()
-        Thread(target=self._run, name="armload-scales", daemon=True).start()
+    It starts with the first task, and with the first after `stop`.
+    """
+
+    _tasks: _Tasks | None = None
 
     def submit(self, task: Callable, *arguments: Any) -> Future:
+        """Begin `task(*arguments)` after what was begun before."""
+        if self._tasks is None:
+            self._tasks = SimpleQueue()
+            Thread(target=_work, args=(self._tasks,), name="armload-scales", daemon=True).start()
         future: Future = Future()
         self._tasks.put((future, task, arguments))
         return future
 
-    def stop(self) -> None:
-        self._tasks.put(None)
+    def wait(self) -> None:
+        """Wait until all that was begun is done."""
+        if self._tasks is not None:
+            self.submit(lambda: None).result()
 
-    def _run(self) -> None:
-        while (given := self._tasks.get()) is not None:
-            future, task, arguments = given
-            try:
-                future.set_result(task(*arguments))
-            except BaseException as error:  # whoever waits for the result gets it
-                future.set_exception(error)
-            del given, future, task, arguments  # a thread that waits must keep nothing alive
+    def stop(self) -> None:
+        """Let the thread end once all is done."""
+        if self._tasks is not None:
+            self._tasks.put(None)
+            self._tasks = None
+
+
+def _work(tasks: _Tasks) -> None:
+    while (given := tasks.get()) is not None:
+        future, task, arguments = given
+        try:
+            future.set_result(task(*arguments))
+        except BaseException as error:  # whoever waits for the result gets it
+            future.set_exception(error)
+        del given, future, task, arguments  # a thread that waits must keep nothing alive
