@@ -68,7 +68,7 @@ class Listening:
                 self.ahead = now - self._used
             self.clock = self._used + self.ahead
         if self._number == 0:
-            self._bad = dict.fromkeys(REASONS, 0)  # of those in a row
+            self._bad: dict[str, int] = dict.fromkeys(REASONS, 0)  # of those in a row
             self._reported = 0  # tenths of a second of them
         self._number += 1
         self._bad[self.gate.reason] += 1
