@@ -9,6 +9,7 @@
 | `nothing`   | no payload                                                                               |
 | `odd`       | dumbbells, poles, panes, rings far off the flange's axis: unlike all of the others       |
 | `light`     | the `shapes` at 0.3–15 % of the weight and of the same density: a screw, a phone, a box   |
+| `wide`      | trays, bars, discs and rings across the flange, carried at their centre                  |
 
 No prior is fitted on `odd`: it tests payloads outside the training families. Figures are those
 of an arm rated for 3 kg. For another, masses grow with its rating and lengths with the cube root.
@@ -24,6 +25,7 @@ from armload.payloads.container import BOTTOM, POSITIONS, TOP, container, positi
 from armload.payloads.odd import ODD
 from armload.payloads.payload import Box, Payload
 from armload.payloads.shapes import SHAPES, TOOLS
+from armload.payloads.wide import WIDE
 
 MASS = (0.2, 2.8)  # [kg] of all boxes together
 CENTRE_LOW, CENTRE_HIGH = (-0.08, -0.08, 0.0), (0.08, 0.08, 0.16)  # [m] of each box
@@ -84,14 +86,19 @@ def draw_payload(family: str, seed: int, rated: float = RATED) -> Payload:
     if family == "container":
         # a small arm carries a small container, a large one a container of the usual size
         return _scaled(_filling(rng, name), min(1.0, scale))
-    shapes, masses = {"shapes": (SHAPES, _SHAPE_MASS), "tools": (TOOLS, _TOOL_MASS), "odd": (ODD, _ODD_MASS)}[family]
+    shapes, masses = {
+        "shapes": (SHAPES, _SHAPE_MASS),
+        "tools": (TOOLS, _TOOL_MASS),
+        "odd": (ODD, _ODD_MASS),
+        "wide": (WIDE, _SHAPE_MASS),
+    }[family]
     mass = rng.uniform(*masses) * scale
     kind = list(shapes)[rng.integers(len(shapes))]
     return Payload(f"{name}, {kind}", shapes[kind](rng, mass, float(np.cbrt(scale))))
 
 
 # The families that `draw_payload` draws from.
-FAMILIES = ("boxes", "shapes", "tools", "container", "nothing", "odd", "light")
+FAMILIES = ("boxes", "shapes", "tools", "container", "nothing", "odd", "light", "wide")
 
 
 def _filling(rng: np.random.Generator, name: str) -> Payload:

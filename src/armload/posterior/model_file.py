@@ -121,6 +121,7 @@ class HybridModel:
             "families": list(prior.families),
             "traits": list(TRAITS),
             "level": calibration.level,
+            "light": calibration.light,
             "bag": None if calibration.bag is None else to_structure(calibration.bag, "bag.", tensors),
             "training": None if self.training is None else asdict(self.training),
             "provenance": self.provenance,
@@ -162,7 +163,10 @@ class HybridModel:
             training, provenance = header["training"], header["provenance"]
             if not isinstance(provenance, dict):
                 raise ValueError(f"a provenance that is {provenance!r}")
-            calibration = Calibration(bag, float(header["level"]), times, widths)
+            light = float(header.get("light", 0.0))  # models before it have one c for all masses
+            if not (np.isfinite(light) and light >= 0.0):
+                raise ValueError(f"a light mass of {light:g} kg")
+            calibration = Calibration(bag, float(header["level"]), times, widths, light)
             return cls(
                 prior,
                 calibration,

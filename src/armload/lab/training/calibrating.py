@@ -20,7 +20,7 @@ from armload.ensembles.weak_learner import Learner
 from armload.inertia import Z95
 from armload.lab.training.records import TIMES, Records
 from armload.posterior import MixturePrior
-from armload.posterior.calibration import COVERAGE, Calibration
+from armload.posterior.calibration import COVERAGE, LIGHT_MASS, Calibration
 from armload.posterior.evidence import KINDS
 
 _INFORMATIVE = 9.0  # a direction counts as seen once the evidence shrinks its prior's variance so many times
@@ -47,7 +47,7 @@ def fit_calibration(
 
     def draft(some: Records) -> Calibration:
         bag, level = (None, 1.0) if trusted else _fit_kappa(some, prior, learners, seed)
-        return Calibration(bag, level, times, np.ones((len(KINDS), len(times), 10)))
+        return Calibration(bag, level, times, np.ones((len(KINDS), len(times), 10)), LIGHT_MASS * float(prior.std[0]))
 
     episodes = np.random.default_rng(seed).permutation(np.unique(records.episode))
     score, which = np.empty((len(records), 10)), nearest(records.t, times)
@@ -88,6 +88,7 @@ def scores(records: Records, prior: MixturePrior, calibration: Calibration) -> N
         found = prior.posterior(trusted.information, trusted.vector)
         beyond = (found.mean - records.truth[k]) ** 2 - (Z95 * trusted.gain_std * found.mean) ** 2
         out[k] = np.sqrt(np.maximum(beyond, 0.0) / np.diag(found.covariance))
+        out[k, 4:] /= calibration.narrowing(found)
     return out
 
 

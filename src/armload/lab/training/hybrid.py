@@ -15,6 +15,7 @@ from armload.errors import ModelError
 from armload.lab.cells import key_of
 from armload.lab.engine import Engine
 from armload.lab.episodes import LIGHTEST, POPULATIONS, TOOL_SHARE, Episode, draw_episodes
+from armload.lab.training.added_families import with_added
 from armload.lab.training.calibrating import fit_calibration
 from armload.lab.training.coverage import FOLDS, Coverage, cross_validated
 from armload.lab.training.records import TIMES, Records, measure_episodes
@@ -98,7 +99,7 @@ def versions() -> dict[str, str]:
 
 
 def payload_mixture(arm: Arm, seed: int = 0) -> MixturePrior:
-    """The payload prior for an arm: draws of every family, up to what the arm is rated for."""
+    """The payload prior for an arm: draws of every family, up to what the arm is rated for, and those added."""
     rng = np.random.default_rng([seed, 7])
     rated = rated_mass(arm)
 
@@ -115,7 +116,8 @@ def payload_mixture(arm: Arm, seed: int = 0) -> MixturePrior:
     samples["tool and payload"] = tools + (1.0 - TOOL_SHARE) * others[rng.permutation(len(others))[:_DRAWS]]
     fitted = MixturePrior.fit(samples, FAMILIES, seed)
     wide = np.diag((_ANYTHING * payload_prior_std(arm)) ** 2)
-    return fitted.joined(MixturePrior(np.ones(1), np.zeros((1, 10)), wide[None], ("anything",)), _ANYTHING_SHARE)
+    fitted = fitted.joined(MixturePrior(np.ones(1), np.zeros((1, 10)), wide[None], ("anything",)), _ANYTHING_SHARE)
+    return with_added(fitted, arm, seed)
 
 
 def episode_records(
