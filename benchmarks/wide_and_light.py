@@ -22,7 +22,7 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +46,16 @@ FOUND = (0.0, 0.03, 0.06, 0.12, 0.25, 0.5, 3.0)  # of the rated mass
 GROUPS = (slice(0, 1), slice(1, 4), slice(4, 10))
 
 
+class Answered(NamedTuple):
+    """Error, half-width and whether determined (10,), the mass found [kg], and which share of c would do (10,)."""
+
+    error: NDArray[np.float64]
+    half: NDArray[np.float64]
+    told: NDArray[np.bool_]
+    mass: float
+    share: NDArray[np.float64]
+
+
 def before(prior: MixturePrior) -> MixturePrior:
     """The prior as it was trained: what was added stands behind `anything`."""
     count = prior.families.index("anything") + 1
@@ -67,15 +77,15 @@ def records_of(robot: Arm, name: str, asked: Any) -> Records:
 
 def answered(
     prior: MixturePrior, calibration: Calibration, log: Evidence, truth: NDArray[np.float64], weak: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], ...]:
-    """Error, half-width and whether determined (10,), the mass found, and which share of c would do (10,)."""
+) -> Answered:
+    """One payload in one log, under one prior and calibration."""
     trusted = calibration.trusted(log)
     found = prior.posterior(trusted.information, trusted.vector)
     std = np.sqrt(np.diag(calibration.widened(found, trusted)))
     told = determined(std, prior.std, std_under_weak_prior(trusted.information, weak), weak)
     beyond = np.maximum((found.mean - truth) ** 2 - (Z95 * trusted.gain_std * found.mean) ** 2, 0.0)
     share = np.sqrt(beyond / np.diag(found.covariance)) / calibration.width(trusted.t, trusted.kind)
-    return np.abs(found.mean - truth), Z95 * std, told, found.mean[:1], share
+    return Answered(np.abs(found.mean - truth), Z95 * std, told, float(found.mean[0]), share)
 
 
 def measured(name: str, asked: Any) -> dict[str, Any]:
@@ -85,7 +95,7 @@ def measured(name: str, asked: Any) -> dict[str, Any]:
     records, rng = records_of(robot, name, asked), np.random.default_rng([asked.seed, 7])
     now, then = model.prior, before(model.prior)
     plain = replace(model.calibration, light=0.0)
-    rows: list[list[tuple[NDArray[np.float64], ...]]] = [[], []]
+    rows: list[list[Answered]] = [[], []]
     wide = []
     for k in range(len(records)):
         log = records.evidence(k)
@@ -102,7 +112,8 @@ def measured(name: str, asked: Any) -> dict[str, Any]:
     out: dict[str, Any] = {"arm": name, "payloads": len(wide)}
     errors = []
     for what, some in zip(("before", "after"), rows, strict=True):
-        error, half, told = (np.array([row[part] for row in some]) for part in range(3))
+        error, half = (np.array([getattr(row, part) for row in some]) for part in ("error", "half"))
+        told = np.array([row.told for row in some], dtype=bool)
         cells = {}
         for label, which in (("compact", ~is_wide), ("wide", is_wide)):
             e, h, counts = (x[which][:, 4:] for x in (error, half, told))
@@ -117,7 +128,7 @@ def measured(name: str, asked: Any) -> dict[str, Any]:
         parts = [float(error[~is_wide][:, part].mean()) for part in GROUPS]
         errors.append([*parts, float(error[is_wide][:, 4:].mean())])
     out["error"] = [round(b / a, 3) for a, b in zip(*errors, strict=True)]
-    mass, share = np.array([row[3][0] for row in rows[1]]) / rated, np.array([row[4] for row in rows[1]])[:, 4:]
+    mass, share = np.array([row.mass for row in rows[1]]) / rated, np.array([row.share for row in rows[1]])[:, 4:]
     out["needed"] = []
     for low, high in pairwise(FOUND):
         here = (mass < high) & ((mass >= low) if low else True)

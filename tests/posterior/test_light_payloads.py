@@ -49,7 +49,7 @@ def test_the_interval_of_a_light_mass_holds_with_and_without_the_empty_hand(mode
         before = model.calibration.widened(found, log)
         inside.append(abs(phi[0] - truth[0]) <= Z95 * np.sqrt(covariance[0, 0]))
         narrow.append(abs(found.mean[0] - truth[0]) <= Z95 * np.sqrt(before[0, 0]))
-    assert np.mean(inside) > 0.9 > np.mean(narrow) + 0.03
+    assert np.mean(inside) > 0.95 > np.mean(narrow) + 0.02
 
 
 def test_a_wider_interval_leaves_the_others_and_every_correlation():

@@ -73,7 +73,7 @@ def test_wide_bodies_are_laminas_across_the_axis():
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_every_shipped_prior_expects_wide_and_light_bodies_as_often_as_stated(name):
-    prior = HybridModel.load(HybridModel.shipped(arm(name))).prior
+    prior = shipped_model(arm(name)).prior
     wide = sum(w for w, family in zip(prior.weights, prior.families, strict=True) if family == "wide")
     first = prior.families.index("anything") + 1  # what was added stands behind
     assert wide == pytest.approx(WIDE)
