@@ -112,6 +112,13 @@ def test_an_interval_holds_both_payloads_while_either_is_likelier_than_one_in_tw
         assert phi[0] + half > 0.3
 
 
+@pytest.mark.parametrize(("went_on", "shift", "rest"), [(0.95, 0.2, True), (0.95, -0.3, False), (0.5, 0.2, False)])
+def test_what_goes_the_other_way_is_no_rest_of_a_hand_over(went_on, shift, rest):
+    tracker = Tracker()
+    tracker.lasting = SimpleNamespace(went_on=went_on, pace=np.full(10, 0.05))  # type: ignore[assignment]
+    assert tracker.rest(np.r_[shift, np.zeros(9)]) is rest
+
+
 def test_modes_give_the_level_that_a_new_run_begins_with():
     """25 Hz: noise twice as large as the scales say is found from the rows, and widens what a run says by √2."""
     modes, rng = Modes(1.5, np.ones(7)), np.random.default_rng(0)

@@ -33,8 +33,8 @@ class Lasting:
     """What a run's rows say of a hand-over that may go on.
 
     Attributes:
-        seconds: since the run's first row [s]. goes_on: probability that the hand-over still does; went_on: that it
-            did at the run's first row.
+        seconds: since the run's first row [s]. pace: (10,) by how much phi changed in a second before.
+        goes_on: probability that the hand-over still does; went_on: that it did at the run's first row.
         ahead: by how much phi (10,) is ahead of the run, and the covariance of that.
     """
 
@@ -43,7 +43,7 @@ class Lasting:
         self._information, self._vector = np.zeros((10, 10)), np.zeros(10)
         self._k, self._kappa, self._g = np.zeros((n, 10, 10)), np.zeros((n, 10, 10)), np.zeros((n, 10))
         self._start: float | None = None  # of the first row [s]
-        self._begun, self._pace = False, np.zeros(10)
+        self._begun, self.pace = False, np.zeros(10)
         self._before, self._prior = np.zeros((10, 10)), np.zeros(n + 1)
         self.seconds, self.goes_on, self.went_on, self.ahead = 0.0, 0.0, 0.0, (np.zeros(10), np.zeros((10, 10)))
 
@@ -57,7 +57,7 @@ class Lasting:
         lasted = max(lasted, HOLDS)
         goes_on = 0.5 * lasted / (lasted + stayed + np.array([0.0, *_ENDS[:-1]]))
         self._prior = np.array([*(goes_on[:-1] - goes_on[1:]), goes_on[-1], 1.0 - goes_on[0]])
-        self._begun, self._pace, self._before = True, shift / lasted, np.diag(before**-2.0)
+        self._begun, self.pace, self._before = True, shift / lasted, np.diag(before**-2.0)
         self._weigh()
 
     def take(self, stream: StreamingPosterior, louder: float) -> None:
@@ -88,7 +88,7 @@ class Lasting:
         return self.seconds > PATIENCE or (self.goes_on < UNLIKELY and more < UNLIKELY * variance)
 
     def _weigh(self) -> None:
-        P, b = np.linalg.inv(self._information + self._before), self._pace
+        P, b = np.linalg.inv(self._information + self._before), self.pace
         k = self._k @ b
         Pk = k @ P
         c = 1.0 + self._kappa @ b @ b - (k * Pk).sum(axis=1)

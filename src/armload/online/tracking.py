@@ -5,6 +5,7 @@ from __future__ import annotations
 from statistics import NormalDist
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armload.inertia import Z95
 from armload.online.lasting import Lasting
@@ -30,10 +31,10 @@ class Tracker:
         """Probability that the hand-over before the run goes on."""
         return 0.0 if self.lasting is None else self.lasting.goes_on
 
-    @property
-    def went_on(self) -> bool:
-        """Whether the run began amid a hand-over: what changes now is its rest."""
-        return self.lasting is not None and self.lasting.went_on > LIKELY
+    def rest(self, shift: NDArray[np.float64]) -> bool:
+        """Whether a change of phi (10,) is the rest of a hand-over amid which the run began: it goes the same way."""
+        lasting = self.lasting
+        return lasting is not None and lasting.went_on > LIKELY and float(shift[0] * lasting.pace[0]) > 0.0
 
     def row(self, run: PosteriorLeastSquares, louder: float) -> None:
         """A run has taken a row; `louder`: how large the noise is, in units of what it is taken for."""

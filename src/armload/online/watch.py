@@ -172,7 +172,7 @@ class PayloadWatch:
             self._naming.held_before = held
         began = max(self._weighing.steady_t, sample.t - PATIENCE)
         until = began - max(sample.t - began, TAKEN_BACK)
-        self._naming.begin(sample.t, began, run, self._tracker.went_on)
+        self._naming.begin(sample.t, began, run, self._tracker.rest(self._weighing.modes.shift()[0]))
         reference = self.runs.reference_for_next(self._naming.held_before)
         following = self._background.submit(next_run, run, reference, until)
         self._change, self.phase = Change(sample.t, began, state, following), SETTLING
