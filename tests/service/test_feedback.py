@@ -230,6 +230,27 @@ def told_by_its_client(controller, said, robot):
     raise AssertionError(one.waits)
 
 
+def told_by_a_service(source, mass, near, seconds, *more):
+    """`armload serve SOURCE --apply auto` until the controller counts about so many kg, which are returned as shown."""
+    command = [sys.executable, "-m", "armload", "serve", source, "--apply", "auto", "--mounted", "nothing", *more]
+    end = time.monotonic() + seconds
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as service:
+        assert service.stdout is not None
+        try:
+            for text in service.stdout:
+                line = json.loads(text)
+                applied = line.get("applied")
+                if applied and applied["waits"] is None and abs(applied["mass"] - mass) < near:
+                    break
+                assert line.get("connection") != "ended"
+                assert time.monotonic() < end, line
+        finally:
+            service.terminate()
+            service.wait(60.0)
+    assert service.returncode == 0
+    return applied["mass"]
+
+
 @pytest.mark.full
 @pytest.mark.parametrize(("name", "package", "version"), [("panda", "panda_py", 5), ("fr3", "pylibfranka", 10)])
 def test_a_franka_robot_counts_what_was_identified_and_nothing_again_once_it_is_put_down(
@@ -296,30 +317,14 @@ def test_a_service_tells_its_robot_what_it_identified_and_reads_it_back(tmp_path
     np.savez(log, t=10.0 + 1e-3 * np.arange(rows), **{key: np.tile(each, (turns, 1)) for key, each in once.items()})
     limits = r'\1<position_based_velocity_limits velocity_offset="0.2" deceleration_limit="5.0" />'
     urdf.write_text(re.sub(r"(<limit [^>]*/>)", limits, robot.urdf.replace("fr3_", "")))
-    end = time.monotonic() + 300.0
-    command = [sys.executable, "-m", "armload", "serve", f"fr3://{address}", "--apply", "auto", "--mounted", "nothing"]
-    with (
-        robot_at("franka_server", log, "--address", address, "--version", 10, "--urdf", urdf, "--real-time") as said,
-        subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as service,
-    ):
-        assert service.stdout is not None
-        try:
-            for text in service.stdout:
-                line = json.loads(text)
-                applied = line.get("applied")
-                if applied and applied["waits"] is None and abs(applied["mass"] - held.mass) < 0.1:
-                    break
-                assert line.get("connection") != "ended"
-                assert time.monotonic() < end, line
-        finally:
-            service.terminate()
-            service.wait(60.0)
+    command = ("franka_server", log, "--address", address, "--version", 10, "--urdf", urdf, "--real-time")
+    with robot_at(*command) as said:
+        shown = told_by_a_service(f"fr3://{address}", held.mass, 0.1, 300.0)
         loads = [event["numbers"] for event in said if event["event"] == "load"]
     masses = [numbers[0] for numbers in loads]
     assert len(masses) > 2
-    assert masses[-1] == pytest.approx(applied["mass"], abs=1e-5)  # what the service shows was read back
+    assert masses[-1] == pytest.approx(shown, abs=1e-5)  # what the service shows was read back
     np.testing.assert_allclose(loads[-1][1:4], held.com, atol=0.03)
-    assert service.returncode == 0
 
 
 @pytest.mark.full
@@ -334,35 +339,18 @@ def test_a_service_tells_a_ur_between_two_motions_of_its_program_what_it_identif
     program = tmp_path / "program.json"
     save_motion(program, motion)
     at = ",".join(f"{x:.6f}" for x in motion.position([0.0])[0])
-    command = [sys.executable, "-m", "armload", "serve", f"ur://{address}", "--robot", "ur10e"]
-    command += ["--apply", "auto", "--mounted", "nothing"]
-    end = time.monotonic() + 400.0
-    with (
-        robot_at("ur_robot", "--address", address, "--", at, orders=f"mount\nwork {program}\n") as said,
-        subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as service,
-    ):
-        assert service.stdout is not None
-        try:
-            for text in service.stdout:
-                line = json.loads(text)
-                applied = line.get("applied")
-                if applied and applied["waits"] is None and applied["mass"] > 0.5 * HELD.mass:
-                    break
-                assert line.get("connection") != "ended"
-                assert time.monotonic() < end, line
-        finally:
-            service.terminate()
-            service.wait(60.0)
+    orders = f"mount\nwork {program}\n"
+    with robot_at("ur_robot", "--address", address, "--", at, orders=orders) as said:
+        shown = told_by_a_service(f"ur://{address}", HELD.mass, 0.5 * HELD.mass, 400.0, "--robot", "ur10e")
         scripts = [event for event in said if event["event"] == "script"]
         loads = [event["numbers"] for event in said if event["event"] == "payload"]
     assert len(loads) > 2
-    assert loads[-1][0] == pytest.approx(applied["mass"], abs=1e-5)  # what the service shows was read back
+    assert loads[-1][0] == pytest.approx(shown, abs=1e-5)  # what the service shows was read back
     assert loads[-1][0] == pytest.approx(HELD.mass, abs=0.3)
     np.testing.assert_allclose(loads[-1][1:4], HELD.com, atol=0.03)
     assert scripts
     assert all(event["speed"] < 0.02 for event in scripts), scripts  # [rad/s]
     assert "moving" not in [event["event"] for event in said]  # no script commanded a motion
-    assert service.returncode == 0
 
 
 def test_a_refused_step_ends_the_series(answer):
