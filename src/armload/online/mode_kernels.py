@@ -14,22 +14,30 @@ from armload.runtime.kernels import kernel
 
 @kernel
 def take_row(
-    h, seen, X, scale, mean, covariance, taken, loud, level, listening,
+    h, seen, X, scale, mean, covariance, taken, error, loud, level, listening, rest,
     root, effort, pushes, sides, rates, p, b, x, P, A, c, since
 ):  # fmt: skip  # pragma: no cover - compiled
     """Take a row; returns the probabilities of each kind, and for how long the likeliest other body has been there [s].
 
     Args:
         h … taken: as of `Modes.take`. loud: (2, n) of the present block, Σ N and Σ B. level: how large the noise is,
-            and the block's length so far [s]. listening: what decides about it.
+            and the block's length so far [s]. listening: what decides about it. rest: (2, n) mean and variance of the
+            error of what is foreseen of an arm that stands [N·m]; the variance is negative before its first row.
         root: (10, 10) mass·R. effort: (n,). pushes: sizes and times of drifts and contacts. sides: of bodies. rates:
             how often each kind begins or ends, and how. p … c: probabilities, states. since: moments, evidence, ages.
     """
     shared = 1.0 if taken else 1.0 + 2.0 * listening[0] / h
-    U, d, v = _innovation(seen, X, scale, root, mean, covariance, shared, level[0])
+    stands = error[0] > 0.0
+    if not stands:
+        rest[1] = -1.0
+    U, d, v = _innovation(seen, X, scale, root, mean, covariance, shared, level[0], error, rest)
     if taken:
         _listen(h, scale, d, v, p[0], loud, level, listening)
     _weigh(h, U, d, v, scale, effort, pushes, sides, rates, p, b, x, P, A, c, since)
+    if stands and p[0] + p[1] > listening[5]:
+        for j in range(len(d)):
+            rest[0, j] += rest[1, j] * scale[j] * d[j] / v[j]
+            rest[1, j] *= level[0] / v[j]
     handing_from = 1 + pushes.shape[1]
     other_from = handing_from + sides.shape[1]
     contact = handing = other = 0.0
@@ -67,10 +75,10 @@ def _listen(h, scale, d, v, steady, loud, level, listening):  # pragma: no cover
 
 
 @kernel
-def _innovation(seen, X, scale, root, mean, covariance, shared, level):  # pragma: no cover - compiled
+def _innovation(seen, X, scale, root, mean, covariance, shared, level, error, rest):  # pragma: no cover - compiled
     """What one row would see of a body (n, 10), its innovations (n,), their variance (n,); all in units of its noise.
 
-    shared: by how much more than the noise the run's own uncertainty counts.
+    shared: by how much more than the noise the run's own uncertainty counts, unless the arm stands.
     """
     n = seen.shape[0]
     U, d, v = np.zeros((n, 10)), np.empty(n), np.empty(n)
@@ -82,7 +90,14 @@ def _innovation(seen, X, scale, root, mean, covariance, shared, level):  # pragm
                 v[j] += seen[j, i] * covariance[i, k] * seen[j, k]
             for k in range(i, 10):
                 U[j, i] += scale[j] * X[j, k] * root[k, i]
-        v[j] = level * (1.0 + shared * max(v[j] - 1.0, 0.0))
+        own = level * max(v[j] - 1.0, 0.0)
+        if error[j] > 0.0:
+            if rest[1, j] < 0.0:
+                rest[0, j], rest[1, j] = 0.0, own / scale[j] ** 2 + error[j]
+            d[j] -= scale[j] * rest[0, j]
+            v[j] = level + scale[j] ** 2 * rest[1, j]
+        else:
+            v[j] = level + shared * own
     return U, d, v
 
 

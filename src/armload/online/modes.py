@@ -14,7 +14,8 @@ of several sizes and times each. Each is a Gaussian filter, so that the likeliho
 another body it is that of all rows since its moment, ½·cᵀ·(A + s⁻²)⁻¹·c − ½·ln|1 + s²·A| over steady's, with
 A = Σ Rᵀ·Wᵀ·W·R/v, c = Σ Rᵀ·Wᵀ·d/v. Probabilities follow from how often each begins and how long it lasts, as in a
 hidden Markov model; a hand-over seldom ends in what was held before unless x may be nothing. Rows that are withheld
-from a run share the errors of its predictions, and count for less.
+from a run share the errors of its predictions, and count for less. Where an arm stands all rows share one error,
+d_j = b_j + noise with b_j ~ N(0, what the pose may be wrong by): it is known after a few rows, and hides no change.
 
 Sources: interacting multiple models, Blom & Bar-Shalom, IEEE T-AC 1988; change points, Adams & MacKay 2007.
 """
@@ -41,6 +42,7 @@ from armload.online.thresholds import (
     LEVEL_BLOCK,
     LEVEL_OUTLIER,
     LEVEL_SHARE,
+    LIKELY,
     LOWEST_LEVEL,
     PUSH_SIZES,
     RARE,
@@ -91,16 +93,22 @@ class Modes:
         self._A, self._c = np.zeros((starts, 10, 10)), np.zeros((starts, 10))  # of A the lower triangle
         self._since = np.array([STARTS, np.zeros(starts), np.zeros(starts)])  # [s], log evidence found, age [s]
         self._loud, self._level = np.zeros((2, n)), np.array([LEVEL, 0.0])  # and the block's length so far [s]
-        self._about_level = np.array([SAME_ERROR, LEVEL_BLOCK, LEVEL_SHARE, LEVEL_OUTLIER, LOWEST_LEVEL])
+        self._about_level = np.array([SAME_ERROR, LEVEL_BLOCK, LEVEL_SHARE, LEVEL_OUTLIER, LOWEST_LEVEL, LIKELY])
+        self._rest = np.zeros((2, n))  # mean and variance of what is foreseen wrongly at rest [N·m]
         self.reset()
 
     def reset(self) -> None:
         """All is steady; how large the noise has been is not forgotten."""
         self._weights[:] = 0.0
         self._weights[0] = 1.0
+        self.foresee_anew()
         for state in (self._b, self._x, self._P, self._A, self._c, self._since[1:]):
             state[:] = 0.0
         self.steady, self.drift, self.contact, self.handing, self.other, self.stays = 1.0, 0.0, 0.0, 0.0, 0.0, 0.0
+
+    def foresee_anew(self) -> None:
+        """What is foreseen is of another state: how wrong it is at rest is not known any more."""
+        self._rest[1] = -1.0
 
     @property
     def level(self) -> float:
@@ -116,15 +124,18 @@ class Modes:
         mean: NDArray[np.float64],
         covariance: NDArray[np.float64],
         taken: bool,
+        error: NDArray[np.float64] | None = None,
     ) -> None:
         """Take a row.
 
         Args:
             h: what the row stands for [s]. seen: (n, 12) as in `SequentialPosterior`. X: (n, ≥ 10) the row's regressor,
                 payload first. scale: (n,) what the row was multiplied by. mean, covariance: of phi before the row.
-            taken: whether the run took it, too.
+            taken: whether the run took it, too. error: of an arm that stands, the variance (n,) of what all rows there
+                are wrong by, beside what the run does not know [N²·m²].
         """
-        row, noise = (h, seen, X, scale, mean, covariance, taken), (self._loud, self._level, self._about_level)
+        row = (h, seen, X, scale, mean, covariance, taken, np.zeros(len(scale)) if error is None else error)
+        noise = (self._loud, self._level, self._about_level, self._rest)
         known = (self.root, self.effort, self._pushes, self._sides[self.side], self._rates)
         state = (self._weights, self._b, self._x, self._P, self._A, self._c, self._since)
         found = take_row(*row, *noise, *known, *state)
@@ -133,17 +144,20 @@ class Modes:
     def shift(self, going_on: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """By how much phi (10,) has changed if it has, and its covariance, by the likeliest such hypothesis.
 
+        A body's size is not known: it may be any, as likely as it explains the rows.
         going_on: of those alone by which it may still be changing.
         """
         k = int(self._weights[_HANDING : _OTHER if going_on else None].argmax())
         if k < _BODIES:
-            x, P = self._x[k], self._P[k]
+            p, x, P = self._weights[_HANDING:_OTHER], self._x, self._P
         else:
             k -= _BODIES
-            sizes = BODY_SIZES[self.side]
             A, c = self._A[k] + np.tril(self._A[k], -1).T, self._c[k]
-            found = [(s * s * c @ np.linalg.solve(M := np.eye(10) + s * s * A, c), M, s) for s in sizes]
-            likely = [square - np.linalg.slogdet(M)[1] for square, M, _ in found]
-            P = np.linalg.inv(A + np.eye(10) / sizes[int(np.argmax(likely))] ** 2)
+            P = np.linalg.inv(A + np.eye(10) / BODY_SIZES[self.side][:, None, None] ** 2)
             x = P @ c
-        return self.root @ x, self.root @ P @ self.root.T
+            likely = x @ c + np.linalg.slogdet(P)[1] - 20.0 * np.log(BODY_SIZES[self.side])
+            p = np.exp(0.5 * (likely - likely.max()))
+        p = p / max(float(p.sum()), 1e-300)
+        mean = p @ x
+        spread = np.tensordot(p, P + x[:, :, None] * x[:, None, :], 1) - np.outer(mean, mean)
+        return self.root @ mean, self.root @ spread @ self.root.T

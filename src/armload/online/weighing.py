@@ -48,6 +48,7 @@ class Weighing:
         self._touched = False  # whether something has touched the arm since it was steady
         self._sure_since = np.inf  # when the payload was first surely another one
         self._gaussian: tuple[PosteriorLeastSquares, Gaussian] | None = None  # before the row, and of which run
+        self._foreseen_by: SequentialPosterior | None = None  # what the last row at rest was weighed with
         self.row_t = self.steady_t = -np.inf
 
     def begin_run(self) -> None:
@@ -124,8 +125,15 @@ class Weighing:
 
     def _weigh(self, row: Row, h: float, state: SequentialPosterior, run: PosteriorLeastSquares) -> None:
         """Weigh a row that the run did not take, for as long as it stands."""
+        if state is not self._foreseen_by:
+            self.modes.foresee_anew()
+            self._foreseen_by = state
+        error = None
+        if row.h <= 0.0:  # friction at rest, unknown as it is, stays what it is: it is the standstill's, not the row's
+            error = state.noise / (row.weights * run.stream.noise.block)
+            row = row._replace(weights=np.ones_like(row.weights))
         seen, scale = state.predict(row._replace(h=h))
-        self.modes.take(h, seen, row.X, scale, *self._before_row(run), False)
+        self.modes.take(h, seen, row.X, scale, *self._before_row(run), False, error)
 
     def _before_row(self, run: PosteriorLeastSquares) -> Gaussian:
         """phi and covariance before the row, under the weak prior."""
