@@ -44,3 +44,23 @@ def test_what_was_handed_over_and_taken_back_is_steady_again():
         most = max(most, modes.handing + modes.other)
     assert most > 0.9
     assert modes.steady > 0.9
+
+
+def test_what_a_pose_is_wrong_by_is_no_change_and_hides_none():
+    """The rows of a standstill share one error, three times their noise. A change is sure when its odds are e^60."""
+    modes, rng = Modes(1.5, np.full(7, 50.0)), np.random.default_rng(5)
+    shift, scale, nothing = 0.2 * np.r_[1.0, np.zeros(9)], np.ones(7), (np.zeros(10), np.zeros((10, 10)))
+    wrong, odds, before, sure_at = 3.0 * rng.normal(size=7), 0.0, [], None
+    for k, (X, d) in enumerate(rows_of_a_standing_arm(np.zeros(10), 3.0, rng)):
+        changed = k * H >= 2.0
+        if changed:
+            odds += float(X @ shift @ d + 0.5 * (X @ shift) @ (X @ shift))  # ln p(rows | shift) / p(rows | nothing)
+        seen = np.column_stack([np.zeros((7, 10)), d + wrong + changed * (X @ shift), np.ones(7)])
+        modes.take(H, seen, X, scale, *nothing, False, np.full(7, 9.0))
+        if changed and sure_at is None and modes.handing + modes.other > 0.999:
+            sure_at = odds
+        elif not changed:
+            before.append(modes.handing + modes.other)
+    assert max(before) < 0.05
+    assert sure_at is not None
+    assert sure_at < 60.0
