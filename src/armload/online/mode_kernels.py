@@ -27,14 +27,11 @@ def take_row(
             how often each kind begins or ends, and how. p … c: probabilities, states. since: moments, evidence, ages.
     """
     shared = 1.0 if taken else 1.0 + 2.0 * listening[0] / h
-    stands = error[0] > 0.0
-    if not stands:
-        rest[1] = -1.0
     U, d, v = _innovation(seen, X, scale, root, mean, covariance, shared, level[0], error, rest)
     if taken:
         _listen(h, scale, d, v, p[0], loud, level, listening)
     _weigh(h, U, d, v, scale, effort, pushes, sides, rates, p, b, x, P, A, c, since)
-    if stands and p[0] + p[1] > listening[5]:
+    if error[0] > 0.0 and p[0] + p[1] > listening[5]:
         for j in range(len(d)):
             rest[0, j] += rest[1, j] * scale[j] * d[j] / v[j]
             rest[1, j] *= level[0] / v[j]

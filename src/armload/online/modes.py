@@ -107,7 +107,7 @@ class Modes:
         self.steady, self.drift, self.contact, self.handing, self.other, self.stays = 1.0, 0.0, 0.0, 0.0, 0.0, 0.0
 
     def foresee_anew(self) -> None:
-        """What is foreseen is of another state: how wrong it is at rest is not known any more."""
+        """The arm has moved, or is foreseen from another state: what that is wrong by at rest is not known."""
         self._rest[1] = -1.0
 
     @property

@@ -6,6 +6,7 @@ A change is detected once it has been sure for `HOLDS`; after a contact, once th
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armload.online.modes import Modes
 from armload.online.runs import Gaussian
@@ -24,6 +25,7 @@ from armload.posterior import PosteriorLeastSquares
 from armload.posterior.sequential import SequentialPosterior
 from armload.recording import GAP, Sample
 from armload.regression import payload_prior_std
+from armload.regression.row_kernels import STILL
 from armload.regression.rows import Row
 
 
@@ -48,7 +50,7 @@ class Weighing:
         self._touched = False  # whether something has touched the arm since it was steady
         self._sure_since = np.inf  # when the payload was first surely another one
         self._gaussian: tuple[PosteriorLeastSquares, Gaussian] | None = None  # before the row, and of which run
-        self._foreseen_by: SequentialPosterior | None = None  # what the last row at rest was weighed with
+        self._at_rest: tuple[SequentialPosterior, NDArray[np.float64]] | None = None  # foreseen by, and where
         self.row_t = self.steady_t = -np.inf
 
     def begin_run(self) -> None:
@@ -103,12 +105,13 @@ class Weighing:
         self.modes.side = stream.posterior.torque
         h, self.row_t = row.t - self.row_t, row.t
         known = stream.seconds > (FIRST_TARED if stream.tares else FIRST_UNTARED)
+        if known and stream.posterior.torque == "link" and self._rests(row, state):  # there friction hides no load
+            if 0.0 < h <= GAP:
+                self._weigh(row, h, state, run)
+        elif known and row.h > 0.0:
+            self.modes.take(row.h, state.seen, row.X, state.scale, *self._before_row(run), True)
         if row.h > 0.0:
-            if known:
-                self.modes.take(row.h, state.seen, row.X, state.scale, *self._before_row(run), True)
             self._gaussian = (run, stream.answer())
-        elif known and 0.0 < h <= GAP and stream.posterior.torque == "link":  # at rest, where friction hides no load
-            self._weigh(row, h, state, run)
         return known
 
     def passed_over(self, sample: Sample, run: PosteriorLeastSquares, state: SequentialPosterior | None) -> bool:
@@ -125,15 +128,21 @@ class Weighing:
 
     def _weigh(self, row: Row, h: float, state: SequentialPosterior, run: PosteriorLeastSquares) -> None:
         """Weigh a row that the run did not take, for as long as it stands."""
-        if state is not self._foreseen_by:
-            self.modes.foresee_anew()
-            self._foreseen_by = state
         error = None
-        if row.h <= 0.0:  # friction at rest, unknown as it is, stays what it is: it is the standstill's, not the row's
+        if self._rests(row, state):  # friction at rest is not known, and stays: it is the standstill's, no row's own
             error = state.noise / (row.weights * run.stream.noise.block)
             row = row._replace(weights=np.ones_like(row.weights))
         seen, scale = state.predict(row._replace(h=h))
         self.modes.take(h, seen, row.X, scale, *self._before_row(run), False, error)
+
+    def _rests(self, row: Row, state: SequentialPosterior) -> bool:
+        """Whether the arm stands, or has hardly moved since it stood; it is foreseen anew elsewhere."""
+        last = self._at_rest
+        near = last is not None and last[0] is state and float(np.abs(row.q - last[1]).max()) <= STILL
+        if not near:
+            self.modes.foresee_anew()
+            self._at_rest = (state, row.q) if row.h <= 0.0 else None
+        return near or row.h <= 0.0
 
     def _before_row(self, run: PosteriorLeastSquares) -> Gaussian:
         """phi and covariance before the row, under the weak prior."""

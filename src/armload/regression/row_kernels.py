@@ -24,7 +24,7 @@ from armload.runtime.kernels import kernel
 FRESH = 2
 # [rad] an arm that stays so near shows one value of its stiction: more of it tells nothing new. Above what encoders and
 # a controller at rest show (test_a_pose_of_a_standing_arm_counts_no_longer_than_it_settles)
-_STILL = 1e-3
+STILL = 1e-3
 
 
 @kernel
@@ -100,7 +100,7 @@ def make_rows(
             weights[m, j] = 1.0 / (1.0 + excess * (1.0 - np.tanh(abs(dq[m, j]) / FRICTION_WIDTH) ** 2))
         moved = not np.isfinite(clock[2])
         for j in range(n):
-            moved |= abs(q[m, j] - joints[4, j]) > _STILL
+            moved |= abs(q[m, j] - joints[4, j]) > STILL
         clock[2] += steps[m]  # not what passed while nothing was seen
         if moved:
             clock[2] = 0.0
