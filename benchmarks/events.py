@@ -1,6 +1,6 @@
 """What a live stream says while what an arm holds changes, or something else happens: delay, misses, mass.
 
-    python benchmarks/events.py [--scenes 8] [--parts steps,ramps_2,...] [--minutes 0] [--seed 90000] [--quick]
+    python benchmarks/events.py [--scenes 16] [--parts steps,ramps_2,...] [--minutes 0] [--seed 90000] [--quick]
                                 [--jobs 1]
 
 The default method on real-like Pandas (`World.real_like`, the sensors as measured, 8 % of the samples lost) at 200 Hz,
@@ -361,7 +361,7 @@ def main() -> None:
         __doc__,
         quick=False,
         parts=",".join(PARTS),
-        scenes=8,
+        scenes=16,
         seed=SEED,
         minutes=0.0,
         jobs=1,
