@@ -1,13 +1,17 @@
 """`armload motion design` and `enrich` on the command line: files others read, and refusals in one sentence."""
 
 import json
+import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from armload.app.cli import main
+from armload.app.cli import main, motion_enrich
 from armload.app.cli.motion_arguments import joints
 from armload.arms import arm
+from armload.errors import MotionError
+from armload.excitation.constraints import SHARE, TOOL_SPEED, TRAVEL
 from armload.motion import export_motion, load_motion
 from armload.motion.point_to_point import PointToPoint
 
@@ -186,3 +190,26 @@ def test_a_way_from_the_present_pose_that_is_not_allowed_is_refused(designed, tm
     assert main(["motion", "export", said["motion"], "--format", "csv", "--out", str(out), *words.split()]) == 2
     assert expected in capsys.readouterr().err
     assert not out.exists()
+
+
+def test_the_help_says_the_limits_of_a_design_and_of_a_path_when_none_is_asked_for(monkeypatch, tmp_path, capsys):
+    kept = SimpleNamespace()
+
+    def constraints_of(options, *_):
+        kept.share, kept.travel, kept.speed = options.share, options.travel, options.speed
+        raise MotionError("far enough")
+
+    monkeypatch.setattr(motion_enrich, "constraints_of", constraints_of)
+    start = np.array([float(x) for x in READY.split(",")])
+    path = PointToPoint(np.array([start, start + 0.2]), np.array([0.1]), np.array([1.0]), name="move")
+    export_motion(path, tmp_path / "path.csv", "csv")
+    assert main(["motion", "enrich", str(tmp_path / "path.csv"), "--robot", "panda", "--out", "o.json"]) == 2
+    for command, values in (("design", (SHARE, TRAVEL, TOOL_SPEED)), ("enrich", (kept.share, kept.travel, kept.speed))):
+        capsys.readouterr()
+        assert main(["motion", command, "--help"]) == 0
+        words = " ".join(capsys.readouterr().out.split())
+        for name, value in zip(("--share S of", "--travel RAD", "--speed V of"), values, strict=True):
+            found = re.search(rf"{name}[^(]*\(default: (\S+)\)", words)
+            assert found is not None
+            said = found[1]
+            assert value >= 1e3 if said == "any" else float(said) == value

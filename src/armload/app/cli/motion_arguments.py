@@ -64,12 +64,33 @@ def joints(text: str) -> tuple[int, ...]:
     return tuple(sorted(set(out)))
 
 
-def add_constraint_arguments(parser: argparse.ArgumentParser) -> None:
-    """What a motion must keep to: `--share` to `--speed`."""
+def add_constraint_arguments(
+    parser: argparse.ArgumentParser, share: str = "0.8", travel: str = "1", speed: str = "1.5"
+) -> None:
+    """What a motion must keep to: `--share` to `--held`.
+
+    Args:
+        share, travel, speed: what the help says of them where they are left out.
+    """
     add = parser.add_argument_group("limits").add_argument
-    add("--share", type=at_least(0.01, float, 1.0), metavar="S", help="of every limit that may be used (default: 0.8)")
-    add("--travel", type=at_least(0.01, float), metavar="RAD", help="farthest of a joint from the start (default: 1)")
-    add("--speed", type=at_least(0.01, float), metavar="V", help="of the payload frame at most [m/s] (default: 1.5)")
+    add(
+        "--share",
+        type=at_least(0.01, float, 1.0),
+        metavar="S",
+        help=f"of every limit that may be used (default: {share})",
+    )
+    add(
+        "--travel",
+        type=at_least(0.01, float),
+        metavar="RAD",
+        help=f"farthest of a joint from the start (default: {travel})",
+    )
+    add(
+        "--speed",
+        type=at_least(0.01, float),
+        metavar="V",
+        help=f"of the payload frame at most [m/s] (default: {speed})",
+    )
     add("--payload", type=at_least(0.0, float), metavar="KG", help="the heaviest there may be (default: as rated)")
     add(
         "--centre",

@@ -37,7 +37,7 @@ def add_enrich_arguments(parser: argparse.ArgumentParser) -> None:
         "--deg", type=at_least(0.0, float, 90.0), default=2.0, metavar="A", help="turned at most (default: 2)"
     )
     add_knowledge_arguments(parser)
-    add_constraint_arguments(parser)
+    add_constraint_arguments(parser, share="1", travel="any", speed="any")
     parser.add_argument("--seed", type=at_least(0), default=0, metavar="N", help="same seed, same path (default: 0)")
     parser.add_argument(
         "--out",
