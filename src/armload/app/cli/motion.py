@@ -85,7 +85,7 @@ def parser() -> Parser:
     check.add_argument(
         "--tare",
         metavar="LOG|MOTION",
-        help="an earlier run of the arm, with anything mounted (default: the same motion again)",
+        help="an earlier run of the arm, with anything mounted (default: of a motion the same again, of a log none)",
     )
     add_column_arguments(check)
     check.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
