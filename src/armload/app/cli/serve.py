@@ -99,7 +99,8 @@ def run(options: argparse.Namespace) -> int | None:
         with service.heard_by(output.put):
             if settings.port is not None:
                 endpoint = Endpoint(service, settings.host, settings.port, settings.token)
-                print_note(f"{len(settings.arms)} arms: {endpoint.url}/arms")
+                count = len(settings.arms)
+                print_note(f"{count} arm{'s' if count > 1 else ''}: {endpoint.url}/arms")
             output.start(service.stop)
             service.run(settings.duration)
     finally:
