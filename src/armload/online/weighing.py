@@ -127,7 +127,7 @@ class Weighing:
         return True
 
     def _weigh(self, row: Row, h: float, state: SequentialPosterior, run: PosteriorLeastSquares) -> None:
-        """Weigh a row that the run did not take, for as long as it stands."""
+        """Weigh a row that the run did not take, or of an arm at rest, for as long as it stands."""
         error = None
         if self._rests(row, state):  # friction at rest is not known, and stays: it is the standstill's, no row's own
             error = state.noise / (row.weights * run.stream.noise.block)
