@@ -124,5 +124,5 @@ def test_modes_give_the_level_that_a_new_run_begins_with():
     modes, rng = Modes(1.5, np.ones(7)), np.random.default_rng(0)
     for _ in range(1000):
         seen = np.column_stack([np.zeros((7, 10)), np.sqrt(2.0) * rng.normal(size=7), np.ones(7)])
-        modes.take(0.04, seen, np.zeros((7, 10)), np.ones(7), np.zeros(10), np.zeros((10, 10)), True)
+        modes.take(0.04, seen, np.zeros((7, 10)), np.zeros((7, 6)), np.ones(7), np.zeros(10), np.zeros((10, 10)), True)
     assert modes.level == pytest.approx(2.0, rel=0.25)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from armload.arms import Arm, arm, full_arm_regressor, momentum_regressor
-from armload.arms.momentum_row import MomentumRow
+from armload.arms.momentum_row import MomentumRow, wrench_row
 from armload.motion import random_motion, taie2024
 from armload.payloads import test_payload as make_payload
 from armload.posterior import HybridIdentifier, PosteriorLeastSquares
@@ -59,6 +59,12 @@ def advance(runs, std):
     return found.posterior, found.state
 
 
+def wrench_of_the_arrays(robot, q):
+    """Jᵀ (n, 6) of the payload frame, force first, in the base's axes, from Pinocchio's Jacobian."""
+    J, R = robot.frame_motion(q).jacobian[0], robot.frame_pose(q)[0][0]
+    return np.vstack([R @ J[3:], R @ J[:3]]).T
+
+
 @pytest.mark.parametrize("name", ["panda", "ur10e"])
 def test_a_row_of_the_momentum_form_is_what_the_arrays_give(name):
     robot = arm(name, gravity=(1.0, -3.0, -9.0))
@@ -66,6 +72,7 @@ def test_a_row_of_the_momentum_form_is_what_the_arrays_give(name):
     row = MomentumRow(robot)
     for _ in range(3):
         q, dq = rng.normal(size=(2, robot.n))
+        assert wrench_row(*row.chain[:4], q) == pytest.approx(wrench_of_the_arrays(robot, q), abs=1e-12)
         momentum, drift = row(q, dq)
         payload, links = momentum_regressor(robot.frame_motion(q), dq), full_arm_regressor(robot, q, dq)
         assert momentum == pytest.approx(np.concatenate([payload.momentum, links.momentum], axis=2)[0], abs=1e-12)
@@ -84,6 +91,7 @@ def test_a_row_knows_slanted_and_sliding_joints():
     joints = [joint.format(k, kind, k + 1, axis) for k, (kind, axis) in enumerate(kinds)]
     robot = Arm("slanted", f'<robot name="slanted">{"".join([*bodies, *joints])}</robot>')
     q, dq = np.random.default_rng(3).normal(size=(2, robot.n))
+    assert wrench_row(*MomentumRow(robot).chain[:4], q) == pytest.approx(wrench_of_the_arrays(robot, q), abs=1e-12)
     momentum, drift = MomentumRow(robot)(q, dq)
     payload, links = momentum_regressor(robot.frame_motion(q), dq), full_arm_regressor(robot, q, dq)
     assert momentum == pytest.approx(np.concatenate([payload.momentum, links.momentum], axis=2)[0], abs=1e-12)

@@ -173,6 +173,23 @@ def leaning_row(rotations, translations, axes, turning, turned, links, q):  # pr
 
 
 @kernel
+def wrench_row(rotations, translations, axes, turning, q):  # pragma: no cover - compiled
+    """Jᵀ (n, 6): torque of each joint by a unit force and a unit moment on the payload frame, in the base's axes."""
+    n = q.shape[0]
+    R, p, lines = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3)), np.empty((n, 3))
+    _poses(rotations, translations, axes, turning, q, R, p, lines)
+    out, arm = np.zeros((n, 6)), np.empty(3)
+    for c in range(n):
+        if turning[c]:
+            for i in range(3):
+                arm[i], out[c, 3 + i] = p[0, i] - p[c + 1, i], lines[c, i]
+            _cross(lines[c], arm, out[c, :3])
+        else:
+            out[c, :3] = lines[c]
+    return out
+
+
+@kernel
 def _project(a, l, omega, v, out, sign, x, y):  # noqa: E741  # pragma: no cover - compiled
     out[0] = sign * (l[0] * v[0] + l[1] * v[1] + l[2] * v[2])
     _cross(v, a, x)

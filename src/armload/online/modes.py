@@ -6,7 +6,8 @@ R·Rᵀ = E[phi·phiᵀ] of a body (`body_root`) the hypotheses are
 
     steady          d = noise
     drifting        d_j = b_j + noise,     b_j an Ornstein–Uhlenbeck process, small and slow: the arm itself
-    contact         the same, large and quick: a person's hand, any torque on any joint, varying
+    contact         the same, large and quick: anything that touches the arm, any torque on any joint, varying;
+                    or d = Jᵀ·f + noise, f (6,) an Ornstein–Uhlenbeck process: a hand that pulls at the payload frame
     handing over    d = W·R·x + noise,     x (10,) an Ornstein–Uhlenbeck process: a body that varies
     another         d = W·R·x + noise,     x ~ N(0, s²·1) since one of several moments: a body that stays
 
@@ -35,6 +36,10 @@ from armload.online.thresholds import (
     DRIFT_RARE,
     DRIFT_SIZE,
     DRIFT_TIME,
+    HAND_LEVER,
+    HAND_RARE,
+    HAND_SIZES,
+    HAND_TIME,
     HANDED_OVER,
     HANDING_TIMES,
     LETS_GO,
@@ -51,7 +56,7 @@ from armload.online.thresholds import (
 )
 
 _CONTACT = 2  # where each kind begins among the probabilities; 0: steady, 1: drifting
-_HANDING, _BODIES = _CONTACT + len(PUSH_SIZES), len(BODY_SIZES["link"])
+_HANDING, _BODIES = _CONTACT + len(PUSH_SIZES) + len(HAND_SIZES), len(BODY_SIZES["link"])
 _OTHER = _HANDING + _BODIES
 
 
@@ -85,10 +90,15 @@ class Modes:
         self.side = "link"
         # what is handed to compiled code comes in few arrays: each costs as much as a hundred products
         self._pushes = np.array([[DRIFT_SIZE, *PUSH_SIZES], [DRIFT_TIME, *(CONTACT_TIME for _ in PUSH_SIZES)]])
+        force = 9.81 * mass * HAND_SIZES  # (K,) [N]
+        size = np.column_stack([*(3 * [force]), *(3 * [HAND_LEVER * force])])  # (K, 6) force, then moment
+        self._hands = {"link": np.array([size, np.full_like(size, HAND_TIME)])}
+        self._hands["motor"] = self._hands["link"] * np.array([0.0, 1.0])[:, None, None]
         self._sides = {side: np.array([BODY_SIZES[side], HANDING_TIMES[side]]) for side in BODY_SIZES}
-        self._rates = np.array([RARE, DRIFT_RARE, CONTACT_LASTS, HANDED_OVER, LETS_GO])
+        self._rates = np.array([RARE, DRIFT_RARE, CONTACT_LASTS, HANDED_OVER, LETS_GO, HAND_RARE])
         self._weights = np.zeros(_OTHER + starts)
         self._b = np.zeros((2, len(self._pushes[0]), n))  # mean and variance of each joint's torque
+        self._f = np.zeros((len(HAND_SIZES), 7, 6))  # mean and covariance of each hand's force and moment
         self._x, self._P = np.zeros((bodies, 10)), np.zeros((bodies, 10, 10))
         self._A, self._c = np.zeros((starts, 10, 10)), np.zeros((starts, 10))  # of A the lower triangle
         self._since = np.array([STARTS, np.zeros(starts), np.zeros(starts)])  # [s], log evidence found, age [s]
@@ -102,7 +112,7 @@ class Modes:
         self._weights[:] = 0.0
         self._weights[0] = 1.0
         self.foresee_anew()
-        for state in (self._b, self._x, self._P, self._A, self._c, self._since[1:]):
+        for state in (self._b, self._f, self._x, self._P, self._A, self._c, self._since[1:]):
             state[:] = 0.0
         self.steady, self.drift, self.contact, self.handing, self.other, self.stays = 1.0, 0.0, 0.0, 0.0, 0.0, 0.0
 
@@ -120,6 +130,7 @@ class Modes:
         h: float,
         seen: NDArray[np.float64],
         X: NDArray[np.float64],
+        wrench: NDArray[np.float64],
         scale: NDArray[np.float64],
         mean: NDArray[np.float64],
         covariance: NDArray[np.float64],
@@ -130,14 +141,16 @@ class Modes:
 
         Args:
             h: what the row stands for [s]. seen: (n, 12) as in `SequentialPosterior`. X: (n, ≥ 10) the row's regressor,
-                payload first. scale: (n,) what the row was multiplied by. mean, covariance: of phi before the row.
+                payload first. wrench: (n, 6) Jᵀ of the payload frame (`wrench_row`). scale: (n,) what the row was
+                multiplied by. mean, covariance: of phi before the row.
             taken: whether the run took it, too. error: of an arm that stands, the variance (n,) of what all rows there
                 are wrong by, beside what the run does not know [N²·m²].
         """
-        row = (h, seen, X, scale, mean, covariance, taken, np.zeros(len(scale)) if error is None else error)
+        row = (h, seen, X, wrench, scale, mean, covariance, taken, np.zeros(len(scale)) if error is None else error)
         noise = (self._loud, self._level, self._about_level, self._rest)
-        known = (self.root, self.effort, self._pushes, self._sides[self.side], self._rates)
-        state = (self._weights, self._b, self._x, self._P, self._A, self._c, self._since)
+        own = (self._pushes, self._hands[self.side], self._sides[self.side])
+        known = (self.root, self.effort, *own, self._rates)
+        state = (self._weights, self._b, self._f, self._x, self._P, self._A, self._c, self._since)
         found = take_row(*row, *noise, *known, *state)
         self.steady, self.drift, self.contact, self.handing, self.other, self.stays = found
 

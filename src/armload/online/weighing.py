@@ -5,9 +5,12 @@ A change is detected once it has been sure for `HOLDS`; after a contact, once th
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
+from armload.arms.momentum_row import MomentumRow, wrench_row
 from armload.online.modes import Modes
 from armload.online.runs import Gaussian
 from armload.online.thresholds import (
@@ -41,7 +44,7 @@ class Weighing:
     """
 
     def __init__(self, run: PosteriorLeastSquares) -> None:
-        self._unit = float(payload_prior_std(run.arm)[0])
+        self._unit, self._chain = float(payload_prior_std(run.arm)[0]), MomentumRow(run.arm).chain[:4]
         self.reset(run)
 
     def reset(self, run: PosteriorLeastSquares) -> None:
@@ -51,6 +54,7 @@ class Weighing:
         self._sure_since = np.inf  # when the payload was first surely another one
         self._gaussian: tuple[PosteriorLeastSquares, Gaussian] | None = None  # before the row, and of which run
         self._at_rest: tuple[SequentialPosterior, NDArray[np.float64]] | None = None  # foreseen by, and where
+        self._seen_steady = False  # whether the arm was steady there: what the pose is wrong by is known
         self.row_t = self.steady_t = -np.inf
 
     def begin_run(self) -> None:
@@ -109,7 +113,7 @@ class Weighing:
             if 0.0 < h <= GAP:
                 self._weigh(row, h, state, run)
         elif known and row.h > 0.0:
-            self.modes.take(row.h, state.seen, row.X, state.scale, *self._before_row(run), True)
+            self._take(row.h, row, state.seen, state.scale, run, True)
         if row.h > 0.0:
             self._gaussian = (run, stream.answer())
         return known
@@ -129,11 +133,17 @@ class Weighing:
     def _weigh(self, row: Row, h: float, state: SequentialPosterior, run: PosteriorLeastSquares) -> None:
         """Weigh a row that the run did not take, or of an arm at rest, for as long as it stands."""
         error = None
-        if self._rests(row, state):  # friction at rest is not known, and stays: it is the standstill's, no row's own
+        # friction at rest is not known, and stays: it is the standstill's, no row's own, once a steady arm has shown it
+        if self._rests(row, state) and (self._seen_steady or self.modes.steady > LIKELY):
+            self._seen_steady = True
             error = state.noise / (row.weights * run.stream.noise.block)
             row = row._replace(weights=np.ones_like(row.weights))
         seen, scale = state.predict(row._replace(h=h))
-        self.modes.take(h, seen, row.X, scale, *self._before_row(run), False, error)
+        self._take(h, row, seen, scale, run, False, error)
+
+    def _take(self, h: float, row: Row, seen: NDArray, scale: NDArray, run: PosteriorLeastSquares, *how: Any) -> None:
+        """Hand a row to the modes; `how`: whether the run took it, and the error of a standstill."""
+        self.modes.take(h, seen, row.X, wrench_row(*self._chain, row.q), scale, *self._before_row(run), *how)
 
     def _rests(self, row: Row, state: SequentialPosterior) -> bool:
         """Whether the arm stands, or has hardly moved since it stood; it is foreseen anew elsewhere."""
@@ -141,7 +151,7 @@ class Weighing:
         near = last is not None and last[0] is state and float(np.abs(row.q - last[1]).max()) <= STILL
         if not near:
             self.modes.foresee_anew()
-            self._at_rest = (state, row.q) if row.h <= 0.0 else None
+            self._at_rest, self._seen_steady = (state, row.q) if row.h <= 0.0 else None, False
         return near or row.h <= 0.0
 
     def _before_row(self, run: PosteriorLeastSquares) -> Gaussian:
