@@ -111,13 +111,20 @@ def tilted(degrees: float, tared: bool, count: int, seed: int) -> Iterator[Wrong
 # ---------------------------------------------------------------------- the payload
 
 
-def taken_up(mass: float | None, count: int, seed: int) -> Iterator[Wrong]:
-    """Taken up or put down at once in the middle of the log: the truth is what is held at the end."""
+def taken_up(mass: float | None, count: int, seed: int, throughout: bool = False) -> Iterator[Wrong]:
+    """Taken up or put down at once in the middle of the log: the truth is what is held at the end.
+
+    throughout: only those where something is taken up, and it is held from the start: nothing changes.
+    """
     for k, (e, log) in enumerate(zip(episodes(count, seed), sound("reference", count, seed), strict=True)):
         rng = np.random.default_rng([seed, k, 3])
         payload = e.payload if mass is None else body_of(mass, seed + k)
         when, up = float(rng.uniform(1.5, 4.5)), rng.random() < 0.5
         held = [(0.0, None), (when, payload)] if up else [(0.0, payload), (when, None)]
+        if throughout:
+            held = [(0.0, payload)]
+        if not up and throughout:
+            continue
         how = {"world": e.world, "sensors": e.sensors, "rate": RATE}
         source = Simulator(e.arm, e.motion, held, speed=None, duration=6.0, seed=e.seed, **how)
         run = Recording(*map(np.array, zip(*source, strict=True)))  # type: ignore[arg-type]
@@ -276,4 +283,9 @@ CASES: dict[str, Callable[[int, int], Iterator[Wrong]]] = {
     "base tilted by 2°": partial(tilted, 2.0, True),
     "30 % of the mass swings": partial(moving, liquid=False),
     "30 % of the mass sloshes": partial(moving, liquid=True),
+}
+# To compare with: the same logs as in a case, sound
+CONTROLS: dict[str, Callable[[int, int], Iterator[Wrong]]] = {
+    "held throughout": partial(taken_up, None, throughout=True),
+    "held throughout, 0.2 kg": partial(taken_up, 0.2, throughout=True),
 }

@@ -1,6 +1,7 @@
 """What is wrong with a log, is it covered or said? Answers to logs of which something is not as identify assumes.
 
     python benchmarks/wrong_logs.py [--logs 24] [--seed 0] [--cases "tilted;swings"]
+    python benchmarks/wrong_logs.py --again "5,9" --logs 64 --cases "the same, 0.2 kg;held throughout, 0.2 kg"
 
 Every case takes the same Pandas, payloads and motions (the benchmark's reference population, `armload.lab.episodes`),
 with a tare of 20 s and a run of 6 s, makes one thing wrong (`wrong_cases.py`) and asks `armload.identify` as a user
@@ -15,21 +16,31 @@ no word       share of the answers that are not called calibrated, and have no n
 
 Cases that are named replace their own among the results. Written to benchmarks/results/wrong_logs.json and a table of
 docs/hybrid.md, after every case; half an hour of one core.
+
+With --again, cases are answered with other seeds, to tell chance from fault: how many values are covered or said, with
+Clopper–Pearson intervals (95 %) that take each value, or each log only, for an answer of its own, as the values of a
+log are correlated; all, and those where something is held at the end. *held throughout* are logs of *taken up or put
+down* where something is taken up, but with it held from the start. Cases that are named replace their own in
+benchmarks/results/wrong_logs_again.json.
 """
 
 from __future__ import annotations
 
+import argparse
 import json
 from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import beta
 from script import RESULTS, ROOT, markdown_table, options, say, write, write_table
-from wrong_cases import CASES, Wrong
+from wrong_cases import CASES, CONTROLS, Wrong
 
 from armload import arm, identify
 
 GROUPS = (slice(0, 1), slice(1, 4), slice(4, 10))
+NAMES = ("mass", "first moments", "inertia")
 
 
 def answered(logs: Iterable[Wrong]) -> dict[str, Any]:
@@ -78,9 +89,49 @@ def table(found: dict[str, Any]) -> str:
     )
 
 
+def between(held: float, of: int) -> list[float]:
+    """The Clopper–Pearson interval (95 %) of a share of which `held` were seen; of logs, it may be a part of one."""
+    low = float(beta.ppf(0.025, held, of - held + 1.0)) if held > 0 else 0.0
+    high = float(beta.ppf(0.975, held + 1.0, of - held)) if held < of else 1.0
+    return [round(low, 3), round(high, 3)]
+
+
+def again(name: str, logs: int, seeds: list[int]) -> dict[str, Any]:
+    """A case with several seeds, and how sure its shares are."""
+    panda, fine, held = arm("panda"), [], []
+    for log in (log for seed in seeds for log in (CASES | CONTROLS)[name](logs, seed)):
+        answer = identify(log.run, panda, tare=log.tare, profile=log.profile)
+        inside = (log.truth >= answer.phi_low) & (log.truth <= answer.phi_high)
+        fine.append(inside | (answer.interval != "calibrated"))
+        held.append(bool(log.truth.any()))
+    return {"all": counted(np.array(fine)), "held at the end": counted(np.array(fine)[held])}
+
+
+def counted(fine: NDArray[np.bool_]) -> dict[str, Any]:
+    """Of each group of parameters: values covered or said, of how many, their share, and its two intervals."""
+    out: dict[str, Any] = {"logs": len(fine)}
+    for name, part in zip(NAMES, GROUPS, strict=True):
+        seen, of, share = int(fine[:, part].sum()), fine[:, part].size, float(fine[:, part].mean())
+        by = {"by value": between(seen, of), "by log": between(share * len(fine), len(fine))}
+        out[name] = {"covered or said": [seen, of], "share": round(share, 3)} | by
+    return out
+
+
+def several(asked: argparse.Namespace) -> None:
+    """The cases that are named, with several seeds."""
+    file, seeds = RESULTS / "wrong_logs_again.json", [int(seed) for seed in asked.again.split(",")]
+    found = json.loads(file.read_text(encoding="utf-8"))["cases"] if file.exists() else {}
+    for name in asked.cases.split(";"):
+        found[name] = again(name, asked.logs, seeds)
+        write("wrong_logs_again", {"seeds": seeds, "cases": found})
+
+
 def main() -> None:
-    asked = options(__doc__, logs=24, seed=0, cases="")
+    asked = options(__doc__, logs=24, seed=0, cases="", again="")
     chosen = [name for name in CASES if not asked.cases or name in asked.cases.split(";")]
+    if asked.again:
+        several(asked)
+        return
     file = RESULTS / "wrong_logs.json"
     found = json.loads(file.read_text(encoding="utf-8"))["cases"] if asked.cases and file.exists() else {}
     for name in chosen:

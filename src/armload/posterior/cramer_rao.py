@@ -29,7 +29,7 @@ from armload.posterior.scales import Scales
 from armload.posterior.solve import solve
 from armload.recording import Recording
 from armload.regression import Correction, GaussianPrior, JointFeatures, payload_prior_std
-from armload.regression.information import RegressionData
+from armload.regression.information import SAME, RegressionData, Session
 from armload.regression.lag import GAIN
 from armload.regression.noise import SMOOTH, NoiseModel
 from armload.regression.prior import REACH
@@ -123,6 +123,7 @@ def bound(
     mounted: ArrayLike | None = None,
     gain: float = GAIN,
     times: Sequence[float] | None = None,
+    session: Session = SAME,
 ) -> Bound:
     """The Bayesian Cramér–Rao bound of the ten parameters along a run.
 
@@ -146,6 +147,8 @@ def bound(
             None: anything within the weak prior.
         gain: λ of the lag [1/s].
         times: when to say [s], increasing, within the run; None: after 1 s, 3 s and the whole run.
+        session: of the run; the tare's is session 0. By what it drifts, offsets and friction may differ from the
+            tare's; its deviations are taken as they are, as if their sizes were known.
 
     Raises:
         IdentificationError: another number of joints than the arm's, times outside the run, or scales or what was
@@ -160,10 +163,10 @@ def bound(
     at_tare = payload_prior_std(arm) if mounted is None else np.asarray(mounted, dtype=float)
     _check_shapes(at_tare, scales, correction, features)
 
-    def empty() -> RegressionData:
-        return RegressionData(correction, gain, features, noise.block)
+    def empty(session: Session = SAME) -> RegressionData:
+        return RegressionData(correction, gain, features, noise.block, session)
 
-    runs, now = [], empty()
+    runs, now = [], empty(session)
     if before is not None:
         runs.append(empty())
         _add(runs[0], before, slice(None))
