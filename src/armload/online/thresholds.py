@@ -35,9 +35,10 @@ HAND_SIZES = np.array([0.25, 1.0])
 HAND_TIME = 4.0
 # [m] how far from the frame's origin a hand takes hold
 HAND_LEVER = 0.1
-# [s] mean time between such pulls: one in two working weeks. A payload's weight is a force, too: where a hand is expected
-# as often as a change, those at once are sure 0.1 s later and some are missed (seeds 5000 to 5003); with one in a day
-# 0.3 kg took half a second (test_a_cycle_in_step_with_the_motion_stays_as_good_in_its_second_half_as_in_its_first)
+# [s] mean time between such pulls: one in two working weeks. A payload's weight is a force, too: where a hand is
+# expected as often as a change, those at once are sure 0.1 s later and some are missed (seeds 5000 to 5003); with one
+# in a day 0.3 kg took half a second
+# (test_a_cycle_in_step_with_the_motion_stays_as_good_in_its_second_half_as_in_its_first)
 HAND_RARE = 288000.0
 # [s] mean duration of a contact: pushes last 0.3 to 3 s (`benchmarks/events.py`)
 CONTACT_LASTS = 1.0
