@@ -35,6 +35,10 @@ def test_every_kernel_that_python_calls_is_compiled_for_a_wheel():
     assert len(called) > 20
     named = {f"armload.{name}" for name in kernels.signatures()}
     assert called <= named <= {f"{module}.{name}" for module, names in made.items() for name in names}
+    for name, kinds in kernels.signatures().items():
+        module, _, function = f"armload.{name}".rpartition(".")
+        takes = len(made[module][function].args.args)
+        assert {len(each) for each in kinds} == {takes}, f"{name} takes {takes} arguments"
 
 
 @pytest.fixture
