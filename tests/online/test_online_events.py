@@ -195,6 +195,48 @@ def test_a_change_while_the_arm_stands_is_noticed_then():
     assert not estimates[-1].moving
 
 
+def test_a_change_is_noticed_though_the_arm_has_stood_since_the_first_sample():
+    """As after a service was begun again beside a parked robot: no tare, and no motion yet."""
+    body, motion = box(1.0), Stopping(random_motion(arm("panda"), 13), -1.0)
+    log = stream(13, [(2.0, body)], 3.5, motion=motion)
+    assert np.ptp(log.q, axis=0).max() < 2e-3  # it gives way by a milliradian under a kilogram
+    estimates, events = said(log, "map-gp")
+    assert len(events) == 1
+    assert 2.0 < events[0].t < 2.3
+    assert not any(e.held for e in estimates if e.t < 2.0)
+    assert covers(estimates[-1], body.phi)[0]
+
+
+@pytest.mark.parametrize("force", [25.0, pytest.param(12.0, marks=pytest.mark.full)])
+def test_an_arm_that_stands_and_is_pressed_upwards_puts_nothing_down(force):
+    """More than the payload's weight lifts the arm, as a part that is pressed on a fixture: no payload does that."""
+    body, motion = box(0.9), Stopping(random_motion(arm("panda"), 13), 5.0)
+    log = stream(13, [(2.0, body)], 12.0, motion=motion)
+    size = np.clip(np.minimum(log.t - 7.0, 10.0 - log.t) / 0.3, 0.0, 1.0)
+    estimates, events = said(pushed(log, (0.0, 0.0, force), size), "map-gp")
+    assert "release" not in [event.kind for event in events]
+    during = [e for e in estimates if 7.6 < e.t < 9.7]
+    assert min(e.p_contact for e in during) > 0.99
+    assert not any(e.interval == "calibrated" for e in during)
+    assert all(covers(e, body.phi)[0] for e in during)
+    assert estimates[-1].p_contact < 0.01
+    assert covers(estimates[-1], body.phi)[0]
+
+
+def test_what_surely_changed_and_likely_stays_is_a_change_though_something_has_touched_the_arm():
+    """That it may go on changing is never ruled out: one part in 600, as changes follow each other."""
+    identifier = OnlineIdentifier(arm("panda"), method="map-gp")
+    weighing = identifier._watch._weighing
+    weighing._touched = True
+    found, lasting = [], [(0.3, 1.0), (0.3, 1.0), (0.0016, 0.2), (0.0016, 1.0), (0.0016, 1.0)]
+    for t, (handing, stays) in zip((0.0, 0.1, 0.2, 0.3, 0.4), lasting, strict=True):
+        weighing.row_t, modes = t, weighing.modes
+        modes.steady, modes.handing, modes.other, modes.stays = 0.0, handing, 1.0 - handing, stays
+        found.append(weighing.changed())
+    identifier.close()
+    assert found == [False, False, False, False, True]
+
+
 def test_a_mass_is_told_once_it_is_known_and_not_before():
     estimates, _ = taken_up(200.0, None)
     masses = [(one.event.kind, one.event.mass) for one in estimates if one.event is not None]

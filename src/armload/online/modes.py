@@ -120,6 +120,11 @@ class Modes:
         """The arm has moved, or is foreseen from another state: what that is wrong by at rest is not known."""
         self._rest[1] = -1.0
 
+    def no_payload(self) -> None:
+        """What would be held since the last row is no payload: it is something that touches the arm."""
+        self.contact += self.handing + self.other
+        self.handing = self.other = self.stays = 0.0
+
     @property
     def level(self) -> float:
         """How large the noise has lately been, in units of what it is expected to be."""

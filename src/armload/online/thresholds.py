@@ -84,7 +84,8 @@ LEVEL_OUTLIER = 8.0
 # probability of a payload that changes or has changed, from which it is an event: one in a thousand may be none, and
 # friction of gears is not what the hypotheses know (test_a_real_arm_that_breaks_away_from_rest_is_no_change_of_payload)
 SURE = 0.999
-# [s] for which it has to be so sure: one lag of the regression, as gears that break away look like a payload for less
+# [s] for which it has to be so sure, or what would be held have no mass that can be: one lag of the regression, as
+# gears that break away look like a payload for less
 HOLDS = 1.0 / GAIN
 # probability of what is taken for so: of a steady arm whose intervals are the calibrated ones, of a payload that stays
 LIKELY = 0.9
@@ -110,8 +111,9 @@ CONTACT_LONGEST = 60.0
 # [s] before a change that are taken back from the run that ends, at least as long as it took to notice it: what a
 # payload does before it shows (test_a_cycle_in_step_with_the_motion_stays_as_good_in_its_second_half_as_in_its_first)
 TAKEN_BACK = 0.2
-# [s] of a run with a tare before which no change is looked for: the tare has told most of what the arm does wrong, and
-# one pose of an arm that stands counts no longer than 0.25 s
+# [s] of a run with a tare before which no change is looked for: the tare has told most of what the arm does wrong. Of
+# an arm that stands it is the time since its first row, as one pose counts no longer than 0.25 s
+# (test_a_change_is_noticed_though_the_arm_has_stood_since_the_first_sample)
 FIRST_TARED = 0.2
 # [s] the same without a tare: how much friction there is must have shown, the posterior knows how little it knows of
 # offsets (changes within the first 2 s; nothing is seen in real logs as they are, seeds 95000 to 95005)

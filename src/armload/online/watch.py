@@ -153,7 +153,7 @@ class PayloadWatch:
 
     def _decide(self, sample: Sample, held: bool) -> None:
         """What becomes of the run, by what the last rows are."""
-        if self._weighing.changed(self.run):
+        if self._weighing.changed():
             self._begin_change(sample, held)
         elif self._weighing.steady > 0.5:
             self.phase, self._gave_up = FOLLOWING, False

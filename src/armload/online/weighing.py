@@ -1,6 +1,7 @@
 """Is it a change? Each row weighed by what it may be (`modes.py`), whether a run has taken it or not.
 
-A change is detected once it has been sure for `HOLDS`; after a contact, once the new payload also stays.
+A change is detected once it has been sure for `HOLDS`; after a contact, once the new payload also stays. What would
+have less than no mass for as long is a contact.
 """
 
 from __future__ import annotations
@@ -52,15 +53,17 @@ class Weighing:
         self.modes = Modes(self._unit, run.stream.correction.effort)
         self._touched = False  # whether something has touched the arm since it was steady
         self._sure_since = np.inf  # when the payload was first surely another one
+        self._impossible_since = np.inf  # when what would be held first was no payload
         self._gaussian: tuple[PosteriorLeastSquares, Gaussian] | None = None  # before the row, and of which run
         self._at_rest: tuple[SequentialPosterior, NDArray[np.float64]] | None = None  # foreseen by, and where
         self._seen_steady = False  # whether the arm was steady there: what the pose is wrong by is known
         self.row_t = self.steady_t = -np.inf
+        self._first_t = np.inf  # of the run's first row
 
     def begin_run(self) -> None:
         """The rows that come are of another run."""
         self.modes.reset()
-        self._sure_since = np.inf
+        self._sure_since = self._impossible_since = self._first_t = np.inf
 
     @property
     def likely(self) -> tuple[float, float, float]:
@@ -76,20 +79,19 @@ class Weighing:
         """
         return self.modes.steady - self.modes.drift if self._touched else self.modes.steady
 
-    def changed(self, run: PosteriorLeastSquares) -> bool:
+    def changed(self) -> bool:
         """Whether the last row shows that the payload is surely another one than the run's."""
         modes = self.modes
         if self.steady > LIKELY:
             self.steady_t, self._touched = self.row_t, False
         self._touched = self._touched or modes.contact > 0.5
-        changed = modes.other if self._touched else modes.other + modes.handing
-        lasting = not self._touched or modes.stays >= AFTER_CONTACT
-        sure = changed > SURE and lasting and self._possible(run)
+        lasting = not self._touched or (modes.other > LIKELY and modes.stays >= AFTER_CONTACT)
+        sure = modes.other + modes.handing > SURE and lasting and self._impossible_since == np.inf
         self._sure_since = min(self._sure_since, self.row_t) if sure else np.inf
         return self.row_t - self._sure_since >= HOLDS
 
     def _possible(self, run: PosteriorLeastSquares) -> bool:
-        """Whether what would be held now has a mass that can be."""
+        """Whether what would be held now has a mass that can be: nothing lifts the arm but what touches it."""
         (mean, covariance), (shift, spread) = self._before_row(run), self.modes.shift()
         std = float(np.sqrt(covariance[0, 0] + spread[0, 0]))
         return float(mean[0] + shift[0]) > -LIGHT * self._unit - std
@@ -108,8 +110,12 @@ class Weighing:
             return False
         self.modes.side = stream.posterior.torque
         h, self.row_t = row.t - self.row_t, row.t
-        known = stream.seconds > (FIRST_TARED if stream.tares else FIRST_UNTARED)
-        if known and stream.posterior.torque == "link" and self._rests(row, state):  # there friction hides no load
+        first = FIRST_TARED if stream.tares else FIRST_UNTARED
+        known, link = stream.seconds > first, stream.posterior.torque == "link"
+        self._first_t = min(self._first_t, row.t)
+        # there friction hides no load. Its rows stand for a quarter of a second, however long it has stood
+        if link and (known or row.t - self._first_t > first) and self._rests(row, state):
+            known = True
             if 0.0 < h <= GAP:
                 self._weigh(row, h, state, run)
         elif known and row.h > 0.0:
@@ -143,7 +149,12 @@ class Weighing:
 
     def _take(self, h: float, row: Row, seen: NDArray, scale: NDArray, run: PosteriorLeastSquares, *how: Any) -> None:
         """Hand a row to the modes; `how`: whether the run took it, and the error of a standstill."""
-        self.modes.take(h, seen, row.X, wrench_row(*self._chain, row.q), scale, *self._before_row(run), *how)
+        modes = self.modes
+        modes.take(h, seen, row.X, wrench_row(*self._chain, row.q), scale, *self._before_row(run), *how)
+        impossible = modes.handing + modes.other > 0.5 and not self._possible(run)
+        self._impossible_since = min(self._impossible_since, row.t) if impossible else np.inf
+        if row.t - self._impossible_since >= HOLDS:
+            modes.no_payload()
 
     def _rests(self, row: Row, state: SequentialPosterior) -> bool:
         """Whether the arm stands, or has hardly moved since it stood; it is foreseen anew elsewhere."""
