@@ -49,6 +49,13 @@ def test_logs_make_a_profile_that_identify_uses(folder, profile, capsys):
     assert found["phi_high"][0] - found["phi_low"][0] < 0.2
 
 
+def test_a_log_that_its_profile_is_learned_from_is_not_called_calibrated(folder, profile, capsys):
+    assert main(["identify", str(folder / "day1.csv"), "--robot", "panda", "--profile", str(profile), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["interval"] == "approximate"
+    assert any("learned from these very measurements" in note for note in found["notes"])
+
+
 def test_show_says_what_is_known_and_how_the_arm_drifted(profile, capsys, tmp_path):
     figure = tmp_path / "arm.png"
     assert main(["profile", "show", str(profile), "--figure", str(figure)]) == 0
@@ -83,6 +90,9 @@ def test_update_adds_a_session_and_refuses_a_payload(folder, profile, capsys, tm
         (["profile", "show"], "takes one profile"),
         (["profile", "day0.csv"], "needs --robot"),
         (["profile", "day0.csv", "--robot", "panda", "--out", "none.profile", "--update"], "no profile at"),
+        (["profile", "day3.csv", "--robot", "panda", "--out", "arm.profile"], "arm.profile exists: give --update"),
+        (["profile", "day1.csv", "--robot", "panda", "--out", "arm.profile", "--update"], "the same measurements as"),
+        (["profile", "day3.csv", "day3.csv", "--robot", "panda", "--out", "new.profile"], "the same measurements as"),
         (["identify", "run.csv", "--robot", "panda", "--profile", "none.profile"], "no profile at"),
         (
             ["identify", "run.csv", "--robot", "panda", "--profile", "arm.profile", "--method", "wls"],

@@ -172,6 +172,7 @@ def test_a_weighed_mass_is_in_the_answer_and_one_that_the_log_contradicts_is_sai
     wrong = answer(capsys, log, "--tare", tare, "--mass", f"{truth + 0.6:.4f}+-0.002")
     assert wrong["interval"] == "approximate"
     assert any("is not what the log says" in note for note in wrong["notes"])
+    assert wrong["phi"] == answer(capsys, log, "--tare", tare)["phi"]  # and no mass between the two
 
 
 def test_a_known_centre_is_in_the_answer_and_one_that_the_log_contradicts_is_said(files, capsys):
@@ -185,6 +186,7 @@ def test_a_known_centre_is_in_the_answer_and_one_that_the_log_contradicts_is_sai
     wrong = answer(capsys, log, "--tare", tare, "--com", f"{r[0] - 0.1:.5f},{r[1]:.5f},{r[2]:.5f}+-0.001")
     assert wrong["interval"] == "approximate"
     assert any("the centre of mass given" in note and "is not what the log says" in note for note in wrong["notes"])
+    assert wrong["phi"] == plain["phi"]
 
 
 def test_an_old_tare_widens_the_interval(files, capsys):

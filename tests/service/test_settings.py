@@ -43,6 +43,7 @@ def test_a_file_says_what_it_says_with_paths_from_its_own_folder(tmp_path):
     [
         (("rating = 2.5", "ratting = 2.5"), "unknown setting 'ratting'"),
         (("rating = 2.5", 'rating = "2.5"'), "rating is '2.5': expected a float"),
+        (("rating = 2.5", 'record = "/dev/full"'), "ends in .csv or .mcap"),
         (("every = 0.5", "every = true"), "every is True"),
         (('name = "right"', 'name = "left"'), "two arms are called 'left'"),
         (('name = "right"', 'name = "../right"'), "letters, digits"),

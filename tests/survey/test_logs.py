@@ -4,7 +4,8 @@ import json
 
 import pytest
 
-from armload.errors import UsageError
+from armload.errors import ArmloadError, UsageError
+from armload.recording import read_recording
 from armload.survey import find_logs
 
 
@@ -23,6 +24,22 @@ def names(logs, folder):
 
 def test_a_folder_is_searched_to_its_bottom_for_what_can_be_a_log(folder):
     assert names(find_logs([str(folder)]), folder) == ["cell-1/a.csv", "cell-1/deep/b.npz", "cell-2/c.mcap"]
+
+
+def test_links_among_folders_lead_to_no_log_twice(folder):
+    """Two links that lead to each other's folders have two hundred thousand ways through them."""
+    (folder / "cell-1" / "deep" / "up").symlink_to("../..")
+    (folder / "cell-2" / "loop").symlink_to("../cell-1")
+    assert names(find_logs([str(folder)]), folder) == ["cell-1/a.csv", "cell-1/deep/b.npz", "cell-2/c.mcap"]
+
+
+def test_a_packed_log_is_a_log_that_its_row_says_to_unpack(folder):
+    (folder / "cell-1" / "old.csv.gz").write_text("x")
+    (folder / "cell-1" / "notes.txt.md.gz").write_text("x")
+    found = names(find_logs([str(folder)]), folder)
+    assert found == ["cell-1/a.csv", "cell-1/deep/b.npz", "cell-1/old.csv.gz", "cell-2/c.mcap"]
+    with pytest.raises(ArmloadError, match="unpack it first"):
+        read_recording(folder / "cell-1" / "old.csv.gz")
 
 
 def test_globs_lists_and_names_give_each_log_once(folder):

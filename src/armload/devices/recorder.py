@@ -28,9 +28,7 @@ from armload.inertia import InertialParameters
 from armload.online import OnlineEstimate
 from armload.recording import Sample
 from armload.recording.columns import column_names
-from armload.recording.growing_file import GrowingFile
-
-RECORDS = (".csv", ".mcap")
+from armload.recording.growing_file import RECORDS, GrowingFile
 
 
 class Recorder:

@@ -16,7 +16,7 @@ from armload.errors import IdentificationError
 from armload.identification.answer import Identification, Segment
 from armload.identification.choice import choose
 from armload.identification.found import Asked, found_in
-from armload.identification.notes import MAY_CHANGE, changed_within, of_both
+from armload.identification.notes import MAY_CHANGE, changed_within, learned_from, of_both
 from armload.identification.plausibility import check_plausible
 from armload.identification.reporting import answered
 from armload.identification.segments import changes_of_payload
@@ -101,7 +101,9 @@ def identify(
         Segment(float(a - recording.t[0]), float(b - recording.t[0]), answer)
         for (a, b), answer in zip(pairwise(edges), answers, strict=True)
     )
-    return replace(answers[-1], segments=segments)
+    answer = replace(answers[-1], segments=segments)
+    own = None if profile is None else profile.learned_from(recording)
+    return answer if own is None else replace(answer, interval="approximate", notes=(learned_from(own), *answer.notes))
 
 
 def _of_one_payload(

@@ -173,15 +173,23 @@ def other_than_given(given: KnownMass | KnownCentre, mean: NDArray[np.float64], 
     if isinstance(given, KnownMass):
         return (
             f"the mass given, {given.mass:.4g} ± {Z95 * given.std:.2g} kg (95 %), is not what the log says, "
-            f"{mean[0]:.4g} ± {Z95 * np.sqrt(covariance[0, 0]):.2g} kg: check what was weighed and what was mounted at "
-            "the tare"
+            f"{mean[0]:.4g} ± {Z95 * np.sqrt(covariance[0, 0]):.2g} kg, and is left out: check its unit, what was "
+            "weighed and what was mounted at the tare"
         )
     r = np.array([given.com, mean[1:4] / mean[0]])
     (x, y, z), (a, b, c) = (1e3 * r).tolist()
     return (
         f"the centre of mass given, ({x:.0f}, {y:.0f}, {z:.0f}) ± {1e3 * Z95 * given.std:.2g} mm (95 %), is not what "
-        f"the log says, ({a:.0f}, {b:.0f}, {c:.0f}) mm: check the frame that it is given in, what is held, and what "
-        "was mounted at the tare"
+        f"the log says, ({a:.0f}, {b:.0f}, {c:.0f}) mm, and is left out: check the frame that it is given in, what is "
+        "held, and what was mounted at the tare"
+    )
+
+
+def learned_from(session: str) -> str:
+    """That a log is asked with a profile which knows it already."""
+    return (
+        f"the profile is learned from these very measurements ({session}): what they say counts twice, and the "
+        "intervals are too narrow; ask another log, or a profile without it"
     )
 
 

@@ -19,12 +19,12 @@ from armload.errors import RecordingError, SafetyError, SourceError
 from armload.excitation import Accuracy, Obstacle
 from armload.identification import Identification, identify
 from armload.inertia import Z95
-from armload.measuring.interruption import held_back
 from armload.measuring.plan import APPROACH, BACK, EMPTY, LOADED, TO_START, Plan, plan_of
 from armload.motion import Motion
 from armload.online import OnlineIdentifier
 from armload.posterior import Known, KnownCentre, KnownMass, Profile
 from armload.recording import Recording, Sample, read_recording
+from armload.runtime.interruption import held_back
 
 ENOUGH = "the accuracy asked for is reached"
 _LOOK = 0.02  # [s] between two looks at the accuracy: a tenth of a braking time

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from armload.posterior.payload_prior import MixturePosterior, MixturePrior
     from armload.posterior.profile import Profile, SessionRecord
     from armload.posterior.profile_file import load_profile, save_profile
-    from armload.posterior.profile_learning import learn_profile
+    from armload.posterior.profile_learning import check_new, learn_profile
     from armload.posterior.scales import Posterior
     from armload.posterior.smooth import SmoothPosteriorLeastSquares
     from armload.posterior.torque_gain import with_known_weight
@@ -46,6 +46,7 @@ __all__ = [
     "Training",
     "advise",
     "bound",
+    "check_new",
     "efficiency",
     "learn_profile",
     "load_profile",

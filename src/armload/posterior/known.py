@@ -159,15 +159,21 @@ class Known:
         return self.com if self.com is not None and self.com.away(own, covariance) > FAR else None
 
     def given(self, mean: NDArray[np.float64], covariance: NDArray[np.float64]) -> Gaussian | None:
-        """phi ~ N(mean, covariance), (10,), (10, 10), given it; None where that is not taken (`if_held`)."""
-        own = self._own(mean)
+        """phi ~ N(mean, covariance), (10,), (10, 10), given what of it that does not deny; None: nothing is taken.
+
+        Between two values that cannot both be true lies none that is: what is denied is left out. With `if_held` all
+        is, then, and where nothing is held.
+        """
+        own, denied = self._own(mean), self.denied(mean, covariance)
         if self.if_held:
             least = max(HELD * float(np.sqrt(covariance[0, 0])), LIGHTEST_HELD)
-            if own[0] <= least or self.denied(mean, covariance) is not None:
+            if own[0] <= least or denied is not None:
                 return None
-        for one in (self.mass, self.com):
-            if one is not None:
-                own, covariance = one.given(own, covariance)
+        taken = [one for one in (self.mass, self.com) if one is not None and one is not denied]
+        if not taken:
+            return None
+        for one in taken:
+            own, covariance = one.given(own, covariance)
         return mean - self._own(mean) + own, covariance
 
     def _own(self, mean: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -19,6 +19,7 @@ from armload.errors import ModelError
 from armload.inertia import InertialParameters
 from armload.posterior.scales import Scales
 from armload.posterior.solve import solve
+from armload.recording import Recording, digest_of
 from armload.regression import Correction, JointFeatures, payload_prior_std
 from armload.regression.information import RegressionData, Session
 from armload.regression.lag import GAIN
@@ -33,7 +34,8 @@ class SessionRecord:
 
     duration [s]; date: [s since 1970], None where the log does not say. offset, coulomb: (n,) by which they differ from
     the mean session [N·m]. statistic: T of `posterior.drift`, chi-squared of 3·n where the session is like the others.
-    noise: (n,) the residual's long-run deviation √S over the one expected.
+    noise: (n,) the residual's long-run deviation √S over the one expected. logs: digests of the logs (`digest_of`); of
+    a stream, and in a profile of an earlier version, there are none.
     """
 
     name: str
@@ -43,6 +45,7 @@ class SessionRecord:
     coulomb: tuple[float, ...]
     statistic: float
     noise: tuple[float, ...]
+    logs: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +97,11 @@ class Profile:
         from hashlib import sha256
 
         return sha256(np.ascontiguousarray(self.A).tobytes() + self.b.tobytes()).hexdigest()[:12]
+
+    def learned_from(self, log: Recording) -> str | None:
+        """The session of the same measurements; None: there is none."""
+        digest = digest_of(log)
+        return next((session.name for session in self.sessions if digest in session.logs), None)
 
     def check(self, arm: Arm) -> None:
         """See that it is of this arm, on this base.

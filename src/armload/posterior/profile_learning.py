@@ -30,7 +30,7 @@ from armload.posterior.profile import Profile, SessionRecord, attached_mass, fin
 from armload.posterior.profile_session import STATED, log_data, poses, record, with_session, without_drift
 from armload.posterior.scales import Scales
 from armload.posterior.solve import threads
-from armload.recording import Recording
+from armload.recording import Recording, digest_of
 from armload.regression import Correction, JointFeatures, payload_prior_std
 from armload.regression.information import RegressionData, Session
 from armload.regression.lag import GAIN
@@ -69,10 +69,11 @@ def learn_profile(
         progress: called as progress(done, total) after every log.
 
     Raises:
-        IdentificationError: no log. ModelError: `known` is of another arm.
+        IdentificationError: no log, or the same measurements twice. ModelError: `known` is of another arm.
     """
     if not logs:
         raise IdentificationError("a profile needs at least one log of the arm: found none")
+    check_new(logs, known)
     correction = Correction(arm, rated_effort(arm))
     if known is not None:
         known.check(arm)
@@ -94,6 +95,23 @@ def learn_profile(
             data = RegressionData.joined([parts[k] for k in of])
             known = with_session(known, correction, data, [logs[k] for k in of])
         return known
+
+
+def check_new(logs: Sequence[Recording], known: Profile | None) -> None:
+    """See that no log counts twice: what is told again is no more certain.
+
+    Raises:
+        IdentificationError: two hold the same measurements, or one and what the profile is learned from.
+    """
+    seen = {} if known is None else {digest: one.name for one in known.sessions for digest in one.logs}
+    for log in logs:
+        digest = digest_of(log)
+        if digest in seen:
+            raise IdentificationError(
+                f"{log.source} holds the same measurements as {seen[digest]}, which the profile is learned from: leave "
+                "it out"
+            )
+        seen[digest] = log.source
 
 
 def by_clock(logs: Sequence[Recording]) -> list[int]:

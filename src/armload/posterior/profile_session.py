@@ -22,7 +22,7 @@ from armload.posterior.problem import Problem
 from armload.posterior.profile import Profile, SessionRecord
 from armload.posterior.scales import Posterior
 from armload.posterior.solve import solve
-from armload.recording import Recording
+from armload.recording import Recording, digest_of
 from armload.regression import Correction, FilteredRegression, JointFeatures, payload_prior_std
 from armload.regression.information import RegressionData, Session
 from armload.regression.lag import GAIN
@@ -110,6 +110,7 @@ def record(
         tuple(correction.coulomb(drift).tolist()),
         float(drift @ np.linalg.solve(covariance, drift)),
         tuple(np.sqrt(S / whole_noise(correction, SMOOTH)).tolist()),
+        tuple(digest_of(log) for log in logs),
     )
 
 

@@ -4,8 +4,8 @@ from armload.recording.alignment import Alignment, same_motion
 from armload.recording.chunks import read_long, recording_chunks
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.compensated import with_gravity
-from armload.recording.copies import check_own_measurements, shared_samples
-from armload.recording.files import LOG_SUFFIXES, has_topics, read_recording, write_recording
+from armload.recording.copies import check_own_measurements, digest_of, shared_samples
+from armload.recording.files import LOG_SUFFIXES, PACKED_SUFFIXES, has_topics, read_recording, write_recording
 from armload.recording.lerobot import data_set_episodes, is_data_set
 from armload.recording.recording import BLOCK, CHANNELS, GAP, JITTERED, Recording, Sample
 from armload.recording.spooled import blocks, largest, parts_of, span
@@ -16,6 +16,7 @@ __all__ = [
     "GAP",
     "JITTERED",
     "LOG_SUFFIXES",
+    "PACKED_SUFFIXES",
     "Alignment",
     "ColumnSpec",
     "Recording",
@@ -23,6 +24,7 @@ __all__ = [
     "blocks",
     "check_own_measurements",
     "data_set_episodes",
+    "digest_of",
     "has_topics",
     "is_data_set",
     "largest",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator
 
 import numpy as np
@@ -23,6 +24,15 @@ def check_own_measurements(log: Recording, tare: Recording) -> None:
             f"the tare {tare.source} and the log {log.source} share {count} measured samples: expected an earlier log "
             "of its own, without what is to be identified; record one, or leave the tare out"
         )
+
+
+def digest_of(log: Recording) -> str:
+    """The first twelve digits of the SHA-256 of what was measured: the same of a copy, whatever its name and form."""
+    digest = hashlib.sha256()
+    for part in blocks(len(log)):
+        for measured in (log.q[part], log.dq[part], log.tau[part]):
+            digest.update(np.ascontiguousarray(measured + 0.0).tobytes())
+    return digest.hexdigest()[:12]
 
 
 def shared_samples(log: Recording, other: Recording) -> int:

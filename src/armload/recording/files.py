@@ -25,6 +25,7 @@ _READERS = {
     **dict.fromkeys((".hdf5", ".h5"), read_hdf5),
 }
 LOG_SUFFIXES = (*_READERS, *BAG_SUFFIXES)
+PACKED_SUFFIXES = (".gz", ".bz2", ".xz", ".zst", ".zip")
 _FORMS = "CSV, Parquet, NPZ, HDF5, ROS bag or LeRobot folder"
 _WRITERS = {".csv": write_csv, ".parquet": write_parquet, ".npz": write_npz}
 _SIGNATURES = {
@@ -85,7 +86,7 @@ def read_recording(
         elif suffix not in _READERS:
             raise RecordingError(
                 f"{where}: unsupported suffix {path.suffix!r}: expected {', '.join(LOG_SUFFIXES)}"
-                f"{_looks_like(path, suffix)}"
+                f"{'; unpack it first' if suffix in PACKED_SUFFIXES else _looks_like(path, suffix)}"
             )
         if path.stat().st_size == 0:
             raise RecordingError(f"{where} is empty: expected a log of at least 2 samples")

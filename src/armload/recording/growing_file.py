@@ -7,6 +7,8 @@ from pathlib import Path
 
 from armload.errors import RecordingError
 
+RECORDS = (".csv", ".mcap")  # what a log can be written as while it is measured
+
 
 class GrowingFile:
     """A new file to which bytes are given whole or not at all, one system call each.

@@ -111,7 +111,7 @@ class Reconnecting(Source):
                         self._noted(sample)
                     yield sample
             except (ArmloadError, OSError) as error:
-                stopped = str(error)
+                stopped = str(error).removesuffix(": open the source again")  # that is done here
             if self._gone.is_set():
                 return
             if stopped is None:

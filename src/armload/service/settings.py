@@ -16,6 +16,7 @@ from urllib.parse import urlsplit
 from armload.devices import WITH_CONTROLLER
 from armload.errors import UsageError
 from armload.identification.arm_options import ArmOptions
+from armload.recording.growing_file import RECORDS
 from armload.service.mqtt import checked
 
 if TYPE_CHECKING:
@@ -32,7 +33,8 @@ class ArmSettings(ArmOptions):
     """One arm.
 
     name: in lines and addresses. source: see `open_source`. save: the folder of its state; None: nothing is kept.
-    record: a `.csv` file that does not exist yet. rating: the most it may hold [kg]; None: what the arm is rated for.
+    record: a `.csv` or `.mcap` file that does not exist yet. rating: the most it may hold [kg]; None: what the arm is
+    rated for.
     com_range: the farthest its payload's centre of mass may be [m]. loop: replay a log again and again.
     rate: of the simulator [Hz]. apply: "auto": what is identified is told to the robot's controller (`Feedback`).
     mounted: path of what was on the flange at the tare or profile, or "nothing"; for `apply`.
@@ -50,6 +52,8 @@ class ArmSettings(ArmOptions):
     mounted: str | None = None
 
     def __post_init__(self) -> None:
+        if self.record is not None and Path(self.record).suffix.lower() not in RECORDS:
+            raise UsageError(f"{self.name}: record is {self.record}: expected a name that ends in .csv or .mcap")
         if self.apply not in (None, "auto"):
             raise UsageError(f'{self.name}: apply is {self.apply!r}: expected "auto"')
         if self.apply is not None and not self._has_controller:

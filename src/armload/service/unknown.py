@@ -75,7 +75,9 @@ def why_unknown(
     if link.connections > 1 and link.resumed is not None:
         since = now - link.resumed
         if since < CONFIRMED or estimate.age > since:
-            return Why(Unknown.UNCONFIRMED, "after the interruption no motion has told yet whether it is held still")
+            return Why(
+                Unknown.UNCONFIRMED, "since the interruption the arm has not moved: it may hold something else by now"
+            )
     if estimate.settling or (estimate.p_change or 0.0) > _EVEN:
         return Why(Unknown.CHANGING, "the payload is changing")
     if (estimate.p_contact or 0.0) > _EVEN:

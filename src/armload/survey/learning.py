@@ -16,7 +16,7 @@ from armload.identification import check_usable
 from armload.inertia import NAMES
 from armload.lab.cells import key_of
 from armload.online.thresholds import LEARN_FROM
-from armload.posterior import Profile, learn_profile, save_profile
+from armload.posterior import Profile, check_new, learn_profile, save_profile
 from armload.posterior.profile_learning import by_clock
 from armload.posterior.profile_session import check_fits
 from armload.recording import Recording
@@ -104,6 +104,7 @@ def _learned(
             log = _stretch(row, settings)
             check_usable(log, arm)
             if k < FIRST:
+                check_new([*first, log], None)
                 first.append(log)
             else:
                 assert profile is not None

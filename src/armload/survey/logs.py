@@ -17,7 +17,7 @@ from pathlib import Path, PurePosixPath
 from typing import IO, Any
 
 from armload.errors import ArmloadError, UsageError
-from armload.recording import LOG_SUFFIXES, data_set_episodes, is_data_set
+from armload.recording import LOG_SUFFIXES, PACKED_SUFFIXES, data_set_episodes, is_data_set
 
 _URL = re.compile(r"[a-z][a-z0-9+.-]*://")
 _WILD = re.compile(r"[*?\[]")
@@ -208,7 +208,10 @@ def _of_store(fs: Any, inside: str) -> Iterator[str]:
 
 
 def _units(path: str, hidden: set[Path]) -> Iterator[tuple[str, int | None, tuple[Path, ...]]]:
-    """Name, episode and files of every unit behind a path."""
+    """Name, episode and files of every unit behind a path.
+
+    hidden: is passed over; a folder is from then on, as links may lead to it again.
+    """
     here = Path(path)
     if is_url(path):
         yield path, None, ()
@@ -218,11 +221,18 @@ def _units(path: str, hidden: set[Path]) -> Iterator[tuple[str, int | None, tupl
         yield from _episodes(here)
     elif (here / "metadata.yaml").is_file():
         yield str(here), None, tuple(sorted(file for file in here.iterdir() if file.is_file()))
-    elif here.resolve() not in hidden:
+    elif (real := here.resolve()) not in hidden:
+        hidden.add(real)
         for inner in sorted(here.iterdir()):
-            known = inner.is_dir() or inner.suffix.lower() in LOG_SUFFIXES
+            known = inner.is_dir() or _is_log(inner)
             if known and not inner.name.startswith(".") and inner.resolve() not in hidden and not _of_survey(inner):
                 yield from _units(str(inner), hidden)
+
+
+def _is_log(file: Path) -> bool:
+    """Whether a file is a log by its name; a packed one is, too: its row says that it has to be unpacked."""
+    name = file.with_suffix("") if file.suffix.lower() in PACKED_SUFFIXES else file
+    return name.suffix.lower() in LOG_SUFFIXES
 
 
 def _of_survey(path: Path) -> bool:

@@ -68,6 +68,10 @@ def run(options: argparse.Namespace) -> None:
         raise UsageError("--mass is of the one log of a known weight that --update adds to the profile --out")
     if options.robot is None or options.out is None:
         raise UsageError("a profile needs --robot, whose arm it is, and --out, its file; or: armload profile show P")
+    if not options.update and Path(options.out).exists():
+        raise UsageError(
+            f"{options.out} exists: give --update to add the logs to it, or another name, or remove it to begin anew"
+        )
     from armload.identification import check_usable
     from armload.posterior import learn_profile, load_profile, save_profile, with_known_weight
     from armload.posterior.profile_session import check_fits

@@ -1,4 +1,4 @@
-"""Ctrl-C while an arm moves: the arm is stopped first, and the interruption comes when it is at rest."""
+"""Ctrl-C held back: while an arm moves, until it is at rest; while modules load that would swallow it."""
 
 from __future__ import annotations
 

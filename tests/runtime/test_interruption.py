@@ -1,0 +1,22 @@
+"""A Ctrl-C is held back, not lost."""
+
+import signal
+
+import pytest
+
+from armload.runtime.interruption import held_back
+
+
+def test_an_interruption_that_a_module_would_swallow_comes_afterwards():
+    def swallows():
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except BaseException:  # as optional imports of others do
+            return "lost"
+        return "went on"
+
+    said = []
+    with pytest.raises(KeyboardInterrupt), held_back():
+        said.append(swallows())
+    assert said == ["went on"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
