@@ -220,5 +220,6 @@ def check_usable(log: Recording, arm: Arm) -> None:
         )
     if log.rate < LOWEST_RATE:
         raise IdentificationError(
-            f"{log.source} is sampled at {log.rate:.3g} Hz: expected at least {LOWEST_RATE:g} Hz; record faster"
+            f"{log.source} is sampled at {log.rate:.3g} Hz: expected at least {LOWEST_RATE:g} Hz; record faster, as "
+            "what lies between two samples is not to be had afterwards"
         )

@@ -185,6 +185,15 @@ def other_than_given(given: KnownMass | KnownCentre, mean: NDArray[np.float64], 
     )
 
 
+def less_than_nothing(mass: float, std: float, relative_to: str) -> str:
+    """That something may have been taken off: by an estimate mass ± std [kg] that is likely negative, not surely."""
+    since = f" since the {relative_to}" if relative_to in ("tare", "profile") else ""
+    return (
+        f"something may have been taken off{since}: the mass would be {mass:.2g} ± {Z95 * std:.2g} kg (95 %), and the "
+        "answer is the nearest body"
+    )
+
+
 def learned_from(session: str) -> str:
     """That a log is asked with a profile which knows it already."""
     return (

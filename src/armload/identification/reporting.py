@@ -20,10 +20,11 @@ from armload.identification.notes import (
     lacking,
     leaning,
     leaning_on_prior,
+    less_than_nothing,
     not_rigid,
 )
 from armload.identification.thresholds import LEANS
-from armload.inertia import InertialParameters, held, is_consistent, vech
+from armload.inertia import HELD, Z95, InertialParameters, held, is_consistent, vech
 from armload.inertia import determined as determined_by
 from armload.posterior.restless import RESTLESS
 from armload.recording import Recording
@@ -61,7 +62,8 @@ def answered(
     leans = np.zeros(10, dtype=bool)
     if found.weak_std is not None:
         leans = determined & (found.weak_std > LEANS * estimate.std)
-    if found.known is not None:  # what was given is known, whatever the log tells, and does not rest on the prior
+    if found.known is not None and denied_by(found.known, found.log_only) is None:
+        # what was given is known, whatever the log tells, and does not rest on the prior
         determined = determined_with(determined, found.known, estimate.std, before)
         leans = leans & ~found.known.which
     phi = body_of(estimate, determined[0], found.exchanged)
@@ -71,6 +73,9 @@ def answered(
     found_of = intervals(phi, low, high, estimate.covariance, otherwise)
     doubts = _doubts(found, arm, determined[0], relative_to)
     every_note = [*doubts, *notes]
+    mass_std = float(estimate.std[0])
+    if determined[0] and -HELD * mass_std <= estimate.phi[0] < -Z95 * mass_std:
+        every_note.append(less_than_nothing(float(estimate.phi[0]), mass_std, relative_to))
     if found.friction_found:
         every_note.append(
             "the torque holds the gears' friction, as that of motor currents does: the intervals allow for it"
