@@ -18,6 +18,7 @@ from armload.app.cli.arguments import (
 from armload.app.cli.named import arm_of, columns_of, payload_of, read_logs, robot_of
 from armload.app.cli.printing import print_note
 from armload.errors import ArmloadError, UsageError
+from armload.runtime.interruption import held_back
 
 if TYPE_CHECKING:
     from armload.arms import Arm
@@ -213,8 +214,10 @@ def _serve(session, options: argparse.Namespace) -> int | None:
     from armload.service.settings import read_token
 
     token = None if options.token_file is None else read_token(options.token_file)
-    page = Page(session, options.host, options.port, token=token)
+    page = None
     try:
+        with held_back():  # what the page loads catches every exception: a Ctrl-C would be lost
+            page = Page(session, options.host, options.port, token=token)
         session.start(options.duration)
         print_note(f"{session.source.name}: {page.url} (Ctrl-C ends it)")
         page.serve()
@@ -223,4 +226,5 @@ def _serve(session, options: argparse.Namespace) -> int | None:
             raise session.error from None  # a bug: whoever wants to see where asks for it
         return 0 if session.error is None else 2  # reported when it happened
     finally:
-        page.close()
+        if page is not None:
+            page.close()

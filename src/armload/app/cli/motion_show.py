@@ -10,6 +10,7 @@ from armload.app.cli.motion_arguments import box, floor, held
 from armload.app.cli.named import arm_of, motion_of
 from armload.app.cli.printing import console, print_note, table
 from armload.errors import UsageError
+from armload.runtime.interruption import held_back
 
 if TYPE_CHECKING:
     from armload.app.page.motion_page import MotionPage
@@ -80,4 +81,5 @@ def _page(motion: Motion, arm: Arm, options: argparse.Namespace) -> MotionPage:
     boxes = tuple(Obstacle((b[0], b[1], b[2]), (b[3], b[4], b[5])) for b in options.box)
     around = Surroundings(arm, options.floor, boxes, options.held)
     port = 8080 if options.port is None else options.port
-    return MotionPage(motion, arm, around, options.host or "127.0.0.1", port)
+    with held_back():  # what the page loads catches every exception: a Ctrl-C would be lost
+        return MotionPage(motion, arm, around, options.host or "127.0.0.1", port)

@@ -14,7 +14,6 @@ from urllib.parse import quote
 from armload.app.page.token_door import TokenDoor
 from armload.errors import UsageError
 from armload.runtime.extras import install
-from armload.runtime.interruption import held_back
 from armload.service.settings import is_loopback
 
 # [length of all links] from what is looked at to the eye: the whole arm is seen, or the payload and the wrist
@@ -42,8 +41,7 @@ class PageServer:
         self, host: str, port: int, label: str, token: str | None = None, otherwise: str = "use --headless"
     ) -> None:
         try:
-            with held_back():  # what viser imports catches every exception, and a Ctrl-C would be lost
-                viser: Any = importlib.import_module("viser")
+            viser: Any = importlib.import_module("viser")
         except ImportError:
             hint = install("viser")
             raise UsageError(f"the page needs viser, which is not installed: {hint}; or {otherwise}") from None
