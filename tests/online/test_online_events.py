@@ -207,6 +207,19 @@ def test_a_change_is_noticed_though_the_arm_has_stood_since_the_first_sample():
     assert covers(estimates[-1], body.phi)[0]
 
 
+def test_a_stream_that_ends_amid_a_doubt_ends_with_what_it_said_last():
+    identifier, last = OnlineIdentifier(arm("panda"), method="map-gp"), None
+    for sample in stream(1, [(5.0, HALF_KILO)], 6.0):
+        if last is not None and last.p_change > 0.5 and last.notes:
+            break
+        last = identifier.update(*sample)
+    assert (last.settling, last.event) == (False, None)
+    end = identifier.conclude()
+    identifier.close()
+    assert end.phi == pytest.approx(last.phi)
+    assert (end.p_change, end.notes) == (last.p_change, last.notes)
+
+
 @pytest.mark.parametrize("force", [25.0, pytest.param(12.0, marks=pytest.mark.full)])
 def test_an_arm_that_stands_and_is_pressed_upwards_puts_nothing_down(force):
     """More than the payload's weight lifts the arm, as a part that is pressed on a fixture: no payload does that."""

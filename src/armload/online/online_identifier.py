@@ -148,7 +148,7 @@ class OnlineIdentifier:
 
         It says what `armload.identify` says of a log of the same samples, if they show no change of payload.
         """
-        if self._watch is not None and self._watch.settling:
+        if self._watch is not None and self._watch.undecided:
             return self._present()
         if self.health.used:
             estimate = (self._watch or self._engine).conclude()

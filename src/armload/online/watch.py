@@ -91,6 +91,11 @@ class PayloadWatch:
         return self.phase == SETTLING
 
     @property
+    def undecided(self) -> bool:
+        """Whether the last rows are likelier of another payload than of the run's, and no run has them yet."""
+        return self.settling or (self.phase == DOUBTING and self.likely[0] > 0.5)
+
+    @property
     def likely(self) -> tuple[float, float, float]:
         """Probabilities that the payload is not what the run holds, or changes; of a contact; of a drift of the arm."""
         changed, contact, drift = self._weighing.likely
