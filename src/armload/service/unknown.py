@@ -76,7 +76,7 @@ def why_unknown(
         since = now - link.resumed
         if since < CONFIRMED or estimate.age > since:
             return Why(
-                Unknown.UNCONFIRMED, "since the interruption the arm has not moved: it may hold something else by now"
+                Unknown.UNCONFIRMED, "since the interruption too little has been seen to tell whether it holds the same"
             )
     if estimate.settling or (estimate.p_change or 0.0) > _EVEN:
         return Why(Unknown.CHANGING, "the payload is changing")
