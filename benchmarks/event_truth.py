@@ -4,11 +4,12 @@ p_held      something is held.
 p_change    the payload is not the one that the run at work began with, or is being handed over (docs/online.md).
 p_contact   somebody pushes, but for the first and last fifth of a push, which are hardly felt.
 
-Which run is at work follows from what the stream says, as in `armload.online.runs`. A new `since` is an event: while it
-settles, the run before it is at work. Then a new run begins, with what is held at that moment; or the run before goes
-on, as it was no change (`AS_BEFORE`). A run that begins may yet give way to the one before the last (`TAKEN_UP`), which
-holds what that began with. So what was taken up again, and recognised, is no change, and neither is the same payload in
-a run of its own; a run that begins amid a hand-over holds something else than what is held at the hand-over's end.
+Which run is at work follows from what the stream says, as in `armload.online.runs`. A new `since` is an event, and so
+is the beginning of a settling: the last event goes on, or is corrected. While it settles, the run before it is at work.
+Then a new run begins, with what is held at that moment; or the run before goes on, as it was no change (`AS_BEFORE`). A
+run that begins may yet give way to the one before the last (`TAKEN_UP`), which holds what that began with. What was
+taken up again, and recognised, is no change, and neither is the same payload in a run of its own; a run that begins
+amid a hand-over holds something else than what is held at the hand-over's end.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ def began_with(said: NDArray, held: NDArray) -> NDArray[np.float64]:
     earlier, previous, current = None, None, held[0]
     for k, now in enumerate(said):
         before = said[max(k - 1, 0)]
-        noticed = noticed or now[SINCE] != before[SINCE]
+        noticed = noticed or now[SINCE] != before[SINCE] or now[SETTLING] > before[SETTLING]
         if noticed and now[SETTLING] == 0.0:
             noticed = False
             if now[RETURN] != AS_BEFORE:

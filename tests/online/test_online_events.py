@@ -15,6 +15,7 @@ from armload.devices import Simulator
 from armload.inertia import InertialParameters
 from armload.motion import Motion, random_motion, taie2024
 from armload.online import OnlineIdentifier
+from armload.online.event import Naming
 from armload.online.runs import Runs
 from armload.online.thresholds import SAME_RUN
 from armload.simulation import Sensors, World, simulate
@@ -329,6 +330,33 @@ def test_another_payload_of_another_mass_is_no_return():
     estimates, events = said(stream(3, [(5.0, HALF_KILO), (9.0, other)], 13.0), "map-gp")
     assert [event.kind for event in events] == ["grasp", "swap"]
     assert covers(estimates[-1], other.phi)[:4].all()
+
+
+def test_what_was_taken_for_an_earlier_payload_is_corrected_and_no_new_change():
+    first, other = box(0.39), box(0.41)
+    estimates, events = said(stream(26, [(5.0, first), (10.0, None), (15.0, other)], 24.0), "map-gp")
+    called = [e.event.kind for e in estimates if e.event is not None and e.event.t > 15.0]
+    assert "return" in called  # so near that it is taken for the first
+    assert [(event.kind, round(event.t)) for event in events] == [("grasp", 5), ("return", 10), ("grasp", 15)]
+    assert covers(estimates[-1], other.phi)[0]
+
+
+@pytest.mark.parametrize(
+    ("t", "step", "corrected"), [(8.0, 0.015, True), (8.0, -0.015, True), (8.0, 0.03, False), (18.0, 0.015, False)]
+)
+def test_a_step_larger_or_later_than_a_recognition_leaves_open_is_a_change(t, step, corrected):
+    naming = Naming()
+    runs = SimpleNamespace(
+        current=SimpleNamespace(stream=SimpleNamespace(seconds=1.0), last=SimpleNamespace(std=[0.005])),
+        unit=1.0,
+        earlier=object(),
+        is_earlier=lambda: True,
+        mass_step=lambda *_: 0.4,
+    )
+    naming.begin(5.0, 4.9, None, rest=False)
+    assert not naming.may_be_taken_for(t, step)  # it was not recognised
+    assert naming.judge(runs, held=True)
+    assert naming.may_be_taken_for(t, step) is corrected
 
 
 @pytest.mark.parametrize("payload", [None, pytest.param(HALF_KILO, marks=pytest.mark.full)], ids=["empty", "loaded"])

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+from armload.inertia import Z95
 from armload.online.runs import Runs
-from armload.online.thresholds import KIND_FROM, KIND_LATEST, KIND_STD, RETURN_STD, RETURN_UNTIL
+from armload.online.thresholds import KIND_FROM, KIND_LATEST, KIND_STD, RETURN_STD, RETURN_UNTIL, RETURN_WITHIN
 from armload.posterior import PosteriorLeastSquares
 
 _KINDS = {(False, True): "grasp", (True, False): "release", (True, True): "swap", (False, False): "change"}
@@ -17,7 +18,8 @@ class Event:
     """Something was taken up, put down or exchanged.
 
     kind: "change" until it is known which, and where nothing seems to be held before or after; "grasp", "release",
-        "swap" (one payload for another) or "return" (what was held before the last event is held again).
+        "swap" (one payload for another) or "return" (what was held before the last event is held again; a "grasp" after
+        all, if it turns out to be only nearly the same).
     t: when it was noticed, on the stream's clock [s]. began: when it seems to have begun [s].
     mass: by how much the mass has changed [kg], below zero where something was put down, of a "return", too; None
         until it is known.
@@ -46,16 +48,27 @@ class Naming:
 
     def __init__(self) -> None:
         self.event: Event | None = None
-        self.judging = self._unnamed = self.held_before = self._held = self._rest = False
+        self.judging = self._unnamed = self.held_before = self._held = self._rest = self._recognised = False
         self._ended: PosteriorLeastSquares | None = None
+
+    def may_be_taken_for(self, t: float, step: float) -> bool:
+        """Whether a step of the mass [payloads] at t [s] tells that the run was recognised wrongly, as it is as small.
+
+        What was taken up is then no other; it weighs something else than the run that it was taken for.
+        """
+        if self.event is None or not self._recognised or t - self.event.t > RETURN_WITHIN:
+            return False
+        return abs(step) <= Z95 * RETURN_STD
 
     def begin(self, t: float, began: float, run: PosteriorLeastSquares, rest: bool) -> None:
         """A change is noticed at t [s]; nobody knows yet which.
 
         Args:
-            t, began: as of `Event`. run: that ends. rest: it is that of the last change, which went on in this run.
+            t, began: as of `Event`. run: that ends. rest: it is that of the last change, which went on in this run, or
+                after which the run was recognised wrongly.
         """
         self._rest, self.judging, self._unnamed = rest and self.event is not None, False, True
+        self._recognised = False
         if self.event is not None and self._rest:
             self.event = replace(self.event, mass=None)
         else:
@@ -74,7 +87,7 @@ class Naming:
             return False
         self.judging = stream.seconds <= RETURN_UNTIL
         if std <= RETURN_STD and runs.earlier is not None and runs.is_earlier():
-            self.judging = False
+            self.judging, self._recognised = False, True
             self._name("return", runs.mass_step(self._ended, runs.earlier))
             return True
         if self._unnamed and (std <= KIND_STD or stream.seconds > KIND_LATEST or stream.stands):

@@ -125,6 +125,9 @@ KIND_LATEST = 1.5
 # [s] of a new run within which it may be recognised as an earlier one: twice the longest push
 # (test_what_is_put_down_is_gone_and_what_is_taken_up_again_is_recognised)
 RETURN_UNTIL = 6.0
+# [s] after a change within which a step as small as a recognition is sure of tells that it was wrong: twice the time it
+# had (test_what_was_taken_for_an_earlier_payload_is_corrected_and_no_new_change)
+RETURN_WITHIN = 2.0 * RETURN_UNTIL
 # [payloads] standard deviation of the mass with which a kind is decided: 50 g of a Panda, a light payload held or not
 KIND_STD = 0.033
 # [payloads] the same to tell one payload from an earlier one: 15 g of a Panda
