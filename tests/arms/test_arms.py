@@ -782,7 +782,10 @@ def test_a_file_that_is_no_description_is_an_arm_error(tmp_path):
     binary.write_bytes(bytes(range(256)))
     with pytest.raises(ArmError, match="cannot be read as text"):
         arm(binary)
-    with pytest.raises(ArmError, match="is not there: expected the path of a URDF file"):
-        arm(tmp_path)  # a folder
+    with pytest.raises(ArmError, match="is a folder: expected the path of a URDF file"):
+        arm(tmp_path)
+    (tmp_path / "torn.urdf").write_text("<robot", encoding="utf-8")
+    with pytest.raises(ArmError, match=r"/torn\.urdf: torn is not a URDF"):
+        arm(tmp_path / "torn.urdf")
     with pytest.raises(ArmError, match=r"missing\.urdf is not there: expected the path of a URDF file"):
         arm(tmp_path / "missing.urdf")

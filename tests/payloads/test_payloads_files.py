@@ -44,6 +44,8 @@ def test_the_result_of_an_identification_reads_as_the_payload_it_found(tmp_path)
         "inertia_com": HAND.inertia_com.round(6).tolist(),
         "intervals": [[0, 1]] * 10,
         "warnings": [],
+        "interval": "approximate",
+        "com_low": [0.0, 0.0, 0.0],
     }
     read = read_payload(write(tmp_path, result))
     assert np.array_equal(read.parameters.phi, HAND.phi)
@@ -87,6 +89,8 @@ PHI = InertialParameters.from_com(1.0, TRIPLE["com"], TRIPLE["inertia_com"]).phi
         ({**TRIPLE, "inertia_com": [[1, 0, 0], [0, 1, 0], [0, 0, 3]]}, "cannot exist.*1, 1, 3"),
         ({**TRIPLE, "phi": [2 * x for x in PHI]}, "contradicts itself: its mass"),
         ({**TRIPLE, "com": [0, 0, 0.2], "phi": PHI}, "contradicts itself: its com"),
+        ({"mass": 1, "com": [0, 0, 0.1], "inertia": TRIPLE["inertia_com"]}, "key 'inertia': expected 'inertia_com'"),
+        ({**TRIPLE, "frame_id": "tool0"}, "key 'frame_id': expected 'frame'"),
         ({**TRIPLE, "frame": 8}, "frame is 8, expected text"),
         ({**TRIPLE, "boxes": [{"size": [1, 2]}]}, "boxes are not a list"),
         ({**TRIPLE, "boxes": 7}, "boxes are not a list"),

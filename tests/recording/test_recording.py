@@ -204,6 +204,9 @@ def test_bytes_that_are_no_text_are_refused_by_line(tmp_path):
     path.write_bytes(text(log()).encode() + b"\xff\xfe\x00")
     with pytest.raises(RecordingError, match=r", line 7: byte 0xff is not text"):
         read_recording(path)
+    path.write_text(text(log()), encoding="utf-16")
+    with pytest.raises(RecordingError, match=r"is UTF-16: expected a CSV file in UTF-8"):
+        read_recording(path)
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)

@@ -42,6 +42,8 @@ def arm(robot: str | Path, frame: str | None = None, gravity: tuple[float, float
         return Arm(name, description_of(name), facts.flange if frame is None else frame, gravity, **facts.of_arm)
     path = Path(robot)
     if not path.is_file():
+        if path.is_dir():
+            raise ArmError(f"robot description {name} is a folder: expected the path of a URDF file")
         if path.suffix or len(path.parts) > 1:
             raise ArmError(f"robot description {name} is not there: expected the path of a URDF file that exists")
         raise ArmError(
@@ -52,7 +54,10 @@ def arm(robot: str | Path, frame: str | None = None, gravity: tuple[float, float
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise ArmError(f"robot description {name} cannot be read as text: {error}") from None
-    found = _as_known(Arm(path.stem, text, frame, gravity))
+    try:
+        found = _as_known(Arm(path.stem, text, frame, gravity))
+    except ArmError as error:
+        raise ArmError(f"{name}: {error}") from None
     if path.stem in ARMS and found.known_as != path.stem:
         return replace(found, name=path.name)  # called like an arm of the catalogue, and not that arm
     return found

@@ -9,13 +9,15 @@
 phi or the three (mass, com, inertia_com) are enough, SI units; phi is about the frame's origin, inertia_com about the
 centre of mass. std says how well they are known (`Uncertainty`): a drawing is never quite what was built. Of what only
 mass and com are known, the inertia is assumed (`Payload.without_inertia`), and users of it say so. Everything else is
-optional and unknown keys are ignored, so that the JSON result of an identification reads as the payload it found.
+optional, and other keys are ignored but for those that are nearly one of these. The JSON result of an identification
+reads as the payload it found.
 """
 
 from __future__ import annotations
 
 import json
 from dataclasses import asdict, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +32,8 @@ from armload.runtime.atomic import replacing
 
 FORMAT = "armload-payload/1"
 _TRIPLE = ("mass", "com", "inertia_com")
+_KEYS = ("format", "name", "frame", "phi", *_TRIPLE, "boxes", "std")
+_ALIKE = 0.7  # of two words (difflib): "inertia" is meant as "inertia_com", a comment is not
 _FARTHEST = 5.0  # [m] a centre of mass farther from the flange than this is in other units
 _WIDEST, _LIGHT = 1.0, 0.01  # [m] radius of gyration; [kg] below which inertia is what was known beforehand
 # Where a file gives phi and (mass, com, inertia_com) they may differ by printed digits, not by an edit.
@@ -49,6 +53,7 @@ def read_payload(path: str | Path) -> Payload:
 def payload_from(content: dict[str, Any], path: str | Path) -> Payload:
     """The payload in the content of a file (`read_content`), for those who read more of it; path: for the errors."""
     path = Path(path)
+    _require_known(content, path)
     try:
         given = {key for key in ("phi", *_TRIPLE) if content.get(key) is not None}
         if given == {"mass", "com"}:
@@ -67,6 +72,16 @@ def payload_from(content: dict[str, Any], path: str | Path) -> Payload:
         raise
     except ArmloadError as error:  # a matrix that is not symmetric, say: name the file
         raise PayloadError(f"payload file {path}: {error}") from None
+
+
+def _require_known(content: dict[str, Any], path: Path) -> None:
+    """Refuse a key that is nearly one of a payload's: what it says would be left out without a word."""
+    if "interval" in content:  # an identification has more
+        return
+    for key in content:
+        near = [] if key in _KEYS else get_close_matches(key.lower(), _KEYS, 1, _ALIKE)
+        if near:
+            raise PayloadError(f"payload file {path} has a key {key!r}: expected {near[0]!r}; rename or remove it")
 
 
 def _without_inertia(content: dict[str, Any], path: Path) -> Payload:

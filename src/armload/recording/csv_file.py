@@ -289,6 +289,8 @@ def _lines(data: bytes, where: str) -> list[str]:
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
+        if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+            raise RecordingError(f"{where} is UTF-16: expected a CSV file in UTF-8; save it as that") from None
         line = data.count(b"\n", 0, error.start) + 1
         raise RecordingError(
             f"{where}, line {line}: byte 0x{data[error.start]:02x} is not text: expected a CSV file in UTF-8; the file "
