@@ -8,9 +8,9 @@ changes   a payload of 0.1, 0.2, 0.5 and 1.5 kg taken up or put down somewhere i
           found, share that is found or doubted, and how far off the time is [s, median]; two changes: taken up after
           2 s and put down after 4 s. With a tare of 20 s near the log's poses, and without
 
-Pandas that differ from their model as real ones do, and UR10e where it is said. Cases that are named replace their own
-among the results. Written to benchmarks/results/changed_logs.json and a table of docs/hybrid.md, after every case; ten
-minutes of one core.
+Pandas that differ from their model as real ones do; and UR5e and UR10e, a tenth and a third of what each is rated for.
+Cases that are named replace their own among the results. Written to benchmarks/results/changed_logs.json and a table of
+docs/hybrid.md, after every case; twenty minutes of one core.
 """
 
 from __future__ import annotations
@@ -31,23 +31,29 @@ from armload.lab.episodes.motion_kinds import MotionSource
 from armload.motion import random_motion, taie2024
 from armload.simulation import Sensors, World, simulate
 
-SOUND = (("panda", "reference"), ("panda", "everyday"), ("panda", "beyond"), ("ur10e", "reference"))
+SOUND = (
+    *(("panda", population) for population in ("reference", "everyday", "beyond")),
+    *((robot, population) for robot in ("ur5e", "ur10e") for population in ("reference", "beyond")),
+)
 MASSES = (0.1, 0.2, 0.5, 1.5)  # [kg]
+MOTOR_SIDE = {"ur5e": (0.5, 1.6), "ur10e": (1.2, 4.0)}  # [kg]
 
 
-def log_with_changes(mass: float, seed: int, twice: bool = False) -> tuple[Recording, Recording, list[float]]:
+def log_with_changes(
+    mass: float, seed: int, twice: bool = False, robot: str = "panda"
+) -> tuple[Recording, Recording, list[float]]:
     """A log of 6 s, a tare, and when the payload changes."""
-    panda, rng = arm("panda"), np.random.default_rng([seed, 3])
-    motion = taie2024() if seed % 2 else random_motion(panda, seed + 40, duration=6.0)
+    known, rng = arm(robot), np.random.default_rng([seed, 3])
+    motion = taie2024() if robot == "panda" and seed % 2 else random_motion(known, seed + 40, duration=6.0)
     payload, when = body_of(mass, seed), float(rng.uniform(1.5, 4.5))
     held = [(0.0, payload), (when, None)] if rng.random() < 0.5 else [(0.0, None), (when, payload)]
     if twice:
         held = [(0.0, None), (2.0, payload), (4.0, None)]
-    how = {"world": World.real_like(panda, 500 + seed), "sensors": Sensors.panda(panda), "rate": 200.0}
-    source = Simulator(panda, motion, held, speed=None, duration=6.0, seed=seed, **how)
-    places = MotionSource(panda, 0.0)
+    how = {"world": World.real_like(known, 500 + seed), "sensors": Sensors.of(known), "rate": 200.0}
+    source = Simulator(known, motion, held, speed=None, duration=6.0, seed=seed, **how)
+    places = MotionSource(known, 0.0)
     about = places.draw("long", rng, 20.0, "tare", places.centre(motion), 0.3)
-    tare = simulate(panda, about, seed=seed + 9000, **how)
+    tare = simulate(known, about, seed=seed + 9000, **how)
     return Recording(*map(np.array, zip(*source, strict=True))), tare, [t for t, _ in held[1:]]  # type: ignore[arg-type]
 
 
@@ -80,12 +86,12 @@ def sound(robot: str, population: str, logs: int, seed: int) -> dict[str, float]
     return {"logs": logs, "found": float(changed), "found or doubted": float(changed + doubted)}
 
 
-def changes(mass: float, twice: bool, tared: bool, logs: int, seed: int) -> dict[str, float]:
+def changes(mass: float, twice: bool, tared: bool, robot: str, logs: int, seed: int) -> dict[str, float]:
     """A payload is taken up or put down."""
     right, told, apart = [], [], []
     for k in range(logs):
-        log, tare, truth = log_with_changes(mass, 1000 * seed + k, twice)
-        times, doubted = looked_at(log, arm("panda"), tare if tared else None)
+        log, tare, truth = log_with_changes(mass, 1000 * seed + k, twice, robot)
+        times, doubted = looked_at(log, arm(robot), tare if tared else None)
         right.append(len(times) == len(truth))
         told.append(bool(times) or doubted)
         if right[-1]:
@@ -94,12 +100,22 @@ def changes(mass: float, twice: bool, tared: bool, logs: int, seed: int) -> dict
     return {"logs": logs, "found": float(np.mean(right)), "found or doubted": float(np.mean(told))} | off
 
 
+def named(robot: str, mass: float, twice: bool, tared: bool) -> str:
+    """What a case is called."""
+    whose = "" if robot == "panda" else f"{robot}, "
+    return f"{whose}{mass} kg{', up and down' if twice else ''}{'' if tared else ', no tare'}"
+
+
 CASES: dict[str, Callable[[int, int], dict[str, float]]] = {
     f"sound, {robot} {population}": partial(sound, robot, population) for robot, population in SOUND
 } | {
-    f"{mass} kg{', up and down' if twice else ''}{'' if tared else ', no tare'}": partial(changes, mass, twice, tared)
+    named(robot, mass, twice, tared): partial(changes, mass, twice, tared, robot)
     for tared in (True, False)
-    for mass, twice in (*((mass, False) for mass in MASSES), (MASSES[-1], True))
+    for robot, mass, twice in (
+        *(("panda", mass, False) for mass in MASSES),
+        ("panda", MASSES[-1], True),
+        *((robot, mass, False) for robot, masses in MOTOR_SIDE.items() for mass in masses),
+    )
 }
 
 

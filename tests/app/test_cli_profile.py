@@ -54,6 +54,11 @@ def test_a_log_that_its_profile_is_learned_from_is_not_called_calibrated(folder,
     found = json.loads(capsys.readouterr().out)
     assert found["interval"] == "approximate"
     assert any("learned from these very measurements" in note for note in found["notes"])
+    as_tare = ["--tare", str(folder / "day1.csv"), "--profile", str(profile), "--json"]
+    assert main(["identify", str(folder / "run.csv"), "--robot", "panda", *as_tare]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["interval"] == "approximate"
+    assert any("learned from these very measurements" in note for note in found["notes"])
 
 
 def test_show_says_what_is_known_and_how_the_arm_drifted(profile, capsys, tmp_path):

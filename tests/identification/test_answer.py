@@ -237,8 +237,22 @@ def test_where_figures_are_nominal_the_first_advice_is_a_tare():
         seed=5,
     )
     tare = simulate(ur, random_motion(ur, 53, duration=15.0), None, world=world, sensors=sensors, rate=100.0, seed=4)
-    assert identify(log, ur).notes[0].startswith("record a tare")
-    assert not any("record a tare" in note for note in identify(log, ur, tare=tare).notes)
+    untared, tared = identify(log, ur), identify(log, ur, tare=tare)
+    assert untared.notes[0].startswith("record a tare")
+    assert not any("record a tare" in note for note in tared.notes)
+    assert "a tare of this very arm, which nothing here confirms" in str(tared)
+    assert "this very arm" not in str(untared)
+
+
+def test_of_joint_sensors_a_tare_is_confirmed_and_nothing_is_assumed(answer):
+    assert "this very arm" not in str(answer)
+
+
+def test_a_pause_of_a_log_is_said(panda, loaded, plain):
+    later = loaded.t + 3600.0 * (np.arange(len(loaded)) >= len(loaded) // 2)
+    found = identify(replace(loaded, t=later), panda)
+    assert any(note.startswith("the log pauses for 3600.0 s, 3.1 s after") for note in found.notes)
+    assert not any("pauses" in note for note in plain.notes)
 
 
 def test_a_standing_arm_lacks_motion(panda):

@@ -9,17 +9,18 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from armload import Recording, arm, write_recording
+from armload import Recording, arm, read_recording, write_recording
 from armload.app.cli import main
 from armload.devices import Simulator
 from armload.errors import IdentificationError
 from armload.identification import identify
+from armload.identification.notes import MAY_CHANGE
 from armload.identification.segments import MASS_MAY_CHANGE, changes_of_payload, of_mass
 from armload.identification.tare_age import DAY, SESSION, drift_after, drift_since, in_words
 from armload.identification.thresholds import PAYLOAD_CHANGED, PAYLOAD_MAY_CHANGE
 from armload.inertia import InertialParameters
 from armload.lab.episodes import draw_episodes, simulate_episodes
-from armload.motion import taie2024
+from armload.motion import random_motion, taie2024
 from armload.payloads import draw_payload, franka_hand
 from armload.posterior.drift import ALLOWED
 from armload.simulation import Sensors, World, simulate
@@ -94,6 +95,29 @@ def test_a_light_thing_taken_up_is_doubted_by_its_mass_and_a_sound_log_is_not(pa
     whole = changes_of_payload(sound.run, panda, sound.tare, kappa=1.5)
     assert not whole.times
     assert not whole.doubted
+
+
+@pytest.mark.parametrize("tared", [True, pytest.param(False, marks=pytest.mark.full)], ids=["tared", "untared"])
+def test_a_change_in_a_log_of_motor_currents_does_not_hide_itself(tared):
+    """What it leaves unexplained looks like an arm unlike its model, of which more would be allowed."""
+    robot, payload = arm("ur10e"), draw_payload("boxes", 4, 2.0)
+    how = {"world": World.real_like(robot, 504), "sensors": Sensors.of(robot), "rate": 200.0}
+    motion = random_motion(robot, 44, duration=6.0)
+    tare = simulate(robot, random_motion(robot, 45, duration=20.0), seed=9, **how) if tared else None
+    for when in (3.3, 9.0):
+        source = Simulator(robot, motion, [(0.0, None), (when, payload)], speed=None, duration=6.0, seed=4, **how)
+        log = Recording(*map(np.array, zip(*source, strict=True)))  # type: ignore[arg-type]
+        found = identify(log, robot, tare=tare)
+        assert len(found.segments) == 1 + (when < 6.0)
+        assert MAY_CHANGE not in found.notes
+
+
+def test_no_change_is_found_in_windows_of_a_real_pair_of_motor_currents(real_data):
+    robot = arm("ur10e")
+    log, tare = (read_recording(real_data / f"ur10e_{name}.csv", robot) for name in ("loaded_2805g", "unloaded"))
+    for start in (6.0, 18.0, 24.0, 48.0):
+        part = log.between(log.t[0] + start, log.t[0] + start + 6.0)
+        assert not changes_of_payload(part, robot, tare, kappa=20.0).doubted
 
 
 def test_the_mass_of_what_was_added_is_chi_squared_of_one_where_nothing_was():

@@ -95,6 +95,8 @@ class Identification:
         its tare, or than the profile's; not in the JSON.
     health: the arm itself, as the log shows it, of a method that asks; not in the JSON.
     gain_known: whether a known weight fixed the torque's scale; not in the JSON.
+    same_arm_assumed: whether it is taken for granted that tare or profile are of this arm, as nothing tells where
+        friction of gears is in the torque; not in the JSON.
     """
 
     method: str
@@ -130,6 +132,7 @@ class Identification:
     another: bool = field(default=False, metadata={"json": False})
     health: ArmHealth | None = field(default=None, metadata={"json": False})
     gain_known: bool = field(default=False, metadata={"json": False})
+    same_arm_assumed: bool = field(default=False, metadata={"json": False})
 
     def __post_init__(self) -> None:
         for name, shape in _ARRAYS.items():

@@ -16,7 +16,7 @@ from armload.errors import IdentificationError
 from armload.identification.answer import Identification, Segment
 from armload.identification.choice import choose
 from armload.identification.found import Asked, found_in
-from armload.identification.notes import MAY_CHANGE, changed_within, learned_from, of_both
+from armload.identification.notes import MAY_CHANGE, changed_within, learned_from, of_both, paused
 from armload.identification.plausibility import check_plausible
 from armload.identification.reporting import answered
 from armload.identification.segments import changes_of_payload
@@ -69,7 +69,7 @@ def identify(
     arm = arm if isinstance(arm, Arm) else arm_named(arm)
     recording = recording if isinstance(recording, Recording) else read_recording(recording, arm)
     tare = tare if tare is None or isinstance(tare, Recording) else read_recording(tare, arm)
-    notes = recording.notes if tare is None else of_both(recording, tare)
+    notes = (*(recording.notes if tare is None else of_both(recording, tare)), *paused(recording))
     for log in (recording, tare):
         if log is not None:
             check_usable(log, arm)
@@ -84,7 +84,7 @@ def identify(
     say("identifying")
     whole = _of_one_payload(recording, arm, tare, mounted, asked, notes)
     of_arm = (None, None) if whole.another else (tare, profile)
-    changes = changes_of_payload(recording, arm, *of_arm, whole.kappa)
+    changes = changes_of_payload(recording, arm, *of_arm, whole.kappa, whole.mass)
     times = changes.times
     edges, answers = [recording.t[0], *times, recording.t[-1]], [whole]
     if times:
@@ -102,7 +102,9 @@ def identify(
         for (a, b), answer in zip(pairwise(edges), answers, strict=True)
     )
     answer = replace(answers[-1], segments=segments)
-    own = None if profile is None else profile.learned_from(recording)
+    own = None
+    if profile is not None:
+        own = profile.learned_from(recording) or (None if tare is None else profile.learned_from(tare))
     return answer if own is None else replace(answer, interval="approximate", notes=(learned_from(own), *answer.notes))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
-from armload.identification.thresholds import KNOWN, NOMINAL
+from armload.identification.thresholds import KNOWN, NOMINAL, PAUSE_SAID
 from armload.inertia import NAMES, SHRINK, Z95
 from armload.posterior import KnownCentre, KnownMass
 from armload.posterior.drift import Drift
@@ -191,6 +191,20 @@ def less_than_nothing(mass: float, std: float, relative_to: str) -> str:
     return (
         f"something may have been taken off{since}: the mass would be {mass:.2g} ± {Z95 * std:.2g} kg (95 %), and the "
         "answer is the nearest body"
+    )
+
+
+def paused(recording: Recording) -> tuple[str, ...]:
+    """That a log pauses for so long that the payload may have been another before, if it does."""
+    steps = np.diff(recording.t)
+    long = np.flatnonzero(steps > PAUSE_SAID)
+    if not long.size:
+        return ()
+    k = long[np.argmax(steps[long])]
+    often = "" if long.size == 1 else f"{long.size} times, the longest "
+    return (
+        f"the log pauses {often}for {steps[k]:.1f} s, {recording.t[k] - recording.t[0]:.1f} s after its start: nothing "
+        "is known of what was taken up or put down meanwhile; if it is not of one payload, cut it there",
     )
 
 

@@ -113,6 +113,7 @@ def answered(
         moves=found.restlessness > RESTLESS or not found.explained,
         another=found.another is not None and found.another.found,
         health=found.health,
+        same_arm_assumed=tared and found.another is None,
     )
 
 

@@ -3,12 +3,13 @@
 The log is cut in two at several places. With the part before a cut as the tare of the part after it
 (`posterior.solve`), phi is what was added at the cut, and
 
-    T = phi_MLᵀ·Λ·phi_ML / kappa
+    T = phi_MLᵀ·(kappa·Λ⁻¹ + C)⁻¹·phi_ML
 
 is chi-squared of ten where nothing was: Λ, phi_ML what the two parts say of it, all that is unknown about the arm
-integrated out, kappa by how much the physics overrates such a log (`posterior.Calibration`). The cut with the largest T
-is sought more finely, and both parts are cut again. A tare or a profile says what the arm does by itself, so that a
-lighter change shows; what was mounted then is taken off, and a day's drift allowed for.
+integrated out, kappa by how much the physics overrates such a log (`posterior.Calibration`), C how much less gears may
+lose of what is held in one part than in the other (`LOSS_DIFFERS`), where that is in the torque. The cut with the
+largest T is sought more finely, and both parts are cut again. A tare or a profile says what the arm does by itself, so
+that a lighter change shows; what was mounted then is taken off, and a day's drift allowed for.
 
 Of something light the mass shows first: with a prior on its moments that lets it lie near the flange, the mass alone is
 chi-squared of one. Where there is a tare or a profile it raises a doubt, but makes no cut: what an arm does wrong in
@@ -35,7 +36,7 @@ from armload.identification.thresholds import (
     CUTS_LEAST,
     CUTS_MOST,
     KAPPA_UNKNOWN,
-    MOTOR_SIDE,
+    LOSS_DIFFERS,
     PART_LEAST,
     PAYLOAD_CHANGED,
     PAYLOAD_MAY_CHANGE,
@@ -55,6 +56,7 @@ from armload.regression.rows_of_log import RowsOfLog
 _ITERATIONS = 3  # of expectation–maximisation: the scales change little after
 _FINER = 4  # cuts on either side of the best one, twice
 _FEW = 32  # smooth functions of the pose with which cuts are compared: T at the likeliest is of all of them
+_NOWHERE_NEAR = 0.5 * PAYLOAD_MAY_CHANGE  # T of the best of few cuts: that of finer ones is at most twice as large
 _LIKELIEST = 2  # cuts of which T is found with the whole model
 # [kg·m, kg·m²] standard deviations of moments and inertia of something light, 0.2 kg within 8 cm of the frame: a stated
 # prior. What is heavier shows in all ten
@@ -88,20 +90,24 @@ def changes_of_payload(
     tare: Recording | None = None,
     profile: Profile | None = None,
     kappa: float | None = None,
+    held: float = 0.0,
 ) -> Changes:
     """Where the payload changes within a log; no time: it is the same throughout.
 
     Args:
         tare, profile: what else is known of the arm, where there is one.
-        kappa: by how much the physics overrates the evidence of this log; None: not known.
+        kappa: by how much the physics overrates the evidence of this log; None: not known. Not believed of motor
+            currents: what a change leaves unexplained is read as the arm's own error, and hides the change.
+        held: mass of what seems to be held [kg].
     """
-    kappa = KAPPA_UNKNOWN if kappa is None else kappa * (MOTOR_SIDE if arm.motor_torque else 1.0)
-    found = _Search.of(recording, arm, tare, profile, kappa).all()
+    if kappa is None or arm.motor_torque:
+        kappa = KAPPA_UNKNOWN
+    found = _Search.of(recording, arm, tare, profile, kappa, held).all()
     if found.times and not arm.motor_torque:  # unknown gear friction looks like a change
         physics = SmoothPosteriorLeastSquares(arm)
         physics.run(recording)
         if physics.posterior.torque == "motor":
-            found = _Search.of(recording, replace(arm, motor_torque=True), tare, profile, kappa).all()
+            found = _Search.of(recording, replace(arm, motor_torque=True), tare, profile, KAPPA_UNKNOWN, held).all()
     return found
 
 
@@ -121,9 +127,11 @@ class _Model(NamedTuple):
 class _Search:
     """The rows of a log, and the cuts in them."""
 
-    def __init__(self, physics: SmoothPosteriorLeastSquares, rows: RowsOfLog, kappa: float) -> None:
+    def __init__(self, physics: SmoothPosteriorLeastSquares, rows: RowsOfLog, kappa: float, held: float = 0.0) -> None:
         self.physics, self.rows, self.kappa = physics, rows, kappa
         self.weak = solution_prior_std(physics.arm)
+        loss = LOSS_DIFFERS * max(held, 0.0) if physics.arm.motor_torque else 0.0  # [kg]
+        self.lost = np.diag((loss * self.weak / self.weak[0]) ** 2)
         known = [_without_payload(tare, physics.arm, physics.start) for tare in physics.stream.tares]
         self.session = Session(1, TESTED) if physics.profile is None and known else physics.session
         self.few = replace(physics.features, pose=min(_FEW, physics.features.pose))
@@ -132,10 +140,16 @@ class _Search:
 
     @classmethod
     def of(
-        cls, recording: Recording, arm: Arm, tare: Recording | None, profile: Profile | None, kappa: float
+        cls,
+        recording: Recording,
+        arm: Arm,
+        tare: Recording | None,
+        profile: Profile | None,
+        kappa: float,
+        held: float,
     ) -> _Search:
         physics = SmoothPosteriorLeastSquares(arm, tare, profile=profile)
-        return cls(physics, RowsOfLog(physics.stream.regression(), recording), kappa)
+        return cls(physics, RowsOfLog(physics.stream.regression(), recording), kappa, held)
 
     def all(self) -> Changes:
         """Changes of the whole log."""
@@ -150,7 +164,7 @@ class _Search:
         count = int(np.clip((t[last - 1] - t[first]) / CUT, CUTS_LEAST, CUTS_MOST))
         cuts = np.unique(np.linspace(first, last - 1, count).astype(int))
         best, most, light = self._best(start, stop, cuts)
-        if most <= PAYLOAD_CHANGED:
+        if most <= _NOWHERE_NEAR:
             return Changes([], most, light)
         spacing = max((last - first) // max(count - 1, 1), 1)
         for _ in range(2):
@@ -158,6 +172,10 @@ class _Search:
             near = best + spacing * np.arange(-_FINER, _FINER + 1)
             cuts = np.unique(np.clip(near, first, last - 1))
             best = int(cuts[np.argmax(self._roughly(self._stretches(start, stop, cuts))[:, 0])])
+        parts = self._stretches(start, stop, np.array([best]))
+        most = max(most, self._statistic(parts[:1], parts[1:])[0])
+        if most <= PAYLOAD_CHANGED:
+            return Changes([], most, light)
         # the rows' lag still holds what was there before, and the cut is off by some rows
         until, after = (int(np.searchsorted(t, t[best] + aside)) for aside in (-SETTLED, SETTLED))
         earlier, later = self.within(start, until).times, self.within(after, stop).times
@@ -202,8 +220,9 @@ class _Search:
 
     def _tests(self, information: NDArray[np.float64], vector: NDArray[np.float64]) -> tuple[float, float]:
         """T, and the statistic of the mass alone, of what a cut's two sides say."""
-        wide = np.diag(self.weak**-2.0)  # directions that neither part tells
-        T = float(vector @ np.linalg.solve(information + wide, vector)) / self.kappa
+        P = np.linalg.inv(information + np.diag(self.weak**-2.0))  # there are directions that neither part tells
+        added = P @ vector
+        T = float(added @ np.linalg.solve(self.kappa * P + self.lost, added))
         if self.physics.arm.motor_torque or not self.whole.known:
             return T, 0.0  # friction that grows with the load differs from part to part as a weight does
         return T, of_mass(information / self.kappa, vector / self.kappa)

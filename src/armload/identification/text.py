@@ -127,10 +127,16 @@ def rests_on(result: Identification) -> str:
     scale = result.torque_gain_std
     how = "known" if result.gain_known else "assumed to be right"
     known = "" if scale is None else f" for a torque scale {how} to {100 * scale:.1g} %"
+    if result.same_arm_assumed:
+        known += f"{' and' if known else ' for'} a {_before(result)} of this very arm, which nothing here confirms"
     return (
         f"± is half of the 95 % interval, {result.interval}{known}; method {result.method}{why}, "
         f"{result.n_samples} samples, {result.duration:.2f} s"
     )
+
+
+def _before(result: Identification) -> str:
+    return result.relative_to if result.relative_to in ("tare", "profile") else "tare or profile"
 
 
 def _rows(parts: dict[str, list[Quantity]]) -> list[str]:

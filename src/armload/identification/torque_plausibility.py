@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -13,6 +12,7 @@ from armload.identification.exchanged import check_for_exchanged_torques
 from armload.identification.thresholds import (
     CURRENT_HIGH,
     CURRENT_LOW,
+    CURRENT_USUAL,
     EFFORT,
     EFFORT_EVER,
     EFFORT_SHARE,
@@ -20,13 +20,13 @@ from armload.identification.thresholds import (
     FROZEN_TIME,
     MODEL_MISFIT,
     NO_TORQUE,
+    OTHER_FORM,
     PARTS_SHARE,
-    SCALE_SURE,
 )
 from armload.identification.torque_scale import TorqueScale, torque_scale
 from armload.recording import Recording, blocks, largest, parts_of, span, with_gravity
 
-# of the arm's own torque: of what holds less the percentage is said; where that may be none, gravity was taken out
+# of the arm's own torque: of what holds less the percentage is said
 _NEARLY_NONE = 0.25
 
 
@@ -100,9 +100,11 @@ def _check_torque_is_the_arms(recording: Recording, arm: Arm) -> None:
     check_for_exchanged_torques(recording, arm, fit)
     if (fit.is_wrong or fit.misfit > MODEL_MISFIT) and _sound_in_parts(recording, arm, fit):
         return
+    if arm.motor_torque:
+        _check_form(recording, arm, fit)
     if fit.is_wrong:
-        _check_for_currents(recording, arm, fit.scale)
-        _check_for_compensation(recording, arm, fit)
+        if ARMS.get(arm.known_as or "") is None and 1.0 / CURRENT_HIGH < fit.scale < 1.0 / CURRENT_LOW:
+            raise _currents(recording, arm, fit)  # its gears and sensors are not described: the size says so by itself
         if fit.is_negative:
             what = "has the opposite sign of"
         elif fit.scale < _NEARLY_NONE:
@@ -136,45 +138,47 @@ def _sound_in_parts(recording: Recording, arm: Arm, seen: TorqueScale, deeper: b
     return not other or (len(other) == 1 and (not deeper or _sound_in_parts(other[0], arm, seen, False)))
 
 
-def _check_for_currents(recording: Recording, arm: Arm, scale: float) -> None:
-    """Refuse motor currents in A by name: of a known arm what its torque constants make a sound log of.
+def _check_form(recording: Recording, arm: Arm, seen: TorqueScale) -> None:
+    """Refuse motor currents, and torque without gravity, by name, of arms whose controllers report either.
 
-    Of an arm whose gears or sensors are not described, the size says so by itself.
+    The form that explains the log best is the one it has, where neither the torque nor any share of it does as well.
+    The payload that the controller was set to is not known here; the arm's own gravity is most of it.
     """
     facts = ARMS.get(arm.known_as or "")
-    constants = None if facts is None else facts.torque_constants
-    if constants is not None:
-        torque = replace(recording, tau=recording.tau * np.array(constants))
-        fit = torque_scale(torque, arm)
-        if fit is None or fit.is_wrong or fit.misfit > MODEL_MISFIT:
-            return
-        how = f"multiply each by its joint's torque constant ({', '.join(f'{k:g}' for k in constants)} N·m/A)"
-    elif facts is not None and facts.torque_side == "link":
-        return  # sensors in the joints: there is no current to be logged
-    elif not 1.0 / CURRENT_HIGH < scale < 1.0 / CURRENT_LOW:
+    constants = (facts and facts.torque_constants) or (CURRENT_USUAL,) * arm.n
+    forms = {
+        "currents": torque_scale(recording, arm, np.array(constants)),
+        "compensated": torque_scale(with_gravity(recording, arm), arm),
+    }
+    sound = {
+        name: fit.evidence
+        for name, fit in forms.items()
+        if fit is not None and not fit.is_wrong and fit.misfit <= MODEL_MISFIT
+    }
+    likeliest = max(sound, key=lambda name: sound[name], default="")
+    if not likeliest or sound[likeliest] < max(seen.evidence + OTHER_FORM, seen.best):
         return
-    else:
-        how = "multiply each by its joint's torque constant [N·m/A, at the joint], from the maker"
+    if likeliest == "currents":
+        raise _currents(recording, arm, seen)
     raise RecordingError(
-        f"{recording.source}: tau holds only {scale:.0%} of the torque {arm.name} needs to carry itself: these look "
-        f"like currents, in A; expected joint torque in N·m: {how}"
+        f"{recording.source}: tau seems to have gravity taken out: expected the measured joint torque in N·m, gravity "
+        "included; say what the controller was set to carry (--compensated nothing, or a payload's file), or how the "
+        "base is mounted (--gravity) if gravity is in it"
     )
 
 
-def _check_for_compensation(recording: Recording, arm: Arm, seen: TorqueScale) -> None:
-    """Refuse torque without gravity by name: it holds nothing of the arm's own, and with gravity put back it is sound.
-
-    Only of arms that measure motor current: their controllers report such torque. The payload that the controller was
-    set to is not known here; the arm's own gravity is most of it.
-    """
-    if not arm.motor_torque or abs(seen.scale) > min(SCALE_SURE * seen.std, _NEARLY_NONE):
-        return
-    fit = torque_scale(with_gravity(recording, arm), arm)
-    if fit is None or fit.is_wrong or fit.misfit > MODEL_MISFIT:
-        return
-    raise RecordingError(
-        f"{recording.source}: tau seems to have gravity taken out: expected the measured joint torque in N·m, gravity "
-        "included; say what the controller was set to carry (--compensated nothing, or a payload's file)"
+def _currents(recording: Recording, arm: Arm, seen: TorqueScale) -> RecordingError:
+    """That these are motor currents, and what to do."""
+    facts = ARMS.get(arm.known_as or "")
+    if facts is None or facts.torque_constants is None:
+        how = "multiply each by its joint's torque constant [N·m/A, at the joint], from the maker"
+    else:
+        each = ", ".join(f"{k:g}" for k in facts.torque_constants)
+        how = f"multiply each by its joint's torque constant ({each} N·m/A)"
+    less = f"holds only {max(seen.scale, 0.0):.0%} of" if seen.is_wrong else "is not"
+    return RecordingError(
+        f"{recording.source}: tau {less} the torque {arm.name} needs to carry itself: these look like currents, in A; "
+        f"expected joint torque in N·m: {how}"
     )
 
 

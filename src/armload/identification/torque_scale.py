@@ -10,10 +10,17 @@ is linear in (s, phi, offset, level). All but s get a prior wide enough for any 
 the rated mass, motor-side friction, a model error of a few per cent of the rated torque, a tenth of it for a joint at
 rest, which friction holds in any way below stiction. If even then s is surely not
 about 1, or the noise far larger than a model error, the torque is not that of this arm.
+
+What tau is, the torque, the motors' currents or the torque without gravity, is a question between three models with
+s = 1, of each of which tau becomes the torque: c·tau, tau + g. With K the covariance of all that is unknown and y what
+the arm's own torque leaves,
+
+    ln p(tau) = −½·yᵀ·K⁻¹·y + Σ ln c + what they have in common
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -35,15 +42,22 @@ from armload.recording.windows import Windows, integrals, windows
 from armload.regression.prior import REACH
 
 _MOST_WINDOWS = 120  # spread over the log: one factor needs no more, whatever the log's length
+_ALIKE = 4  # neighbouring windows that err alike, and count for one
 _POINTS = 9  # model evaluations per window of 0.25 s: the trapezoidal rule errs by 0.3 % at 1 Hz
 
 
 class TorqueScale(NamedTuple):
-    """scale: s; std: its standard deviation; misfit: rms of what s = 1 leaves, in units of a plausible model error."""
+    """How much of the arm's own torque there is.
+
+    scale: s; std: its standard deviation; misfit: rms of what s = 1 leaves, in units of a plausible model error.
+    evidence: ln p(tau) of s = 1, to be compared with that of the same log as something else. best: of the likeliest s.
+    """
 
     scale: float
     std: float
     misfit: float
+    evidence: float
+    best: float
 
     @property
     def is_wrong(self) -> bool:
@@ -62,8 +76,13 @@ class TorqueScale(NamedTuple):
         )
 
 
-def torque_scale(recording: Recording, arm: Arm) -> TorqueScale | None:
-    """Fit the model above to a log; None if the log is too short to say anything."""
+def torque_scale(recording: Recording, arm: Arm, constants: NDArray[np.float64] | None = None) -> TorqueScale | None:
+    """Fit the model above to a log; None if the log is too short to say anything.
+
+    constants: (n,) [N·m/A] if tau is current.
+    """
+    if constants is not None:
+        recording = replace(recording, tau=recording.tau * constants)
     parts = _some(windows(recording))
     if len(parts.first) < 2:
         return None
@@ -83,18 +102,20 @@ def torque_scale(recording: Recording, arm: Arm) -> TorqueScale | None:
     A = A.reshape(W * n, -1) * prior / noise[:, None]
     b, y = own.ravel() / noise, tau.ravel() / noise
 
-    # Marginalise everything but s: with K = 1 + A·Aᵀ, s = bᵀK⁻¹y / bᵀK⁻¹b. Neighbouring windows err alike, so the
-    # standard deviation is that of one window in four.
+    # Marginalise everything but s: with K = 1 + A·Aᵀ, s = bᵀK⁻¹y / bᵀK⁻¹b
     inner = np.linalg.inv(np.eye(A.shape[1]) + A.T @ A)
     Kb = b - A @ (inner @ (A.T @ b))
     information = float(b @ Kb)
     if information <= 0:
         return None
     scale = float(y @ Kb) / information
-    rest = (y - b) - A @ (inner @ (A.T @ (y - b)))  # what s = 1 leaves
+    left = y - b
+    rest = left - A @ (inner @ (A.T @ left))  # what s = 1 leaves
     misfit = float(np.sqrt(np.mean(rest**2)))
-    std = 2.0 * max(1.0, misfit) / np.sqrt(information)
-    return TorqueScale(scale, std, misfit)
+    std = np.sqrt(_ALIKE) * max(1.0, misfit) / np.sqrt(information)
+    evidence = -0.5 * float(left @ rest) + (0.0 if constants is None else W * float(np.log(constants).sum()))
+    best = evidence + 0.5 * (scale - 1.0) ** 2 * information
+    return TorqueScale(scale, std, misfit, evidence / _ALIKE, best / _ALIKE)
 
 
 def _averages(recording: Recording, arm: Arm, parts: Windows) -> tuple[NDArray, ...]:

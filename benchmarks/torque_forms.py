@@ -1,0 +1,86 @@
+"""Currents, and torque without gravity, of arms that measure motor current: how many logs are refused by that name.
+
+    python benchmarks/torque_forms.py [--logs 30] [--seed 0]
+
+Logs of 3, 6 or 20 s at 200 Hz of a random motion, 0.3 to 1 times as fast as it is drawn, of UR3e, UR5e and UR10e that
+differ from their model as real ones do, and of arms beyond those, in turn. They hold nothing in a third, else 0 to 1.2
+times the rated payload. Each is asked as it is (sound), with its torque divided by 11 N·m/A (currents), and less the
+gravity of the bare arm (without gravity), as a controller that is set to carry nothing reports it. Called so: refused,
+by the form's own name; refused: by any. Written to benchmarks/results/torque_forms.json and a table of
+docs/recordings.md; three minutes of one core.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from bodies import body_of
+from script import ROOT, markdown_table, options, say, write, write_table
+
+from armload import Recording, arm
+from armload.arms import rated_mass
+from armload.errors import RecordingError
+from armload.identification import check_plausible
+from armload.motion import random_motion
+from armload.simulation import Sensors, World, simulate
+
+ROBOTS = ("ur3e", "ur5e", "ur10e")
+CONSTANT = 11.0  # [N·m/A]
+FORMS = {"sound": "", "currents": "look like currents", "without gravity": "gravity taken out"}
+
+
+def log_of(robot: str, seed: int) -> Recording:
+    """A sound log."""
+    known, rng = arm(robot), np.random.default_rng([seed, 21])
+    mass = rated_mass(known) * float(rng.uniform(0.0, 1.2))
+    duration, slower = float(rng.choice([3.0, 6.0, 20.0])), float(rng.uniform(0.3, 1.0))
+    world = (World.real_like if seed % 2 else World.beyond)(known, seed)
+    motion = random_motion(known, seed + 40, duration=duration / slower)
+    payload = body_of(mass, seed) if seed % 3 else None
+    how = {"world": world, "sensors": Sensors.of(known), "rate": 200.0, "seed": seed}
+    return simulate(known, motion, payload, duration=duration, **how)
+
+
+def as_form(log: Recording, robot: str, form: str) -> Recording:
+    """The same log with its torque in another form."""
+    if form == "currents":
+        return replace(log, tau=log.tau / CONSTANT)
+    return log if form == "sound" else replace(log, tau=log.tau - arm(robot).torque(log.q))
+
+
+def refusal(log: Recording, robot: str) -> str:
+    """Why a log is refused; "": it is not."""
+    try:
+        check_plausible(log, arm(robot))
+    except RecordingError as error:
+        return str(error)
+    return ""
+
+
+def main() -> None:
+    asked = options(__doc__, logs=30, seed=0)
+    found: dict[str, dict[str, dict[str, int]]] = {}
+    for robot in ROBOTS:
+        logs = [log_of(robot, 1000 * asked.seed + k) for k in range(asked.logs)]
+        found[robot] = {}
+        for form, name in FORMS.items():
+            said = [refusal(as_form(log, robot, form), robot) for log in logs]
+            called = sum(bool(name) and name in text for text in said)
+            found[robot][form] = {"logs": len(logs), "called so": called, "refused": sum(map(bool, said))}
+        say(f"{robot}: {found[robot]}")
+    write("torque_forms", {"seed": asked.seed, "robots": found})
+    rows = [
+        [robot, form, *(f"{case[what]} of {case['logs']}" for what in ("called so", "refused"))]
+        for robot, forms in found.items()
+        for form, case in forms.items()
+    ]
+    for row in rows:
+        if row[1] == "sound":
+            row[2] = ""
+    table = markdown_table(["arm", "torque", "called so", "refused"], "llrr", rows)
+    write_table(ROOT / "docs" / "recordings.md", "torque forms", table)
+
+
+if __name__ == "__main__":
+    main()
