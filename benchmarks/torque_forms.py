@@ -6,7 +6,8 @@ Logs of 3, 6 or 20 s at 200 Hz of a random motion, 0.3 to 1 times as fast as it 
 differ from their model as real ones do, and of arms beyond those, in turn. They hold nothing in a third, else 0 to 1.2
 times the rated payload. Each is asked as it is (sound), with its torque divided by 11 N·m/A (currents), and less the
 gravity of the bare arm (without gravity), as a controller that is set to carry nothing reports it. Called so: refused,
-by the form's own name; refused: by any. Written to benchmarks/results/torque_forms.json and a table of
+by the form's own name; refused: by any; most: log odds of torque without gravity (`OTHER_FORM`), the largest of the
+sound logs and the smallest of those without. Written to benchmarks/results/torque_forms.json and a table of
 docs/recordings.md; three minutes of one core.
 """
 
@@ -22,7 +23,9 @@ from armload import Recording, arm
 from armload.arms import rated_mass
 from armload.errors import RecordingError
 from armload.identification import check_plausible
+from armload.identification.torque_scale import torque_scale
 from armload.motion import random_motion
+from armload.recording import with_gravity
 from armload.simulation import Sensors, World, simulate
 
 ROBOTS = ("ur3e", "ur5e", "ur10e")
@@ -58,16 +61,27 @@ def refusal(log: Recording, robot: str) -> str:
     return ""
 
 
+def without_gravity(log: Recording, robot: str) -> float:
+    """Log odds of torque without gravity over torque with it."""
+    with_it, without = torque_scale(log, arm(robot)), torque_scale(with_gravity(log, arm(robot)), arm(robot))
+    assert with_it is not None
+    assert without is not None
+    return without.evidence - with_it.evidence
+
+
 def main() -> None:
     asked = options(__doc__, logs=30, seed=0)
-    found: dict[str, dict[str, dict[str, int]]] = {}
+    found: dict[str, dict[str, dict[str, float]]] = {}
     for robot in ROBOTS:
         logs = [log_of(robot, 1000 * asked.seed + k) for k in range(asked.logs)]
         found[robot] = {}
+        odds = {form: [without_gravity(as_form(log, robot, form), robot) for log in logs] for form in FORMS}
         for form, name in FORMS.items():
             said = [refusal(as_form(log, robot, form), robot) for log in logs]
             called = sum(bool(name) and name in text for text in said)
             found[robot][form] = {"logs": len(logs), "called so": called, "refused": sum(map(bool, said))}
+        found[robot]["sound"]["most"] = max(odds["sound"])
+        found[robot]["without gravity"]["least"] = min(odds["without gravity"])
         say(f"{robot}: {found[robot]}")
     write("torque_forms", {"seed": asked.seed, "robots": found})
     rows = [
