@@ -28,7 +28,7 @@ def log_of(panda, seed, held=((0.0, None),)):
 @pytest.mark.parametrize("tared", [False, True])
 def test_a_cut_says_what_a_solution_of_its_own_with_the_same_scales_does(panda, tared):
     log = log_of(panda, 1, [(0.0, None), (2.5, draw_payload("boxes", 3, 1.0))])
-    search = _Search.of(log, panda, log_of(panda, 2) if tared else None, None, 1.0)
+    search = _Search.of(log, panda, log_of(panda, 2) if tared else None, None, 1.0, 0.0)
     known, features = search.rough.known, search.few
     stretches = search._stretches(0, len(search.rows.t), np.array(CUTS))
     for stretch in stretches:

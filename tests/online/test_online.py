@@ -1,7 +1,9 @@
 """An identifier on a running robot: what a stream may do to it, and what it must not."""
 
 import json
+import os
 import re
+import time
 from dataclasses import fields, replace
 from functools import cache
 
@@ -18,6 +20,7 @@ from armload.errors import IdentificationError
 from armload.identification import METHODS
 from armload.motion import random_motion, taie2024
 from armload.online import OnlineEstimate, OnlineIdentifier
+from armload.online.state import saved_at
 from armload.payloads import franka_hand
 from armload.payloads import test_payload as make_payload
 from armload.posterior import shipped_model
@@ -434,6 +437,14 @@ def test_a_state_goes_on_with_its_model_whatever_the_file_is_called_and_says_of_
         each.close()
     np.testing.assert_array_equal(phis[0], phis[1])
     np.testing.assert_array_equal(phis[0], phis[2])
+
+
+def test_a_state_says_when_it_was_saved_whatever_the_date_of_its_file(online, log, tmp_path):
+    fed(online, list(log)[:50])
+    before = time.time()
+    path = online.save(tmp_path / "state.npz")
+    os.utime(path, (0.0, 0.0))
+    assert before <= saved_at(path) <= time.time()
 
 
 def test_a_state_of_an_earlier_format_is_refused(panda, online, log, tmp_path):

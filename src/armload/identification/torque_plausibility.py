@@ -153,7 +153,7 @@ def _check_form(recording: Recording, arm: Arm, seen: TorqueScale) -> None:
     sound = {
         name: fit.evidence
         for name, fit in forms.items()
-        if fit is not None and not fit.is_wrong and fit.misfit <= MODEL_MISFIT
+        if fit is not None and fit.is_determined and not fit.is_wrong and fit.misfit <= MODEL_MISFIT
     }
     likeliest = max(sound, key=lambda name: sound[name], default="")
     if not likeliest or sound[likeliest] < max(seen.evidence + OTHER_FORM, seen.best):

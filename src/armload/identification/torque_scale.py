@@ -15,7 +15,9 @@ What tau is, the torque, the motors' currents or the torque without gravity, is 
 s = 1, of each of which tau becomes the torque: c·tau, tau + g. With K the covariance of all that is unknown and y what
 the arm's own torque leaves,
 
-    ln p(tau) = −½·yᵀ·K⁻¹·y + Σ ln c + what they have in common
+    ln p(tau) = −½·yᵀ·K⁻¹·y + Σ ν·ln c + what they have in common
+
+with ν ≤ 1 what is noise alone in a row, and not made up by the unknowns, whose priors are wider than anything believed.
 """
 
 from __future__ import annotations
@@ -63,6 +65,11 @@ class TorqueScale(NamedTuple):
     def is_wrong(self) -> bool:
         """Whether s is surely beyond what a sound log of the arm shows."""
         return self.scale + SCALE_SURE * self.std < SCALE_LOW or self.scale - SCALE_SURE * self.std > SCALE_HIGH
+
+    @property
+    def is_determined(self) -> bool:
+        """Whether s is known better than that the arm's own torque may be in it or not: it moves, against gravity."""
+        return self.std < 1.0
 
     @property
     def is_negative(self) -> bool:
@@ -113,7 +120,10 @@ def torque_scale(recording: Recording, arm: Arm, constants: NDArray[np.float64] 
     rest = left - A @ (inner @ (A.T @ left))  # what s = 1 leaves
     misfit = float(np.sqrt(np.mean(rest**2)))
     std = np.sqrt(_ALIKE) * max(1.0, misfit) / np.sqrt(information)
-    evidence = -0.5 * float(left @ rest) + (0.0 if constants is None else W * float(np.log(constants).sum()))
+    evidence = -0.5 * float(left @ rest)
+    if constants is not None:  # of what the unknowns make up, which may be anything, nothing is believed
+        noise_alone = 1.0 - np.einsum("ij,jk,ik->i", A, inner, A)
+        evidence += float(noise_alone.reshape(W, n).sum(axis=0) @ np.log(constants))
     best = evidence + 0.5 * (scale - 1.0) ** 2 * information
     return TorqueScale(scale, std, misfit, evidence / _ALIKE, best / _ALIKE)
 

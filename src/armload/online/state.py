@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import time
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from os import PathLike
@@ -36,7 +37,13 @@ def save_state(path: str | PathLike[str], state: dict[str, Any], arm: Arm, metho
         tree = packer.node(state)
     except TypeError as error:
         raise IdentificationError(f"a live identifier of this kind cannot be saved: {error}") from None
-    text = {"format": FORMAT, "origin": _origin(arm, method, engine), "tree": tree, "objects": packer.objects}
+    text = {
+        "format": FORMAT,
+        "saved": time.time(),
+        "origin": _origin(arm, method, engine),
+        "tree": tree,
+        "objects": packer.objects,
+    }
     arrays = {f"a{k}": array for k, array in enumerate(packer.arrays)}
     with replacing(Path(path)) as part, part.open("wb") as file:
         np.savez(file, allow_pickle=False, tree=np.frombuffer(json.dumps(text).encode(), dtype=np.uint8), **arrays)
@@ -63,6 +70,12 @@ def load_state(path: str | PathLike[str], arm: Arm, method: str, engine: Identif
         raise
     except Exception as error:
         raise IdentificationError(f"{path} is no state of a live identifier ({error}): begin without it") from None
+
+
+def saved_at(path: str | PathLike[str]) -> float:
+    """When a state that can be read was saved [s since 1970], as it says itself: a copy's file has another date."""
+    with np.load(path, allow_pickle=False) as data:
+        return float(json.loads(data["tree"].tobytes())["saved"])
 
 
 def _known(arm: Arm, engine: Identifier) -> dict[str, Any]:

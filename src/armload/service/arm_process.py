@@ -25,6 +25,7 @@ from armload.devices import Detached, Reader, controller_of
 from armload.devices.reader import columns_of
 from armload.errors import ArmloadError, IdentificationError
 from armload.online import OnlineEstimate, OnlineIdentifier
+from armload.online.state import saved_at
 from armload.posterior import load_profile
 from armload.recording import read_recording
 from armload.runtime.kernels import COMPILING
@@ -178,7 +179,7 @@ class ArmProcess:
         if kept is not None and kept.exists():
             try:
                 identifier = OnlineIdentifier.restore(kept, self.arm, settings.method, profile, every=self.every)
-                self._kept, self._continued = kept.stat().st_mtime, True
+                self._kept, self._continued = saved_at(kept), True
                 self.note(f"continued from {kept}, saved {time.time() - self._kept:.0f} s ago")
             except (IdentificationError, OSError) as error:
                 self.note(f"{error}: begun anew")
