@@ -58,8 +58,8 @@ PAYLOAD_CHANGED = 29.588298445074422
 # T where it may have: the 99 % quantile
 PAYLOAD_MAY_CHANGE = 23.209251158954356
 # by how much the physics overrates a log's evidence, where it is not known, and where torque is motor current: as of
-# arms that are least like their models, with motor currents and beyond the measured ones (`Calibration.kappa`). No
-# sound simulated log of a UR arm is called changed with it (`benchmarks/changed_logs.py`)
+# arms that are least like their models, with motor currents and beyond the measured ones (`Calibration.kappa`). One
+# of 96 sound simulated logs of UR arms is called changed with it (`benchmarks/changed_logs.py`)
 KAPPA_UNKNOWN = 4.5
 # of what is held: standard deviation of what gears lose of it in one part of a log and not in another, where torque is
 # motor current. A stated prior; without it sound logs of heavy payloads are called changed
@@ -143,8 +143,9 @@ OTHER_FORM = 2.0
 # [N·m/A] torque constant of a joint, gear included, at least: the wrist of a small arm. A UR10e's are 10 to 12
 # (test_motor_currents_are_called_so_with_what_to_do)
 CURRENT_LOW = 4.0
-# [N·m/A] the same where nobody tells: a UR10e's are 10 to 12, those of arms with gears of 100 to 1 much the same
-# (test_currents_and_torque_without_gravity_are_called_so_where_their_size_says_nothing)
+# [N·m/A] torque constant of a joint where nobody tells: a UR10e's are 10 to 12, those of other arms with gears of 100
+# to 1 much the same (test_currents_and_torque_without_gravity_are_called_so_where_their_size_says_nothing)
 CURRENT_USUAL = 11.0
-# [N·m/A] the same at most: the shoulder of a large arm (test_motor_currents_are_called_so_with_what_to_do)
+# [N·m/A] torque constant of a joint, gear included, at most: the shoulder of a large arm
+# (test_motor_currents_are_called_so_with_what_to_do)
 CURRENT_HIGH = 60.0
