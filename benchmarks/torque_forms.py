@@ -6,9 +6,9 @@ Logs of 3, 6 or 20 s at 200 Hz of a random motion, 0.3 to 1 times as fast as it 
 differ from their model as real ones do, and of arms beyond those, in turn. They hold nothing in a third, else 0 to 1.2
 times the rated payload. Each is asked as it is (sound), with its torque divided by 11 N·m/A (currents), and less the
 gravity of the bare arm (without gravity), as a controller that is set to carry nothing reports it. Called so: refused,
-by the form's own name; refused: by any; most: log odds of torque without gravity (`OTHER_FORM`), the largest of the
-sound logs and the smallest of those without. Written to benchmarks/results/torque_forms.json and a table of
-docs/recordings.md; three minutes of one core.
+by the form's own name; refused: by any. In the result stand, too, the log odds of torque without gravity
+(`OTHER_FORM`): the most of the sound logs, and the least of those without. Written to
+benchmarks/results/torque_forms.json and a table of docs/recordings.md; a minute of one core.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def refusal(log: Recording, robot: str) -> str:
     return ""
 
 
-def without_gravity(log: Recording, robot: str) -> float:
+def log_odds(log: Recording, robot: str) -> float:
     """Log odds of torque without gravity over torque with it."""
     with_it, without = torque_scale(log, arm(robot)), torque_scale(with_gravity(log, arm(robot)), arm(robot))
     assert with_it is not None
@@ -75,13 +75,12 @@ def main() -> None:
     for robot in ROBOTS:
         logs = [log_of(robot, 1000 * asked.seed + k) for k in range(asked.logs)]
         found[robot] = {}
-        odds = {form: [without_gravity(as_form(log, robot, form), robot) for log in logs] for form in FORMS}
         for form, name in FORMS.items():
             said = [refusal(as_form(log, robot, form), robot) for log in logs]
             called = sum(bool(name) and name in text for text in said)
             found[robot][form] = {"logs": len(logs), "called so": called, "refused": sum(map(bool, said))}
-        found[robot]["sound"]["most"] = max(odds["sound"])
-        found[robot]["without gravity"]["least"] = min(odds["without gravity"])
+        for form, what, end in (("sound", "most", max), ("without gravity", "least", min)):
+            found[robot][form][what] = end(log_odds(as_form(log, robot, form), robot) for log in logs)
         say(f"{robot}: {found[robot]}")
     write("torque_forms", {"seed": asked.seed, "robots": found})
     rows = [

@@ -428,7 +428,7 @@ def test_torque_without_gravity_is_called_so_with_what_to_do(real_data, name):
 @pytest.mark.parametrize("seed", [0, 1, 2, 3])
 @pytest.mark.parametrize("name", ["ur5e", "ur10e"])
 def test_currents_and_torque_without_gravity_are_called_so_where_their_size_says_nothing(name, seed):
-    """In a slow motion of six seconds friction and a payload could make up any share of the arm's own torque."""
+    """In six seconds friction and a payload could make up any share of the arm's own torque."""
     robot = arm(name)
     how = {"world": World.real_like(robot, 500 + seed), "sensors": Sensors.of(robot), "rate": 200.0, "seed": seed}
     log = simulate(robot, random_motion(robot, 40 + seed, duration=6.0), heavy(1.0 * seed, seed), **how)

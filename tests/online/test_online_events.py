@@ -354,9 +354,9 @@ def test_a_step_larger_or_later_than_a_recognition_leaves_open_is_a_change(t, st
         mass_step=lambda *_: 0.4,
     )
     naming.begin(5.0, 4.9, None, rest=False)
-    assert not naming.may_be_taken_for(t, step)  # it was not recognised
+    assert not naming.corrects_the_recognition(t, step)  # it was not recognised
     assert naming.judge(runs, held=True)
-    assert naming.may_be_taken_for(t, step) is corrected
+    assert naming.corrects_the_recognition(t, step) is corrected
 
 
 @pytest.mark.parametrize("payload", [None, pytest.param(HALF_KILO, marks=pytest.mark.full)], ids=["empty", "loaded"])

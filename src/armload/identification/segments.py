@@ -56,7 +56,7 @@ from armload.regression.rows_of_log import RowsOfLog
 _ITERATIONS = 3  # of expectation–maximisation: the scales change little after
 _FINER = 4  # cuts on either side of the best one, twice
 _FEW = 32  # smooth functions of the pose with which cuts are compared: T at the likeliest is of all of them
-_NOWHERE_NEAR = 0.5 * PAYLOAD_MAY_CHANGE  # T of the best of few cuts: that of finer ones is at most twice as large
+_NOWHERE_NEAR = 0.5 * PAYLOAD_MAY_CHANGE  # T of the best of few cuts: finer ones seldom double it. A stated bound
 _LIKELIEST = 2  # cuts of which T is found with the whole model
 # [kg·m, kg·m²] standard deviations of moments and inertia of something light, 0.2 kg within 8 cm of the frame: a stated
 # prior. What is heavier shows in all ten

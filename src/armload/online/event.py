@@ -51,10 +51,10 @@ class Naming:
         self.judging = self._unnamed = self.held_before = self._held = self._rest = self._recognised = False
         self._ended: PosteriorLeastSquares | None = None
 
-    def may_be_taken_for(self, t: float, step: float) -> bool:
+    def corrects_the_recognition(self, t: float, step: float) -> bool:
         """Whether a step of the mass [payloads] at t [s] tells that the run was recognised wrongly, as it is as small.
 
-        What was taken up is then no other; it weighs something else than the run that it was taken for.
+        The payload has not changed then: it is another than the one it was taken for, and weighs nearly as much.
         """
         if self.event is None or not self._recognised or t - self.event.t > RETURN_WITHIN:
             return False

@@ -178,7 +178,9 @@ class PayloadWatch:
         began = max(self._weighing.steady_t, sample.t - PATIENCE)
         until = began - max(sample.t - began, TAKEN_BACK)
         shift = self._weighing.modes.shift()[0]
-        rest = self._tracker.rest(shift) or self._naming.may_be_taken_for(sample.t, float(shift[0]) / self.runs.unit)
+        rest = self._tracker.rest(shift) or self._naming.corrects_the_recognition(
+            sample.t, float(shift[0]) / self.runs.unit
+        )
         self._naming.begin(sample.t, began, run, rest)
         reference = self.runs.reference_for_next(self._naming.held_before)
         following = self._background.submit(next_run, run, reference, until)
