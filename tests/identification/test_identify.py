@@ -14,6 +14,7 @@ from armload.estimators import Estimate, FilteredRecursiveLeastSquares
 from armload.identification import METHODS, identify
 from armload.identification.found import Found
 from armload.identification.intervals import Before
+from armload.identification.notes import COMPUTED
 from armload.identification.thresholds import MISFIT
 from armload.inertia import Z95, InertialParameters, distance_to_body, is_consistent, nearest_body
 from armload.lab.episodes import Recipe, draw_episodes, simulate_episodes
@@ -404,3 +405,24 @@ def test_a_real_log_of_another_model_is_not_called_calibrated_and_a_sound_one_is
     assert any("differ from those of iiwa14" in note for note in wrong.notes)
     sound = real_answer("panda_unloaded_1khz.csv", None, "panda")
     assert not any("differ from those of" in note for note in sound.notes)
+
+
+@pytest.mark.parametrize("which", [10, 18])
+def test_friction_of_one_way_is_no_offset_of_an_arm_s_torque(which):
+    """Two sound UR5e that rub more one way than the other, by up to a half of their friction."""
+    robot = arm("ur5e")
+    (logs,) = simulate_episodes([draw_episodes(robot, "reference", 24, 350, motions=6)[which]])
+    found = identify(logs.run, robot, tare=logs.tare)
+    assert not any("times as far off" in note for note in found.notes)
+    assert found.interval == "calibrated"
+
+
+def test_a_torque_that_is_computed_and_not_measured_is_told_by_its_lack_of_friction(real_like):
+    panda, motion = real_like[0], random_motion(real_like[0], 7, duration=6.0)
+    t = np.arange(0.0, 6.0, 5e-3)
+    q, dq, ddq = motion(t)
+    noise = 0.05 * np.random.default_rng(3).normal(size=q.shape)
+    wanted = Recording(t, q, dq, panda.torque(q, dq, ddq) + noise)  # whatever the arm holds
+    assert COMPUTED in identify(wanted, panda).notes
+    rubs = np.tanh(dq / 0.05) * [0.25, 0.25, 0.2, 0.35, 0.35, 0.2, 0.26]
+    assert COMPUTED not in identify(replace(wanted, tau=wanted.tau + rubs), panda).notes

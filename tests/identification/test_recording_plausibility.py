@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from armload.arms import arm, rated_effort
+from armload.devices import Simulator
 from armload.errors import RecordingError
 from armload.identification import check_plausible
 from armload.identification.exchanged import check_for_exchanged_torques
@@ -444,3 +445,12 @@ def test_a_torque_that_is_no_current_is_not_called_one(panda):
     with pytest.raises(RecordingError, match="of the torque panda needs") as caught:
         check_plausible(replace(log, tau=0.1 * log.tau), panda)
     assert "current" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("name", "mass", "seed"), [("ur5e", 3.0, 6), ("ur5e", 3.0, 20), ("ur3e", 2.0, 5)])
+def test_what_is_put_down_within_a_log_of_motor_currents_is_no_gravity_taken_out(name, mass, seed):
+    robot = arm(name)
+    how = {"world": World.real_like(robot, 500 + seed), "sensors": Sensors.of(robot), "rate": 200.0, "seed": seed}
+    held, motion = [(0.0, heavy(mass, seed)), (3.0, None)], random_motion(robot, 40 + seed, duration=6.0)
+    source = Simulator(robot, motion, held, speed=None, duration=6.0, **how)
+    check_plausible(Recording(*map(np.array, zip(*source, strict=True))), robot)

@@ -72,6 +72,12 @@ def test_a_payload_taken_up_within_a_log_is_found_and_each_part_answered(panda, 
     assert json.loads(json.dumps(found.to_dict()))["segments"][1]["mass"] == found.mass
 
 
+def test_what_is_taken_up_shortly_before_the_end_is_found(panda, payload):
+    found = identify(log_of(panda, [(0.0, None), (5.2, payload)]), panda)
+    assert [part.start for part in found.segments] == [0.0, pytest.approx(5.2, abs=0.1)]
+    assert found.phi_low[0] <= payload.parameters.mass <= found.phi_high[0]
+
+
 @pytest.mark.parametrize("held", [None, "payload"])
 def test_a_log_whose_payload_stays_is_one_part(panda, payload, held):
     log = log_of(panda, [(0.0, None if held is None else payload)], seed=6)

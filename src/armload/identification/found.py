@@ -15,7 +15,7 @@ from armload.identification.arm_health import ArmHealth
 from armload.identification.choice import Choice, choose
 from armload.identification.intervals import Before
 from armload.identification.known_payload import know
-from armload.identification.thresholds import LARGEST_OFFSETS, MISFIT, MOVES
+from armload.identification.thresholds import LARGEST_OFFSET, LEAST_SEEN, MISFIT, MOVES
 from armload.inertia import distance_to_body, is_consistent
 from armload.posterior import HybridIdentifier, Known, PosteriorLeastSquares, Profile
 from armload.posterior.drift import Drift
@@ -52,6 +52,7 @@ class Found(NamedTuple):
     unprojected: mean (10,) and covariance (10, 10) of what the log says, before a body was made of it; None: the
         estimate's.
     offset_ratio: how many times the arm's torque offsets are what is expected of them, where that is too often.
+    frictionless: whether no joint that moves shows friction, of a method that knows the arm's.
     strange_links: by how much the arm's links differ from the model's (`ArmMismatch.links`), where that is too much.
     unknown_friction: whether the torques hold unknown gear friction; `friction_found`: that they did.
     known_arm_std: standard deviation (10,) of a method that says what it would be, were the arm known exactly.
@@ -76,6 +77,7 @@ class Found(NamedTuple):
     weak_std: NDArray[np.float64] | None = None
     unprojected: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     offset_ratio: float = 0.0
+    frictionless: bool = False
     strange_links: float = 0.0
     unknown_friction: bool = False
     friction_found: bool = False
@@ -166,6 +168,7 @@ def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Foun
         weak_std=identifier.weak_std,
         unprojected=identifier.unprojected,
         offset_ratio=0.0 if mismatch is None else _offset_ratio(mismatch, recording),
+        frictionless=posterior is not None and _frictionless(posterior, recording),
         strange_links=0.0 if mismatch is None or mismatch.torque == "motor" else _strange(mismatch.links),
         unknown_friction=unknown and mismatch is not None and mismatch.torque == "motor",
         known_arm_std=identifier.known_arm_std,
@@ -183,6 +186,13 @@ def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Foun
     )
 
 
+def _frictionless(found: PosteriorLeastSquares, recording: Recording) -> bool:
+    """Whether half of the joints move at least, and no such joint shows friction."""
+    correction, moves = found.stream.correction, span(recording.q) > MOVES
+    rubs = np.abs(correction.coulomb(found.posterior.eta)) > LEAST_SEEN * correction.effort
+    return 2 * moves.sum() >= len(moves) and not rubs[moves].any()
+
+
 def _strange(links: float) -> float:
     """By how much the links differ from the model's, where no sound arm's do: motor currents tell too little."""
     return links if links > STRANGE_LINKS else 0.0
@@ -194,4 +204,4 @@ def _offset_ratio(mismatch: ArmMismatch, recording: Recording) -> float:
     if mismatch.torque == "motor":  # there a joint at rest is held by any friction below stiction
         ratios = ratios[span(recording.q) > MOVES]
     times = float(np.sqrt(ratios.mean())) if ratios.size else 0.0
-    return times if times > LARGEST_OFFSETS[mismatch.torque] else 0.0
+    return times if times > LARGEST_OFFSET else 0.0

@@ -35,6 +35,13 @@ MAY_CHANGE = (
 )
 
 
+# a torque that a controller works out, not one that a sensor measures
+COMPUTED = (
+    "no joint that moves shows friction, as every torque does that is measured: if tau is computed, a desired or a "
+    "model's torque, what is held is not in it"
+)
+
+
 def lacking(
     arm: Arm,
     tared: bool,
@@ -112,10 +119,10 @@ def arm_changed(drift: Drift | None, another: AnotherArm | None, what: str = "ta
     if drift is None or not drift.changed:
         return None
     j = drift.joint
+    offset, friction = (f"{x:+.2g} N·m" if abs(x) >= 5e-4 else "nothing" for x in (drift.offset[j], drift.coulomb[j]))
     return (
-        f"the arm is not as {then}: at joint {j + 1} the torque's offset differs by {drift.offset[j]:+.2g} "
-        f"N·m, the friction by {drift.coulomb[j]:+.2g} N·m; the intervals allow for it; record a tare of this arm as "
-        "it is now, with the same base and tool"
+        f"the arm is not as {then}: at joint {j + 1} the torque's offset differs by {offset}, the friction by "
+        f"{friction}; the intervals allow for it; record a tare of this arm as it is now, with the same base and tool"
     )
 
 

@@ -14,6 +14,7 @@ from armload.identification.found import Found
 from armload.identification.intervals import about_com, intervals, phi_interval
 from armload.identification.known_payload import denied_by, determined_with
 from armload.identification.notes import (
+    COMPUTED,
     another_model,
     arm_changed,
     gravity_turned,
@@ -76,6 +77,8 @@ def answered(
     mass_std = float(estimate.std[0])
     if determined[0] and -HELD * mass_std <= estimate.phi[0] < -Z95 * mass_std:
         every_note.append(less_than_nothing(float(estimate.phi[0]), mass_std, relative_to))
+    if found.frictionless:
+        every_note.append(COMPUTED)
     if found.friction_found:
         every_note.append(
             "the torque holds the gears' friction, as that of motor currents does: the intervals allow for it"

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -31,10 +32,10 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.identification.cut_scan import added_at_cuts, of_the_log
+from armload.identification.standing_changes import changes_at_rest
 from armload.identification.thresholds import (
-    CUT,
-    CUTS_LEAST,
-    CUTS_MOST,
+    CUT_FARTHER,
+    CUT_SHARE,
     KAPPA_UNKNOWN,
     LOSS_DIFFERS,
     PART_LEAST,
@@ -96,19 +97,27 @@ def changes_of_payload(
 
     Args:
         tare, profile: what else is known of the arm, where there is one.
-        kappa: by how much the physics overrates the evidence of this log; None: not known. Not believed of motor
-            currents: what a change leaves unexplained is read as the arm's own error, and hides the change.
+        kappa: by how much the physics overrates the evidence of this log, where it does; None: not known. Not believed
+            of motor currents: what a change leaves unexplained is read as the arm's own error, and hides the change.
         held: mass of what seems to be held [kg].
     """
-    if kappa is None or arm.motor_torque:
-        kappa = KAPPA_UNKNOWN
+    kappa = KAPPA_UNKNOWN if kappa is None or arm.motor_torque else max(kappa, 1.0)
     found = _Search.of(recording, arm, tare, profile, kappa, held).all()
-    if found.times and not arm.motor_torque:  # unknown gear friction looks like a change
-        physics = SmoothPosteriorLeastSquares(arm)
-        physics.run(recording)
-        if physics.posterior.torque == "motor":
-            found = _Search.of(recording, replace(arm, motor_torque=True), tare, profile, KAPPA_UNKNOWN, held).all()
+    if found.times and not arm.motor_torque and _rubs(recording, found.times, arm):
+        found = _Search.of(recording, replace(arm, motor_torque=True), tare, profile, KAPPA_UNKNOWN, held).all()
     return found
+
+
+def _rubs(recording: Recording, times: list[float], arm: Arm) -> bool:
+    """Whether the torque holds gear friction nobody told of, which looks like a change, as a change looks like it.
+
+    The longest part in which nothing changes tells.
+    """
+    edges = [recording.t[0], *times, recording.t[-1]]
+    start, end = max(pairwise(edges), key=lambda part: part[1] - part[0])
+    physics = SmoothPosteriorLeastSquares(arm)
+    physics.run(recording.between(start + SETTLED, end - SETTLED))
+    return physics.posterior.gears
 
 
 class _Model(NamedTuple):
@@ -152,26 +161,51 @@ class _Search:
         return cls(physics, RowsOfLog(physics.stream.regression(), recording), kappa, held)
 
     def all(self) -> Changes:
-        """Changes of the whole log."""
-        return self.within(0, len(self.rows.t))
+        """Changes of the whole log: while the arm stands, and between those.
+
+        Of what is too near to an end, or to the next change, to be a part of its own, there is but a doubt.
+        """
+        t, seen = self.rows.t, self.at_rest()
+        times = [a for a, b in pairwise([*seen, t[-1]]) if a - t[0] >= PART_LEAST and b - a >= PART_LEAST]
+        starts = [0, *np.searchsorted(t, np.array(times) + SETTLED).tolist()]
+        stops = [*np.searchsorted(t, np.array(times) - SETTLED).tolist(), len(t)]
+        parts = [self.within(start, stop) for start, stop in zip(starts, stops, strict=True)]
+        statistic = max(PAYLOAD_CHANGED if seen else 0.0, *(part.statistic for part in parts))
+        times = sorted([*times, *(time for part in parts for time in part.times)])
+        return Changes(times, statistic, max(part.of_mass for part in parts))
+
+    def at_rest(self) -> list[float]:
+        """When the payload changes while the arm stands."""
+        if self.physics.arm.motor_torque:
+            return []
+        return changes_at_rest(self.rows.t, self.rows.q, self.rows.r, self.physics.stream.correction, self.coulomb)
+
+    @cache  # noqa: B019 - as long as the search
+    def coulomb(self) -> NDArray[np.float64]:
+        """Coulomb friction of the joints (n,) [N·m], as the log and what else is known show it."""
+        data = self._data(slice(0, len(self.rows.t)))
+        data.session = self.session
+        found = solve([*self.whole.known, data], self.weak, None, SMOOTH, _ITERATIONS, self.whole.start)
+        return np.abs(self.physics.stream.correction.coulomb(found.eta))
 
     def within(self, start: int, stop: int) -> Changes:
         """Changes between two rows."""
         t = self.rows.t
         if stop - start < 3 or t[stop - 1] - t[start] < 2.0 * PART_LEAST:
             return Changes([], 0.0)
-        first, last = np.searchsorted(t, [t[start] + PART_LEAST, t[stop - 1] - PART_LEAST])
-        count = int(np.clip((t[last - 1] - t[first]) / CUT, CUTS_LEAST, CUTS_MOST))
-        cuts = np.unique(np.linspace(first, last - 1, count).astype(int))
+        cuts = self._candidates(start, stop)
+        if not cuts.size:
+            return Changes([], 0.0)
         best, most, light = self._best(start, stop, cuts)
         if most <= _NOWHERE_NEAR:
             return Changes([], most, light)
-        spacing = max((last - first) // max(count - 1, 1), 1)
+        around = np.searchsorted(cuts, best)
+        near = cuts[max(around - 1, 0)], cuts[min(around + 1, len(cuts) - 1)]
         for _ in range(2):
-            spacing = max(spacing // _FINER, 1)
-            near = best + spacing * np.arange(-_FINER, _FINER + 1)
-            cuts = np.unique(np.clip(near, first, last - 1))
+            cuts = np.unique(np.linspace(*near, 2 * _FINER + 1).astype(int))
             best = int(cuts[np.argmax(self._roughly(self._stretches(start, stop, cuts))[:, 0])])
+            spacing = max((near[1] - near[0]) // (2 * _FINER), 1)
+            near = max(best - spacing, near[0]), min(best + spacing, near[1])
         parts = self._stretches(start, stop, np.array([best]))
         most = max(most, self._statistic(parts[:1], parts[1:])[0])
         if most <= PAYLOAD_CHANGED:
@@ -180,6 +214,21 @@ class _Search:
         until, after = (int(np.searchsorted(t, t[best] + aside)) for aside in (-SETTLED, SETTLED))
         earlier, later = self.within(start, until).times, self.within(after, stop).times
         return Changes([*earlier, float(t[best]) - 1.0 / GAIN, *later], most, light)
+
+    def _candidates(self, start: int, stop: int) -> NDArray[np.int64]:
+        """Cuts between two rows: the denser the nearer to either end.
+
+        Rows on both sides stand for `SETTLED` at least: one pose of rest counts for a while only.
+        """
+        t, stood = self.rows.t, np.cumsum(self.rows.h[start:stop])
+        length, away = t[stop - 1] - t[start], [PART_LEAST]
+        while away[-1] < 0.5 * length:
+            away.append(away[-1] + min(CUT_FARTHER * away[-1], CUT_SHARE * length))
+        away = np.array(away[:-1] or away)
+        cuts = np.unique(np.searchsorted(t, np.r_[t[start] + away, t[stop - 1] - away]))
+        cuts = cuts[(cuts > start) & (cuts < stop)]
+        before = stood[cuts - start - 1]
+        return cuts[(before >= SETTLED) & (stood[-1] - before >= SETTLED)]
 
     def _best(self, start: int, stop: int, cuts: np.ndarray) -> tuple[int, float, float]:
         """The cut with the largest T, T, and the largest of any cut's mass alone."""

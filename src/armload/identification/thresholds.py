@@ -18,10 +18,13 @@ LOWEST_RATE = GAIN
 # [standard deviations] between what the log says and the nearest body: the truth of one sound log in a thousand lies
 # farther from what is found (`inertia.distance_to_body`; test_sound_logs_have_a_body_within_the_error_bars)
 MISFIT = 5.439512702905879  # the 99.9 % quantile of a chi distribution of ten degrees of freedom
-# [of the expected offsets, rms] by the side the torque is measured on: about 1 of most simulated arms, more where
-# friction holds the joints (motor currents). A base tilted by 30° is seen in 26 of 28 simulated logs, none of 138 sound
-# ones (tests/identification/test_identify.py has one of each)
-LARGEST_OFFSETS = {"link": 5.0, "motor": 8.0}
+# [of the expected offsets, rms] at most of a sound arm's, whose friction may differ from one way to the other: none of
+# 288 sound simulated logs of UR5e and UR10e is beyond (test_friction_of_one_way_is_no_offset_of_an_arm_s_torque)
+LARGEST_OFFSET = 5.0
+# [effort limits] Coulomb friction that some joint shows of any torque that is measured: the least of two Pandas' large
+# joints is 2.3e-3, of their wrists 2e-2; a model's torque leaves 2e-4
+# (test_a_torque_that_is_computed_and_not_measured_is_told_by_its_lack_of_friction)
+LEAST_SEEN = 1e-3
 # [rad] a joint that stays within so much stands: friction below stiction holds it
 MOVES = 0.05
 # times that a log tells a parameter worse under the weak prior: beyond, it leaves it to the learned one. The factor by
@@ -69,8 +72,15 @@ LOSS_DIFFERS = 0.03
 PART_LEAST = 0.5
 # [s] left out after a change: four lags of the regression, 2 % of the old torque is left
 SETTLED = 0.2
-# [s] between two cuts, the least and the most cuts of a log: a payload is seldom held for less
-CUT, CUTS_LEAST, CUTS_MOST = 1.0, 5, 9
+# T of what is added while the arm stands: the 99.9 % quantile of a chi-squared distribution of three degrees of
+# freedom, as one pose tells the mass and two moments
+CHANGED_AT_REST = 16.26623619623813
+# [rad] that a joint turns until its friction has turned over: presliding, a hundredth of a degree to half a one of
+# geared joints. A stated prior
+PRESLIDING = 5e-3
+# of the shorter part, and of the whole log: by how much the next cut is farther from an end of the log. One that is off
+# by more is not likely enough to be sought more finely (test_what_is_taken_up_shortly_before_the_end_is_found)
+CUT_FARTHER, CUT_SHARE = 0.6, 1.0 / 9.0
 
 # ---------------------------------------------------------------------- units, columns and limits, `plausibility.py`
 

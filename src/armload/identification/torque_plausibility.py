@@ -23,7 +23,7 @@ from armload.identification.thresholds import (
     OTHER_FORM,
     PARTS_SHARE,
 )
-from armload.identification.torque_scale import TorqueScale, torque_scale
+from armload.identification.torque_scale import TorqueScale, log_odds_of_change, torque_scale
 from armload.recording import Recording, blocks, largest, parts_of, span, with_gravity
 
 # of the arm's own torque: of what holds less the percentage is said
@@ -141,8 +141,9 @@ def _sound_in_parts(recording: Recording, arm: Arm, seen: TorqueScale, deeper: b
 def _check_form(recording: Recording, arm: Arm, seen: TorqueScale) -> None:
     """Refuse motor currents, and torque without gravity, by name, of arms whose controllers report either.
 
-    The form that explains the log best is the one it has, where neither the torque nor any share of it does as well.
-    The payload that the controller was set to is not known here; the arm's own gravity is most of it.
+    The form that explains the log best is the one it has, where neither the torque, with one payload or one that
+    changes, nor any share of it does as well. The payload that the controller was set to is not known here; the arm's
+    own gravity is most of it.
     """
     facts = ARMS.get(arm.known_as or "")
     constants = (facts and facts.torque_constants) or (CURRENT_USUAL,) * arm.n
@@ -157,6 +158,8 @@ def _check_form(recording: Recording, arm: Arm, seen: TorqueScale) -> None:
     }
     likeliest = max(sound, key=lambda name: sound[name], default="")
     if not likeliest or sound[likeliest] < max(seen.evidence + OTHER_FORM, seen.best):
+        return
+    if sound[likeliest] < seen.evidence + log_odds_of_change(recording, arm) + OTHER_FORM:
         return
     if likeliest == "currents":
         raise _currents(recording, arm, seen)

@@ -18,6 +18,11 @@ the arm's own torque leaves,
     ln p(tau) = −½·yᵀ·K⁻¹·y + Σ ν·ln c + what they have in common
 
 with ν ≤ 1 what is noise alone in a row, and not made up by the unknowns, whose priors are wider than anything believed.
+A payload that changes at a cut is two payloads, phi before and phi after, in the place of one: K grows, and
+
+    ln p(tau | cut) = −½·yᵀ·K⁻¹·y − ½·ln|K|
+
+is averaged over the cuts, none of which is likelier than another.
 """
 
 from __future__ import annotations
@@ -27,6 +32,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import logsumexp
 
 from armload.arms import FRICTION_WIDTH, Arm, momentum_regressor, rated_effort, rated_mass
 from armload.identification.thresholds import (
@@ -90,27 +96,12 @@ def torque_scale(recording: Recording, arm: Arm, constants: NDArray[np.float64] 
     """
     if constants is not None:
         recording = replace(recording, tau=recording.tau * constants)
-    parts = _some(windows(recording))
-    if len(parts.first) < 2:
+    system = _System.of(recording, arm)
+    if system is None:
         return None
-    own, payload, tau, friction, moving = _averages(recording, arm, parts)
-    W, n = own.shape
-    rated = rated_effort(arm)
-
-    offset = np.broadcast_to(np.eye(n), (W, n, n))
-    level = friction[:, :, None] * np.eye(n)
-    A = np.concatenate([payload, offset, level], axis=2)  # (W, n, 10 + 2n)
-    mass = HEAVIEST * rated_mass(arm)
-    prior = np.concatenate(
-        [mass * np.r_[1.0, [REACH] * 3, [REACH**2] * 6], OFFSET * rated, FRICTION * rated]
-    )  # standard deviations
-    # a joint at rest is held by any friction below stiction: tanh knows nothing of it
-    noise = (rated * np.hypot(MODEL_ERROR, STICTION * (1.0 - np.minimum(moving, 1.0)))).ravel()
-    A = A.reshape(W * n, -1) * prior / noise[:, None]
-    b, y = own.ravel() / noise, tau.ravel() / noise
+    A, b, y, inner = system.A, system.b, system.y, system.inner
 
     # Marginalise everything but s: with K = 1 + A·Aᵀ, s = bᵀK⁻¹y / bᵀK⁻¹b
-    inner = np.linalg.inv(np.eye(A.shape[1]) + A.T @ A)
     Kb = b - A @ (inner @ (A.T @ b))
     information = float(b @ Kb)
     if information <= 0:
@@ -123,9 +114,68 @@ def torque_scale(recording: Recording, arm: Arm, constants: NDArray[np.float64] 
     evidence = -0.5 * float(left @ rest)
     if constants is not None:  # of what the unknowns make up, which may be anything, nothing is believed
         noise_alone = 1.0 - np.einsum("ij,jk,ik->i", A, inner, A)
-        evidence += float(noise_alone.reshape(W, n).sum(axis=0) @ np.log(constants))
+        evidence += float(noise_alone.reshape(-1, arm.n).sum(axis=0) @ np.log(constants))
     best = evidence + 0.5 * (scale - 1.0) ** 2 * information
     return TorqueScale(scale, std, misfit, evidence / _ALIKE, best / _ALIKE)
+
+
+def log_odds_of_change(recording: Recording, arm: Arm) -> float:
+    """ln p(tau) with a payload that changes once, at any window of the log, over that with one payload; s = 1."""
+    system = _System.of(recording, arm)
+    if system is None or system.windows < 2:
+        return 0.0
+    whole = _log_evidence(system.A, system.y - system.b)
+    window = np.repeat(np.arange(system.windows), arm.n)[:, None]
+    payload, arms_own = system.A[:, :10], system.A[:, 10:]
+    odds = [
+        _log_evidence(np.hstack([payload * (window < cut), payload * (window >= cut), arms_own]), system.y - system.b)
+        for cut in range(1, system.windows)
+    ]
+    return float(logsumexp(odds) - np.log(len(odds)) - whole) / _ALIKE
+
+
+def _log_evidence(A: NDArray[np.float64], y: NDArray[np.float64]) -> float:
+    """ln p(y) of y ~ N(0, K = 1 + A·Aᵀ), but for what does not depend on A."""
+    inner = np.eye(A.shape[1]) + A.T @ A
+    projected = A.T @ y
+    return 0.5 * float(projected @ np.linalg.solve(inner, projected)) - 0.5 * float(np.linalg.slogdet(inner)[1])
+
+
+class _System(NamedTuple):
+    """y = s·b + A·x + noise, x and noise ~ N(0, 1), of all rows, n a window.
+
+    A: (W·n, p), the payload's ten columns first. b, y: (W·n,).
+    """
+
+    windows: int
+    A: NDArray[np.float64]
+    b: NDArray[np.float64]
+    y: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, recording: Recording, arm: Arm) -> _System | None:
+        """The model above of a log; None: it is too short to say anything."""
+        parts = _some(windows(recording))
+        if len(parts.first) < 2:
+            return None
+        own, payload, tau, friction, moving = _averages(recording, arm, parts)
+        W, n = own.shape
+        rated = rated_effort(arm)
+        offset = np.broadcast_to(np.eye(n), (W, n, n))
+        level = friction[:, :, None] * np.eye(n)
+        A = np.concatenate([payload, offset, level], axis=2)  # (W, n, 10 + 2n)
+        mass = HEAVIEST * rated_mass(arm)
+        prior = np.concatenate(
+            [mass * np.r_[1.0, [REACH] * 3, [REACH**2] * 6], OFFSET * rated, FRICTION * rated]
+        )  # standard deviations
+        # a joint at rest is held by any friction below stiction: tanh knows nothing of it
+        noise = (rated * np.hypot(MODEL_ERROR, STICTION * (1.0 - np.minimum(moving, 1.0)))).ravel()
+        return cls(W, A.reshape(W * n, -1) * prior / noise[:, None], own.ravel() / noise, tau.ravel() / noise)
+
+    @property
+    def inner(self) -> NDArray[np.float64]:
+        """(1 + Aᵀ·A)⁻¹, (p, p)."""
+        return np.asarray(np.linalg.inv(np.eye(self.A.shape[1]) + self.A.T @ self.A), float)
 
 
 def _averages(recording: Recording, arm: Arm, parts: Windows) -> tuple[NDArray, ...]:

@@ -251,7 +251,8 @@ class PosteriorLeastSquares(Identifier):
             return None
         found, std = self.posterior, self._correction.prior_std[-10 * self.arm.n :]
         links = float(np.sum((found.eta[-len(std) :][std > 0.0] / std[std > 0.0]) ** 2))
-        return ArmMismatch(found.torque, found.ratios["offset"], links)
+        offsets = (self._correction.offset(found.eta) / self._correction.expected_offset(found.eta)) ** 2
+        return ArmMismatch(found.torque, offsets, links)
 
     def evidence(self, elapsed: float | None = None) -> Evidence:
         """What the logs say as the stream stands, without a prior on the payload, `elapsed` [s] after the run began."""

@@ -46,6 +46,9 @@ _MOTOR_FRICTION = {"coulomb": 5.0, "viscous": 5.0}
 # [1] prior standard deviation of the share of the torque that a joint's gear loses: 0.04 to 0.07 of a UR10e's in five
 # of its joints (`benchmarks/real_residuals.py`)
 _LOSS = 0.08
+# [1] standard deviation of the share of its Coulomb friction by which a joint rubs more one way than the other: what
+# moves one way mostly has it as an offset. A stated prior, as of the simulated arms (`simulation/model_error.py`)
+_ONE_WAY = 0.2
 # [effort limits] friction surely in a motor current's torque: 0.03 to 0.06 of a UR10e's joints. With it, |torque| of a
 # joint that mostly rubs would be its friction, and a loss all that it transmits
 LEAST_FRICTION = 0.02
@@ -122,6 +125,10 @@ class Correction:
     def tilt(self) -> slice:
         """Where eta has the angles [rad] by which gravity is turned about `Arm.horizontal`."""
         return slice(self.own, self.own + TILTS)
+
+    def expected_offset(self, eta: ArrayLike) -> NDArray[np.float64]:
+        """Standard deviation of the joints' offsets (n,) [N·m], whose friction may differ from one way to the other."""
+        return np.hypot(PER_JOINT["offset"] * self.effort, _ONE_WAY * self.coulomb(eta))
 
     def coulomb(self, eta: ArrayLike) -> NDArray[np.float64]:
         """The Coulomb friction (n,) [N·m] among the unknowns."""

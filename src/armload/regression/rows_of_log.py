@@ -36,14 +36,14 @@ class RowsOfLog:
         recording: the log.
 
     Attributes:
-        t: their times (M,) [s].
+        t, q, h, r: of all of them, as `Rows` has them; X is what takes the memory.
     """
 
     def __init__(self, regression: FilteredRegression, recording: Recording) -> None:
         self._regression, self._recording = regression, recording
         self._blocks: list[_Block] = []
         self._kept: dict[int, Rows] = {}
-        times, first, size = [], 0, 0.0
+        made, first, size = [], 0, 0.0
         for samples in blocks(len(recording)):
             state = regression.state
             rows = self._made(samples)
@@ -53,9 +53,9 @@ class RowsOfLog:
                 self._kept[first] = rows
             else:
                 self._kept.clear()  # most are made anew in any case
-            times.append(rows.t)
+            made.append((rows.t, rows.q, rows.h, rows.r))
             first += len(rows.t)
-        self.t = np.concatenate(times)
+        self.t, self.q, self.h, self.r = (np.concatenate(parts) for parts in zip(*made, strict=True))
 
     def between(self, start: int, stop: int) -> Iterator[Rows]:
         """The rows start … stop, in parts that end where blocks of samples do."""
