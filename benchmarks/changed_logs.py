@@ -10,7 +10,7 @@ changes   a payload of 0.1, 0.2, 0.5 and 1.5 kg taken up or put down somewhere i
 
 Pandas that differ from their model as real ones do; and UR5e and UR10e, a tenth and a third of what each is rated for.
 Cases that are named replace their own among the results. Written to benchmarks/results/changed_logs.json and a table of
-docs/hybrid.md, after every case; twenty minutes of one core.
+docs/hybrid.md, after every case; half an hour of one core.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from functools import partial
 
 import numpy as np
 from bodies import body_of
+from event_scenes import Resting
 from script import RESULTS, ROOT, markdown_table, options, say, write, write_table
 
 from armload import Arm, Recording, arm, identify
@@ -28,7 +29,7 @@ from armload.devices import Simulator
 from armload.identification.notes import MAY_CHANGE
 from armload.lab.episodes import draw_episodes, simulate_episodes
 from armload.lab.episodes.motion_kinds import MotionSource
-from armload.motion import random_motion, taie2024
+from armload.motion import Motion, random_motion, taie2024
 from armload.simulation import Sensors, World, simulate
 
 SOUND = (
@@ -36,24 +37,27 @@ SOUND = (
     *((robot, population) for robot in ("ur5e", "ur10e") for population in ("reference", "beyond")),
 )
 MASSES = (0.1, 0.2, 0.5, 1.5)  # [kg]
+WHEN = {"": (1.5, 4.5), "at rest": (3.5, 5.3), "late": (4.8, 5.3)}  # [s]
+RESTS = 2.0  # [s] from then on within a second
 MOTOR_SIDE = {"ur5e": (0.5, 1.6), "ur10e": (1.2, 4.0)}  # [kg]
 
 
 def log_with_changes(
-    mass: float, seed: int, twice: bool = False, robot: str = "panda"
+    mass: float, seed: int, how: str = "", robot: str = "panda"
 ) -> tuple[Recording, Recording, list[float]]:
-    """A log of 6 s, a tare, and when the payload changes."""
+    """A log of 6 s, a tare, and when the payload changes; how: one of `WHEN`, or "up and down"."""
     known, rng = arm(robot), np.random.default_rng([seed, 3])
-    motion = taie2024() if robot == "panda" and seed % 2 else random_motion(known, seed + 40, duration=6.0)
-    payload, when = body_of(mass, seed), float(rng.uniform(1.5, 4.5))
+    motion: Motion = taie2024() if robot == "panda" and seed % 2 else random_motion(known, seed + 40, duration=6.0)
+    payload, when = body_of(mass, seed), float(rng.uniform(*WHEN.get(how, WHEN[""])))
     held = [(0.0, payload), (when, None)] if rng.random() < 0.5 else [(0.0, None), (when, payload)]
-    if twice:
+    if how == "up and down":
         held = [(0.0, None), (2.0, payload), (4.0, None)]
-    how = {"world": World.real_like(known, 500 + seed), "sensors": Sensors.of(known), "rate": 200.0}
-    source = Simulator(known, motion, held, speed=None, duration=6.0, seed=seed, **how)
+    moves = Resting(motion, (RESTS,)) if how == "at rest" else motion
+    of_arm = {"world": World.real_like(known, 500 + seed), "sensors": Sensors.of(known), "rate": 200.0}
+    source = Simulator(known, moves, held, speed=None, duration=6.0, seed=seed, **of_arm)
     places = MotionSource(known, 0.0)
     about = places.draw("long", rng, 20.0, "tare", places.centre(motion), 0.3)
-    tare = simulate(known, about, seed=seed + 9000, **how)
+    tare = simulate(known, about, seed=seed + 9000, **of_arm)
     return Recording(*map(np.array, zip(*source, strict=True))), tare, [t for t, _ in held[1:]]  # type: ignore[arg-type]
 
 
@@ -86,11 +90,11 @@ def sound(robot: str, population: str, logs: int, seed: int) -> dict[str, float]
     return {"logs": logs, "found": float(changed), "found or doubted": float(changed + doubted)}
 
 
-def changes(mass: float, twice: bool, tared: bool, robot: str, logs: int, seed: int) -> dict[str, float]:
+def changes(mass: float, how: str, tared: bool, robot: str, logs: int, seed: int) -> dict[str, float]:
     """A payload is taken up or put down."""
     right, told, apart = [], [], []
     for k in range(logs):
-        log, tare, truth = log_with_changes(mass, 1000 * seed + k, twice, robot)
+        log, tare, truth = log_with_changes(mass, 1000 * seed + k, how, robot)
         times, doubted = looked_at(log, arm(robot), tare if tared else None)
         right.append(len(times) == len(truth))
         told.append(bool(times) or doubted)
@@ -100,21 +104,23 @@ def changes(mass: float, twice: bool, tared: bool, robot: str, logs: int, seed: 
     return {"logs": logs, "found": float(np.mean(right)), "found or doubted": float(np.mean(told))} | off
 
 
-def named(robot: str, mass: float, twice: bool, tared: bool) -> str:
+def named(robot: str, mass: float, how: str, tared: bool) -> str:
     """What a case is called."""
     whose = "" if robot == "panda" else f"{robot}, "
-    return f"{whose}{mass} kg{', up and down' if twice else ''}{'' if tared else ', no tare'}"
+    return f"{whose}{mass} kg{how and ', '}{how}{'' if tared else ', no tare'}"
 
 
 CASES: dict[str, Callable[[int, int], dict[str, float]]] = {
     f"sound, {robot} {population}": partial(sound, robot, population) for robot, population in SOUND
 } | {
-    named(robot, mass, twice, tared): partial(changes, mass, twice, tared, robot)
+    named(robot, mass, how, tared): partial(changes, mass, how, tared, robot)
     for tared in (True, False)
-    for robot, mass, twice in (
-        *(("panda", mass, False) for mass in MASSES),
-        ("panda", MASSES[-1], True),
-        *((robot, mass, False) for robot, masses in MOTOR_SIDE.items() for mass in masses),
+    for robot, mass, how in (
+        *(("panda", mass, "") for mass in MASSES),
+        ("panda", MASSES[-1], "up and down"),
+        *(("panda", mass, how) for how in ("at rest", "late") for mass in MASSES[1:]),
+        *((robot, mass, "") for robot, masses in MOTOR_SIDE.items() for mass in masses),
+        *((robot, masses[-1], how) for robot, masses in MOTOR_SIDE.items() for how in ("at rest", "late")),
     )
 }
 

@@ -62,7 +62,7 @@ def main() -> None:
     panda, logs = arm("panda"), {row: [] for row in ROWS}
     for row, cases in ROWS.items():
         for name in cases:
-            for log in CASES[name](asked.logs, asked.seed):
+            for log in CASES[name]("panda", asked.logs, asked.seed):
                 identifier = HybridIdentifier(panda, log.tare)
                 identifier.run(log.run)
                 logs[row].append((identifier.evidence(), log.truth))

@@ -164,7 +164,7 @@ def main() -> None:
     asked = options(__doc__, logs=12, seed=40)
     found: list[Judged] = []
     for kind, (_, case, age) in LOGS.items():
-        logs = changed("day", asked.logs, asked.seed) if age else CASES[case](asked.logs, asked.seed)
+        logs = changed("day", "panda", asked.logs, asked.seed) if age else CASES[case]("panda", asked.logs, asked.seed)
         for k, log in enumerate(logs):
             found += judged(log, kind, k, asked.seed)
         say(f"{kind}: {asked.logs} logs")

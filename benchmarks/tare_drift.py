@@ -54,6 +54,7 @@ CASES = {  # name → arm, population, what has changed
     "old, FR3": ("fr3", "reference", 1.0),
 }
 OLD_OFFSET = np.array([0.3, 0.3, 0.3, 0.3, 0.1, 0.1, 0.1])  # [N·m] of a Panda and an FR3
+OLD_SHARE = 0.3 / 87.0  # of the rated torque: the offset of another arm, as of a Panda's large joints
 OLD_FRICTION = 0.3
 
 
@@ -73,7 +74,9 @@ def before(episode: Episode, change: Any, k: int) -> Episode:
     else:
         slips, shifts = {"offsets": (0.0, 1.0), "friction": (1.0, 0.0)}.get(change, (change, change))
         level = world.friction.level * (1.0 + slips * OLD_FRICTION)
-        offset = world.offset + shifts * rng.choice([-1.0, 1.0], episode.arm.n) * OLD_OFFSET
+        franka = episode.arm.known_as in ("panda", "fr3")
+        size = OLD_OFFSET if franka else OLD_SHARE * rated_effort(episode.arm)
+        offset = world.offset + shifts * rng.choice([-1.0, 1.0], episode.arm.n) * size
         then = replace(world, offset=offset, friction=replace(world.friction, level=level))
     return replace(episode, tare_world=then)
 

@@ -1,4 +1,4 @@
-"""Logs of a Panda of which one thing is not as `armload.identify` assumes, and sound ones: cases of wrong_logs.py."""
+"""Logs of an arm of which one thing is not as `armload.identify` assumes, and sound ones: cases of wrong_logs.py."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tare_drift import before
 
 from armload import Recording, arm
-from armload.arms import Arm
+from armload.arms import Arm, rated_mass
 from armload.devices import Simulator
 from armload.inertia import InertialParameters
 from armload.lab.episodes import Episode, draw_episodes, simulate_episodes
@@ -27,6 +27,7 @@ from armload.simulation.resolution import COARSE
 TILT = 5.0  # [°]
 RATE = 200.0  # [Hz]
 STEP = 1e-3  # [s] of what moves beside the arm
+LIGHT, WEIGHT = 0.2 / 3.0, 2.0 / 3.0  # of what an arm is rated for: something light, a known weight
 
 
 class Wrong(NamedTuple):
@@ -39,9 +40,9 @@ class Wrong(NamedTuple):
 
 
 @cache
-def episodes(count: int, seed: int, population: str = "reference") -> tuple[Episode, ...]:
+def episodes(robot: str, count: int, seed: int, population: str = "reference") -> tuple[Episode, ...]:
     """Those that are made wrong."""
-    return tuple(draw_episodes(arm("panda"), population, count, 300 + seed, motions=max(6, count // 4)))
+    return tuple(draw_episodes(arm(robot), population, count, 300 + seed, motions=max(6, count // 4)))
 
 
 def simulated(changed: list[Episode]) -> Iterator[Wrong]:
@@ -50,57 +51,63 @@ def simulated(changed: list[Episode]) -> Iterator[Wrong]:
         yield Wrong(logs.run, logs.tare, logs.truth.phi)
 
 
-def sound(population: str, count: int, seed: int) -> Iterator[Wrong]:
+def sound(population: str, robot: str, count: int, seed: int) -> Iterator[Wrong]:
     """Nothing is wrong."""
-    return simulated(list(episodes(count, seed, population)))
+    return simulated(list(episodes(robot, count, seed, population)))
 
 
 # ---------------------------------------------------------------------- the arm and its tare
 
 
-def changed(change: str | float, count: int, seed: int) -> Iterator[Wrong]:
+def changed(change: str | float, robot: str, count: int, seed: int) -> Iterator[Wrong]:
     """The arm was another at its tare, as in tare_drift.py."""
-    return simulated([before(e, change, k) for k, e in enumerate(episodes(count, seed))])
+    return simulated([before(e, change, k) for k, e in enumerate(episodes(robot, count, seed))])
 
 
-def tool_off(hand: bool, count: int, seed: int) -> Iterator[Wrong]:
+def tool_off(hand: bool, robot: str, count: int, seed: int) -> Iterator[Wrong]:
     """A tool was on at the tare and is off in the run: the truth is the payload less the tool, or less the hand."""
-    drawn = episodes(count, seed)
-    tools = [franka_hand() if hand else draw_payload("tools", 900 + seed + k, 0.6 * 3.0) for k in range(count)]
+    drawn, rated = episodes(robot, count, seed), rated_mass(arm(robot))
+    tools = [franka_hand() if hand else draw_payload("tools", 900 + seed + k, 0.6 * rated) for k in range(count)]
     with_tool = simulate_episodes([replace(e, tool=tool) for e, tool in zip(drawn, tools, strict=True)])
     for logs, off, tool in zip(simulate_episodes(drawn), with_tool, tools, strict=True):
         yield Wrong(logs.run, off.tare, logs.truth.phi - tool.parameters.phi)
 
 
-def gain(size: float, each: bool, count: int, seed: int) -> Iterator[Wrong]:
+def gain(size: float, each: bool, robot: str, count: int, seed: int) -> Iterator[Wrong]:
     """The torque's scale is off by a share: by the same of all joints, or by up to so much and a third at least."""
-    for k, log in enumerate(sound("reference", count, seed)):
+    for k, log in enumerate(sound("reference", robot, count, seed)):
         rng = np.random.default_rng([seed, k, 7])
-        by = rng.choice([-1.0, 1.0], 7) * rng.uniform(size / 3.0, size, 7) if each else np.full(7, size)
+        n = log.run.n
+        by = rng.choice([-1.0, 1.0], n) * rng.uniform(size / 3.0, size, n) if each else np.full(n, size)
         run, tare = (replace(x, tau=x.tau * (1.0 + by)) for x in (log.run, log.tare) if x is not None)
         yield Wrong(run, tare, log.truth)
 
 
-def weighed(size: float, each: bool, count: int, seed: int) -> Iterator[Wrong]:
-    """The same, but the arm has a profile of four empty logs of one session, and 2.000 kg were hung on for 20 s."""
-    panda, source = arm("panda"), MotionSource(arm("panda"), 0.0)
-    weight = InertialParameters.from_com(2.0, (0.0, 0.0, 0.08), np.diag([4e-3, 4e-3, 2e-3]))
-    for k, (e, log) in enumerate(zip(episodes(count, seed), gain(size, each, count, seed), strict=True)):
+def weighed(size: float, each: bool, robot: str, count: int, seed: int) -> Iterator[Wrong]:
+    """The same, but the arm has a profile of four empty logs of one session, and a weight was hung on for 20 s.
+
+    It weighs two thirds of what the arm is rated for, 2.000 kg of a Panda's 3, and is known to 2 g.
+    """
+    known_arm, source = arm(robot), MotionSource(arm(robot), 0.0)
+    mass, n = WEIGHT * rated_mass(known_arm), known_arm.n
+    weight = InertialParameters.from_com(mass, (0.0, 0.0, 0.08), mass * np.diag([2e-3, 2e-3, 1e-3]))
+    drawn = episodes(robot, count, seed)
+    for k, (e, log) in enumerate(zip(drawn, gain(size, each, robot, count, seed), strict=True)):
         rng, around = np.random.default_rng([seed, k, 7]), source.centre(e.motion)
-        by = rng.choice([-1.0, 1.0], 7) * rng.uniform(size / 3.0, size, 7) if each else np.full(7, size)
+        by = rng.choice([-1.0, 1.0], n) * rng.uniform(size / 3.0, size, n) if each else np.full(n, size)
         motions = [source.draw("long", rng, 20.0, f"{k}-{i}", around, 0.3) for i in range(5)]
         runs = [Run(motion, None, e.world, e.sensors, e.seed + i, e.gains) for i, motion in enumerate(motions)]
         runs[-1] = replace(runs[-1], payload=weight)
-        logs = simulate_many(panda, runs, rate=RATE, duration=20.0, workers=1, resolution=COARSE)
+        logs = simulate_many(known_arm, runs, rate=RATE, duration=20.0, workers=1, resolution=COARSE)
         *empty, loaded = (replace(x, tau=x.tau * (1.0 + by)) for x in logs)
-        known = learn_profile(panda, empty, sessions=[0] * len(empty))
-        yield Wrong(log.run, None, log.truth, with_known_weight(known, panda, loaded, 2.0, 0.002))
+        known = learn_profile(known_arm, empty, sessions=[0] * len(empty))
+        yield Wrong(log.run, None, log.truth, with_known_weight(known, known_arm, loaded, mass, 0.002))
 
 
-def tilted(degrees: float, tared: bool, count: int, seed: int) -> Iterator[Wrong]:
+def tilted(degrees: float, tared: bool, robot: str, count: int, seed: int) -> Iterator[Wrong]:
     """The base leans, in any direction, and nobody said so: at the tare and in the run."""
     leaning = []
-    for k, e in enumerate(episodes(count, seed)):
+    for k, e in enumerate(episodes(robot, count, seed)):
         way, angle = np.random.default_rng([seed, k, 8]).uniform(0.0, 2.0 * np.pi), np.radians(degrees)
         gravity = 9.81 * np.array([np.sin(angle) * np.cos(way), np.sin(angle) * np.sin(way), -np.cos(angle)])
         leans = replace(e.arm, gravity=tuple(gravity.tolist()))
@@ -111,14 +118,16 @@ def tilted(degrees: float, tared: bool, count: int, seed: int) -> Iterator[Wrong
 # ---------------------------------------------------------------------- the payload
 
 
-def taken_up(mass: float | None, count: int, seed: int, throughout: bool = False) -> Iterator[Wrong]:
+def taken_up(light: bool, robot: str, count: int, seed: int, throughout: bool = False) -> Iterator[Wrong]:
     """Taken up or put down at once in the middle of the log: the truth is what is held at the end.
 
-    throughout: only those where something is taken up, and it is held from the start: nothing changes.
+    light: it weighs a fifteenth of what the arm is rated for, 0.2 kg of a Panda's 3. throughout: only those where
+    something is taken up, and it is held from the start: nothing changes.
     """
-    for k, (e, log) in enumerate(zip(episodes(count, seed), sound("reference", count, seed), strict=True)):
+    drawn, mass = episodes(robot, count, seed), LIGHT * rated_mass(arm(robot))
+    for k, (e, log) in enumerate(zip(drawn, sound("reference", robot, count, seed), strict=True)):
         rng = np.random.default_rng([seed, k, 3])
-        payload = e.payload if mass is None else body_of(mass, seed + k)
+        payload = body_of(mass, seed + k) if light else e.payload
         when, up = float(rng.uniform(1.5, 4.5)), rng.random() < 0.5
         held = [(0.0, None), (when, payload)] if up else [(0.0, payload), (when, None)]
         if throughout:
@@ -131,13 +140,15 @@ def taken_up(mass: float | None, count: int, seed: int, throughout: bool = False
         yield Wrong(run, log.tare, payload.parameters.phi if up else np.zeros(10))
 
 
-def moving(count: int, seed: int, liquid: bool) -> Iterator[Wrong]:
+def moving(robot: str, count: int, seed: int, liquid: bool) -> Iterator[Wrong]:
     """30 % of the payload's mass hangs on a string of 5–15 cm, or is held by a spring of 1.5–4 Hz, damped by 3–20 %.
 
     The log is that of the rigid payload, and what the moving part does differently is added: the arm's controller is
     stiff. The first moments' truth is that of the part's mean place.
     """
-    for k, (e, log) in enumerate(zip(episodes(count, seed), sound("reference", count, seed), strict=True)):
+    for k, (e, log) in enumerate(
+        zip(episodes(robot, count, seed), sound("reference", robot, count, seed), strict=True)
+    ):
         rng = np.random.default_rng([seed, k, 9])
         frequency = rng.uniform(1.5, 4.0) if liquid else np.sqrt(9.81 / rng.uniform(0.05, 0.15)) / (2.0 * np.pi)
         part = Part(0.3 * log.truth[0], 2.0 * np.pi * frequency, rng.uniform(0.03, 0.2), liquid)
@@ -232,34 +243,38 @@ class Play(NamedTuple):
 # ---------------------------------------------------------------------- another simulator
 
 
-def other_simulator(count: int, seed: int) -> Iterator[Wrong]:
+def other_simulator(robot: str, count: int, seed: int) -> Iterator[Wrong]:
     """Sound logs of an arm that follows its motion exactly, by Pinocchio: other links, friction and pose errors.
 
-    Links differ by 2 % of mass and 2 mm of centre; friction has a Stribeck peak; the pose's torque is that of steps,
-    tanh(2·sin(q_j + a) + cos(2·q_k + b)), of 0.3 % of the effort limit, not the smooth waves of `JointFeatures`.
+    Links differ by 2 % of mass and 2 mm of centre, times the arm's `link_spread`; friction has a Stribeck peak; the
+    pose's torque is that of steps, tanh(2·sin(q_j + a) + cos(2·q_k + b)), of 0.3 % of the effort limit, not the smooth
+    waves of `JointFeatures`. Where torque is motor current, friction is six times as large, and gears lose 2–8 %.
     """
-    panda = arm("panda")
-    for k, e in enumerate(episodes(count, seed)):
+    known = arm(robot)
+    n, effort, spread = known.n, known.limits.effort, known.link_spread
+    rubs, loses = (6.0, (0.02, 0.08)) if known.motor_torque else (1.0, (0.0, 0.0))
+    for k, e in enumerate(episodes(robot, count, seed)):
         rng = np.random.default_rng([seed, k, 11])
-        links = panda.link_parameters * (1.0 + 0.02 * rng.normal(size=(7, 1)))
-        links[:, 1:4] += links[:, :1] * 0.002 * rng.normal(size=(7, 3))
-        actual, effort = panda.with_links(links), panda.limits.effort
-        a, b, other = rng.uniform(0, 2 * np.pi, 7), rng.uniform(0, 2 * np.pi, 7), rng.permutation(7)
-        level, peak = 0.01 * effort * rng.uniform(0.3, 1.0, 7), rng.uniform(0.0, 0.3, 7)
-        offset, viscous = 0.003 * effort * rng.normal(size=7), 0.004 * effort * rng.uniform(0.2, 1.0, 7)
-        logs = []
+        links = known.link_parameters * (1.0 + 0.02 * spread * rng.normal(size=(n, 1)))
+        links[:, 1:4] += links[:, :1] * 0.002 * spread * rng.normal(size=(n, 3))
+        actual = known.with_links(links)
+        a, b, other = rng.uniform(0, 2 * np.pi, n), rng.uniform(0, 2 * np.pi, n), rng.permutation(n)
+        level, peak = 0.01 * rubs * effort * rng.uniform(0.3, 1.0, n), rng.uniform(0.0, 0.3, n)
+        offset, viscous = 0.003 * effort * rng.normal(size=n), 0.004 * rubs * effort * rng.uniform(0.2, 1.0, n)
+        lost, logs = np.random.default_rng([seed, k, 12]).uniform(*loses, n), []
         for part, motion, seconds in ((e.payload, e.motion, 6.0), (None, e.tare_motion, e.tare_duration)):
             t = np.arange(round(seconds * RATE)) / RATE
             q, dq, ddq = motion(t)
             body = actual if part is None else actual.with_payload(InertialParameters(part.parameters.phi))
-            friction = np.tanh(dq / 0.05) * level * (1.0 + peak * np.exp(-((dq / 0.1) ** 2))) + viscous * dq
+            torque = body.torque(q, dq, ddq)
+            size = level * (1.0 + peak * np.exp(-((dq / 0.1) ** 2))) + lost * np.abs(torque)
             steps = 0.004 * effort * np.tanh(2.0 * np.sin(q + a) + np.cos(2.0 * q[:, other] + b))
-            exact = Recording(t, q, dq, body.torque(q, dq, ddq) + friction + steps + offset)
-            logs.append(Sensors.panda(panda).observe(exact, int(rng.integers(1 << 30))))
+            exact = Recording(t, q, dq, torque + np.tanh(dq / 0.05) * size + viscous * dq + steps + offset)
+            logs.append(Sensors.of(known).observe(exact, int(rng.integers(1 << 30))))
         yield Wrong(logs[0], logs[1], e.payload.parameters.phi)
 
 
-CASES: dict[str, Callable[[int, int], Iterator[Wrong]]] = {
+CASES: dict[str, Callable[[str, int, int], Iterator[Wrong]]] = {
     "nothing": partial(sound, "reference"),
     "nothing, everyday motions": partial(sound, "everyday"),
     "nothing, tare elsewhere": partial(sound, "elsewhere"),
@@ -268,8 +283,8 @@ CASES: dict[str, Callable[[int, int], Iterator[Wrong]]] = {
     "nothing, arms beyond": partial(sound, "beyond"),
     "nothing, no tare": partial(sound, "untared"),
     "nothing, another simulator": other_simulator,
-    "taken up or put down": partial(taken_up, None),
-    "the same, 0.2 kg": partial(taken_up, 0.2),
+    "taken up or put down": partial(taken_up, False),
+    "the same, something light": partial(taken_up, True),
     "tare of another arm": partial(changed, "other"),
     "tool off since the tare": partial(tool_off, False),
     "hand off since the tare": partial(tool_off, True),
@@ -284,8 +299,10 @@ CASES: dict[str, Callable[[int, int], Iterator[Wrong]]] = {
     "30 % of the mass swings": partial(moving, liquid=False),
     "30 % of the mass sloshes": partial(moving, liquid=True),
 }
+# Of a Panda alone: its own hand
+PANDAS = ("hand off since the tare",)
 # To compare with: the same logs as in a case, sound
-CONTROLS: dict[str, Callable[[int, int], Iterator[Wrong]]] = {
-    "held throughout": partial(taken_up, None, throughout=True),
-    "held throughout, 0.2 kg": partial(taken_up, 0.2, throughout=True),
+CONTROLS: dict[str, Callable[[str, int, int], Iterator[Wrong]]] = {
+    "held throughout": partial(taken_up, False, throughout=True),
+    "held throughout, something light": partial(taken_up, True, throughout=True),
 }

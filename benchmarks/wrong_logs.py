@@ -1,9 +1,9 @@
 """What is wrong with a log, is it covered or said? Answers to logs of which something is not as identify assumes.
 
-    python benchmarks/wrong_logs.py [--logs 24] [--seed 0] [--cases "tilted;swings"]
-    python benchmarks/wrong_logs.py --again "5,9" --logs 64 --cases "the same, 0.2 kg;held throughout, 0.2 kg"
+    python benchmarks/wrong_logs.py [--robot panda] [--logs 24] [--seed 0] [--cases "old tare;nothing"]
+    python benchmarks/wrong_logs.py --again "5,9" --logs 64 --cases "taken up or put down;held throughout"
 
-Every case takes the same Pandas, payloads and motions (the benchmark's reference population, `armload.lab.episodes`),
+Every case takes the same arms, payloads and motions (the benchmark's reference population, `armload.lab.episodes`),
 with a tare of 20 s and a run of 6 s, makes one thing wrong (`wrong_cases.py`) and asks `armload.identify` as a user
 does. Sound logs are among the cases, twice as many of each: of several populations, and of a second simulator that
 shares nothing with the one the hybrid was trained on but the rigid body.
@@ -11,17 +11,17 @@ shares nothing with the one the hybrid was trained on but the rigid body.
 mass          mean absolute error ± mean half-width [g]
 inside        share of the true values inside their intervals: mass · first moments · inertia
 calibrated    share of the answers that are called calibrated
-covered or said   share of the true values that lie inside, or whose answer is not called calibrated
+covered or said   share of the true values that lie inside, or whose answer is not called calibrated; or refused
 no word       share of the answers that are not called calibrated, and have no note that says why
 
-Cases that are named replace their own among the results. Written to benchmarks/results/wrong_logs.json and a table of
-docs/hybrid.md, after every case; half an hour of one core.
+Cases that are named replace their own among the results. Written to benchmarks/results/wrong_logs_<robot>.json and a
+table of docs/hybrid.md, after every case; half an hour of one core.
 
 With --again, cases are answered with other seeds, to tell chance from fault: how many values are covered or said, with
 Clopper–Pearson intervals (95 %) that take each value, or each log only, for an answer of its own, as the values of a
 log are correlated; all, and those where something is held at the end. *held throughout* are logs of *taken up or put
 down* where something is taken up, but with it held from the start. Cases that are named replace their own in
-benchmarks/results/wrong_logs_again.json.
+benchmarks/results/wrong_logs_again.json, which is of the Panda.
 """
 
 from __future__ import annotations
@@ -35,20 +35,25 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import beta
 from script import RESULTS, ROOT, markdown_table, options, say, write, write_table
-from wrong_cases import CASES, CONTROLS, Wrong
+from wrong_cases import CASES, CONTROLS, PANDAS, Wrong
 
-from armload import arm, identify
+from armload import Arm, arm, identify
+from armload.errors import RecordingError
 
 GROUPS = (slice(0, 1), slice(1, 4), slice(4, 10))
 NAMES = ("mass", "first moments", "inertia")
 
 
-def answered(logs: Iterable[Wrong]) -> dict[str, Any]:
+def answered(known: Arm, logs: Iterable[Wrong]) -> dict[str, Any]:
     """What is said of the logs of a case."""
     error, half, inside, calibrated, silent, notes = [], [], [], [], [], {}
-    panda = arm("panda")
+    refused = 0
     for log in logs:
-        answer = identify(log.run, panda, tare=log.tare, profile=log.profile)
+        try:
+            answer = identify(log.run, known, tare=log.tare, profile=log.profile)
+        except RecordingError as reason:
+            refused, notes = refused + 1, notes | {f"refused: {str(reason)[:60]}": 1}
+            continue
         error.append(np.abs(answer.phi - log.truth))
         half.append(0.5 * (answer.phi_high - answer.phi_low))
         inside.append((log.truth >= answer.phi_low) & (log.truth <= answer.phi_high))
@@ -57,9 +62,10 @@ def answered(logs: Iterable[Wrong]) -> dict[str, Any]:
         first = answer.notes[0].split(":")[0][:60] if answer.notes and not calibrated[-1] else ""
         notes[first] = notes.get(first, 0) + 1
     held, trusted = np.array(inside), np.array(calibrated)
-    fine = held | ~trusted[:, None]
+    fine = np.vstack([held | ~trusted[:, None], np.ones((refused, 10), bool)])
     return {
-        "logs": len(trusted),
+        "logs": len(fine),
+        "refused": refused,
         "mass error [g]": round(1e3 * float(np.mean(error, axis=0)[0]), 1),
         "half-width [g]": round(1e3 * float(np.mean(half, axis=0)[0]), 1),
         "first moments [g·m]": round(1e3 * float(np.mean(error, axis=0)[1:4].mean()), 2),
@@ -99,7 +105,7 @@ def between(held: float, of: int) -> list[float]:
 def again(name: str, logs: int, seeds: list[int]) -> dict[str, Any]:
     """A case with several seeds, and how sure its shares are."""
     panda, fine, held = arm("panda"), [], []
-    for log in (log for seed in seeds for log in (CASES | CONTROLS)[name](logs, seed)):
+    for log in (log for seed in seeds for log in (CASES | CONTROLS)[name]("panda", logs, seed)):
         answer = identify(log.run, panda, tare=log.tare, profile=log.profile)
         inside = (log.truth >= answer.phi_low) & (log.truth <= answer.phi_high)
         fine.append(inside | (answer.interval != "calibrated"))
@@ -127,20 +133,23 @@ def several(asked: argparse.Namespace) -> None:
 
 
 def main() -> None:
-    asked = options(__doc__, logs=24, seed=0, cases="", again="")
-    chosen = [name for name in CASES if not asked.cases or name in asked.cases.split(";")]
+    asked = options(__doc__, robot="panda", logs=24, seed=0, cases="", again="")
+    known, result = arm(asked.robot), f"wrong_logs_{asked.robot}"
+    there = [name for name in CASES if asked.robot == "panda" or name not in PANDAS]
+    chosen = [name for name in there if not asked.cases or name in asked.cases.split(";")]
     if asked.again:
         several(asked)
         return
-    file = RESULTS / "wrong_logs.json"
+    file = RESULTS / f"{result}.json"
     found = json.loads(file.read_text(encoding="utf-8"))["cases"] if asked.cases and file.exists() else {}
     for name in chosen:
         count = asked.logs * (2 if name.startswith("nothing") else 1)
-        found[name] = answered(CASES[name](count, asked.seed))
+        found[name] = answered(known, CASES[name](asked.robot, count, asked.seed))
         say(f"{name}: {found[name]}")
         found = {name: found[name] for name in CASES if name in found}
-        write("wrong_logs", {"seed": asked.seed, "cases": found})
-        write_table(ROOT / "docs" / "hybrid.md", "wrong logs", table(found))
+        write(result, {"seed": asked.seed, "cases": found})
+        marker = "wrong logs" if asked.robot == "panda" else f"wrong logs of {asked.robot}"
+        write_table(ROOT / "docs" / "hybrid.md", marker, table(found))
 
 
 if __name__ == "__main__":
