@@ -32,7 +32,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
 
 from armload.arms import FRICTION_WIDTH, Arm, momentum_regressor, rated_effort, rated_mass
 from armload.identification.thresholds import (
@@ -131,7 +130,7 @@ def log_odds_of_change(recording: Recording, arm: Arm) -> float:
         _log_evidence(np.hstack([payload * (window < cut), payload * (window >= cut), arms_own]), system.y - system.b)
         for cut in range(1, system.windows)
     ]
-    return float(logsumexp(odds) - np.log(len(odds)) - whole) / _ALIKE
+    return float(np.logaddexp.reduce(odds) - np.log(len(odds)) - whole) / _ALIKE
 
 
 def _log_evidence(A: NDArray[np.float64], y: NDArray[np.float64]) -> float:
