@@ -19,7 +19,8 @@ LOWEST_RATE = GAIN
 # farther from what is found (`inertia.distance_to_body`; test_sound_logs_have_a_body_within_the_error_bars)
 MISFIT = 5.439512702905879  # the 99.9 % quantile of a chi distribution of ten degrees of freedom
 # [of the expected offsets, rms] at most of a sound arm's, whose friction may differ from one way to the other: none of
-# 288 sound simulated logs of UR5e and UR10e is beyond (test_friction_of_one_way_is_no_offset_of_an_arm_s_torque)
+# 384 sound simulated logs of a UR10e is beyond (`benchmarks/wrong_logs.py --robot ur10e`;
+# test_friction_of_one_way_is_no_offset_of_an_arm_s_torque)
 LARGEST_OFFSET = 5.0
 # [effort limits] Coulomb friction that some joint shows of any torque that is measured: the least of two Pandas' large
 # joints is 2.3e-3, of their wrists 2e-2; a model's torque leaves 2e-4
