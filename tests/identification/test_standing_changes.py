@@ -7,11 +7,13 @@ import pytest
 
 from armload import Recording, arm
 from armload.identification import identify
-from armload.identification.notes import MAY_CHANGE
+from armload.identification.notes import MAY_CHANGE, rested
 from armload.identification.standing_changes import changes_at_rest
 from armload.identification.thresholds import MOVES, PRESLIDING
+from armload.motion import random_motion
 from armload.payloads import draw_payload
 from armload.regression import Correction
+from armload.simulation import World, simulate
 
 Q = np.array([0.1, -0.4, 0.2, -1.9, 0.3, 1.7, 0.6])
 RATE, SECONDS = 200.0, 8.0  # [Hz, s]
@@ -113,3 +115,18 @@ def test_an_arm_that_comes_back_to_its_pose_has_another_friction_and_no_payload(
 def test_what_no_payload_explains_is_none(correction):
     turned = np.array([6.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])  # about the vertical: no weight does that
     assert seen([(4.0, 0.0, turned)], correction) == []
+
+
+@pytest.mark.parametrize(("name", "said"), [("ur5e", True), ("panda", False)])
+def test_what_a_motor_s_torque_hardly_shows_while_the_arm_stands_at_the_end_is_said(name, said):
+    robot = arm(name)
+    log = simulate(robot, random_motion(robot, 5, duration=4.0), world=World.real_like(robot, 3), rate=200.0, seed=1)
+    step = np.diff(log.t).mean()
+    stands = Recording(
+        np.r_[log.t, log.t[-1] + step * np.arange(1, 401)],
+        *(np.vstack([part, np.tile(end, (400, 1))]) for part, end in ((log.q, log.q[-1]), (log.dq, 0.0 * log.dq[-1]))),
+        np.vstack([log.tau, np.tile(log.tau[-1], (400, 1))]),
+    )
+    assert rested(log, robot) == ()
+    assert bool(rested(stands, robot)) == said
+    assert any("the arm stands in the last 2." in note for note in rested(stands, robot)) == said

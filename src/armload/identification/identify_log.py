@@ -16,7 +16,7 @@ from armload.errors import IdentificationError
 from armload.identification.answer import Identification, Segment
 from armload.identification.choice import choose
 from armload.identification.found import Asked, found_in
-from armload.identification.notes import MAY_CHANGE, changed_within, learned_from, of_both, paused
+from armload.identification.notes import MAY_CHANGE, changed_within, learned_from, of_both, paused, rested
 from armload.identification.plausibility import check_plausible
 from armload.identification.reporting import answered
 from armload.identification.segments import changes_of_payload
@@ -69,7 +69,8 @@ def identify(
     arm = arm if isinstance(arm, Arm) else arm_named(arm)
     recording = recording if isinstance(recording, Recording) else read_recording(recording, arm)
     tare = tare if tare is None or isinstance(tare, Recording) else read_recording(tare, arm)
-    notes = (*(recording.notes if tare is None else of_both(recording, tare)), *paused(recording))
+    read = recording.notes if tare is None else of_both(recording, tare)
+    notes = (*read, *paused(recording), *rested(recording, arm))
     for log in (recording, tare):
         if log is not None:
             check_usable(log, arm)

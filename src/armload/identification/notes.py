@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
-from armload.identification.thresholds import KNOWN, NOMINAL, PAUSE_SAID
+from armload.identification.thresholds import KNOWN, MOVES, NOMINAL, PAUSE_SAID
 from armload.inertia import NAMES, SHRINK, Z95
 from armload.posterior import KnownCentre, KnownMass
 from armload.posterior.drift import Drift
@@ -212,6 +212,18 @@ def paused(recording: Recording) -> tuple[str, ...]:
     return (
         f"the log pauses {often}for {steps[k]:.1f} s, {recording.t[k] - recording.t[0]:.1f} s after its start: nothing "
         "is known of what was taken up or put down meanwhile; if it is not of one payload, cut it there",
+    )
+
+
+def rested(recording: Recording, arm: Arm) -> tuple[str, ...]:
+    """That an arm stands at the end for as long as an exchange takes, where its torque does not show one."""
+    moved = np.flatnonzero(np.abs(recording.q - recording.q[-1]).max(axis=1) > MOVES)
+    rests = float(recording.t[-1] - recording.t[moved[-1] if moved.size else 0])
+    if not arm.motor_torque or not moved.size or rests < PAUSE_SAID:
+        return ()
+    return (
+        f"the arm stands in the last {rests:.1f} s: what is taken up or put down there hardly shows in the motors' "
+        "torque; let the arm move on after it",
     )
 
 
