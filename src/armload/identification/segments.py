@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import replace
-from functools import cache
+from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -178,9 +178,10 @@ class _Search:
         """When the payload changes while the arm stands."""
         if self.physics.arm.motor_torque:
             return []
-        return changes_at_rest(self.rows.t, self.rows.q, self.rows.r, self.physics.stream.correction, self.coulomb)
+        rows, correction = self.rows, self.physics.stream.correction
+        return changes_at_rest(rows.t, rows.q, rows.r, correction, lambda: self.coulomb)
 
-    @cache  # noqa: B019 - as long as the search
+    @cached_property
     def coulomb(self) -> NDArray[np.float64]:
         """Coulomb friction of the joints (n,) [N·m], as the log and what else is known show it."""
         data = self._data(slice(0, len(self.rows.t)))
