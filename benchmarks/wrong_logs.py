@@ -46,13 +46,13 @@ NAMES = ("mass", "first moments", "inertia")
 
 def answered(known: Arm, logs: Iterable[Wrong]) -> dict[str, Any]:
     """What is said of the logs of a case."""
-    error, half, inside, calibrated, silent, notes = [], [], [], [], [], {}
-    refused = 0
+    error, half, inside, calibrated, silent, notes, refused = [], [], [], [], [], {}, 0
     for log in logs:
         try:
             answer = identify(log.run, known, tare=log.tare, profile=log.profile)
         except RecordingError as reason:
-            refused, notes = refused + 1, notes | {f"refused: {str(reason)[:60]}": 1}
+            first = f"refused: {str(reason)[:60]}"
+            refused, notes[first] = refused + 1, notes.get(first, 0) + 1
             continue
         error.append(np.abs(answer.phi - log.truth))
         half.append(0.5 * (answer.phi_high - answer.phi_low))

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from armload import Recording, arm
+from armload import Recording, arm, read_recording
 from armload.identification import identify
 from armload.identification.notes import MAY_CHANGE, rested
 from armload.identification.standing_changes import changes_at_rest
 from armload.identification.thresholds import MOVES, PRESLIDING
 from armload.motion import random_motion
 from armload.payloads import draw_payload
+from armload.posterior import SmoothPosteriorLeastSquares
 from armload.regression import Correction
 from armload.simulation import World, simulate
 
@@ -130,3 +131,15 @@ def test_what_a_motor_s_torque_hardly_shows_while_the_arm_stands_at_the_end_is_s
     assert rested(log, robot) == ()
     assert bool(rested(stands, robot)) == said
     assert any("the arm stands in the last 2." in note for note in rested(stands, robot)) == said
+
+
+def test_the_torque_of_a_real_ur10e_changes_while_it_stands_and_holds_the_same(real_data):
+    """As a payload would change it: why motor currents are not asked."""
+    robot = arm("ur10e")
+    log = read_recording(real_data / "ur10e_loaded_2805g.csv", robot)
+    physics = SmoothPosteriorLeastSquares(robot)
+    rows = physics.stream.regression().rows(log.t, log.q, log.dq, log.tau)
+    correction = physics.stream.correction
+    coulomb = 0.05 * correction.effort  # what is expected of gears
+    assert changes_at_rest(rows.t, rows.q, rows.r, correction, lambda: coulomb)
+    assert len(identify(log, robot).segments) == 1

@@ -15,8 +15,9 @@ Of something light the mass shows first: with a prior on its moments that lets i
 chi-squared of one. Where there is a tare or a profile it raises a doubt, but makes no cut: what an arm does wrong in
 half a second looks like a weight, too (a real Panda's).
 
-Which cuts come into question is asked of a model with fewer smooth functions, all cuts of one solution
-(`cut_scan.py`); T, which decides, is of the whole model at the likeliest of them.
+While the arm stands, what it takes up is found by the torque of that pose (`standing_changes.py`); cuts are sought
+between those changes. Which cuts come into question is asked of a model with fewer smooth functions, all cuts of one
+solution (`cut_scan.py`); T, which decides, is of the whole model at the likeliest of them.
 """
 
 from __future__ import annotations

@@ -14,8 +14,8 @@ prior Δphi ~ N(0, P),
 
 is what a payload explains of Δr: chi-squared of three where there is none, as a pose at rest tells the mass and two
 moments. Beyond its 99.9 % quantile there is one, if it explains more than it leaves. Torque of the motor's side is not
-asked: stiction, or a brake, holds what is taken up, and lets go of what is not (a real UR10e's torque changes five
-times in its last standstill, in which nothing is done).
+asked: stiction, or a brake, holds what is taken up, and lets go of what is not
+(test_the_torque_of_a_real_ur10e_changes_while_it_stands_and_holds_the_same).
 """
 
 from __future__ import annotations
@@ -43,6 +43,7 @@ class _Rests(NamedTuple):
     """Rows of a log: t (M,), q (M, n), r (M, n); begin (M,): the first row of the mean that ends at a row.
 
     settled: (M,) whether the arm has stood for as long as a mean before it begins, and the lags hold nothing else.
+    correction, coulomb: as `changes_at_rest` has them.
     """
 
     t: NDArray[np.float64]
@@ -50,20 +51,51 @@ class _Rests(NamedTuple):
     r: NDArray[np.float64]
     begin: NDArray[np.int64]
     settled: NDArray[np.bool_]
+    correction: Correction
+    coulomb: Callable[[], NDArray[np.float64]]
 
     @classmethod
-    def of(cls, t: NDArray[np.float64], q: NDArray[np.float64], r: NDArray[np.float64]) -> _Rests:
+    def of(
+        cls,
+        t: NDArray[np.float64],
+        q: NDArray[np.float64],
+        r: NDArray[np.float64],
+        correction: Correction,
+        coulomb: Callable[[], NDArray[np.float64]],
+    ) -> _Rests:
+        """Of a log's rows."""
         row = np.arange(len(t))
         turned = np.abs(q - q[np.searchsorted(t, t - _REST)]).max(axis=1)
         moved = np.maximum.accumulate(np.where(turned > STILL, row, -1))
         fresh = np.maximum.accumulate(np.where(np.diff(t, prepend=-np.inf) > GAP, row, 0))
         since = t - np.where(moved > fresh, t[moved], t[fresh] + _WINDOW)
-        return cls(t, q, r, np.searchsorted(t, t - _WINDOW), since > 2.0 * _WINDOW)
+        return cls(t, q, r, np.searchsorted(t, t - _WINDOW), since > 2.0 * _WINDOW, correction, coulomb)
 
     def mean(self, row: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """r (n,) before a row, and the variance of that mean: one lag is one value."""
         some = self.r[self.begin[row] : row + 1]
         return some.mean(axis=0), some.var(axis=0) / (_WINDOW * GAIN)
+
+    def change(self, one: int, other: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Δr (n,) of two rows, and the diagonal of D (n,) without friction."""
+        (r, noise), (more, noise_then) = self.mean(one), self.mean(other)
+        return more - r, self.correction.daily_std[: self.correction.arm.n] ** 2 + noise + noise_then
+
+    def is_changed(self, before: int, now: int, turned: NDArray[np.float64]) -> bool:
+        """Whether another payload explains what the torque is now, the joints having turned so far since (n,) [rad]."""
+        difference, own = self.change(before, now)
+        if np.sum(difference**2 / own) <= CHANGED_AT_REST:  # whatever explains it
+            return False
+        own = own + (2.0 * self.coulomb() * np.minimum(turned / PRESLIDING, 1.0)) ** 2
+        arm, still = self.correction.arm, np.zeros((1, self.correction.arm.n))
+        W = payload_regressor(arm.frame_motion(self.q[now][None]), still, still)[0] * solution_prior_std(arm)
+        left = float(difference @ np.linalg.solve(np.diag(own) + W @ W.T, difference))
+        return float(np.sum(difference**2 / own)) - left > max(CHANGED_AT_REST, left)
+
+    def goes_on(self, row: int) -> bool:
+        """Whether the torque is not what it was a mean before."""
+        difference, own = self.change(int(self.begin[row]), row)
+        return bool(np.any(difference**2 > own))
 
 
 def changes_at_rest(
@@ -79,7 +111,7 @@ def changes_at_rest(
         t, q, r: rows: times (M,), joint angles (M, n) [rad], what the bare arm does not explain (M, n) [N·m].
         correction: of the arm. coulomb: finds its Coulomb friction (n,) [N·m], and is asked where it matters.
     """
-    rests, hop, out = _Rests.of(t, q, r), max(int(_HOP / max(np.median(np.diff(t)), 1e-9)), 1), []
+    rests, hop, out = _Rests.of(t, q, r, correction, coulomb), max(int(_HOP / max(np.median(np.diff(t)), 1e-9)), 1), []
     rows = np.flatnonzero(rests.settled)[::hop]
     reference, seen, turned = -1, -1, np.zeros(correction.arm.n)
     k = 0
@@ -90,44 +122,13 @@ def changes_at_rest(
         seen = row
         if reference < 0 or turned.max() > MOVES:
             reference, turned = row, np.zeros(correction.arm.n)
-        elif _is_changed(rests, reference, row, turned, correction, coulomb):
-            while k + 1 < len(rows) and _goes_on(rests, int(rows[k]), correction):
+        elif rests.is_changed(reference, row, turned):
+            while k + 1 < len(rows) and rests.goes_on(int(rows[k])):
                 k += 1
             out += _between(rests, reference, int(rows[k]))
             reference, seen, turned = int(rows[k]), int(rows[k]), np.zeros(correction.arm.n)
         k += 1
     return out
-
-
-def _own(rests: _Rests, one: int, other: int, correction: Correction) -> tuple[NDArray[np.float64], ...]:
-    """Δr (n,) of two rows, and the diagonal of D (n,) without friction."""
-    (r, noise), (more, noise_then) = rests.mean(one), rests.mean(other)
-    return more - r, correction.daily_std[: correction.arm.n] ** 2 + noise + noise_then
-
-
-def _is_changed(
-    rests: _Rests,
-    before: int,
-    now: int,
-    turned: NDArray[np.float64],
-    correction: Correction,
-    coulomb: Callable[[], NDArray[np.float64]],
-) -> bool:
-    """Whether another payload explains what the torque is now."""
-    difference, own = _own(rests, before, now, correction)
-    if np.sum(difference**2 / own) <= CHANGED_AT_REST:  # whatever explains it
-        return False
-    own = own + (2.0 * coulomb() * np.minimum(turned / PRESLIDING, 1.0)) ** 2
-    arm, still = correction.arm, np.zeros((1, correction.arm.n))
-    W = payload_regressor(arm.frame_motion(rests.q[now][None]), still, still)[0] * solution_prior_std(arm)
-    left = float(difference @ np.linalg.solve(np.diag(own) + W @ W.T, difference))
-    return float(np.sum(difference**2 / own)) - left > max(CHANGED_AT_REST, left)
-
-
-def _goes_on(rests: _Rests, row: int, correction: Correction) -> bool:
-    """Whether the torque is not what it was a mean before."""
-    difference, own = _own(rests, int(rests.begin[row]), row, correction)
-    return bool(np.any(difference**2 > own))
 
 
 def _between(rests: _Rests, before: int, after: int) -> list[float]:
