@@ -23,6 +23,7 @@ of one core.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -36,7 +37,7 @@ from armload import arm
 from armload.identification.intervals import Before, phi_interval
 from armload.inertia import determined
 from armload.payloads import draw_payload
-from armload.posterior import Evidence, HybridIdentifier
+from armload.posterior import HybridIdentifier
 from armload.posterior.hybrid import answer, std_under_weak_prior
 from armload.regression import payload_prior_std
 
@@ -92,7 +93,7 @@ def judged(log: Wrong, kind: str, k: int, seed: int) -> Iterator[Judged]:
         own = identifier.evidence()
         for family, phi in payloads(k, seed):
             vector = own.vector + own.information @ (phi - log.truth)
-            trusted = calibration.trusted(Evidence(own.information, vector, own.gain_std, own.traits, own.t, own.kind))
+            trusted = calibration.trusted(replace(own, vector=vector))
             found = answer(trusted, calibration, prior, False)
             std = np.sqrt(np.diag(found.covariance))
             told = determined(std, prior.std, std_under_weak_prior(trusted.information, weak), weak)

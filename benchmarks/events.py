@@ -403,7 +403,9 @@ def main() -> None:
     result: dict[str, Any] = {"seeds_from": asked.seed, "parts": {part: of_part(x) for part, x in found.items() if x}}
     if "early" in parts:
         result["early"] = by_mass(found["early"])
-    result |= {"in_all": in_all(result["parts"]), "reliability": reliability([x for y in found.values() for x in y])}
+    result["reliability"] = reliability([x for y in found.values() for x in y])
+    if set(parts) - {"pushes", "drift", "real", "real_tared", "real_as_is"}:
+        result["in_all"] = in_all(result["parts"])
     if asked.quick or set(parts) != set(PARTS) or asked.seed != SEED:
         print(json.dumps(result, indent=1))
     else:

@@ -77,7 +77,8 @@ def held(robot: Arm, model: HybridModel, records: Records) -> dict[str, NDArray[
         out["hybrid"][k] = np.abs(found.mean - truth) <= half
         P = np.linalg.inv(trusted.information + np.diag(weak**-2))
         alone = P @ trusted.vector
-        out["log alone"][k] = np.abs(alone - truth) <= Z95 * np.sqrt(np.diag(P) + (trusted.gain_std * alone) ** 2)
+        variance = np.diag(P + trusted.of_joints(alone, P)) + (trusted.gain_std * alone) ** 2
+        out["log alone"][k] = np.abs(alone - truth) <= Z95 * np.sqrt(variance)
         told = determined(half / Z95, prior.std, std_under_weak_prior(trusted.information, weak), weak)
         before, reach = Z95 * prior.std, np.minimum(half, Z95 * prior.std)
         low = np.where(told, found.mean - half, np.minimum(prior.mean - before, found.mean - reach))

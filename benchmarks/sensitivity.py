@@ -2,7 +2,7 @@
 
     python benchmarks/sensitivity.py [--only SURE,HOLDS] [--parts streams,logs,tares] [--far] [--page]
 
-The constants are those of `online/thresholds.py` that decide about changes, of `identification/thresholds.py`, three of
+The constants are those of `online/thresholds.py` that decide about changes, of `identification/thresholds.py`, four of
 the posterior, and those of a tare's age. Each is set to half and to double, all others as they are; of a probability,
 that of the
 contrary. What changes nothing either way is set to a thousandth and to a thousand times, too: a constant that changes
@@ -63,6 +63,7 @@ GROUPS = {  # home → constants, None: all; what they are tried on
     "online.thresholds": (r"(?s)# -+ the hypotheses.*(?=# -+ notes)", ("streams",)),
     "identification.thresholds": (r"(?s).*", ("logs",)),
     "posterior.problem": (r"(?m)(^#.*\n)*^(_MOTOR_SIDE|GAIN_STD) = .*\n", ("streams", "logs")),
+    "posterior.joint_gains": (r"(?m)(^#.*\n)*^LOAD_LOSS = .*\n", ("streams", "logs")),
     "posterior.hybrid": (r"(?m)(^#.*\n)*^_REMOVED = .*\n", ("streams", "logs")),
     "regression.mismatch": (r"(?m)(^#.*\n)*^DAILY = .*\n", ("tares",)),
     "posterior.drift": (r"(?m)(^#.*\n)*^(TESTED|ALLOWED|CHANGED|SESSION) = .*\n", ("tares",)),

@@ -83,7 +83,8 @@ def answered(
     found = prior.posterior(trusted.information, trusted.vector)
     std = np.sqrt(np.diag(calibration.widened(found, trusted)))
     told = determined(std, prior.std, std_under_weak_prior(trusted.information, weak), weak)
-    beyond = np.maximum((found.mean - truth) ** 2 - (Z95 * trusted.gain_std * found.mean) ** 2, 0.0)
+    scales = (trusted.gain_std * found.mean) ** 2 + np.diag(trusted.of_joints(found.mean, found.covariance))
+    beyond = np.maximum((found.mean - truth) ** 2 - Z95**2 * scales, 0.0)
     share = np.sqrt(beyond / np.diag(found.covariance)) / calibration.width(trusted.t, trusted.kind)
     return Answered(np.abs(found.mean - truth), Z95 * std, told, float(found.mean[0]), share)
 

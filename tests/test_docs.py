@@ -90,6 +90,28 @@ def test_commands_on_the_page_exist(page):
         assert not unknown, f"{page.name}: armload {' '.join(words)}: no option {unknown}"
 
 
+def options_of(script):
+    """The options that a script of the benchmarks declares, by name."""
+    found, tree = set(), ast.parse(script.read_text(encoding="utf-8"))
+    for call in (node for node in ast.walk(tree) if isinstance(node, ast.Call)):
+        name = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
+        if name == "options":
+            found |= {f"--{given.arg.replace('_', '-')}" for given in call.keywords}
+        elif name == "add_argument":
+            found |= {arg.value for arg in call.args if isinstance(arg, ast.Constant)}
+    return found
+
+
+@pytest.mark.parametrize("page", PAGES, ids=page_id)
+def test_scripts_on_the_page_exist_with_their_options(page):
+    for name, words in re.findall(r"benchmarks/(\w+)\.py([^`\n;]*)", page.read_text(encoding="utf-8")):
+        script = ROOT / "benchmarks" / f"{name}.py"
+        assert script.exists(), f"{page.name}: there is no {script.name}"
+        flags = re.findall(r"(?<=\s)--[a-z][\w-]*", words)
+        unknown = [flag for flag in flags if flag not in options_of(script)]
+        assert not unknown, f"{page.name}: {script.name} has no option {unknown}"
+
+
 @pytest.mark.parametrize("page", PAGES, ids=page_id)
 def test_links_on_the_page_lead_somewhere(page):
     text = BLOCK.sub("", page.read_text(encoding="utf-8"))

@@ -214,7 +214,7 @@ def synthetic(mixture):
             Λ = np.linalg.inv(R)
             rows.append((Λ, Λ @ seen, 0.0, traits, t, episode % 2, truth, episode, "synthetic"))
     columns = [np.array([row[k] for row in rows]) for k in range(9)]
-    return Records(*columns)
+    return Records(*columns, np.zeros((len(rows), 0, 10, 10)))
 
 
 def half_widths(calibration, records, prior):

@@ -1,6 +1,6 @@
 """What a bound comes to on an arm that differs from its model: the half-width that most such arms stay within.
 
-    h_i² = min(f_i·b_i, p_i)² + (1.96·γ·max(|phi_i|, m·l_i))²,      γ² = gain² + loss²,   l = (1, L, L²)
+    h_i² = min(f_i·b_i, p_i)² + (1.96·γ·max(|phi_i|, m·l_i))²,      γ² = gain² + s²,   l = (1, L, L²)
 
 b is the bound's half-width, p that of what was known before, phi the heaviest payload of the range, parameter by
 parameter, m its mass. The bound is of the stated model, and the estimator gives wider intervals for reasons that no
@@ -10,8 +10,9 @@ motion changes, none of which the bound knows:
   bound doubles where the empty run is at the place
 - trust: the calibrated method widens by what it learned of arms unlike their models, 1.5 to 2.2 times on motor currents
 - the load: torque is calibrated to so many per cent, and the payload is known no better; of what it adds gears lose a
-  share that an empty run does not show. As each joint has its own, both reach the moments by a lever L, the one of the
-  wrist's joints, and the inertias by its square, wherever the payload's centre is
+  share that an empty run does not show, so that on motor currents each joint has a scale of its own, s² = gain² + loss²
+  (`posterior.joint_gains`; behind the gears s is 0). It reaches the moments by a lever L, the one of the wrist's
+  joints, and the inertias by its square, wherever the payload's centre is
 
 The first two are the factors f, stated priors: 90 % quantiles over simulated worlds of the estimator's half-width over
 the bound's, without the load's share, the largest of several designs (`benchmarks/designed_motions.py`). loss and L are
@@ -30,6 +31,7 @@ from numpy.typing import NDArray
 from armload.excitation.criterion import Criterion
 from armload.excitation.payload_range import PayloadRange
 from armload.inertia import Z95
+from armload.posterior.joint_gains import LOAD_LOSS, scale_of_joints
 from armload.posterior.problem import assumed_gain
 
 # [1] f of mass, moments and inertias, by the side of the torque and by the empty run: the loaded run's own motion, a
@@ -42,7 +44,6 @@ _FACTORS = {
     ("motor", "own"): (8.0, 6.5, 4.0),
     ("motor", None): (7.0, 6.5, 1.2),
 }
-_LOSS = {"link": 0.0, "motor": 0.017}  # [1] of the load, 1 sigma, that gears keep to themselves. Stated, see above
 _LEVER = {"link": 0.13, "motor": 0.27}  # [m] L. Stated, see above
 
 
@@ -55,10 +56,10 @@ def promised(criterion: Criterion, bound: NDArray[np.float64], payload: PayloadR
 
 def of_gain(criterion: Criterion, payload: PayloadRange) -> NDArray[np.float64]:
     """The share (10,) of it that calibration and gears leave of the heaviest payload, whatever the motion."""
-    side = _side(criterion)
+    side, gain = _side(criterion), gain_std(criterion)
     lever = payload.mass * np.repeat([1.0, _LEVER[side], _LEVER[side] ** 2], [1, 3, 6])
     heaviest = np.maximum(np.abs(payload.corners()).max(axis=0), lever)
-    return Z95 * float(np.hypot(gain_std(criterion), _LOSS[side])) * heaviest
+    return Z95 * float(np.hypot(gain, scale_of_joints(gain) if side == "motor" else 0.0)) * heaviest
 
 
 def gain_std(criterion: Criterion) -> float:
@@ -68,8 +69,8 @@ def gain_std(criterion: Criterion) -> float:
 
 def of_gain_in_words(criterion: Criterion) -> str:
     """What that share comes from."""
-    loss = _LOSS[_side(criterion)]
-    gears = f" and gears keep {100 * loss:.2g} % of a load to themselves" if loss else ""
+    motor = _side(criterion) == "motor"
+    gears = f" in all and by joint, and gears keep {100 * LOAD_LOSS:.2g} % of a load to themselves" if motor else ""
     return f"the torque is calibrated to {100 * gain_std(criterion):.2g} %{gears} (1 sigma)"
 
 

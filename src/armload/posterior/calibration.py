@@ -4,7 +4,8 @@
        the evidence is taken as Λ/kappa, h/kappa
     2. the half-width h_i of parameter i has h_i² = (c_i(t)·std_i)² + (1.96·gain·phi_i)², gain being how well the
        torque's scale is known; c_i is such that 95 % of the episodes lie inside, each answered by a bag that has not
-       seen it (cross-conformal prediction), one per time and with or without a tare
+       seen it (cross-conformal prediction), one per time and with or without a tare. Where joints have scales of their
+       own, what those do is added (`joint_gains`)
     3. the inertia's c is smaller by (m/m_0)^(2/3) where the mass m that may be held is below m_0
 
 The first makes widths follow the log at hand, the second makes them hold on average over the episodes they were
@@ -18,7 +19,7 @@ Intelligence 2015 (cross-conformal); Breiman 1996 (bagging).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,13 +76,14 @@ class Calibration:
         """
         kappa = louder * self.kappa(evidence.traits)
         Λ, h = evidence.information / kappa, evidence.vector / kappa
-        return Evidence(Λ, h, evidence.gain_std, evidence.traits, evidence.t, evidence.kind)
+        return replace(evidence, information=Λ, vector=h)
 
     def widened(self, found: MixturePosterior, evidence: Evidence) -> NDArray[np.float64]:
         """Covariance (10, 10) such that ±1.96 standard deviations are the calibrated 95 % interval."""
         width = self.width(evidence.t, evidence.kind)
         width[4:] *= self.narrowing(found)
-        return _spread(found.covariance, found.mean, evidence.gain_std, width / Z95)
+        out = _spread(found.covariance, found.mean, evidence.gain_std, width / Z95)
+        return out + evidence.of_joints(found.mean, found.covariance)
 
     def narrowing(self, found: MixturePosterior) -> float:
         """What is left of the inertia's c: the mass that may be held is the mean and a standard deviation of it."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.inertia.cholesky import factor
+from armload.posterior.joint_gains import spread
 from armload.posterior.scales import Posterior
 from armload.runtime.kernels import kernel
 
@@ -35,10 +36,12 @@ class Evidence:
     """What the logs alone say of a payload, all that is unknown about the arm integrated out.
 
     information, vector: Λ (10, 10) and Λ·phi_ML (10,).
-    gain_std: relative standard deviation of the torque's calibration.
+    gain_std: relative standard deviation of the torque's calibration, one for all joints.
     traits: (T,), named by `TRAITS`.
     t: seconds since the run began.
     kind: index into `KINDS`, what there was to compare with.
+    moved: (n, 10, 10) by what a standard deviation of each joint's own scale moves phi (`posterior.joint_gains`); None:
+        joints have none.
     """
 
     information: NDArray[np.float64]
@@ -47,6 +50,14 @@ class Evidence:
     traits: NDArray[np.float64]
     t: float
     kind: int
+    moved: NDArray[np.float64] | None = None
+
+    def of_joints(self, mean: NDArray[np.float64], covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+        """By how much the joints' own scales widen the covariance (10, 10) of a mean (10,) under a prior.
+
+        covariance: P of that mean, which follows the torque by P·Λ of what it does without a prior.
+        """
+        return spread(None if self.moved is None else covariance @ self.information @ self.moved, mean)
 
     @classmethod
     def of(
@@ -78,7 +89,7 @@ class Evidence:
         information = Λ if into_frame is None else into_frame.T @ Λ @ into_frame
         traits = _traits(information, weak, ratios, float(t), float(tare_time), motor, speed, same)
         kind = 2 if same_motion else int(tare_time > 0)
-        return cls(Λ, vector, posterior.gain_std, traits, float(t), kind)
+        return cls(Λ, vector, posterior.gain_std, traits, float(t), kind, posterior.moved)
 
 
 @kernel

@@ -206,12 +206,13 @@ def without_learned_prior(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Mean (10,) and covariance (10, 10) under a prior N(0, diag(wide²)), what `map-gp` makes of the same evidence.
 
-    P = (Λ + diag(wide)⁻²)⁻¹, m = P·h, covariance P + gain²·m·mᵀ. A learned prior draws the mean to the bodies it knows,
-    so that its mean cannot tell that no body explains the log.
+    P = (Λ + diag(wide)⁻²)⁻¹, m = P·h, covariance P + gain²·m·mᵀ and that of the joints' own scales. A learned prior
+    draws the mean to the bodies it knows, so that its mean cannot tell that no body explains the log.
     """
     P = wide[:, None] * np.linalg.inv(np.eye(10) + wide[:, None] * trusted.information * wide) * wide
     mean = P @ trusted.vector
-    return mean, 0.5 * (P + P.T) + trusted.gain_std**2 * np.outer(mean, mean)
+    gains = trusted.gain_std**2 * np.outer(mean, mean) + trusted.of_joints(mean, P)
+    return mean, 0.5 * (P + P.T) + gains
 
 
 @kernel

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.posterior.elimination import Eliminated, RunInformation, eliminated
+from armload.posterior.joint_gains import moved_by_joint, scale_of_joints, spread
 from armload.posterior.scales import Posterior, Scales
 from armload.posterior.sequential import SequentialPosterior
 from armload.regression import GaussianPrior
@@ -241,9 +242,10 @@ class Problem:
             before = np.linalg.inv(self.root @ self.root.T)
             pull = before @ self.mean[self.last]
         gain = self.correction.gain_std or assumed_gain(self.correction.arm, torque)
+        moved = self._moved(scales, found, gain) if self.correction.arm.motor_torque else None
         return Posterior(
             phi=phi,
-            covariance=self.noise_model.overrated * covariance + gain**2 * np.outer(phi, phi),
+            covariance=self.noise_model.overrated * covariance + gain**2 * np.outer(phi, phi) + spread(moved, phi),
             information=precision - before,
             vector=precision @ phi - pull,
             eta=eta,
@@ -261,9 +263,15 @@ class Problem:
             torque=torque,
             gears=gears,
             gain_std=gain,
+            moved=moved,
             scales=scales,
             ratios=self._ratios(scales, eta),
         )
+
+    def _moved(self, scales: Scales, found: _Gaussian, gain: float) -> NDArray[np.float64]:
+        """By what a scale of its own of each joint moves phi (n, 10, 10), 1 sigma."""
+        run = self.runs[-1], self.selections[-1], scales.noise[-1]
+        return moved_by_joint(*run, found.covariance[self.last], found.slope, scale_of_joints(gain))
 
     def _ratios(self, scales: Scales, eta: NDArray) -> dict[str, NDArray[np.float64]]:
         stated = self.correction.prior_std**2

@@ -52,7 +52,9 @@ class Posterior:
     power: (K, n) mean square of each run's residual [N²·m²].
     torque: "link" or "motor", the side the torque seems to be measured on.
     gears: whether friction of gears is surely in the torque, so that it differs from run to run on a sound arm.
-    gain_std: relative standard deviation of the torque's calibration.
+    gain_std: relative standard deviation of the torque's calibration, one for all joints.
+    moved: (n, 10, 10) by what a standard deviation of each joint's own scale moves phi (`posterior.joint_gains`); None:
+        joints have none.
     scales: what expectation–maximisation found; another solution may start there.
     ratios: the scales (n,) of "noise", "pose", "velocity" and "friction", and the squared offsets ("offset"), over what
         was expected of them, as variances.
@@ -72,5 +74,6 @@ class Posterior:
     torque: str
     gears: bool
     gain_std: float
+    moved: NDArray[np.float64] | None
     scales: Scales
     ratios: dict[str, NDArray[np.float64]]

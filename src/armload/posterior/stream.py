@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from armload.posterior.accumulation import Accumulation
 from armload.posterior.another_arm import FROM, another_arm, apart, found_so_far
 from armload.posterior.drift import ALLOWED, TESTED, Drift, drift_of, drift_since_tare
+from armload.posterior.joint_gains import spread
 from armload.posterior.restless import RESTLESS, restlessness
 from armload.posterior.same_motion import Difference, SameMotion
 from armload.posterior.scales import AnotherArm, Posterior, Scales
@@ -194,7 +195,8 @@ class StreamingPosterior:
     def answer(self, louder: float = 1.0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """phi (10,) and its covariance (10, 10) under the Gaussian prior, as `solve` gives them; noise is `louder`."""
         state, about = self._current, (louder * self.noise.overrated, self.posterior.gain_std**2)
-        return under_prior(state.information, state.vector, *self._gaussian, *about)
+        phi, covariance = under_prior(state.information, state.vector, *self._gaussian, *about)
+        return phi, covariance + spread(self.posterior.moved, phi)
 
     @property
     def _current(self) -> SequentialPosterior:

@@ -42,7 +42,7 @@ class NoiseModel:
 # without features, the smooth mismatch is in the residual: it is large and repeats: 0.2–0.6 % of the effort limit of
 # two Pandas over a block
 RIGID = NoiseModel(residual=4e-3, block=BLOCK, floor=False, novelty=NOVELTY)
-# what is left repeats all the same: errors hardly fall after half a minute (`benchmarks/long_logs.py`), nor may the
+# what is left repeats all the same: errors hardly fall after half a minute (`benchmarks/minute_logs.py`), nor may the
 # information grow for days, until its digits are gone
 SMOOTH = NoiseModel(residual=1e-3, block=0.25, floor=True, novelty=60.0, overrated=2.25)
 

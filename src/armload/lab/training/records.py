@@ -28,6 +28,7 @@ class Records:
 
     information (N, 10, 10), vector (N, 10), gain_std (N,), traits (N, T), t (N,), kind (N,): see `Evidence`.
     truth: (N, 10) what identification was to find. episode: (N,) which episode. group: (N,) what it was drawn from.
+    moved: (N, n, 10, 10) of the evidence; (N, 0, 10, 10) where joints have no scale of their own.
     """
 
     information: NDArray[np.float64]
@@ -39,6 +40,7 @@ class Records:
     truth: NDArray[np.float64]
     episode: NDArray[np.int64]
     group: NDArray[np.str_]
+    moved: NDArray[np.float64]
 
     def __len__(self) -> int:
         return len(self.t)
@@ -49,6 +51,7 @@ class Records:
 
     def evidence(self, k: int) -> Evidence:
         """Row k as the identifier sees it."""
+        moved = self.moved[k]
         return Evidence(
             self.information[k],
             self.vector[k],
@@ -56,6 +59,7 @@ class Records:
             self.traits[k],
             float(self.t[k]),
             int(self.kind[k]),
+            moved if len(moved) else None,
         )
 
     def save(self, path: str | Path) -> Path:
@@ -132,7 +136,8 @@ def _measured(item: tuple[int, Sequence[Episode]], times: tuple[float, ...]) -> 
         for tare, truth in pairs:
             rows += [(e, truth, k, group) for e in evidence_over_time(episode.arm, logs.run, tare, times)]
     evidence = [row[0] for row in rows]
-    columns = {f.name: np.array([getattr(e, f.name) for e in evidence]) for f in fields(Evidence)}
+    columns = {f.name: np.array([getattr(e, f.name) for e in evidence]) for f in fields(Evidence) if f.name != "moved"}
+    columns["moved"] = np.array([np.zeros((0, 10, 10)) if e.moved is None else e.moved for e in evidence])
     truth, number, group = (np.array([row[k] for row in rows]) for k in (1, 2, 3))
     return Records(**columns, truth=truth, episode=number, group=group)
 

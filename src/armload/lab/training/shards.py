@@ -1,8 +1,8 @@
 """Records of very many episodes: what is large of them stays in the files of their chunks, and is read when asked for.
 
-Nine tenths of a record are its information and its vector. A training goes through them row by row, one chunk after
-the other, so that one or two chunks at a time are in memory, however many there are; the rest of a record, some thirty
-numbers, is.
+Nine tenths of a record are its information, its vector and what its joints' scales do. A training goes through them
+row by row, one chunk after the other, so that one or two chunks at a time are in memory, however many there are; the
+rest of a record, some thirty numbers, is.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from armload.errors import ModelError
 from armload.lab.training.records import Records
 
-LARGE = ("information", "vector")
+LARGE = ("information", "vector", "moved")
 _OPEN = 2  # [chunks] in memory: where the next one begins, the last is not yet done with
 
 
@@ -55,7 +55,7 @@ def _chunk(path: str) -> dict[str, NDArray[np.float64]]:
 
 
 def stored_records(paths: Sequence[str | Path], firsts: Sequence[int]) -> Records:
-    """One `Records` of the chunks in some files; information and vector stay there.
+    """One `Records` of the chunks in some files; what is `LARGE` stays there.
 
     Args:
         paths: what `Records.save` wrote. firsts: number of each chunk's first episode.
