@@ -12,6 +12,7 @@ from armload.devices import Detached
 from armload.online import OnlineIdentifier
 from armload.recording import write_recording
 from armload.service import Reconnecting, Session, Unknown
+from armload.service.backoff import Backoff
 from armload.service.reconnecting import STALLED
 from armload.service.transit import Transit
 from armload.service.unknown import Link, why_unknown
@@ -82,6 +83,28 @@ def test_what_cannot_be_opened_is_tried_again_and_ends_when_told(panda, tmp_path
             source.close()
     assert len(seen) == 10
     assert source.why is None
+
+
+def test_a_reason_that_stays_is_said_as_often_as_the_wait_grows_and_then_now_and_then(panda, tmp_path, monkeypatch):
+    monkeypatch.setattr("armload.service.reconnecting.Backoff", lambda: Backoff(0.001, 0.004))
+    said, trials, path = [], [], tmp_path / "none.csv"
+
+    def opened():
+        trials.append(None)
+        return Detached(str(path), panda)
+
+    source = Reconnecting(opened, said=said.append, name="arm", n=7)
+    for _ in source.ticking(0.001):
+        if len(trials) == 10:
+            break
+    assert len(said) == 3  # 1, 2 and 4 ms
+    assert all("none.csv" in text for text in said)
+    monkeypatch.setattr("armload.service.reconnecting.REMINDED", 0.0)
+    for _ in source.ticking(0.001):
+        if len(trials) == 13:
+            break
+    source.close()
+    assert len(said) >= 5
 
 
 @pytest.mark.parametrize("step", [-100.0, 100.0])

@@ -15,6 +15,8 @@ from armload.service.transit import Transit
 
 STALLED = 3.0  # [s] without a sample after which the connection counts as lost: two lost TCP packets cost three
 BEHIND = 1.0  # [s] a sample may wait before the newest takes its place: saving a state takes a tenth
+# [s] between two words of a reason that stays: a robot that is off over the weekend is tried twelve times a minute
+REMINDED = 600.0
 
 
 class Reconnecting(Source):
@@ -57,6 +59,7 @@ class Reconnecting(Source):
         self._made: Detached | Exception | None = None  # by the trial
         self._lost, self._late, self._gone = 0, 0.0, threading.Event()
         self._transit, self._backoff = Transit(), Backoff()
+        self._told: tuple[str, float, float] | None = None  # the last reason, the wait then, and when [s, monotonic]
         if first is not None:
             self._take(first)
 
@@ -119,7 +122,7 @@ class Reconnecting(Source):
                 return
             self.state, self.why = "lost", stopped
             wait = self._backoff.failed(time.monotonic() - began)
-            self._said(f"{stopped}; it is opened again in {wait:.1f} s")
+            self._tell(stopped, wait, "opened")
             yield from self._let_go(wait, tick)
 
     def close(self) -> None:
@@ -177,8 +180,15 @@ class Reconnecting(Source):
         else:
             self.state, self.why = "lost", str(made)
             wait = self._backoff.failed(0.0)
-            self._said(f"{made}; it is tried again in {wait:.1f} s")
+            self._tell(self.why, wait, "tried")
             yield from self._waited(wait, tick)
+
+    def _tell(self, why: str, wait: float, what: str) -> None:
+        """Say why it is lost, as often as the wait grows, and then every `REMINDED`."""
+        now = time.monotonic()
+        if self._told is None or self._told[:2] != (why, wait) or now - self._told[2] >= REMINDED:
+            self._told = why, wait, now
+            self._said(f"{why}; it is {what} again in {wait:.1f} s")
 
     def _waited(self, wait: float, tick: float) -> Iterator[None]:
         until = time.monotonic() + wait
