@@ -43,6 +43,7 @@ KEYS = [
     "covariance",
     "rests_on_prior",
     "torque_gain_std",
+    "same_arm_assumed",
     "notes",
     "log",
     "date",

@@ -136,6 +136,33 @@ def test_a_file_that_is_no_profile_is_refused_by_name(tmp_path, damage):
         load_profile(path)
 
 
+@pytest.mark.parametrize("where", [0.3, 0.6, 0.95])
+def test_a_file_of_which_a_byte_is_another_is_refused(young, tmp_path, where):
+    path = save_profile(young, tmp_path / "arm.profile")
+    content = bytearray(path.read_bytes())
+    content[int(where * len(content))] ^= 0x10
+    path.write_bytes(content)
+    with pytest.raises(ModelError, match="was altered after it was written"):
+        load_profile(path)
+
+
+@pytest.mark.parametrize(("loaded", "mass"), [((2,), 0.5), pytest.param((0, 2, 4), 1.0, marks=pytest.mark.full)])
+def test_a_payload_in_some_of_the_logs_is_told_and_no_profile_is_made_of_them(panda, life, loaded, mass):
+    """Taken for the arm's, half of it would be missing in every answer."""
+    episode, logs, _ = life
+    held = InertialParameters.from_com(mass, (0.0, 0.0, 0.06), mass * np.diag([2e-3, 2e-3, 1e-3]))
+    rng, source = np.random.default_rng(1), MotionSource(panda, 0.0)
+    around = source.centre(episode.motion)
+    motions = [source.draw("long", rng, SECONDS, f"day {k}", around, 0.5) for k in range(DAYS)]
+    worlds = [replace(episode.world, offset=episode.world.offset + OFFSET * rng.normal(size=7)) for _ in motions]
+    mixed = list(logs)
+    for k in loaded:
+        mixed[k] = replace(simulated(panda, [worlds[k]], [motions[k]], held, seed=90 + k)[0], source=f"day{k}.csv")
+    named = "|".join(f"day{k}" for k in loaded) if len(loaded) == 1 else "carries"
+    with pytest.raises(IdentificationError, match=rf"({named}).* kg beside what is mounted in the other logs"):
+        learn_profile(panda, mixed)
+
+
 def test_a_profile_of_another_arm_or_base_is_refused(panda, run, young):
     with pytest.raises(ModelError, match="another arm"):
         identify(replace(run, joint_names=None), arm("fr3"), profile=young)

@@ -13,6 +13,7 @@ from armload.inertia import InertialParameters
 from armload.lab.episodes.motion_kinds import MotionSource
 from armload.payloads import draw_payload
 from armload.posterior import learn_profile, load_profile, save_profile, with_known_weight
+from armload.posterior.torque_gain import common_gain
 from armload.simulation import Run, Sensors, World, simulate_many
 from armload.simulation.resolution import COARSE
 
@@ -90,3 +91,29 @@ def test_another_payload_is_then_found_in_its_own_mass(panda, logs, profile, wei
 def test_a_weight_that_is_none_or_that_the_log_does_not_bear_is_refused(panda, logs, profile, mass, std):
     with pytest.raises(IdentificationError, match="weight"):
         with_known_weight(profile, panda, logs[4], mass, std)
+
+
+def test_a_weight_by_which_all_joints_are_off_alike_is_to_be_weighed_again(weighed):
+    """Joints' sensors are off by some per cent, and not all by the same: 9 % of all is the weight's."""
+    assert common_gain(weighed) is None
+    n = len(GAIN)
+    assert common_gain(replace(weighed, gain=np.full(n, -0.09), gain_joint_std=np.full(n, 0.01))) == pytest.approx(
+        -0.09
+    )
+    assert common_gain(replace(weighed, gain=None)) is None
+
+
+@pytest.mark.full  # some seconds
+@pytest.mark.parametrize("said", [1.5, 0.6])
+def test_a_weight_that_is_far_from_what_was_said_is_refused_on_motor_currents_too(said):
+    """A joint's constant may be off by 12 % (1 sigma), those of all joints alike are not."""
+    robot = arm("ur10e")
+    world, source, rng = World.real_like(robot, 8), MotionSource(robot, 0.0), np.random.default_rng(2)
+    motions = [source.draw("long", rng, 10.0, f"{k}") for k in range(4)]
+    held = InertialParameters.from_com(6.0, (0.0, 0.0, 0.08), np.diag([2e-2, 2e-2, 1e-2]))
+    runs = [Run(motion, held if k == 3 else None, world, Sensors.of(robot), k) for k, motion in enumerate(motions)]
+    logs = simulate_many(robot, runs, rate=100.0, duration=10.0, workers=1, resolution=COARSE)
+    known = learn_profile(robot, logs[:3], sessions=[0] * 3)
+    assert abs(common_gain(with_known_weight(known, robot, logs[3], 6.0, 0.002)) or 0.0) == 0.0
+    with pytest.raises(IdentificationError, match="expected the weight of"):
+        with_known_weight(known, robot, logs[3], 6.0 * said, 0.002)

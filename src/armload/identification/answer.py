@@ -85,6 +85,8 @@ class Identification:
         log; always so of what is not determined.
     torque_gain_std: relative standard deviation of the torque's scale that the intervals allow for: assumed on the
         arm's sheet, or as a known weight showed it (`armload profile --mass`); None: the method knows nothing of it.
+    same_arm_assumed: whether it is taken for granted that tare or profile are of this arm, as nothing tells where
+        friction of gears is in the torque.
     notes: what else the user should know, a sentence each.
     segments: the log's parts, throughout each of which the payload is the same, with their answers; one where it never
         changes. All else is of the last.
@@ -95,8 +97,6 @@ class Identification:
         its tare, or than the profile's; not in the JSON.
     health: the arm itself, as the log shows it, of a method that asks; not in the JSON.
     gain_known: whether a known weight fixed the torque's scale; not in the JSON.
-    same_arm_assumed: whether it is taken for granted that tare or profile are of this arm, as nothing tells where
-        friction of gears is in the torque; not in the JSON.
     """
 
     method: str
@@ -122,6 +122,7 @@ class Identification:
     covariance: NDArray[np.float64]
     rests_on_prior: NDArray[np.bool_]
     torque_gain_std: float | None = None
+    same_arm_assumed: bool = False
     notes: tuple[str, ...] = ()
     segments: tuple[Segment, ...] = field(default=(), metadata={"json": False})
     log: str = ""
@@ -132,7 +133,6 @@ class Identification:
     another: bool = field(default=False, metadata={"json": False})
     health: ArmHealth | None = field(default=None, metadata={"json": False})
     gain_known: bool = field(default=False, metadata={"json": False})
-    same_arm_assumed: bool = field(default=False, metadata={"json": False})
 
     def __post_init__(self) -> None:
         for name, shape in _ARRAYS.items():

@@ -5,7 +5,6 @@ safetensors with JSON in its header, nothing in it is executed when it is read.
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -137,7 +136,7 @@ class HybridModel:
         Raises:
             ModelError: missing, damaged or foreign file, or one of another armload.
         """
-        tensors, text = read_tensors(
+        tensors, header = read_tensors(
             Path(path),
             _HEADER,
             f"no hybrid model at {path}: train one with `armload train --method hybrid`",
@@ -145,7 +144,6 @@ class HybridModel:
             f"{path} is no hybrid model: expected one that armload trained with --method hybrid",
         )
         try:
-            header = json.loads(text)
             if header["format"] != FORMAT or header["traits"] != list(TRAITS):
                 raise ModelError(f"{path} belongs to another version of armload: train it again")
             arm = header["arm"]

@@ -11,7 +11,6 @@ prior.
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from os import PathLike
 from pathlib import Path
@@ -76,7 +75,7 @@ def load_profile(path: str | PathLike[str]) -> Profile:
     Raises:
         ModelError: missing, damaged or foreign file, or one of another armload.
     """
-    tensors, text = read_tensors(
+    tensors, header = read_tensors(
         Path(path),
         _HEADER,
         f"no profile at {path}: learn one with `armload profile`",
@@ -84,7 +83,6 @@ def load_profile(path: str | PathLike[str]) -> Profile:
         f"{path} is no profile of an arm: expected a file that `armload profile` wrote",
     )
     try:
-        header = json.loads(text)
         if header["format"] != FORMAT:
             raise ModelError(f"{path} belongs to another version of armload: learn the profile again")
         arm, n = header["arm"], int(header["arm"]["joints"])

@@ -27,6 +27,7 @@ from armload.errors import IdentificationError
 from armload.posterior.drift import SESSION
 from armload.posterior.problem import Problem
 from armload.posterior.profile import Profile, SessionRecord, attached_mass, fingerprint
+from armload.posterior.profile_agreement import carried, check_agree
 from armload.posterior.profile_session import STATED, log_data, poses, record, with_session, without_drift
 from armload.posterior.scales import Scales
 from armload.posterior.solve import threads
@@ -69,7 +70,8 @@ def learn_profile(
         progress: called as progress(done, total) after every log.
 
     Raises:
-        IdentificationError: no log, or the same measurements twice. ModelError: `known` is of another arm.
+        IdentificationError: no log, the same measurements twice, or a log that carries what the others do not.
+        ModelError: `known` is of another arm.
     """
     if not logs:
         raise IdentificationError("a profile needs at least one log of the arm: found none")
@@ -103,14 +105,17 @@ def check_new(logs: Sequence[Recording], known: Profile | None) -> None:
     Raises:
         IdentificationError: two hold the same measurements, or one and what the profile is learned from.
     """
-    seen = {} if known is None else {digest: one.name for one in known.sessions for digest in one.logs}
+    learned = {} if known is None else {digest: one.name for one in known.sessions for digest in one.logs}
+    seen: dict[str, str] = {}
     for log in logs:
         digest = digest_of(log)
-        if digest in seen:
+        if digest in learned:
             raise IdentificationError(
-                f"{log.source} holds the same measurements as {seen[digest]}, which the profile is learned from: leave "
-                "it out"
+                f"{log.source} holds the same measurements as {learned[digest]}, which the profile is learned from: "
+                "leave it out"
             )
+        if digest in seen:
+            raise IdentificationError(f"{log.source} holds the same measurements as {seen[digest]}: name one of them")
         seen[digest] = log.source
 
 
@@ -144,6 +149,8 @@ def _learned(correction: Correction, parts: list[RegressionData], logs: Sequence
         fit = _fitted(correction, data)
         found.append((*_left_out(correction, data, fit), fit, data))
     _, repeated, fit, data = max(found, key=lambda one: one[0])
+    if len(logs) > 1:
+        check_agree(logs, carried(correction, data, fit.scales, fit.drift, repeated))
     A, b = 0.0, 0.0
     for number in fit.means:
         of = [(part, S) for part, S in zip(data, fit.scales.noise, strict=True) if part.session.number == number]

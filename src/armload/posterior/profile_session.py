@@ -143,7 +143,8 @@ def check_fits(known: Profile, arm: Arm, log: Recording, tool: NDArray[np.float6
     if abs(mass) > HELD * std:
         raise IdentificationError(
             f"{log.source} carries {mass:+.3g} ± {Z95 * std:.2g} kg beside what was mounted in the profile's logs: a "
-            "profile learns from the arm without a payload; leave the log out, or name what was mounted with --tool"
+            "profile learns from the arm without a payload; leave the log out, name what was mounted with --tool, or "
+            "learn a new profile if the arm was repaired"
         )
     if drift.changed or another:
         raise IdentificationError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,8 +14,10 @@ from numpy.typing import NDArray
 from armload.errors import ModelError
 from armload.runtime.atomic import replacing
 
+_DIGEST = "sha256"
 
-def write_tensors(path: Path, tensors: Mapping[str, NDArray], name: str, header: Any, what: str) -> None:
+
+def write_tensors(path: Path, tensors: Mapping[str, NDArray], name: str, header: Mapping[str, Any], what: str) -> None:
     """Write tensors, and a header under its name.
 
     Args:
@@ -29,19 +32,31 @@ def write_tensors(path: Path, tensors: Mapping[str, NDArray], name: str, header:
         path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(path) as part:
             arrays = {key: np.ascontiguousarray(array) for key, array in tensors.items()}
-            part.write_bytes(save(arrays, {name: json.dumps(header)}))
+            signed = {**header, _DIGEST: digest(arrays, header)}
+            part.write_bytes(save(arrays, {name: json.dumps(signed)}))
     except OSError as error:
         raise ModelError(f"{what} cannot be written to {path}: {error.strerror}; name a file elsewhere") from None
 
 
-def read_tensors(path: Path, name: str, missing: str, unreadable: str, foreign: str) -> tuple[dict[str, NDArray], str]:
-    """The tensors of a file, and the text of its header.
+def digest(tensors: Mapping[str, NDArray], header: Mapping[str, Any]) -> str:
+    """SHA-256 of a header and of all tensors, by their names."""
+    found = hashlib.sha256(json.dumps(header).encode())
+    for key in sorted(tensors):
+        found.update(f"{key} {tensors[key].dtype} {tensors[key].shape}".encode())
+        found.update(np.ascontiguousarray(tensors[key]).tobytes())
+    return found.hexdigest()
+
+
+def read_tensors(
+    path: Path, name: str, missing: str, unreadable: str, foreign: str
+) -> tuple[dict[str, NDArray], dict[str, Any]]:
+    """The tensors of a file, and its header.
 
     Args:
         name: of the header. missing, unreadable, foreign: what to say where the file is none, or none of ours.
 
     Raises:
-        ModelError: one of these three.
+        ModelError: one of these three, or the file is not as it was written.
     """
     from safetensors import SafetensorError, safe_open
 
@@ -55,4 +70,11 @@ def read_tensors(path: Path, name: str, missing: str, unreadable: str, foreign: 
         raise ModelError(unreadable) from None
     if text is None:
         raise ModelError(foreign)
-    return tensors, text
+    try:
+        header = json.loads(text)
+        said = header.pop(_DIGEST, None)  # files of earlier versions have none
+    except (ValueError, AttributeError, TypeError):
+        raise ModelError(unreadable) from None
+    if said not in (None, digest(tensors, header)):
+        raise ModelError(f"{path} was altered after it was written (its SHA-256 differs): copy it again")
+    return tensors, header

@@ -22,7 +22,7 @@ from armload.arms import Arm, rated_effort
 from armload.errors import IdentificationError
 from armload.inertia import HELD, Z95
 from armload.posterior.elimination import RunInformation, eliminated
-from armload.posterior.problem import Problem, assumed_gain
+from armload.posterior.problem import GAIN_STD, Problem, assumed_gain
 from armload.posterior.profile import Profile
 from armload.posterior.profile_session import log_data
 from armload.posterior.scales import Scales
@@ -36,6 +36,8 @@ from armload.regression.noise import SMOOTH
 # sensor is far off is what a known weight is hung on for. A stated prior
 _WIDE = 6.0
 _STEPS = 3
+# [assumed scales] of all joints together, beyond which rather the weight is not what was said: 6 % of motor constants
+_UNLIKELY = 3.0
 # of the torque, below which no gain is believed to be known: the weight itself moves a little on its hook. Stated
 _LEAST = 1e-3
 
@@ -63,7 +65,10 @@ def with_known_weight(profile: Profile, arm: Arm, log: Recording, mass: float, s
         found = solve(runs, wide, None, SMOOTH, 3, profile.scales)
         phi, mass_std = found.phi, float(np.sqrt(found.covariance[0, 0]))
         side = assumed_gain(arm, found.torque)
-        if abs(phi[0] - mass) > HELD * np.hypot(mass_std, _WIDE * side * mass):
+        seen = data.A[:, :10, :10] / found.scales.noise[-1][:, None, None]
+        # independent gains of the joints that bear it: all of them are seldom off by the same
+        scale = _WIDE * side * float(np.linalg.norm(_shares(arm, seen, phi)))
+        if abs(phi[0] - mass) > HELD * np.hypot(mass_std, scale * abs(phi[0])):
             raise IdentificationError(
                 f"{log.source} carries {phi[0]:.4g} ± {Z95 * mass_std:.2g} kg by the profile: expected the weight of "
                 f"{mass:.4g} kg that is known; check what was hung on, and what was mounted in the profile's logs"
@@ -72,14 +77,29 @@ def with_known_weight(profile: Profile, arm: Arm, log: Recording, mass: float, s
         gamma, C = np.zeros(arm.n), np.zeros((arm.n, arm.n))  # found in the first step
         for _ in range(_STEPS):
             phi, gamma, C = _solved(problem, found.scales, phi, mass, max(std, 1e-6), _WIDE * side)
-    seen = data.A[:, :10, :10] / found.scales.noise[-1][:, None, None]
-    # what each joint's gain does to the mass: d ln m / d gamma_j, 1 in all
-    total = np.linalg.inv(seen.sum(axis=0) + np.diag(payload_prior_std(arm) ** -2.0))
-    weight = (total @ (seen @ phi).T)[0] / mass
+    weight = _shares(arm, seen, phi)
     share = float(np.sqrt(SMOOTH.overrated * weight @ C @ weight + (std / mass) ** 2))
     each = np.sqrt(SMOOTH.overrated * np.diag(C) + (std / mass) ** 2)
     each = np.minimum(each, _WIDE * side)  # no more than before the weight was hung on
     return replace(profile, gain=gamma, gain_std=max(share, _LEAST), gain_joint_std=np.maximum(each, _LEAST))
+
+
+def common_gain(profile: Profile) -> float | None:
+    """By how much the torque of all joints is off by a known weight, where that is seldom so of an arm; else None.
+
+    The mean of the joints' gains, each weighed by how well it is known. Rather, the weight was not what was said.
+    """
+    if profile.gain is None or profile.gain_joint_std is None:
+        return None
+    weights = profile.gain_joint_std**-2.0
+    mean = float(weights @ profile.gain / weights.sum())
+    return mean if abs(mean) > _UNLIKELY * GAIN_STD["motor"] else None
+
+
+def _shares(arm: Arm, seen: NDArray, phi: NDArray) -> NDArray[np.float64]:
+    """d ln m / d gamma_j (n,), what each joint's gain does to the mass, 1 in all; seen: (n, 10, 10) over the noise."""
+    total = np.linalg.inv(seen.sum(axis=0) + np.diag(payload_prior_std(arm) ** -2.0))
+    return (total @ (seen @ phi).T)[0] / phi[0]
 
 
 def _solved(

@@ -192,6 +192,7 @@ def _print(profile: Profile) -> None:
 def _next(profile: Profile) -> tuple[str, ...]:
     """What to record next, and what does not fit."""
     from armload.posterior.drift import CHANGED
+    from armload.posterior.torque_gain import common_gain
 
     advice = [
         f"{Path(session.name).name} does not fit the other sessions (misfit {session.statistic:.0f}): another arm, "
@@ -199,6 +200,12 @@ def _next(profile: Profile) -> tuple[str, ...]:
         for session in profile.sessions
         if session.statistic > CHANGED
     ]
+    common = common_gain(profile)
+    if common is not None:
+        advice.append(
+            f"by the known weight the torque of all joints is off by {100 * common:+.0f} %, more than an arm's is: "
+            "weigh it again; every answer by this profile rests on it"
+        )
     if len(profile.sessions) < 4:
         days = f"{len(profile.sessions)} sessions do not tell how the arm drifts: record it on four days or more"
         advice.append(days)
