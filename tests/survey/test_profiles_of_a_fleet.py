@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from armload.inertia import InertialParameters
 from armload.motion import random_motion
 from armload.posterior import load_profile
 from armload.recording import write_recording
@@ -43,3 +44,24 @@ def test_an_exchanged_arm_is_not_averaged_with_the_one_before(panda, tmp_path, m
     assert exchanged["changed"]
     assert not sound["changed"]
     assert sound["relative_to"] == "profile"
+
+
+def test_a_stretch_that_holds_something_is_left_out_and_the_profile_made_of_the_others(panda):
+    """Three days, one of them with half a kilogram that nobody saw: its number, and a profile of the other two."""
+    world = World.real_like(panda, 3)
+    held = InertialParameters.from_com(0.5, (0.0, 0.0, 0.06), 0.5 * np.diag([2e-3, 2e-3, 1e-3]))
+    logs = [
+        simulate_inverse(
+            panda,
+            random_motion(panda, day, duration=12.0),
+            [(0.0, held if day == 1 else None)],
+            world=world,
+            rate=50.0,
+            seed=day,
+        )
+        for day in range(3)
+    ]
+    profile, apart = learning._of_those_that_agree(panda, logs, None)
+    assert list(apart) == [1]
+    assert "beside what is mounted in the other logs" in apart[1]
+    assert len(profile.sessions) == 2

@@ -27,6 +27,14 @@ from armload.regression.lag import GAIN
 from armload.regression.noise import SMOOTH
 
 
+class DisagreementError(IdentificationError):
+    """A log of a profile carries what the others do not; `log`: its number among them."""
+
+    def __init__(self, message: str, log: int) -> None:
+        super().__init__(message)
+        self.log = log
+
+
 def carried(
     correction: Correction,
     data: Sequence[RegressionData],
@@ -62,15 +70,16 @@ def check_agree(logs: Sequence[Recording], masses: NDArray[np.float64]) -> None:
     """See that no log carries what the others do not; masses as of `carried`.
 
     Raises:
-        IdentificationError: one does; the one that is farthest from the others is named.
+        DisagreementError: one does; the one that is farthest from the others is named.
     """
     mass, std = masses.T
     if not (np.abs(mass) > HELD * std).any():
         return
     k = int(np.argmax(np.abs(mass)))
     told = ", ".join(f"{log.source} {m:+.3g}" for log, m in zip(logs, mass, strict=True))
-    raise IdentificationError(
+    raise DisagreementError(
         f"{logs[k].source} carries {mass[k]:+.3g} ± {Z95 * std[k]:.2g} kg beside what is mounted in the other logs "
         f"(each beside the others: {told} kg): a profile needs the same mounted in all of them; leave out the logs of "
-        "a payload, or name a tool that was mounted with --tool"
+        "a payload, or name a tool that was mounted with --tool",
+        k,
     )

@@ -11,12 +11,17 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm
 from armload.errors import ArmloadError
 from armload.identification import check_usable
 from armload.inertia import NAMES
 from armload.lab.cells import key_of
 from armload.online.thresholds import LEARN_FROM
 from armload.posterior import Profile, check_new, learn_profile, save_profile
+from armload.posterior.profile_agreement import DisagreementError
 from armload.posterior.profile_learning import by_clock
 from armload.posterior.profile_session import check_fits
 from armload.recording import Recording
@@ -114,10 +119,25 @@ def _learned(
         except ArmloadError as error:
             left_out.append(place | {"reason": str(error)})
         if first and k + 1 == min(FIRST, len(chosen)):
-            profile = learn_profile(arm, first, [mounted] * len(first), sessions=by_clock(first))
+            profile, apart = _of_those_that_agree(arm, first, mounted)
+            left_out += [learned[i] | {"reason": reason} for i, reason in apart.items()]
+            learned = [place for i, place in enumerate(learned) if i not in apart]
         elif k + 1 == FIRST:
             return None, learned, left_out
     return profile, learned, left_out
+
+
+def _of_those_that_agree(
+    arm: Arm, logs: Sequence[Recording], mounted: NDArray[np.float64] | None
+) -> tuple[Profile, dict[int, str]]:
+    """The profile of those with the same mounted, and why the others were left out, by their numbers."""
+    kept, apart = list(range(len(logs))), dict[int, str]()
+    while True:
+        some = [logs[i] for i in kept]
+        try:
+            return learn_profile(arm, some, [mounted] * len(some), sessions=by_clock(some)), apart
+        except DisagreementError as error:
+            apart[kept.pop(error.log)] = str(error)
 
 
 def _stretch(row: dict[str, Any], settings: Settings) -> Recording:
