@@ -7,6 +7,14 @@ import pytest
 from armload.runtime.interruption import held_back
 
 
+@pytest.fixture(autouse=True)
+def _interruptible():
+    """Ctrl-C as in a terminal: what a shell has begun in the background ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 def test_an_interruption_that_a_module_would_swallow_comes_afterwards():
     def swallows():
         try:
