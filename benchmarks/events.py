@@ -283,11 +283,16 @@ def by_mass(cells: list[dict[str, Any]]) -> dict[str, Any]:
     return out
 
 
+def is_sound(part: str) -> bool:
+    """Whether nobody pushes and the simulated arm stays as it is."""
+    return part not in ("pushes", "drift") and not part.startswith("real")
+
+
 def in_all(parts: dict[str, Any]) -> dict[str, Any]:
     """Of all simulated parts: changes of 0.2 kg and more within half a second; false events where nobody pushes."""
     which = ("steps", "ramps_0.1", "ramps_0.5", "swaps", "drop", "cycles", *RATES)
     quick = [parts[x] for x in which if x in parts]
-    sound = [x["false"] for name, x in parts.items() if name not in ("pushes", "drift") and not name.startswith("real")]
+    sound = [x["false"] for name, x in parts.items() if is_sound(name)]
     return {
         "missed": share(sum(x["missed"]["count"] for x in quick), sum(x["changes"] for x in quick)),
         "false": per_hour(sum(x["count"] for x in sound), sum(x["hours"] for x in sound)),
@@ -404,7 +409,7 @@ def main() -> None:
     if "early" in parts:
         result["early"] = by_mass(found["early"])
     result["reliability"] = reliability([x for y in found.values() for x in y])
-    if set(parts) - {"pushes", "drift", "real", "real_tared", "real_as_is"}:
+    if any(map(is_sound, parts)):
         result["in_all"] = in_all(result["parts"])
     if asked.quick or set(parts) != set(PARTS) or asked.seed != SEED:
         print(json.dumps(result, indent=1))

@@ -8,12 +8,11 @@ at 200 Hz, without a tare and with one of 20 s on another motion, answered by th
 Goes on from out/minute_logs. Written to benchmarks/results/minute_logs.json and a table of docs/hybrid.md: share of the
 95 % intervals that hold the truth, ± the standard error if a log's ten count as one answer, and mean half-width over
 mean error of mass · first moments · inertia. In the results stand the errors, too, and d ln(error) / d ln(t) from 6 to
-60 s: −0.5 where errors average out, 0 where more of the log tells no more. Half an hour of one core.
+60 s: −0.5 where errors average out, 0 where more of the log tells no more. Five minutes of one core.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -33,13 +32,14 @@ FIRST_SEED = 910_001  # nothing is trained on it
 GROUPS = {"mass": slice(0, 1), "first moments": slice(1, 4), "inertia": slice(4, 10)}
 TARES = ("no tare", "tare")
 MOTIONS = ("harmonics", "long", "point-to-point", "pick-and-place")
-LONG = Recipe(payloads=("boxes", "shapes", "tools", "container"), motions=MOTIONS, duration=TIMES[-1])
+PAYLOADS = ("boxes", "shapes", "tools", "container")
+LONG = Recipe(worlds=("real_like",), payloads=PAYLOADS, motions=MOTIONS, duration=TIMES[-1])
 
 
 @cache
 def episodes(robot: str, count: int) -> list[Episode]:
     """Long episodes on arms that differ from their model as real ones do."""
-    return draw_episodes(arm(robot), replace(LONG, worlds=("real_like",)), count, FIRST_SEED, motions=count)
+    return draw_episodes(arm(robot), LONG, count, FIRST_SEED, motions=count)
 
 
 def answered(

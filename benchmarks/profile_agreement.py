@@ -11,19 +11,18 @@ is named. Written to benchmarks/results/profile_agreement.json and a table of do
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from bodies import body_of
 from script import ROOT, markdown_table, options, say, write, write_table
+from tare_drift import another_day
 
 from armload import Arm, Recording, arm
-from armload.arms import rated_effort, rated_mass
+from armload.arms import rated_mass
 from armload.errors import IdentificationError
 from armload.lab.episodes.motion_kinds import MotionSource
 from armload.posterior import learn_profile
-from armload.regression import Correction
 from armload.simulation import Run, Sensors, World, simulate_many
 from armload.simulation.resolution import COARSE
 
@@ -37,14 +36,6 @@ CASES = {  # which of K logs hold how much of what the arm is rated for
 }
 
 
-def of_a_day(world: World, known: Arm, rng: np.random.Generator) -> World:
-    """The arm on another day: offsets and Coulomb friction differ by what is expected, 1 sigma."""
-    own = 2 * known.n
-    by = rng.normal(size=own) * Correction(known, rated_effort(known)).daily_std[:own]
-    level = np.maximum(world.friction.level + by[known.n :], 0.3 * world.friction.level)
-    return replace(world, offset=world.offset + by[: known.n], friction=replace(world.friction, level=level))
-
-
 def logs_of(known: Arm, number: int, case: str) -> list[Recording]:
     """The logs of one arm's days."""
     which, share = CASES[case]
@@ -55,7 +46,7 @@ def logs_of(known: Arm, number: int, case: str) -> list[Recording]:
     for day in range(days):
         motion = source.draw("long", rng, SECONDS, f"day {day}")
         held = body if day in range(days)[which] else None
-        runs.append(Run(motion, held, of_a_day(world, known, rng), Sensors.of(known), 1000 * number + day))
+        runs.append(Run(motion, held, another_day(world, known, rng), Sensors.of(known), 1000 * number + day))
     return simulate_many(known, runs, rate=100.0, duration=SECONDS, workers=1, resolution=COARSE)
 
 

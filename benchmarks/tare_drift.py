@@ -58,6 +58,15 @@ OLD_SHARE = 0.3 / 87.0  # of the rated torque: the offset of another arm, as of 
 OLD_FRICTION = 0.3
 
 
+def another_day(world: World, known: Arm, rng: np.random.Generator) -> World:
+    """The arm on another day: offsets and Coulomb friction differ by what is expected, 1 sigma."""
+    drift = rng.normal(size=(2, known.n)) * Correction(known, rated_effort(known)).daily_std[: 2 * known.n].reshape(
+        2, -1
+    )
+    level = np.maximum(world.friction.level + drift[1], 0.3 * world.friction.level)
+    return replace(world, offset=world.offset + drift[0], friction=replace(world.friction, level=level))
+
+
 def before(episode: Episode, change: Any, k: int) -> Episode:
     """The episode with a tare of the arm before it changed."""
     world, rng = episode.world, np.random.default_rng([k, 99])
@@ -66,11 +75,7 @@ def before(episode: Episode, change: Any, k: int) -> Episode:
     if change == "other":
         return replace(episode, tare_world=World.real_like(episode.arm, 7000 + k))
     if change == "day":
-        drift = rng.normal(size=(2, episode.arm.n)) * Correction(episode.arm, rated_effort(episode.arm)).daily_std[
-            : 2 * episode.arm.n
-        ].reshape(2, -1)
-        level = np.maximum(world.friction.level + drift[1], 0.3 * world.friction.level)
-        then = replace(world, offset=world.offset + drift[0], friction=replace(world.friction, level=level))
+        then = another_day(world, episode.arm, rng)
     else:
         slips, shifts = {"offsets": (0.0, 1.0), "friction": (1.0, 0.0)}.get(change, (change, change))
         level = world.friction.level * (1.0 + slips * OLD_FRICTION)

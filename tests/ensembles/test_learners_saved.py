@@ -20,12 +20,12 @@ from armload.ensembles import (
     load_model,
     save_model,
 )
-from armload.ensembles.artefact import _digest
 from armload.errors import ArmloadError, IdentificationError, ModelError
 from armload.inertia import InertialParameters
 from armload.motion import MotionFingerprint, random_motion, taie2024
 from armload.online import OnlineIdentifier
 from armload.recording import Recording, Sample
+from armload.runtime.content import content_digest
 
 SMALL = NetworkLearner(hidden=8, max_epochs=2, batch=64)
 ENSEMBLES = {
@@ -190,7 +190,7 @@ def rewritten(path, change, target):
         tensors = {k: file.get_tensor(k).copy() for k in file.keys()}  # noqa: SIM118
     header.pop("sha256")
     change(header, tensors)
-    header["sha256"] = _digest(header, tensors)
+    header["sha256"] = content_digest(header, tensors)
     save_file(tensors, target, {"armload": json.dumps(header)})
     return target
 

@@ -6,7 +6,6 @@ trained on, because a learned payload model is valid for these only.
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import fields
@@ -32,6 +31,7 @@ from armload.inertia import NAMES
 from armload.motion import Motion, MotionFingerprint
 from armload.recording.columns import column_names
 from armload.runtime.atomic import replacing
+from armload.runtime.content import content_digest
 from armload.runtime.version import package_versions
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ def save_model(
     }
     from safetensors.numpy import save
 
-    header["sha256"] = _digest(header, tensors)
+    header["sha256"] = content_digest(header, tensors)
     path = Path(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -144,7 +144,7 @@ def load_model(path: str | PathLike[str]) -> LearnedModel:
         if found != FORMAT:
             raise ModelError(f"{path} has model format {found}: this armload reads {FORMAT}; update armload")
         digest = header.pop("sha256")
-        if digest != _digest(header, tensors):
+        if digest != content_digest(header, tensors):
             raise ModelError(f"{path} was altered after it was saved (its SHA-256 differs): copy it again")
         unknown = [kind for kind in _kinds(header["structure"]) if kind not in _LEAVES and kind not in _BRANCHES]
         if unknown:
@@ -217,10 +217,3 @@ def from_structure(structure: dict[str, Any], prefix: str, tensors: dict[str, ND
 def _kinds(structure: dict[str, Any]) -> list[str]:
     """The types of a tree of parts, its leaves' and its branches'."""
     return [str(structure["type"]), *(kind for part in structure.get("parts", ()) for kind in _kinds(part))]
-
-
-def _digest(header: dict[str, Any], tensors: dict[str, NDArray]) -> str:
-    digest = hashlib.sha256(json.dumps(header, sort_keys=True).encode())
-    for name in sorted(tensors):
-        digest.update(f"{name} {tensors[name].dtype} {tensors[name].shape}".encode() + tensors[name].tobytes())
-    return digest.hexdigest()

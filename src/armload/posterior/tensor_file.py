@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from armload.errors import ModelError
 from armload.runtime.atomic import replacing
+from armload.runtime.content import content_digest
 
 _DIGEST = "sha256"
 
@@ -32,19 +32,10 @@ def write_tensors(path: Path, tensors: Mapping[str, NDArray], name: str, header:
         path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(path) as part:
             arrays = {key: np.ascontiguousarray(array) for key, array in tensors.items()}
-            signed = {**header, _DIGEST: digest(arrays, header)}
+            signed = {**header, _DIGEST: content_digest(header, arrays)}
             part.write_bytes(save(arrays, {name: json.dumps(signed)}))
     except OSError as error:
         raise ModelError(f"{what} cannot be written to {path}: {error.strerror}; name a file elsewhere") from None
-
-
-def digest(tensors: Mapping[str, NDArray], header: Mapping[str, Any]) -> str:
-    """SHA-256 of a header and of all tensors, by their names."""
-    found = hashlib.sha256(json.dumps(header).encode())
-    for key in sorted(tensors):
-        found.update(f"{key} {tensors[key].dtype} {tensors[key].shape}".encode())
-        found.update(np.ascontiguousarray(tensors[key]).tobytes())
-    return found.hexdigest()
 
 
 def read_tensors(
@@ -75,6 +66,6 @@ def read_tensors(
         said = header.pop(_DIGEST, None)  # files of earlier versions have none
     except (ValueError, AttributeError, TypeError):
         raise ModelError(unreadable) from None
-    if said not in (None, digest(tensors, header)):
+    if said not in (None, content_digest(header, tensors)):
         raise ModelError(f"{path} was altered after it was written (its SHA-256 differs): copy it again")
     return tensors, header

@@ -36,7 +36,8 @@ from armload.regression.noise import SMOOTH
 # sensor is far off is what a known weight is hung on for. A stated prior
 _WIDE = 6.0
 _STEPS = 3
-# [assumed scales] of all joints together, beyond which rather the weight is not what was said: 6 % of motor constants
+# [assumed scales] of all joints together, beyond which rather the weight is not what was said: 6 % of motor constants.
+# A stated prior (test_a_weight_by_which_all_joints_are_off_alike_is_to_be_weighed_again)
 _UNLIKELY = 3.0
 # of the torque, below which no gain is believed to be known: the weight itself moves a little on its hook. Stated
 _LEAST = 1e-3
