@@ -60,9 +60,8 @@ OLD_FRICTION = 0.3
 
 def another_day(world: World, known: Arm, rng: np.random.Generator) -> World:
     """The arm on another day: offsets and Coulomb friction differ by what is expected, 1 sigma."""
-    drift = rng.normal(size=(2, known.n)) * Correction(known, rated_effort(known)).daily_std[: 2 * known.n].reshape(
-        2, -1
-    )
+    daily = Correction(known, rated_effort(known)).daily_std[: 2 * known.n].reshape(2, -1)
+    drift = rng.normal(size=(2, known.n)) * daily
     level = np.maximum(world.friction.level + drift[1], 0.3 * world.friction.level)
     return replace(world, offset=world.offset + drift[0], friction=replace(world.friction, level=level))
 
