@@ -1,6 +1,6 @@
 """Where real arms differ from simulated ones: what one model leaves of real logs, and of simulated logs like them.
 
-    ARMLOAD_REAL_DATA=FOLDER python benchmarks/real_residuals.py [--worlds 12]
+    ARMLOAD_REAL_DATA=FOLDER python benchmarks/real_residuals.py [--worlds 12] [--only "Panda;KUKA"]
 
 Each real log's motion is simulated on arms of `World.real_like` and of `World.beyond`, seen by the sensors of the arm's
 sheet at the log's mean rate, and all are fitted alike: the rigid part of `map-gp` alone, and with its smooth features.
@@ -10,31 +10,39 @@ limit where no unit is named; what is compared is the mean over the joints, medi
 noise: white, from second differences. rigid, smooth: rms left of the seconds held out. time: at which the
 autocorrelation of what the rigid fit leaves falls to 1/e [s]; slow: share of its power below 1 Hz. explained: share of
 its variance that the features explain in the seconds held out. coulomb, viscous [per rad/s], offset: of the rigid fit.
-load: share of the torque that the gear loses [%], where torque is motor current. stribeck: mean of what the rigid fit
-leaves against the motion at 0.02–0.08 rad/s over that at 0.2–0.6. reversal: by how much more than the fitted tanh the
-torque steps from 0.1 s before to 0.1 s after a reversal. rest: rms left of joints at rest. asymmetry: half the
-difference of what the rigid fit leaves in the two directions.
+load: share of the torque that a joint loses [%]; behind the gears of a fit of its own that expects up to 8 %, and of
+the joints that bear a quarter of what the one that bears most does. stribeck: mean of what the rigid fit leaves against
+the motion at 0.02–0.08 rad/s over that at 0.2–0.6. reversal: by how much more than the fitted tanh the torque steps
+from 0.1 s before to 0.1 s after a reversal. rest: rms left of joints at rest. asymmetry: half the difference of what
+the rigid fit leaves in the two directions.
+
+Two logs are there once more, real and simulated, with velocities as positions and velocities tell them together
+(`armload.recording.steadied`): noise of the velocities is in what the fits leave, as momentum of the arm.
 
 The KUKA is an LWR 4+ most likely, of which no description is built in: it is fitted as an iiwa14, whose links are free
-within their spread, and the simulated arms are iiwas. No sample of a log is used for anything else.
-Writes benchmarks/results/real_residuals.json, the tables of docs/real_arms.md and docs/pictures/real_residuals.svg.
+within their spread, and the simulated arms are iiwas. No sample of a log is used for anything else. Logs that are named
+replace their own among the results. Writes benchmarks/results/real_residuals.json, the tables of docs/real_arms.md and
+docs/pictures/real_residuals.svg.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from real_logs import data
-from script import ROOT, markdown_table, options, say, write, write_table
+from script import RESULTS, ROOT, markdown_table, options, say, write, write_table
 
 from armload import Arm, InertialParameters, Recording, arm, read_recording
 from armload.arms import rated_effort
 from armload.inertia import nearest_consistent
 from armload.motion import Motion
 from armload.posterior.problem import Problem
+from armload.recording import steadied
 from armload.regression import Correction, FilteredRegression, JointFeatures, solution_prior_std
 from armload.regression.information import RegressionData
 from armload.regression.lag import GAIN
@@ -49,7 +57,12 @@ LOGS = {
     "UR10e, 2.805 kg": ("ur10e_loaded_2805g.csv", "ur10e"),
     "UR10": ("ur10_ros2_bag.db3", "ur10"),
     "KUKA": ("kuka_lwr_100hz.csv", "iiwa14"),
+    "Panda, steadied": ("panda_unloaded_1khz.csv", "panda"),
+    "KUKA, steadied": ("kuka_lwr_100hz.csv", "iiwa14"),
 }
+STEADIED = ", steadied"
+MOST_LOST = 0.08  # of the torque, 1 sigma, where the fit is to tell what joints behind their gears lose
+BEARS = 0.25  # of the largest mean torque of a joint: of one that tells it
 KNOTS = 0.12  # [s] of the spline through a log's positions: slower than its noise, faster than its motion
 PART = 2.0  # [s] of each part that is fitted, or held out
 EVEN = 50.0  # [Hz] at which correlation and spectrum are taken
@@ -150,8 +163,7 @@ def measures(robot: Arm, log: Recording) -> dict[str, NDArray[np.float64]]:
         "viscous": unit * np.abs(whole.eta[2 * n : 3 * n]),
         "offset": unit * np.abs(correction.offset(whole.eta)),
     }
-    if robot.motor_torque:
-        out["load"] = 100.0 * whole.eta[4 * n : 5 * n]
+    out["load"] = 100.0 * (whole.eta[correction.load] if robot.motor_torque else lost(robot, log, settled))
     out["time"], out["slow"] = slowness(rows.t, e)
     against = e * np.sign(dq)
     names = ("stribeck", "asymmetry", "reversal", "rest")
@@ -168,6 +180,14 @@ def measures(robot: Arm, log: Recording) -> dict[str, NDArray[np.float64]]:
         if still.sum() > 50:
             out["rest"][j] = unit[j] * np.sqrt(np.mean(e[still, j] ** 2))
     return out
+
+
+def lost(robot: Arm, log: Recording, settled: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Share of the torque that joints lose behind their gears (n,); nan of joints that bear little."""
+    correction, rows = made(replace(robot, gear_loss=MOST_LOST), log, JointFeatures(robot.n))
+    share = fitted(correction, rows, False, settled).eta[correction.load]
+    bears = np.abs(log.tau).mean(axis=0)
+    return np.where(bears > BEARS * bears.max(), share, np.nan)
 
 
 def slowness(t: NDArray, e: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -221,13 +241,14 @@ def compared(name: str, count: int) -> dict[str, Any]:
     file, which = LOGS[name]
     robot = arm(which)
     log = read_recording(data() / file, robot)
-    real = measures(robot, log)
+    as_read: Callable[[Recording], Recording] = steadied if name.endswith(STEADIED) else lambda log: log
+    real = measures(robot, as_read(log))
     correction, rows = made(robot, log, JointFeatures(robot.n))
     phi = fitted(correction, rows, False, np.ones(len(rows.t), dtype=bool)).phi
     held = InertialParameters(nearest_consistent(phi)) if "kg" in name else None
     out: dict[str, Any] = {"real": {key: listed(x) for key, x in real.items()}}
     for worlds in ("real_like", "beyond"):
-        several = [measures(robot, x) for x in alike(robot, log, worlds, count, held)]
+        several = [measures(robot, as_read(x)) for x in alike(robot, log, worlds, count, held)]
         out[worlds] = {key: [listed(x[key]) for x in several] for key in real}
         say(f"{name}: {worlds} done")
     return out
@@ -275,7 +296,7 @@ def picture(logs: dict[str, Any]) -> None:
     import matplotlib.pyplot as plt
 
     keys = ("noise", "rigid", "smooth", "coulomb", "viscous", "offset", "load", "time", "stribeck", "reversal", "rest")
-    figure, axes = plt.subplots(1, len(logs), figsize=(11, 4.2), sharey=True, layout="constrained")
+    figure, axes = plt.subplots(1, len(logs), figsize=(14, 4.2), sharey=True, layout="constrained")
     for axis, (name, entry) in zip(axes, logs.items(), strict=True):
         for row, key in enumerate(keys):
             if key not in entry["real"]:
@@ -299,8 +320,11 @@ def picture(logs: dict[str, Any]) -> None:
 
 
 def main() -> None:
-    asked = options(__doc__, worlds=12)
-    logs = {name: compared(name, asked.worlds) for name in LOGS}
+    asked = options(__doc__, worlds=12, only="")
+    file, chosen = RESULTS / "real_residuals.json", asked.only.split(";") if asked.only else list(LOGS)
+    found = json.loads(file.read_text(encoding="utf-8"))["logs"] if asked.only else {}
+    found |= {name: compared(name, asked.worlds) for name in chosen}
+    logs = {name: found[name] for name in LOGS if name in found}
     write("real_residuals", {"worlds": asked.worlds, "unit": "1e-3 effort limits", "logs": logs}, None)
     write_table(ROOT / "docs" / "real_arms.md", "real residuals", table(logs))
     picture(logs)

@@ -60,6 +60,8 @@ class Arm:
             of inertia (1 sigma): 1 for an identified model, 10 for nominal figures of unknown quality.
         motor_torque: whether the torque is known to be motor current times a constant, with all of the gear's friction
             in it; where it is not known, each log tells.
+        gear_loss: standard deviation of the share of the torque that a joint rubs away, where torque is measured
+            behind the gears; 0: nothing (`regression.mismatch`).
         torque_gain_std: relative standard deviation of the torque's scale, before a known weight was hung on; None:
             what is usual for a sensor of its side (`posterior.problem.GAIN_STD`).
         known_as: which built-in arm it is, whatever the file that describes it is called.
@@ -76,6 +78,7 @@ class Arm:
     jerk: tuple[float, ...] | None = field(default=None, repr=False)
     link_spread: float = field(default=10.0, repr=False)
     motor_torque: bool = field(default=False, repr=False)
+    gear_loss: float = field(default=0.0, repr=False)
     torque_gain_std: float | None = field(default=None, repr=False)
     known_as: str | None = field(default=None, repr=False)
 

@@ -86,7 +86,7 @@ class RowModel:
         D[:, j, 10 + n + j] = s
         D[:, j, 10 + 2 * n + j] = dq
         Y[:, j, 10 + 3 * n + j] = dq
-        if self.arm.motor_torque:
+        if self.correction.loss_std > 0.0:
             D[:, j, 10 + 4 * n + j] = np.abs(torque - self.correction.least_friction * s) * s
         links = 10 + self._own + TILTS
         Y[:, :, links:], D[:, :, links:] = momentum[:, :, 10:], drift[:, :, 10:]
@@ -113,7 +113,7 @@ class RowModel:
         links = 10 + self._own + TILTS
         out.momentum[:, :, 10:] += Y[:, :, links:]
         out.drift[:, :, 10:] += D[:, :, links:]
-        if self.arm.motor_torque:
+        if self.correction.loss_std > 0.0:
             load, c = D[:, j, 10 + 4 * n + j], self.correction.least_friction
             through = rows.torque - c * s
             sign = np.sign(through)

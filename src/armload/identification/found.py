@@ -26,7 +26,8 @@ from armload.regression import payload_prior_std
 
 # [squared expected deviations, summed over links] that no sound arm with joint torque sensors shows: the 99 % point of
 # chi-squared for a Panda's 70 link parameters, of which a log tells a part. Simulated ones as measured reach 13 (60
-# logs of 12 arms on other seeds, too), those beyond 36, the real Panda 55; a KUKA LWR taken for an iiwa has 180 to 200
+# logs of 12 arms on other seeds, too), those beyond 36, the real Panda 55. A KUKA LWR taken for an iiwa has 180 to 200,
+# but with the noise of its log's velocities taken out 17 to 26: then it is not told
 STRANGE_LINKS = 100.0
 
 

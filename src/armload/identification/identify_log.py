@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,16 +17,27 @@ from armload.errors import IdentificationError
 from armload.identification.answer import Identification, Segment
 from armload.identification.choice import choose
 from armload.identification.found import Asked, found_in
-from armload.identification.notes import MAY_CHANGE, changed_within, learned_from, of_both, paused, rested
+from armload.identification.notes import (
+    ALLOWED,
+    MAY_CHANGE,
+    UNCHECKED,
+    changed_within,
+    learned_from,
+    of_both,
+    paused,
+    rested,
+)
 from armload.identification.plausibility import check_plausible
 from armload.identification.reporting import answered
 from armload.identification.segments import changes_of_payload
 from armload.identification.tare_age import drift_since
-from armload.identification.thresholds import DECISIVE, HEAVIEST, LOWEST_RATE, SETTLED
+from armload.identification.thresholds import DECISIVE, EXPLAINS, HEAVIEST, LOWEST_RATE, SETTLED
 from armload.inertia import HELD, Z95, InertialParameters
 from armload.payloads import INERTIA_ASSUMED, Payload, read_payload
 from armload.posterior import Known, KnownCentre, KnownMass, Profile, load_profile
-from armload.recording import Recording, check_own_measurements, read_recording
+from armload.posterior.drift import CHANGED
+from armload.recording import Recording, check_own_measurements, read_recording, steadied
+from armload.regression.mismatch import LINK_LOSS
 
 
 def identify(
@@ -83,8 +95,45 @@ def identify(
         _check_same_mounted(tare, arm, profile, asked)
     mounted = read_payload(tool) if isinstance(tool, str | Path) else tool
     say("identifying")
+    account = _account(recording, arm, tare, mounted, asked, notes)
+    if account.doubts and not arm.motor_torque:
+        say("asking whether noise of the velocities, or friction that grows with the load, would explain it")
+        rubbing, calmer = replace(arm, gear_loss=LINK_LOSS), None if tare is None else steadied(tare)
+        other = _account(steadied(recording), rubbing, calmer, mounted, asked, (*notes, ALLOWED))
+        if not other.doubts and other.left <= EXPLAINS * max(account.left, 1.0):
+            account = other
+            if tare is None or profile is not None:
+                answer = replace(other.answer, interval="approximate", notes=(*other.answer.notes, UNCHECKED))
+                account = other._replace(answer=answer)
+    answer, own = account.answer, None
+    if profile is not None:
+        own = profile.learned_from(recording) or (None if tare is None else profile.learned_from(tare))
+    return answer if own is None else replace(answer, interval="approximate", notes=(learned_from(own), *answer.notes))
+
+
+class _Account(NamedTuple):
+    """An answer, and what speaks against one payload on the same arm.
+
+    doubts: how many there are, changes within the log counted. left: of what the log leaves unexplained of either, the
+    most, over what raises a doubt.
+    """
+
+    answer: Identification
+    doubts: int
+    left: float
+
+
+def _account(
+    recording: Recording,
+    arm: Arm,
+    tare: Recording | None,
+    mounted: InertialParameters | Payload | None,
+    asked: Asked,
+    notes: tuple[str, ...],
+) -> _Account:
+    """The answer for a log, part by part where the payload changes within it."""
     whole = _of_one_payload(recording, arm, tare, mounted, asked, notes)
-    of_arm = (None, None) if whole.another else (tare, profile)
+    of_arm = (None, None) if whole.another else (tare, asked.profile)
     changes = changes_of_payload(recording, arm, *of_arm, whole.kappa, whole.mass)
     times = changes.times
     edges, answers = [recording.t[0], *times, recording.t[-1]], [whole]
@@ -103,10 +152,9 @@ def identify(
         for (a, b), answer in zip(pairwise(edges), answers, strict=True)
     )
     answer = replace(answers[-1], segments=segments)
-    own = None
-    if profile is not None:
-        own = profile.learned_from(recording) or (None if tare is None else profile.learned_from(tare))
-    return answer if own is None else replace(answer, interval="approximate", notes=(learned_from(own), *answer.notes))
+    misfit = 0.0 if whole.health is None else whole.health.misfit or 0.0
+    doubts = len(times) + changes.doubted + sum(answer.doubts for answer in answers)
+    return _Account(answer, doubts, max(changes.doubt, misfit / CHANGED))
 
 
 def _of_one_payload(

@@ -35,6 +35,18 @@ MAY_CHANGE = (
 )
 
 
+ALLOWED = (
+    "this log fits better with the noise of its velocities taken out and friction that grows with the load allowed "
+    "for: the answer is made so"
+)
+
+
+UNCHECKED = (
+    "the intervals of an answer made so were checked with a tare, and without a profile, only: they may be too narrow; "
+    "record a tare"
+)
+
+
 # a torque that a controller works out, not one that a sensor measures
 COMPUTED = (
     "no joint that moves shows friction, as every torque does that is measured: if tau is computed, a desired or a "

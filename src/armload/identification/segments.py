@@ -81,9 +81,14 @@ class Changes(NamedTuple):
     of_mass: float = 0.0
 
     @property
+    def doubt(self) -> float:
+        """The larger of the two, over what raises a doubt."""
+        return max(self.statistic / PAYLOAD_MAY_CHANGE, self.of_mass / MASS_MAY_CHANGE)
+
+    @property
     def doubted(self) -> bool:
         """Whether the payload may change, by one of the two."""
-        return self.statistic > PAYLOAD_MAY_CHANGE or self.of_mass > MASS_MAY_CHANGE
+        return self.doubt > 1.0
 
 
 def changes_of_payload(

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import FRICTION_WIDTH, Arm
+from armload.arms import FRICTION_WIDTH, Arm, rated_effort
 from armload.errors import IdentificationError
 from armload.posterior.scales import Scales
-from armload.regression import JointFeatures
+from armload.regression import Correction, JointFeatures
 from armload.regression.mismatch import TILTS
 from armload.simulation import Sensors, World
 
@@ -48,12 +48,12 @@ def scales_of(
         )
     features = features or JointFeatures(arm.n)
     friction = np.array([_friction(world) for world in worlds])  # (worlds, 3, n)
-    nominal = World.nominal(arm).links
+    nominal, loses = World.nominal(arm).links, Correction(arm, rated_effort(arm)).loss_std > 0.0
     square = [
         np.mean([world.offset**2 for world in worlds], axis=0),
         *friction[:, :2].var(axis=0),
         np.mean([np.zeros(arm.n) if w.rotor_inertia is None else w.rotor_inertia**2 for w in worlds], axis=0),
-        *([np.var(np.array([world.friction.load for world in worlds]), axis=0)] if arm.motor_torque else []),
+        *([np.var(np.array([world.friction.load for world in worlds]), axis=0)] if loses else []),
         np.zeros(TILTS),
         np.mean([(world.links - nominal) ** 2 for world in worlds], axis=0).ravel(),
     ]

@@ -98,7 +98,7 @@ class PosteriorLeastSquares(Identifier):
         if profile is not None:
             profile.check(arm)
             self._tares.append(profile.data(self._correction, gain, self._noise.block))
-            self._start = profile.scales
+            self._start = profile.start(self._correction)
             self._tare_time += profile.duration
             self.session = profile.session(self._correction)
         if tare is not None:

@@ -138,13 +138,26 @@ class Profile:
         if flange != arm.frame:
             T[:10, :10] = np.array([arm.in_frame(InertialParameters(unit, flange)).phi for unit in np.eye(10)])
             T[:10, :10] = np.linalg.inv(T[:10, :10].T)
-        out.A, out.b, out.noise = T.T @ self.A @ T, self.b @ T, np.ones(self.n)
+        A, b = T.T @ self.A @ T, self.b @ T
+        if self.A.shape[1] < out.A.shape[1]:  # it knows nothing of what joints lose
+            known = np.delete(np.arange(out.A.shape[1]), 10 + np.r_[correction.load])
+            out.A[:, known[:, None], known], out.b[:, known] = A, b
+        else:
+            out.A, out.b = A, b
+        out.noise = np.ones(self.n)
         return out
+
+    def start(self, correction: Correction) -> Scales:
+        """The scales that a log of the arm begins with."""
+        eta = self.scales.eta
+        if len(eta) < correction.size:
+            eta = np.insert(eta, correction.load.start, correction.prior_std[correction.load] ** 2)
+        return replace(self.scales, eta=eta)
 
     def mounted(self, arm: Arm) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """phi_0 (10,) about the arm's frame, what is mounted in the profile's logs, and its covariance (10, 10)."""
         data = self.data(Correction(arm, rated_effort(arm)), GAIN, SMOOTH.block)
-        found = solve([data], payload_prior_std(arm), None, SMOOTH, 1, self.scales)
+        found = solve([data], payload_prior_std(arm), None, SMOOTH, 1, self.start(data.correction))
         return found.phi, found.covariance
 
     def uncertainty(self, q: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ from armload.recording.files import LOG_SUFFIXES, PACKED_SUFFIXES, has_topics, r
 from armload.recording.lerobot import data_set_episodes, is_data_set
 from armload.recording.recording import BLOCK, CHANNELS, GAP, JITTERED, Recording, Sample
 from armload.recording.spooled import blocks, largest, parts_of, span
+from armload.recording.steadied import steadied
 
 __all__ = [
     "BLOCK",
@@ -35,6 +36,7 @@ __all__ = [
     "same_motion",
     "shared_samples",
     "span",
+    "steadied",
     "with_gravity",
     "write_recording",
 ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from html import escape
 from typing import NamedTuple
@@ -145,6 +145,10 @@ class Recording:
     def between(self, start: float, stop: float) -> Recording:
         """The samples with start ≤ t < stop [s], on the recording's own clock."""
         return self.select(slice(*np.searchsorted(self.t, [start, stop]).tolist()))
+
+    def with_velocities(self, parts: Iterable[NDArray[np.float64]]) -> Recording:
+        """The same with other velocities dq (N, n), given in parts that follow each other."""
+        return replace(self, dq=np.concatenate(list(parts)))
 
     def select(self, rows: NDArray | slice) -> Recording:
         """The samples at the given rows (index array, mask or slice)."""

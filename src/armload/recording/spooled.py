@@ -114,6 +114,15 @@ class SpooledRecording(Recording):
         q, dq, tau = (getattr(self, name).within(part) for name in QUANTITIES)
         return replace(self, t=self.t[part], q=q, dq=dq, tau=tau)
 
+    def with_velocities(self, parts: Iterable[NDArray[np.float64]]) -> Recording:
+        """The same with other velocities, which lie on disk, too."""
+        file = _File(None)
+        with open(file.number, "wb", closefd=False) as writer:
+            for part in parts:
+                writer.write(part.tobytes())
+        dq: Any = OnDisk(file, self.n, slice(0, self.n), slice(0, len(self)))
+        return replace(self, dq=dq)
+
     def _in_memory(self, index: NDArray) -> Recording:
         q, dq, tau = (getattr(self, name)[index] for name in QUANTITIES)
         return Recording(self.t[index], q, dq, tau, self.channel, self.joint_names, self.source, self.notes, self.epoch)

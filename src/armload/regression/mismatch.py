@@ -46,6 +46,8 @@ _MOTOR_FRICTION = {"coulomb": 5.0, "viscous": 5.0}
 # [1] prior standard deviation of the share of the torque that a joint's gear loses: 0.04 to 0.07 of a UR10e's in five
 # of its joints (`benchmarks/real_residuals.py`)
 _LOSS = 0.08
+# [1] the same where the torque is measured behind the gears, of an arm that shows a loss at all (`Arm.gear_loss`)
+LINK_LOSS = 0.01
 # [1] standard deviation of the share of its Coulomb friction by which a joint rubs more one way than the other: what
 # moves one way mostly has it as an offset. A stated prior, as of the simulated arms (`simulation/model_error.py`)
 _ONE_WAY = 0.2
@@ -87,14 +89,24 @@ class Correction:
     @property
     def own(self) -> int:
         """How many unknowns, the first ones, are the joints' own: all but the tilt and the links'."""
-        return (len(PER_JOINT) + self.arm.motor_torque) * self.arm.n
+        return (len(PER_JOINT) + (self.loss_std > 0.0)) * self.arm.n
+
+    @property
+    def loss_std(self) -> float:
+        """Prior standard deviation of the share of the torque that a joint loses; 0: it loses nothing."""
+        return _LOSS if self.arm.motor_torque else self.arm.gear_loss
+
+    @property
+    def load(self) -> slice:
+        """Where eta has what the joints lose of the torque; empty where they lose nothing."""
+        return slice(len(PER_JOINT) * self.arm.n, self.own)
 
     @cached_property
     def prior_std(self) -> NDArray[np.float64]:
         """Prior standard deviation of eta (p,), its mean being zero."""
         larger = _MOTOR_FRICTION if self.arm.motor_torque else {}
         per_joint = [fraction * larger.get(name, 1.0) * self.effort for name, fraction in PER_JOINT.items()]
-        loss = np.full(self.own - len(PER_JOINT) * self.arm.n, _LOSS)
+        loss = np.full(self.own - len(PER_JOINT) * self.arm.n, self.loss_std)
         return np.concatenate([*per_joint, loss, np.zeros(TILTS), _link_std(self.arm)])
 
     @property
@@ -155,7 +167,7 @@ class Correction:
         direction = np.tanh(dq / FRICTION_WIDTH)
         momentum = [nothing, nothing, nothing, dq[:, :, None] * eye]
         drift = [nothing + eye, direction[:, :, None] * eye, dq[:, :, None] * eye, nothing]
-        if self.arm.motor_torque:
+        if self.loss_std > 0.0:
             momentum.append(nothing)
             drift.append((np.abs(torque - self.least_friction * direction) * direction)[:, :, None] * eye)
         momentum.append(level)

@@ -1,0 +1,71 @@
+"""Velocities with less noise: what positions and velocities around a moment say of it together.
+
+Within `AROUND` of a sample a joint's motion is a cubic in time, and both channels tell its coefficients,
+
+    q(t + s) = c_0 + c_1·s + c_2·s²/2 + c_3·s³/6 + e_q,      dq(t + s) = c_1 + c_2·s + c_3·s²/2 + e_dq
+
+by least squares, weighted by how noisy each is; c_1 is the velocity. A velocity's noise is in both sides of the
+regression, as momentum of arm and payload: the slower a log is sampled, the less of it the lag takes away, and what
+hardly turns seems to have less inertia than it has, surely.
+
+Sources: local regression, Cleveland, J. Am. Stat. Assoc. 74, 1979 (here of two channels, all of a window alike); bias
+by noise of the regressor: Fuller, Measurement Error Models, 1987.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.recording.recording import GAP, Recording
+from armload.recording.spooled import blocks, parts_of
+
+# [s] to either side: a cubic follows a motion of 2 Hz within 1 % there, and at 100 Hz a third of the noise is left
+# (test_velocities_told_by_both_channels_have_a_third_of_the_noise_and_all_of_the_motion). With 0.05 s half is, and one
+# in six sound logs of a Gen3 stays doubted
+AROUND = 0.075
+_QUIET = 1e-9  # [rad] noise of a channel at least: a joint that stands shows none
+_HELD = 1e-9  # of the weight of one sample: holds what too few samples around do not tell
+
+
+def steadied(recording: Recording) -> Recording:
+    """The same log with the velocities that its positions and velocities tell together; none is told across a gap."""
+    return recording.with_velocities(_velocities(recording))
+
+
+def _velocities(recording: Recording) -> Iterator[NDArray[np.float64]]:
+    """dq a block of samples at a time."""
+    t, n = recording.t, recording.n
+    pieces = np.r_[0, np.cumsum(np.diff(t) > GAP)]
+    weights = np.maximum([_noise(recording.q), AROUND * _noise(recording.dq)], _QUIET) ** -2.0
+    reach = int(np.max(np.searchsorted(t, t + AROUND, side="right") - np.arange(len(t)))) - 1
+    for part in blocks(len(t)):
+        first, stop = max(part.start - reach, 0), min(part.stop + reach, len(t))
+        channels = recording.q[first:stop], AROUND * recording.dq[first:stop]
+        at, rows = t[part], np.arange(part.start, part.stop)
+        A = np.tile((_HELD * weights.sum(axis=0))[:, None, None] * np.eye(4), (len(rows), 1, 1, 1))
+        b = np.zeros((len(rows), n, 4))
+        for away in range(-reach, reach + 1):
+            k = np.clip(rows + away, 0, len(t) - 1)
+            s = (t[k] - at) / AROUND
+            near = (k == rows + away) & (np.abs(s) <= 1.0) & (pieces[k] == pieces[rows])
+            nothing, one = np.zeros_like(s), np.ones_like(s)
+            bases = (one, s, s**2 / 2.0, s**3 / 6.0), (nothing, one, s, s**2 / 2.0)
+            for basis, channel, weight in zip(bases, channels, weights, strict=True):
+                X = near[:, None] * np.stack(basis, axis=1)
+                A += weight[:, None, None] * (X[:, :, None] * X[:, None, :])[:, None]
+                b += (weight * channel[k - first])[:, :, None] * X[:, None, :]
+        yield np.array(np.linalg.solve(A, b[..., None])[:, :, 1, 0] / AROUND, dtype=float)
+
+
+def _noise(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Standard deviation (n,) of white noise in a smooth signal (N, n): its third differences have 20 times the power.
+
+    0 where there are too few samples to tell.
+    """
+    thirds = [np.diff(part, 3, axis=0) for part in parts_of(x) if len(part) > 3]
+    if not thirds:
+        return np.zeros(x.shape[1])
+    return np.sqrt(sum((d**2).sum(axis=0) for d in thirds) / sum(map(len, thirds)) / 20.0)
