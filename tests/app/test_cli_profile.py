@@ -96,8 +96,8 @@ def test_update_adds_a_session_and_refuses_a_payload(folder, profile, capsys, tm
         (["profile", "day0.csv"], "needs --robot"),
         (["profile", "day0.csv", "--robot", "panda", "--out", "none.profile", "--update"], "no profile at"),
         (["profile", "day3.csv", "--robot", "panda", "--out", "arm.profile"], "arm.profile exists: give --update"),
-        (["profile", "day1.csv", "--robot", "panda", "--out", "arm.profile", "--update"], "the same measurements as"),
-        (["profile", "day3.csv", "day3.csv", "--robot", "panda", "--out", "new.profile"], "the same measurements as"),
+        (["profile", "day1.csv", "--robot", "panda", "--out", "arm.profile", "--update"], "holds measurements of"),
+        (["profile", "day3.csv", "day3.csv", "--robot", "panda", "--out", "new.profile"], "holds measurements of"),
         (["identify", "run.csv", "--robot", "panda", "--profile", "none.profile"], "no profile at"),
         (
             ["identify", "run.csv", "--robot", "panda", "--profile", "arm.profile", "--method", "wls"],

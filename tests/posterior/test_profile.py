@@ -100,6 +100,21 @@ def test_the_first_waves_of_many_are_those_of_few(panda, life):
         np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.parametrize("rows", [slice(200, None), slice(600, 1200)])
+def test_a_part_of_an_old_log_is_not_learned_again(panda, life, young, rows):
+    part, other = life[1][1].select(rows), life[1][3]
+    with pytest.raises(IdentificationError, match="the profile is learned from: leave it out"):
+        learn_profile(panda, [other, part], known=young)
+    assert young.learned_from(part) == young.sessions[1].name
+    assert young.learned_from(other) is None
+
+
+def test_two_parts_of_a_log_that_overlap_are_not_learned_together(panda, life):
+    log = life[1][0]
+    with pytest.raises(IdentificationError, match="name one of them"):
+        learn_profile(panda, [log.select(slice(0, 1200)), log.select(slice(600, None))])
+
+
 @pytest.mark.full  # some seconds
 def test_a_profile_knows_the_payload_better_than_a_tare_of_another_day(panda, life, run, profile):
     truth = life[0].truth.phi

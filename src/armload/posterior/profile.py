@@ -19,7 +19,7 @@ from armload.errors import ModelError
 from armload.inertia import InertialParameters
 from armload.posterior.scales import Scales
 from armload.posterior.solve import solve
-from armload.recording import Recording, digest_of
+from armload.recording import Recording, digest_of, marks_of
 from armload.regression import Correction, JointFeatures, payload_prior_std
 from armload.regression.information import RegressionData, Session
 from armload.regression.lag import GAIN
@@ -35,7 +35,7 @@ class SessionRecord:
     duration [s]; date: [s since 1970], None where the log does not say. offset, coulomb: (n,) by which they differ from
     the mean session [N·m]. statistic: T of `posterior.drift`, chi-squared of 3·n where the session is like the others.
     noise: (n,) the residual's long-run deviation √S over the one expected. logs: digests of the logs (`digest_of`); of
-    a stream, and in a profile of an earlier version, there are none.
+    a stream, and in a profile of an earlier version, there are none. marks: of the logs' samples (`marks_of`).
     """
 
     name: str
@@ -46,6 +46,7 @@ class SessionRecord:
     statistic: float
     noise: tuple[float, ...]
     logs: tuple[str, ...] = ()
+    marks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,9 +100,9 @@ class Profile:
         return sha256(np.ascontiguousarray(self.A).tobytes() + self.b.tobytes()).hexdigest()[:12]
 
     def learned_from(self, log: Recording) -> str | None:
-        """The session of the same measurements; None: there is none."""
-        digest = digest_of(log)
-        return next((session.name for session in self.sessions if digest in session.logs), None)
+        """The session of the same measurements, or of some of them; None: there is none."""
+        digest, marks = digest_of(log), set(marks_of(log))
+        return next((one.name for one in self.sessions if digest in one.logs or marks.intersection(one.marks)), None)
 
     def check(self, arm: Arm) -> None:
         """See that it is of this arm, on this base.

@@ -31,7 +31,7 @@ from armload.posterior.profile_agreement import carried, check_agree
 from armload.posterior.profile_session import STATED, log_data, poses, record, with_session, without_drift
 from armload.posterior.scales import Scales
 from armload.posterior.solve import threads
-from armload.recording import Recording, digest_of
+from armload.recording import Recording, digest_of, marks_of
 from armload.regression import Correction, JointFeatures, payload_prior_std
 from armload.regression.information import RegressionData, Session
 from armload.regression.lag import GAIN
@@ -105,18 +105,16 @@ def check_new(logs: Sequence[Recording], known: Profile | None) -> None:
     Raises:
         IdentificationError: two hold the same measurements, or one and what the profile is learned from.
     """
-    learned = {} if known is None else {digest: one.name for one in known.sessions for digest in one.logs}
     seen: dict[str, str] = {}
     for log in logs:
-        digest = digest_of(log)
-        if digest in learned:
+        if known is not None and (learned := known.learned_from(log)) is not None:
             raise IdentificationError(
-                f"{log.source} holds the same measurements as {learned[digest]}, which the profile is learned from: "
-                "leave it out"
+                f"{log.source} holds measurements of {learned}, which the profile is learned from: leave it out"
             )
-        if digest in seen:
-            raise IdentificationError(f"{log.source} holds the same measurements as {seen[digest]}: name one of them")
-        seen[digest] = log.source
+        marks = {digest_of(log), *marks_of(log)}
+        if same := marks.intersection(seen):
+            raise IdentificationError(f"{log.source} holds measurements of {seen[same.pop()]}: name one of them")
+        seen |= dict.fromkeys(marks, log.source)
 
 
 def by_clock(logs: Sequence[Recording]) -> list[int]:

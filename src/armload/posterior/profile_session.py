@@ -22,7 +22,7 @@ from armload.posterior.problem import Problem
 from armload.posterior.profile import Profile, SessionRecord
 from armload.posterior.scales import Posterior
 from armload.posterior.solve import solve
-from armload.recording import Recording, digest_of
+from armload.recording import Recording, digest_of, marks_of
 from armload.regression import Correction, FilteredRegression, JointFeatures, payload_prior_std
 from armload.regression.information import RegressionData, Session
 from armload.regression.lag import GAIN
@@ -111,6 +111,7 @@ def record(
         float(drift @ np.linalg.solve(covariance, drift)),
         tuple(np.sqrt(S / whole_noise(correction, SMOOTH)).tolist()),
         tuple(digest_of(log) for log in logs),
+        tuple(mark for log in logs for mark in marks_of(log)),
     )
 
 

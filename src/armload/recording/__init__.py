@@ -4,7 +4,7 @@ from armload.recording.alignment import Alignment, same_motion
 from armload.recording.chunks import read_long, recording_chunks
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.compensated import with_gravity
-from armload.recording.copies import check_own_measurements, digest_of, shared_samples
+from armload.recording.copies import check_own_measurements, digest_of, marks_of, shared_samples
 from armload.recording.files import LOG_SUFFIXES, PACKED_SUFFIXES, has_topics, read_recording, write_recording
 from armload.recording.lerobot import data_set_episodes, is_data_set
 from armload.recording.recording import BLOCK, CHANNELS, GAP, JITTERED, Recording, Sample
@@ -29,6 +29,7 @@ __all__ = [
     "has_topics",
     "is_data_set",
     "largest",
+    "marks_of",
     "parts_of",
     "read_long",
     "read_recording",
