@@ -49,11 +49,13 @@ def test_a_joint_that_stands_is_still_at_rest():
     assert np.abs(steadied(still).dq).max() < 1e-8
 
 
-def test_samples_that_are_alone_keep_their_velocity():
-    t = np.array([0.0, 0.09, 0.18, 0.4])  # farther apart than what is taken together
-    dq = np.array([[0.1], [0.3], [-0.2], [0.5]])
-    log = Recording(t, np.cumsum(dq, axis=0), dq, dq)
-    np.testing.assert_allclose(steadied(log).dq, dq, rtol=1e-6)
+@pytest.mark.parametrize("noise", [1e-3, 1e-12])
+def test_samples_that_are_alone_keep_their_velocity(noise):
+    """However much surer the positions are."""
+    rng = np.random.default_rng(2)
+    t = 0.09 * np.arange(20)  # farther apart than what is taken together
+    q, dq = 0.3 + noise * rng.normal(size=(20, 2)), 0.1 * rng.normal(size=(20, 2))
+    np.testing.assert_allclose(steadied(Recording(t, q, dq, dq)).dq, dq, rtol=1e-6)
 
 
 def test_a_log_on_disk_has_the_same_velocities():

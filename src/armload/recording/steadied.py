@@ -15,6 +15,8 @@ by noise of the regressor: Fuller, Measurement Error Models, 1987.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import product
+from math import factorial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,24 +41,34 @@ def _velocities(recording: Recording) -> Iterator[NDArray[np.float64]]:
     """dq a block of samples at a time."""
     t, n = recording.t, recording.n
     pieces = np.r_[0, np.cumsum(np.diff(t) > GAP)]
-    weights = np.maximum([_noise(recording.q), AROUND * _noise(recording.dq)], _QUIET) ** -2.0
+    of_q, of_dq = np.maximum([_noise(recording.q), AROUND * _noise(recording.dq)], _QUIET) ** -2.0
+    held = (_HELD * (of_q + of_dq))[:, None, None] * np.diag([0.0, 0.0, 1.0, 1.0])
     reach = int(np.max(np.searchsorted(t, t + AROUND, side="right") - np.arange(len(t)))) - 1
     for part in blocks(len(t)):
         first, stop = max(part.start - reach, 0), min(part.stop + reach, len(t))
-        channels = recording.q[first:stop], AROUND * recording.dq[first:stop]
-        at, rows = t[part], np.arange(part.start, part.stop)
-        A = np.tile((_HELD * weights.sum(axis=0))[:, None, None] * np.eye(4), (len(rows), 1, 1, 1))
-        b = np.zeros((len(rows), n, 4))
+        q, dq = recording.q[first:stop], AROUND * recording.dq[first:stop]
+        rows = np.arange(part.start, part.stop)
+        moments, q_sums, dq_sums = np.zeros((7, len(rows))), np.zeros((4, len(rows), n)), np.zeros((3, len(rows), n))
         for away in range(-reach, reach + 1):
             k = np.clip(rows + away, 0, len(t) - 1)
-            s = (t[k] - at) / AROUND
-            near = (k == rows + away) & (np.abs(s) <= 1.0) & (pieces[k] == pieces[rows])
-            nothing, one = np.zeros_like(s), np.ones_like(s)
-            bases = (one, s, s**2 / 2.0, s**3 / 6.0), (nothing, one, s, s**2 / 2.0)
-            for basis, channel, weight in zip(bases, channels, weights, strict=True):
-                X = near[:, None] * np.stack(basis, axis=1)
-                A += weight[:, None, None] * (X[:, :, None] * X[:, None, :])[:, None]
-                b += (weight * channel[k - first])[:, :, None] * X[:, None, :]
+            s = (t[k] - t[part]) / AROUND
+            power = ((k == rows + away) & (np.abs(s) <= 1.0) & (pieces[k] == pieces[rows])).astype(float)
+            for p in range(7):  # Σ sᵖ, Σ sᵖ·q and Σ sᵖ·dq over what is near
+                moments[p] += power
+                if p < 4:
+                    q_sums[p] += power[:, None] * q[k - first]
+                if p < 3:
+                    dq_sums[p] += power[:, None] * dq[k - first]
+                power = power * s
+        A, b = np.zeros((len(rows), n, 4, 4)) + held, np.zeros((len(rows), n, 4))
+        for i, j in product(range(4), range(4)):
+            A[:, :, i, j] += of_q * moments[i + j][:, None] / (factorial(i) * factorial(j))
+            if i and j:
+                A[:, :, i, j] += of_dq * moments[i + j - 2][:, None] / (factorial(i - 1) * factorial(j - 1))
+        for i in range(4):
+            b[:, :, i] += of_q * q_sums[i] / factorial(i)
+            if i:
+                b[:, :, i] += of_dq * dq_sums[i - 1] / factorial(i - 1)
         yield np.array(np.linalg.solve(A, b[..., None])[:, :, 1, 0] / AROUND, dtype=float)
 
 
