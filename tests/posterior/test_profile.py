@@ -16,6 +16,7 @@ from armload.lab.episodes.motion_kinds import MotionSource
 from armload.online import OnlineIdentifier
 from armload.posterior import HybridIdentifier, learn_profile, load_profile, save_profile
 from armload.posterior.problem import Problem
+from armload.posterior.profile import remembered
 from armload.posterior.profile_learning import by_clock
 from armload.posterior.profile_session import log_data, without_drift
 from armload.recording import Recording
@@ -113,6 +114,18 @@ def test_two_parts_of_a_log_that_overlap_are_not_learned_together(panda, life):
     log = life[1][0]
     with pytest.raises(IdentificationError, match="name one of them"):
         learn_profile(panda, [log.select(slice(0, 1200)), log.select(slice(600, None))])
+
+
+def test_a_profile_of_many_logs_remembers_a_bounded_number_of_their_samples(young):
+    """And of a log that is learned later the same ones as of a part of it."""
+    rng = np.random.default_rng(1)
+    logs = [tuple(f"{x:012x}" for x in rng.integers(0, 1 << 47, 300)) for _ in range(40)]
+    kept: tuple = ()
+    for marks in logs:
+        kept = remembered([*kept, replace(young.sessions[0], marks=marks)], most=2000)
+        assert sum(len(one.marks) for one in kept) <= 2000
+    assert all(len(one.marks) > 10 for one in kept)
+    assert all(set(one.marks) < set(marks) for one, marks in zip(kept, logs, strict=True))
 
 
 @pytest.mark.full  # some seconds

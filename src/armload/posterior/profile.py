@@ -25,6 +25,9 @@ from armload.regression.information import RegressionData, Session
 from armload.regression.lag import GAIN
 from armload.regression.noise import SMOOTH
 
+# marks of samples that a profile remembers, 0.8 MB of its file: with more, every other one is forgotten, the samples
+# themselves decide which (test_a_profile_of_many_logs_remembers_a_bounded_number_of_their_samples)
+MARKS = 50_000
 _SAME_MASS = 1e-3  # [kg] tools whose masses differ by less are one
 
 
@@ -175,6 +178,18 @@ class Profile:
     def session(self, correction: Correction, number: int = 1) -> Session:
         """Another session of the arm."""
         return Session(number, 1.0, tuple(np.sqrt(self.drift) / correction.daily_std))
+
+
+def remembered(sessions: Iterable[SessionRecord], most: int = MARKS) -> tuple[SessionRecord, ...]:
+    """The sessions with at most so many marks: of all alike those of every other, fourth, eighth value are kept."""
+    kept = tuple(sessions)
+    while sum(len(one.marks) for one in kept) > most:
+        values = [int(mark, 16) for one in kept for mark in one.marks]
+        every = 2
+        while all(value % every == 0 for value in values):
+            every *= 2
+        kept = tuple(replace(one, marks=tuple(m for m in one.marks if int(m, 16) % every == 0)) for one in kept)
+    return kept
 
 
 def attached_mass(arm: Arm) -> float:

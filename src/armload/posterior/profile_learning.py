@@ -26,7 +26,7 @@ from armload.arms import Arm, rated_effort
 from armload.errors import IdentificationError
 from armload.posterior.drift import SESSION
 from armload.posterior.problem import Problem
-from armload.posterior.profile import Profile, SessionRecord, attached_mass, fingerprint
+from armload.posterior.profile import Profile, SessionRecord, attached_mass, fingerprint, remembered
 from armload.posterior.profile_agreement import carried, check_agree
 from armload.posterior.profile_session import STATED, log_data, poses, record, with_session, without_drift
 from armload.posterior.scales import Scales
@@ -168,7 +168,7 @@ def _learned(correction: Correction, parts: list[RegressionData], logs: Sequence
         replace(fit.scales, noise=np.ones((1, arm.n)), drifts=np.zeros((0, 0))),
         fit.drift,
         repeated,
-        tuple(_records(correction, fit, data, logs)),
+        remembered(_records(correction, fit, data, logs)),
         np.concatenate([poses(log) for log in logs]),
     )
 

@@ -19,7 +19,7 @@ from armload.inertia import HELD, Z95
 from armload.posterior.another_arm import another_arm
 from armload.posterior.drift import Drift, drift_of
 from armload.posterior.problem import Problem
-from armload.posterior.profile import Profile, SessionRecord
+from armload.posterior.profile import Profile, SessionRecord, remembered
 from armload.posterior.scales import Posterior
 from armload.posterior.solve import solve
 from armload.recording import Recording, digest_of, marks_of
@@ -86,7 +86,7 @@ def with_session(
         A=known.A + A / known.repeated,
         b=known.b + b / known.repeated,
         drift=(seen * known.drift + means**2 + np.diag(P)) / (seen + 1.0),
-        sessions=(*known.sessions, record(correction, means, P + np.diag(known.drift), S, *about)),
+        sessions=remembered([*known.sessions, record(correction, means, P + np.diag(known.drift), S, *about)]),
         poses=np.concatenate([known.poses, *(poses(log) for log in logs)]),
     )
 
