@@ -51,9 +51,9 @@ NOMINAL = 5.0
 KNOWN = 1.5
 
 # of what is left unexplained of a payload that stays the same on the arm as it was, the most that noise of the
-# velocities and friction that grows with the load may leave where they are to explain it: of sound logs 0.1 to 0.6 of
-# it is left, of a tare of another day 0.87 and more (`benchmarks/rubbing_joints.py`;
-# test_an_arm_that_changed_since_its_tare_is_not_explained_by_its_rubbing)
+# velocities and friction that grows with the load may leave where they are to explain it. A stated bound: one of 96
+# logs of arms that changed since their tare, or were exchanged, is explained so, and sound ones are
+# (`benchmarks/rubbing_joints.py`; test_an_arm_that_changed_since_its_tare_is_not_explained_by_its_rubbing)
 EXPLAINS = 0.7
 # [s] between two samples of a log, above which a note says so: a payload may be exchanged in as long. A stated prior
 # (test_a_pause_of_a_log_is_said)
