@@ -14,8 +14,9 @@ from armload.app.cli import main
 from armload.devices import Simulator
 from armload.errors import IdentificationError
 from armload.identification import identify
+from armload.identification.added_mass import MASS_MAY_CHANGE, of_mass
 from armload.identification.notes import MAY_CHANGE
-from armload.identification.segments import MASS_MAY_CHANGE, changes_of_payload, of_mass
+from armload.identification.segments import changes_of_payload
 from armload.identification.tare_age import DAY, SESSION, drift_after, drift_since, in_words
 from armload.identification.thresholds import PAYLOAD_CHANGED, PAYLOAD_MAY_CHANGE
 from armload.inertia import InertialParameters

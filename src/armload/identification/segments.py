@@ -32,6 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
+from armload.identification.added_mass import MASS_MAY_CHANGE, of_mass
 from armload.identification.cut_scan import added_at_cuts, of_the_log
 from armload.identification.standing_changes import changes_at_rest
 from armload.identification.thresholds import (
@@ -60,14 +61,6 @@ _FINER = 4  # cuts on either side of the best one, twice
 _FEW = 32  # smooth functions of the pose with which cuts are compared: T at the likeliest is of all of them
 _NOWHERE_NEAR = 0.5 * PAYLOAD_MAY_CHANGE  # T of the best of few cuts: finer ones seldom double it. A stated bound
 _LIKELIEST = 2  # cuts of which T is found with the whole model
-# [kg·m, kg·m²] standard deviations of moments and inertia of something light, 0.2 kg within 8 cm of the frame: a stated
-# prior. What is heavier shows in all ten
-_LIGHT = 0.2 * np.array([0.08] * 3 + [0.08**2] * 6)
-
-
-# chi-squared of the mass alone where the payload may change: the 99 % quantile for one degree of freedom, as
-# `PAYLOAD_MAY_CHANGE` is for ten. Of 27 sound simulated logs the largest is 2.5, of three windows of a real Panda's 1.0
-MASS_MAY_CHANGE = 6.634896601021213
 
 
 class Changes(NamedTuple):
@@ -282,15 +275,6 @@ class _Search:
         if self.physics.arm.motor_torque or not self.whole.known:
             return T, 0.0  # friction that grows with the load differs from part to part as a weight does
         return T, of_mass(information / self.kappa, vector / self.kappa)
-
-
-def of_mass(information: np.ndarray, vector: np.ndarray) -> float:
-    """h_m²/Λ_m, chi-squared of one where nothing was added; Λ_m, h_m are of the mass, something light's moments out."""
-    rest = np.linalg.solve(information[1:, 1:] + np.diag(_LIGHT**-2.0), np.c_[information[1:, 0], vector[1:]])
-    own = information[0, 0] - information[0, 1:] @ rest[:, 0]
-    if own <= 0.0:  # neither part moves: they tell nothing
-        return 0.0
-    return float((vector[0] - information[0, 1:] @ rest[:, 1]) ** 2 / own)
 
 
 def _without_payload(data: RegressionData, arm: Arm, start: Scales | None) -> RegressionData:
