@@ -9,8 +9,9 @@ both), or a multiple of that, or differences of positions of 17 bits over 10 ms.
 1 %, too: the arm's offsets and friction changed by three daily deviations since its tare, the tare is of another arm,
 or something is taken up within the log.
 
-doubted at first   share called changed within the log, or since the tare, or explained by no body, as the log is read
-                   first: those of the next column, and those answered with the noise taken out and load allowed for
+looks wrong        share that seems to change within the log, or since the tare, or is explained by no body, as the log
+                   is read first: those of the next column, and those answered with the noise taken out and load
+                   allowed for
 doubted            share of which the answer says so
 calibrated         share of the answers
 inside             share of the true values inside their intervals: mass · first moments · inertia
@@ -76,11 +77,12 @@ CASES = {
 
 
 class Logs(NamedTuple):
-    """A log, its tare, and phi (10,) of what is held at its end."""
+    """A log, its tare, phi (10,) of what is held at its end, and when that was taken up [s], if within the log."""
 
     run: Recording
     tare: Recording
     truth: NDArray[np.float64]
+    when: float | None = None
 
 
 def logs_of(known: Arm, case: Case, count: int, seed: int) -> Iterator[Logs]:
@@ -98,14 +100,15 @@ def logs_of(known: Arm, case: Case, count: int, seed: int) -> Iterator[Logs]:
         sensors = replace(sensors, velocity_noise=sensors.velocity_noise * (case.noise or 0.0))
         how = {"sensors": sensors, "rate": case.rate}
         tare = simulate(known, about, world=before, seed=9000 + k, **how)
-        if case.wrong == "taken up":
-            held = [(0.0, None), (float(rng.uniform(3.0, 7.0)), payload)]
+        when = float(rng.uniform(3.0, 7.0)) if case.wrong == "taken up" else None
+        if when is not None:
+            held = [(0.0, None), (when, payload)]
             source = Simulator(known, motion, held, world=world, speed=None, duration=10.0, seed=k, **how)
             run = Recording(*map(np.array, zip(*source, strict=True)))  # type: ignore[arg-type]
         else:
             run = simulate(known, motion, payload, world=world, seed=k, **how)
         run, tare = (differenced(log) if case.noise is None else log for log in (run, tare))
-        yield Logs(run, tare, payload.parameters.phi)
+        yield Logs(run, tare, payload.parameters.phi, when)
 
 
 def at_the_tare(known: Arm, world: World, case: Case, rng: np.random.Generator) -> World:
@@ -141,7 +144,7 @@ def asked_of(known: Arm, logs: Iterator[Logs]) -> dict[str, object]:
     fine = held | ~trusted[:, None]
     return {
         "logs": len(held),
-        "doubted at first": round(float(np.mean(first)), 3),
+        "looks wrong": round(float(np.mean(first)), 3),
         "doubted": round(float(np.mean(doubted)), 3),
         "calibrated": round(float(trusted.mean()), 3),
         "inside": [round(float(held[:, part].mean()), 3) for part in GROUPS],
@@ -153,12 +156,12 @@ def table(found: dict[str, dict[str, dict]]) -> str:
     """The cases as rows."""
     rows = [
         [robot, name]
-        + [f"{100 * case[what]:.0f} %" for what in ("doubted at first", "doubted", "calibrated")]
+        + [f"{100 * case[what]:.0f} %" for what in ("looks wrong", "doubted", "calibrated")]
         + [" · ".join(f"{x:.2f}" for x in case[what]) for what in ("inside", "covered or said")]
         for robot, cases in found.items()
         for name, case in cases.items()
     ]
-    columns = ["arm", "log", "doubted at first", "doubted", "calibrated", "inside", "covered or said"]
+    columns = ["arm", "log", "looks wrong", "doubted", "calibrated", "inside", "covered or said"]
     return markdown_table(columns, "llrrrrr", rows)
 
 

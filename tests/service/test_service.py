@@ -35,12 +35,13 @@ def cell(panda, analytic_log, tmp_path):
     """A file of arms that replay a log in a circle; the second alternates with it."""
     write_recording(tmp_path / "run.csv", analytic_log(panda, HELD, duration=8.0))
 
-    def make(*names, **service):
+    def make(*names, steady=False, **service):
         # each process is an arm's, or its reader: that one that is ready takes over is in test_spare.py
         lines = [f"{key} = {json.dumps(value)}" for key, value in {"spare": False, **service}.items()]
         for name in names:
             lines += ["[[arm]]", f'name = "{name}"', 'source = "run.csv"', 'robot = "panda"', 'method = "map"']
             lines += ["loop = true", 'save = "state"', "rating = 0.5" if name == "heavy" else ""]
+            lines += ["steady = true"] if steady else []
         path = tmp_path / "cell.toml"
         path.write_text("\n".join(lines))
         return path
@@ -159,6 +160,15 @@ def get(url, **headers):
     except urllib.error.HTTPError as error:
         with error:
             return error.code, json.loads(error.read())
+
+
+@pytest.mark.full
+def test_an_arm_whose_velocities_are_told_by_its_positions_too_is_answered_75_ms_later_and_says_so(serve, cell):
+    running = serve(cell("light", steady=True, every=0.1))
+    line = running.until(known("light"))
+    assert line["mass"] == pytest.approx(HELD.mass, abs=0.05)
+    lags = [running.until(known("light"))["lag"] for _ in range(10)]
+    assert 0.07 < np.median(lags) < 0.15
 
 
 @pytest.mark.full

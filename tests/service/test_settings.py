@@ -26,6 +26,7 @@ name = "right"
 source = "sim"
 robot = "panda"
 gravity = [0, 0, -9.8]
+steady = true
 """
 
 
@@ -35,6 +36,7 @@ def test_a_file_says_what_it_says_with_paths_from_its_own_folder(tmp_path):
     left, right = settings.arms
     assert (settings.every, settings.port, settings.headers) == (1.0, 0, {"Authorization": "Bearer abc"})
     assert (left.tare, left.save, left.rating) == (str(tmp_path / "empty.csv"), str(tmp_path / "state"), 2.5)
+    assert (left.steady, right.steady) == (False, True)
     assert (right.source, right.gravity, right.state) == ("sim", (0.0, 0.0, -9.8), None)
 
 

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from armload.devices.simulator.mover import SimulatedMover
     from armload.devices.simulator.source import Simulator
     from armload.devices.source import Source
+    from armload.devices.steadied import Steadied
     from armload.devices.supervision import Supervision, Thresholds
     from armload.devices.ur.form import URPayload, ur_payload
     from armload.devices.ur.source import URSource
@@ -54,6 +55,7 @@ __all__ = [
     "SimulatedMover",
     "Simulator",
     "Source",
+    "Steadied",
     "StreamedMover",
     "Supervision",
     "Thresholds",

@@ -67,6 +67,10 @@ class Source(ABC):
         arrived = self.arrived()
         return 0.0 if arrived is None else max(0.0, time.monotonic() - arrived) * self.speed
 
+    def as_it_came(self, sample: Sample) -> Sample:
+        """The sample handed on last, before anything was made of it."""
+        return sample
+
     @property
     def simulated(self) -> bool:
         """Whether it is a simulator, whose payload can be changed (`hold`)."""

@@ -96,7 +96,7 @@ def identify(
     mounted = read_payload(tool) if isinstance(tool, str | Path) else tool
     say("identifying")
     account = _account(recording, arm, tare, mounted, asked, notes)
-    if account.doubts and not arm.motor_torque:
+    if (account.doubts or account.left > 1.0) and not arm.motor_torque:
         say("asking whether noise of the velocities, or friction that grows with the load, would explain it")
         rubbing, calmer = replace(arm, gear_loss=LINK_LOSS), None if tare is None else steadied(tare)
         other = _account(steadied(recording), rubbing, calmer, mounted, asked, (*notes, ALLOWED))
@@ -154,7 +154,7 @@ def _account(
     answer = replace(answers[-1], segments=segments)
     misfit = 0.0 if whole.health is None else whole.health.misfit or 0.0
     doubts = len(times) + changes.doubted + sum(answer.doubts for answer in answers)
-    return _Account(answer, doubts, max(changes.doubt, misfit / CHANGED))
+    return _Account(answer, doubts, max(changes.left, misfit / CHANGED))
 
 
 def _of_one_payload(

@@ -53,9 +53,10 @@ from armload.recording import Recording
 from armload.regression import JointFeatures, payload_prior_std, solution_prior_std
 from armload.regression.information import RegressionData, Session
 from armload.regression.lag import GAIN
-from armload.regression.noise import SMOOTH
+from armload.regression.noise import SMOOTH, NoiseModel
 from armload.regression.rows_of_log import RowsOfLog
 
+_NOISE = replace(SMOOTH, white=True)  # what is left, and looks like a change where it is taken to be less
 _ITERATIONS = 3  # of expectation–maximisation: the scales change little after
 _FINER = 4  # cuts on either side of the best one, twice
 _FEW = 32  # smooth functions of the pose with which cuts are compared: T at the likeliest is of all of them
@@ -66,22 +67,28 @@ _LIKELIEST = 2  # cuts of which T is found with the whole model
 class Changes(NamedTuple):
     """times: [s, on the log's clock] at which the payload changes. statistic: the largest T of the whole log.
 
-    of_mass: the largest chi-squared of the mass alone; 0 where not tested.
+    of_mass: the largest chi-squared of the mass alone; 0 where not tested. left: as `doubt`, but with noise that is no
+    more than its blocks show: below 1 nothing is left to be explained.
     """
 
     times: list[float]
     statistic: float
     of_mass: float = 0.0
+    left: float = 0.0
 
     @property
     def doubt(self) -> float:
         """The larger of the two, over what raises a doubt."""
-        return max(self.statistic / PAYLOAD_MAY_CHANGE, self.of_mass / MASS_MAY_CHANGE)
+        return _doubt(self.statistic, self.of_mass)
 
     @property
     def doubted(self) -> bool:
         """Whether the payload may change, by one of the two."""
         return self.doubt > 1.0
+
+
+def _doubt(statistic: float, of_mass: float) -> float:
+    return max(statistic / PAYLOAD_MAY_CHANGE, of_mass / MASS_MAY_CHANGE)
 
 
 def changes_of_payload(
@@ -171,7 +178,8 @@ class _Search:
         parts = [self.within(start, stop) for start, stop in zip(starts, stops, strict=True)]
         statistic = max(PAYLOAD_CHANGED if seen else 0.0, *(part.statistic for part in parts))
         times = sorted([*times, *(time for part in parts for time in part.times)])
-        return Changes(times, statistic, max(part.of_mass for part in parts))
+        of_mass, left = max(part.of_mass for part in parts), max(part.left for part in parts)
+        return Changes(times, statistic, of_mass, max(left, _doubt(statistic, of_mass)))
 
     def at_rest(self) -> list[float]:
         """When the payload changes while the arm stands."""
@@ -185,7 +193,7 @@ class _Search:
         """Coulomb friction of the joints (n,) [N·m], as the log and what else is known show it."""
         data = self._data(slice(0, len(self.rows.t)))
         data.session = self.session
-        found = solve([*self.whole.known, data], self.weak, None, SMOOTH, _ITERATIONS, self.whole.start)
+        found = solve([*self.whole.known, data], self.weak, None, _NOISE, _ITERATIONS, self.whole.start)
         return np.abs(self.physics.stream.correction.coulomb(found.eta))
 
     def within(self, start: int, stop: int) -> Changes:
@@ -196,9 +204,9 @@ class _Search:
         cuts = self._candidates(start, stop)
         if not cuts.size:
             return Changes([], 0.0)
-        best, most, light = self._best(start, stop, cuts)
+        best, most, light, left = self._best(start, stop, cuts)
         if most <= _NOWHERE_NEAR:
-            return Changes([], most, light)
+            return Changes([], most, light, left)
         around = np.searchsorted(cuts, best)
         near = cuts[max(around - 1, 0)], cuts[min(around + 1, len(cuts) - 1)]
         for _ in range(2):
@@ -209,11 +217,11 @@ class _Search:
         parts = self._stretches(start, stop, np.array([best]))
         most = max(most, self._statistic(parts[:1], parts[1:])[0])
         if most <= PAYLOAD_CHANGED:
-            return Changes([], most, light)
+            return Changes([], most, light, max(left, _doubt(*self._statistic(parts[:1], parts[1:], SMOOTH))))
         # the rows' lag still holds what was there before, and the cut is off by some rows
         until, after = (int(np.searchsorted(t, t[best] + aside)) for aside in (-SETTLED, SETTLED))
         earlier, later = self.within(start, until).times, self.within(after, stop).times
-        return Changes([*earlier, float(t[best]) - 1.0 / GAIN, *later], most, light)
+        return Changes([*earlier, float(t[best]) - 1.0 / GAIN, *later], most, light, left)
 
     def _candidates(self, start: int, stop: int) -> NDArray[np.int64]:
         """Cuts between two rows: the denser the nearer to either end.
@@ -230,14 +238,16 @@ class _Search:
         before = stood[cuts - start - 1]
         return cuts[(before >= SETTLED) & (stood[-1] - before >= SETTLED)]
 
-    def _best(self, start: int, stop: int, cuts: np.ndarray) -> tuple[int, float, float]:
-        """The cut with the largest T, T, and the largest of any cut's mass alone."""
+    def _best(self, start: int, stop: int, cuts: np.ndarray) -> tuple[int, float, float, float]:
+        """The cut with the largest T, T, the largest of any cut's mass alone, and what is `Changes.left`."""
         stretches = self._stretches(start, stop, cuts)
         roughly = self._roughly(stretches)
         likely = np.unique([*np.argsort(roughly[:, 0])[-_LIKELIEST:], np.argmax(roughly[:, 1])])
-        found = [self._statistic(stretches[: k + 1], stretches[k + 1 :]) for k in likely]
+        parts = [(stretches[: k + 1], stretches[k + 1 :]) for k in likely]
+        found, left = [self._statistic(*part) for part in parts], [self._statistic(*part, SMOOTH) for part in parts]
         best = int(np.argmax([T for T, _ in found]))
-        return int(cuts[likely[best]]), found[best][0], max(light for _, light in found)
+        light = max(light for _, light in found)
+        return int(cuts[likely[best]]), found[best][0], light, max(_doubt(*both) for both in left)
 
     def _roughly(self, stretches: list[RegressionData]) -> NDArray[np.float64]:
         """Both statistics of every cut (K, 2), with fewer smooth functions, and scales of the likeliest cut."""
@@ -246,7 +256,7 @@ class _Search:
         cuts = added_at_cuts(self.rough.known, stretches, self.few, self.weak, self.rough.start)
         best = int(np.argmax([self._tests(*cut)[0] for cut in cuts])) + 1
         parts = [RegressionData.joined(part).of_features(self.few) for part in (stretches[:best], stretches[best:])]
-        solution = solve([*self.rough.known, *parts], self.weak, None, SMOOTH, _ITERATIONS, self.rough.start)
+        solution = solve([*self.rough.known, *parts], self.weak, None, _NOISE, _ITERATIONS, self.rough.start)
         scales = of_the_log(solution.scales, (parts[0].blocks.duration, parts[1].blocks.duration))
         cuts = added_at_cuts(self.rough.known, stretches, self.few, self.weak, scales)
         return np.array([self._tests(*cut) for cut in cuts])
@@ -260,11 +270,13 @@ class _Search:
             data.take(rows)
         return data
 
-    def _statistic(self, before: list[RegressionData], after: list[RegressionData]) -> tuple[float, float]:
+    def _statistic(
+        self, before: list[RegressionData], after: list[RegressionData], noise: NoiseModel = _NOISE
+    ) -> tuple[float, float]:
         parts = [RegressionData.joined(before), RegressionData.joined(after)]
         for part in parts:
             part.session = self.session
-        solution = solve([*self.whole.known, *parts], self.weak, None, SMOOTH, _ITERATIONS, self.whole.start)
+        solution = solve([*self.whole.known, *parts], self.weak, None, noise, _ITERATIONS, self.whole.start)
         return self._tests(solution.information, solution.vector)
 
     def _tests(self, information: NDArray[np.float64], vector: NDArray[np.float64]) -> tuple[float, float]:

@@ -8,6 +8,10 @@ The run's rows have unknowns of their own, delta ~ N(0, D), by which offsets and
 is small where nothing else has changed. It is large for a tare of another day, of another arm, or of another base.
 With a profile, E is the drift of the arm's own sessions, and T is large where this one is not of their kind.
 
+A joint that rubs more under load rubs more than at the tare by a share of what was added: that is no drift. Before an
+arm is called changed, E has it, too, for a joint that loses `LINK_LOSS` of the torque that it bears; a log of which T
+is large without that is read once more (`identification.identify_log`).
+
 Motor currents cannot be asked: friction differs from run to run on a sound arm, too, by more than T allows (T = 1000 of
 the real UR10e pair, though what its gears lose is an unknown). They are told by friction that only gears have
 (`Posterior.gears`): an arm with much friction behind its gears, or more of it at the tare, is asked all the same.
@@ -25,6 +29,7 @@ from armload.posterior.scales import Posterior
 from armload.posterior.solve import solve
 from armload.regression import Correction, GaussianPrior
 from armload.regression.information import RegressionData, Session
+from armload.regression.mismatch import LINK_LOSS
 from armload.regression.noise import NoiseModel
 
 # [daily deviations] that the test allows for: with a wider prior little else changes (`benchmarks/tare_drift.py`)
@@ -44,7 +49,8 @@ class Drift:
     """By how much an arm differs from what it was at its tare.
 
     offset, coulomb: (n,) change of the torque offsets and of the Coulomb friction [N·m]. statistic: T.
-    joint: the joint whose own T is largest, from 0. changed: whether T is beyond what sound logs show.
+    joint: the joint whose own T is largest, from 0. changed: whether T is beyond what sound logs show, with joints that
+    rub under load among them.
     """
 
     offset: NDArray[np.float64]
@@ -79,10 +85,13 @@ def drift_of(found: Posterior, correction: Correction, explained: Session) -> Dr
     C = found.drift_covariance + np.diag(explained.variance(correction))
     own = [change[j::n] @ np.linalg.solve(C[j::n, j::n], change[j::n]) for j in range(n)]
     statistic = float(change @ np.linalg.solve(C, change))
+    if not correction.loss_std:  # else it is an unknown of its own
+        rubs = correction.coulomb(np.arange(len(change)))
+        C[rubs, rubs] += (LINK_LOSS * found.borne) ** 2
     return Drift(
         offset=correction.offset(change),
         coulomb=correction.coulomb(change),
         statistic=statistic,
         joint=int(np.argmax(own)),
-        changed=statistic > CHANGED,
+        changed=float(change @ np.linalg.solve(C, change)) > CHANGED,
     )

@@ -74,6 +74,14 @@ class _Gaussian:
         shared, own = X[:, : len(E)] @ E - X[:, len(E) :] @ self.slope[j], X[:, len(E) :]
         return shared @ self.covariance @ shared.T + own @ self.rest[j] @ own.T
 
+    def power(self, E: NDArray, run: RegressionData) -> NDArray[np.float64]:
+        """Mean square (n,) over a run of what X_j·[E·z, g_j] is off by: what a fit leaves is smaller by this much."""
+        k, total = len(E), np.zeros(len(run.A))
+        for j, A in enumerate(run.A):
+            B = np.concatenate([E, -self.slope[j]])
+            total[j] = np.sum((A @ B) * (B @ self.covariance)) + np.sum(A[k:, k:] * self.rest[j])
+        return total / max(run.blocks.duration, 1e-9)
+
     def spread(self, E: NDArray, j: int, X: NDArray) -> NDArray[np.float64]:
         """Variance (B,) of X·[E·z, g_j], X (B, ·)."""
         shared, own = X[:, : len(E)] @ E - X[:, len(E) :] @ self.slope[j], X[:, len(E) :]
@@ -215,8 +223,12 @@ class Problem:
                 out.append(run.noise)
                 continue
             spread = partial(found.spread, E) if self.features.size else None
-            S = run.residual_variance(E @ found.mean, expected, np.inf, found.weights, spread)
+            x = E @ found.mean
+            S = run.residual_variance(x, expected, np.inf, found.weights, spread)
             S = np.maximum(S, expected) if model.floor else S
+            if model.white:
+                power = run.residual_power(x, found.weights) + found.power(E, run)
+                S = np.maximum(S, expected + 2.0 / run.gain * power)
             out.append(S * max(1.0, run.blocks.duration / model.novelty))
         return np.array(out)
 
@@ -262,6 +274,7 @@ class Problem:
             ),
             torque=torque,
             gears=gears,
+            borne=self.runs[-1].rms_of(phi),
             gain_std=gain,
             moved=moved,
             scales=scales,

@@ -52,6 +52,7 @@ class Posterior:
     power: (K, n) mean square of each run's residual [N²·m²].
     torque: "link" or "motor", the side the torque seems to be measured on.
     gears: whether friction of gears is surely in the torque, so that it differs from run to run on a sound arm.
+    borne: rms torque (n,) that what was added costs the joints in the run [N·m].
     gain_std: relative standard deviation of the torque's calibration, one for all joints.
     moved: (n, 10, 10) by what a standard deviation of each joint's own scale moves phi (`posterior.joint_gains`); None:
         joints have none.
@@ -73,6 +74,7 @@ class Posterior:
     power: NDArray[np.float64]
     torque: str
     gears: bool
+    borne: NDArray[np.float64]
     gain_std: float
     moved: NDArray[np.float64] | None
     scales: Scales

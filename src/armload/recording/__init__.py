@@ -10,6 +10,7 @@ from armload.recording.lerobot import data_set_episodes, is_data_set
 from armload.recording.recording import BLOCK, CHANNELS, GAP, JITTERED, Recording, Sample
 from armload.recording.spooled import blocks, largest, parts_of, span
 from armload.recording.steadied import steadied
+from armload.recording.steadying import Steadying
 
 __all__ = [
     "BLOCK",
@@ -22,6 +23,7 @@ __all__ = [
     "ColumnSpec",
     "Recording",
     "Sample",
+    "Steadying",
     "blocks",
     "check_own_measurements",
     "data_set_episodes",

@@ -15,8 +15,6 @@ by noise of the regressor: Fuller, Measurement Error Models, 1987.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import product
-from math import factorial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +26,9 @@ from armload.recording.spooled import blocks, parts_of
 # (test_velocities_told_by_both_channels_have_a_third_of_the_noise_and_all_of_the_motion). With 0.05 s half is, and one
 # in six sound logs of a Gen3 stays doubted
 AROUND = 0.075
+_POWER = np.add.outer(np.arange(4), np.arange(4))  # of s in the normal equations' matrix
+_FACTORIAL = np.array([1.0, 1.0, 2.0, 6.0])
+_OF_BOTH = np.outer(_FACTORIAL, _FACTORIAL)
 _QUIET = 1e-9  # [rad] noise of a channel at least: a joint that stands shows none
 _HELD = 1e-9  # of the weight of one sample: holds what too few samples around do not tell
 
@@ -41,8 +42,7 @@ def _velocities(recording: Recording) -> Iterator[NDArray[np.float64]]:
     """dq a block of samples at a time."""
     t, n = recording.t, recording.n
     pieces = np.r_[0, np.cumsum(np.diff(t) > GAP)]
-    of_q, of_dq = np.maximum([_noise(recording.q), AROUND * _noise(recording.dq)], _QUIET) ** -2.0
-    held = (_HELD * (of_q + of_dq))[:, None, None] * np.diag([0.0, 0.0, 1.0, 1.0])
+    precision = precision_of(_noise(recording.q), _noise(recording.dq))
     reach = int(np.max(np.searchsorted(t, t + AROUND, side="right") - np.arange(len(t)))) - 1
     for part in blocks(len(t)):
         first, stop = max(part.start - reach, 0), min(part.stop + reach, len(t))
@@ -60,16 +60,37 @@ def _velocities(recording: Recording) -> Iterator[NDArray[np.float64]]:
                 if p < 3:
                     dq_sums[p] += power[:, None] * dq[k - first]
                 power = power * s
-        A, b = np.zeros((len(rows), n, 4, 4)) + held, np.zeros((len(rows), n, 4))
-        for i, j in product(range(4), range(4)):
-            A[:, :, i, j] += of_q * moments[i + j][:, None] / (factorial(i) * factorial(j))
-            if i and j:
-                A[:, :, i, j] += of_dq * moments[i + j - 2][:, None] / (factorial(i - 1) * factorial(j - 1))
-        for i in range(4):
-            b[:, :, i] += of_q * q_sums[i] / factorial(i)
-            if i:
-                b[:, :, i] += of_dq * dq_sums[i - 1] / factorial(i - 1)
-        yield np.array(np.linalg.solve(A, b[..., None])[:, :, 1, 0] / AROUND, dtype=float)
+        yield told(moments, q_sums, dq_sums, precision)
+
+
+def precision_of(q_std: NDArray[np.float64], dq_std: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
+    """One over the variance (n,) of the noise in q and in dq·`AROUND` [1/rad²]."""
+    of_q, of_dq = np.maximum([q_std, AROUND * dq_std], _QUIET) ** -2.0
+    return of_q, of_dq
+
+
+def told(
+    moments: NDArray[np.float64],
+    q_sums: NDArray[np.float64],
+    dq_sums: NDArray[np.float64],
+    precision: tuple[NDArray[np.float64], NDArray[np.float64]],
+) -> NDArray[np.float64]:
+    """c_1 (R, n) [rad/s] of R moments, by least squares; s is in units of `AROUND`.
+
+    Args:
+        moments: Σ sᵖ (7, R) over the samples near each. q_sums: Σ sᵖ·q (4, R, n). dq_sums: Σ sᵖ·dq·`AROUND` (3, R, n).
+        precision: as of `precision_of`.
+    """
+    (of_q, of_dq), (_, count, n) = precision, q_sums.shape
+    b = np.zeros((count, n, 4))
+    A = np.zeros((count, n, 4, 4)) + (_HELD * (of_q + of_dq))[:, None, None] * np.diag([0.0, 0.0, 1.0, 1.0])
+    A += of_q[:, None, None] * (moments.T[:, _POWER] / _OF_BOTH)[:, None]
+    A[:, :, 1:, 1:] += of_dq[:, None, None] * (moments.T[:, _POWER[:3, :3]] / _OF_BOTH[:3, :3])[:, None]
+    for i in range(4):
+        b[:, :, i] += of_q * q_sums[i] / _FACTORIAL[i]
+        if i:
+            b[:, :, i] += of_dq * dq_sums[i - 1] / _FACTORIAL[i - 1]
+    return np.array(np.linalg.solve(A, b[..., None])[:, :, 1, 0] / AROUND, dtype=float)
 
 
 def _noise(x: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -146,6 +146,11 @@ class RegressionData:
         squares = columns_of(self.A[:, shared, shared], E)
         return columns_of(squares.swapaxes(1, 2), E), columns_of(self.b[:, None, shared], E)[:, 0]
 
+    def rms_of(self, phi: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Root mean square (n,) of the torque that a body (10,) costs the joints [N·m], behind the lag."""
+        squares = np.einsum("k,jkl,l->j", phi, self.A[:, :10, :10], phi)
+        return np.sqrt(np.maximum(squares, 0.0) / max(self.blocks.duration, 1e-9))
+
     def residual_power(self, x: NDArray, weights: NDArray) -> NDArray[np.float64]:
         """Mean square (n,) [N²·m²] of what x (10 + p,), payload and eta, and the features' weights (n, R) leave.
 

@@ -30,6 +30,9 @@ class NoiseModel:
             the configuration and has no unknown of its own.
         overrated: by which factor the posterior's covariance is too small on arms unlike those the model was made for:
             squared error over variance, mean over simulated episodes (`overrating` in lab/training, 2 % trimmed).
+        white: whether S is never taken to be smaller than that of white noise of the residual's power, 2·power/λ behind
+            the lag. Few blocks do not tell it, and many smooth functions follow what they do: vibration that a slow
+            log folds to low frequencies is white, and larger than all else.
     """
 
     residual: float
@@ -37,6 +40,7 @@ class NoiseModel:
     floor: bool
     novelty: float
     overrated: float = 1.0
+    white: bool = False
 
 
 # without features, the smooth mismatch is in the residual: it is large and repeats: 0.2–0.6 % of the effort limit of

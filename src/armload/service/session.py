@@ -190,7 +190,7 @@ class Session:
 
     def _take(self, sample: Sample) -> OnlineEstimate:
         if self._recorder is not None:
-            self._recorder.append(sample)
+            self._recorder.append(self.source.as_it_came(sample))
         before, used = self.estimate, self._identifier.health.used
         estimate = self._identifier.update(*sample)
         event = estimate.event

@@ -38,6 +38,7 @@ class ArmSettings(ArmOptions):
     com_range: the farthest its payload's centre of mass may be [m]. loop: replay a log again and again.
     rate: of the simulator [Hz]. apply: "auto": what is identified is told to the robot's controller (`Feedback`).
     mounted: path of what was on the flange at the tare or profile, or "nothing"; for `apply`.
+    steady: whether velocities are told by the positions, too (`devices.Steadied`).
     """
 
     name: str
@@ -50,6 +51,7 @@ class ArmSettings(ArmOptions):
     rate: float = 1000.0
     apply: str | None = None
     mounted: str | None = None
+    steady: bool = False
 
     def __post_init__(self) -> None:
         if self.record is not None and Path(self.record).suffix.lower() not in RECORDS:

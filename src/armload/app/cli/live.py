@@ -36,6 +36,7 @@ examples:
   armload live panda://172.16.0.2 --tool franka-hand
   armload live panda://172.16.0.2 --mass 1.200±0.002      (taken where something is held that may be it)
   armload live 'ur://192.168.0.10?torque_constants=12,12,10,11,11,11' --robot ur10e
+  armload live ros2:///joint_states --robot iiwa14 --steady   (velocities that are differences of positions)
   armload live ros2:///joint_states --robot my_arm.urdf --frame tool0
 
 The page is for this machine only (http://127.0.0.1:8080) unless --host says otherwise. Its address then has a token,
@@ -69,6 +70,11 @@ def parser() -> Parser:
     add_known_arguments(parser)
     add_tool_and_topic_arguments(parser)
     add_column_arguments(parser)
+    add(
+        "--steady",
+        action="store_true",
+        help="tell velocities by the positions, too, 75 ms late: where they are coarse, noisy or seldom sampled",
+    )
     add("--headless", action="store_true", help="no page: one JSON object per line on stdout")
     add(
         "--every",
@@ -112,9 +118,9 @@ def parser() -> Parser:
 def run(options: argparse.Namespace) -> int | None:
     """Identify until the source ends (--headless) or somebody interrupts; 2 after an error."""
     from armload.app.cli.headless import lines
-    from armload.devices import Detached, Recorder, open_source
+    from armload.devices import Detached, Recorder, Steadied, open_source
     from armload.posterior import Known, load_profile
-    from armload.recording import ColumnSpec, check_own_measurements, has_topics
+    from armload.recording import ColumnSpec, check_own_measurements, has_topics, steadied
     from armload.service.session import Session
 
     options.robot = options.robot or robot_of(options.source)
@@ -144,6 +150,8 @@ def run(options: argparse.Namespace) -> int | None:
     )
     if isinstance(source, Detached) and "://" in options.source:
         source = _reopened(source, options, arm, None if mcap else options.record)
+    if options.steady:
+        source, tare = Steadied(source), None if tare is None else steadied(tare)
     with source:
         recorder = Recorder(mcap, arm.n, arm.joint_names) if mcap else None
         known = Known.of(options.mass, options.com, if_held=True)

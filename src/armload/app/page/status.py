@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from typing import NamedTuple
 
+from armload.devices import Steadied
 from armload.inertia import NAMES
 from armload.online import OnlineEstimate
 from armload.service.reconnecting import Reconnecting
@@ -121,7 +122,7 @@ def in_words(seconds: float) -> str:
 
 def _link(session: Session, now: float) -> Link:
     """The connection; a log or a simulator is there until it ends, and is never silent."""
-    source = session.source
+    source = session.source.source if isinstance(session.source, Steadied) else session.source
     if session.error is not None:
         return Link("lost", str(session.error), 1, None, None)
     if isinstance(source, Reconnecting):

@@ -1,0 +1,102 @@
+"""Velocities with less noise on a stream: samples come out as they went in, but later, and with `steadied` velocities.
+
+What comes after a moment tells as much of its velocity as what came before: a sample is held back until the next
+`AROUND` has come. Nothing is told across a gap, or of a sample that is none; neither is left out.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.recording.recording import GAP, Sample
+from armload.recording.steadied import AROUND, precision_of, told
+
+_ROWS = 1024  # of the arrays that the last samples are in, at first; they grow where more come within `AROUND`
+_THIRD = np.array([-1.0, 3.0, -3.0, 1.0])  # differences of them: of white noise they have 20 times the power
+_LONG = 2000.0  # [samples] over which noise is averaged: some seconds. It may change with the motion
+
+
+class Steadying:
+    """Takes samples, and gives them back `AROUND` later with the velocities that q and dq together tell.
+
+    Args:
+        n: joints.
+    """
+
+    def __init__(self, n: int) -> None:
+        self._n = n
+        self._t, self._both = np.empty(_ROWS), np.empty((_ROWS, 2 * n))  # times, and q and dq·AROUND beside each other
+        self._power, self._count = np.zeros(2 * n), 0.0  # mean square of third differences, and of how many
+        self._begin()
+
+    def _begin(self) -> None:
+        """A stretch of its own: what came before tells nothing of what comes."""
+        self._first = self._stop = 0  # rows that are kept
+        self._held: list[tuple[Sample, Any]] = []  # given back next, the last ones; and what goes with each
+
+    def take(self, sample: Sample, tag: Any = None) -> list[tuple[Sample, Any]]:
+        """Take a sample; those whose time has come, in order, each with the tag that it was given with."""
+        good = self._of(sample)
+        if good is None:
+            return [*self.flush(), (sample, tag)]
+        out = []
+        t, both = good
+        if self._stop and not 0.0 < t - self._t[self._stop - 1] <= GAP:
+            out = self.flush()
+        self._append(t, both)
+        self._held.append((sample, tag))
+        while self._held and float(self._held[0][0].t) <= t - AROUND:
+            out.append(self._next())
+        return out
+
+    def flush(self) -> list[tuple[Sample, Any]]:
+        """All that is held back, by what has come so far: no more is coming, or not for long."""
+        out = [self._next() for _ in range(len(self._held))]
+        self._begin()
+        return out
+
+    def _of(self, sample: Sample) -> tuple[float, NDArray[np.float64]] | None:
+        """Time, and q and dq·AROUND, of a sample that can be used."""
+        try:
+            t = float(sample.t)
+            both = np.concatenate([np.asarray(sample.q, float), AROUND * np.asarray(sample.dq, float)])
+        except (TypeError, ValueError):
+            return None
+        return (t, both) if both.shape == (2 * self._n,) and np.isfinite(both.sum() + t) else None
+
+    def _append(self, t: float, both: NDArray[np.float64]) -> None:
+        if self._stop == len(self._t):
+            kept = slice(self._first, self._stop)
+            size = max(2 * (kept.stop - kept.start), _ROWS)
+            self._t, self._both = (_moved(x[kept], size) for x in (self._t, self._both))
+            self._first, self._stop = 0, kept.stop - kept.start
+        self._t[self._stop], self._both[self._stop] = t, both
+        self._stop += 1
+        if self._stop - self._first >= len(_THIRD):
+            third = _THIRD @ self._both[self._stop - len(_THIRD) : self._stop]
+            self._count = min(self._count + 1.0, _LONG)
+            self._power += (third**2 - self._power) / self._count
+
+    def _next(self) -> tuple[Sample, Any]:
+        """The sample that is held back longest."""
+        sample, tag = self._held.pop(0)
+        t = float(sample.t)
+        kept = self._t[self._first : self._stop]
+        first, stop = np.searchsorted(kept, t - AROUND), np.searchsorted(kept, t + AROUND, side="right")
+        near = slice(self._first + int(first), self._first + int(stop))
+        self._first = near.start
+        powers = ((self._t[near] - t) / AROUND) ** np.arange(7)[:, None]
+        sums = powers[:4] @ self._both[near]
+        std = np.sqrt(self._power / 20.0)
+        precision = precision_of(std[: self._n], std[self._n :] / AROUND)
+        dq = told(powers.sum(axis=1)[:, None], sums[:, None, : self._n], sums[:3, None, self._n :], precision)[0]
+        return sample._replace(dq=dq), tag
+
+
+def _moved(x: NDArray[np.float64], size: int) -> NDArray[np.float64]:
+    out = np.empty((size, *x.shape[1:]))
+    out[: len(x)] = x
+    return out

@@ -1,0 +1,125 @@
+"""A source whose velocities are told by its positions, too: what a coarse robot sends, answered as its log is."""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from armload.app.cli import main
+from armload.arms import arm
+from armload.devices import Replay, Source, Steadied
+from armload.inertia import InertialParameters
+from armload.lab.episodes.motion_kinds import MotionSource
+from armload.motion import random_motion
+from armload.payloads import draw_payload
+from armload.recording import Recording, read_recording, steadied, write_recording
+from armload.simulation import Sensors, World, simulate
+
+STEP = 2.0 * np.pi / 2.0**17  # [rad]
+
+
+def coarse(log):
+    """The same with positions of 17 bits, and velocities that are their differences to the sample before."""
+    q = np.round(log.q / STEP) * STEP
+    dq = np.zeros_like(q)
+    dq[1:] = np.diff(q, axis=0) / np.diff(log.t)[:, None]
+    return replace(log, q=q, dq=dq).select(slice(1, None))
+
+
+class Silent(Source):
+    """Sends what a log has, then nothing for a while, then ends."""
+
+    def __init__(self, log: Recording, ticks: int) -> None:
+        self.name, self.n, self.rate, self._log, self._ticks = "silent", log.n, log.rate, log, ticks
+        self._came = 0.0
+
+    def __iter__(self):
+        return (sample for sample in self.ticking(0.0) if sample is not None)
+
+    def ticking(self, tick):  # noqa: ARG002
+        for k, sample in enumerate(self._log):
+            self._came = 1000.0 + k
+            yield sample
+        yield from [None] * self._ticks
+
+    def arrived(self):
+        return self._came
+
+    def close(self):
+        """Nothing is held."""
+
+
+@pytest.fixture(scope="module")
+def swinging():
+    t = np.arange(200) / 100.0
+    q = 0.3 * np.sin(3.0 * t)[:, None] * [1.0, 0.5]
+    rng = np.random.default_rng(4)
+    return Recording(t, q, np.gradient(q, t, axis=0) + 2e-3 * rng.normal(size=q.shape), q)
+
+
+def test_what_is_held_back_comes_before_the_silence_is_told(swinging):
+    ticks = list(Steadied(Silent(swinging, 3)).ticking(0.1))
+    assert [None if sample is None else sample.t for sample in ticks] == [*swinging.t, None, None, None]
+
+
+def test_a_sample_has_arrived_when_it_came_and_not_when_it_is_handed_on(swinging):
+    source = Steadied(Silent(swinging, 0))
+    for k, sample in enumerate(source):
+        assert sample.t == swinging.t[k]
+        assert source.arrived() == 1000.0 + k
+        came = source.as_it_came(sample)
+        np.testing.assert_array_equal(came.dq, swinging.dq[k])
+        assert not np.array_equal(sample.dq, came.dq)
+
+
+def test_a_replay_in_real_time_is_75_ms_late_and_says_so(swinging):
+    source = Steadied(Replay(swinging.between(0.0, 0.6), speed=1.0))
+    lags = [source.lag() for _ in source]
+    assert np.median(lags[:40]) == pytest.approx(0.08, abs=0.02)
+    assert time.monotonic() - source.arrived() < 1.0
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    """A run of a Gen3 at 100 Hz with most of what it is rated for, and its tare, as such robots log them."""
+    robot, folder = arm("gen3"), tmp_path_factory.mktemp("coarse")
+    world, places = World.real_like(robot, 900), MotionSource(robot, 0.0)
+    motion = random_motion(robot, 60, duration=10.0)
+    about = places.draw("long", np.random.default_rng(8), 20.0, "tare", places.centre(motion), 0.3)
+    drawn = draw_payload("boxes", 0).parameters.phi
+    body = InertialParameters(drawn * (0.8 * robot.rated_payload / drawn[0]))
+    how = {"world": world, "sensors": Sensors.of(robot), "rate": 100.0}
+    run, tare = simulate(robot, motion, body, seed=0, **how), simulate(robot, about, seed=50, **how)
+    for name, log in (("run", run), ("empty", tare)):
+        write_recording(folder / f"{name}.csv", coarse(log))
+    return folder / "run.csv", folder / "empty.csv", body.mass
+
+
+def test_a_sound_stream_of_coarse_velocities_is_doubted_and_steadied_is_not(logs, capsys):
+    run, empty, mass = logs
+    last = {}
+    for steady in ([], ["--steady"]):
+        args = ["live", str(run), "--robot", "gen3", "--tare", str(empty), "--headless", "--speed", "max", *steady]
+        assert main(args) == 0
+        last[bool(steady)] = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert last[False]["event"] is not None
+    assert last[False]["interval"] == "approximate"
+    assert last[True]["event"] is None
+    assert last[True]["interval"] == "calibrated"
+    assert last[True]["phi_low"][0] <= mass <= last[True]["phi_high"][0]
+
+
+def test_a_record_of_a_steadied_stream_has_the_samples_as_they_came(logs, tmp_path, capsys):
+    robot, (run, _, _) = arm("gen3"), logs
+    options = ["--robot", "gen3", "--method", "map", "--headless", "--speed", "max", "--duration", "1", "--steady"]
+    for name in ("record.csv", "record.mcap"):
+        assert main(["live", str(run), *options, "--record", str(tmp_path / name)]) == 0
+        kept, log = read_recording(tmp_path / name, robot), read_recording(run, robot)
+        assert len(kept) > 50
+        np.testing.assert_allclose(kept.dq[: len(log)], log.dq[: len(kept)], rtol=0, atol=1e-12)
+    assert capsys.readouterr().out
+    assert np.abs(steadied(log).dq - log.dq).max() > 1e-3
