@@ -99,13 +99,15 @@ def logs(tmp_path_factory):
     return folder / "run.csv", folder / "empty.csv", body.mass
 
 
-def test_a_sound_stream_of_coarse_velocities_is_doubted_and_steadied_is_not(logs, capsys):
+def test_a_stream_of_coarse_velocities_is_told_how_they_can_be_steadied_and_then_not_doubted(logs, capsys):
     run, empty, mass = logs
     last = {}
     for steady in ([], ["--steady"]):
         args = ["live", str(run), "--robot", "gen3", "--tare", str(empty), "--headless", "--speed", "max", *steady]
         assert main(args) == 0
-        last[bool(steady)] = json.loads(capsys.readouterr().out.splitlines()[-1])
+        out, err = capsys.readouterr()
+        last[bool(steady)] = json.loads(out.splitlines()[-1])
+        assert err.count("steady them") == (0 if steady else 1)
     assert last[False]["event"] is not None
     assert last[False]["interval"] == "approximate"
     assert last[True]["event"] is None

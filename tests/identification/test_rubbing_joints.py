@@ -15,6 +15,8 @@ from armload.inertia import InertialParameters
 from armload.lab.episodes.motion_kinds import MotionSource
 from armload.motion import random_motion
 from armload.payloads import draw_payload
+from armload.posterior import HybridIdentifier
+from armload.posterior.drift import CHANGED
 from armload.simulation import Sensors, World, simulate
 
 STEP = 2.0 * np.pi / 2.0**17  # [rad] of positions of 17 bits
@@ -66,6 +68,20 @@ def test_an_arm_that_changed_since_its_tare_is_not_explained_by_its_rubbing():
     assert answer.interval == "approximate"
     assert any("not as it was at its tare" in note for note in answer.notes)
     assert ALLOWED not in answer.notes
+
+
+@pytest.mark.parametrize("k", [2, pytest.param(4, marks=pytest.mark.full)])
+def test_joints_that_rub_more_for_what_was_added_are_no_arm_that_changed_and_hide_none(k):
+    """As of a stream, which is not read twice."""
+    robot, found = arm("gen3"), {}
+    for changed in (0.0, 0.4):
+        run, tare, _ = logs_of(robot, k, 0.01, 200.0, False, changed)
+        identifier = HybridIdentifier(robot, tare)
+        identifier.run(run)
+        found[changed] = identifier.stream.drift
+    assert found[0.0].statistic > CHANGED
+    assert not found[0.0].changed
+    assert found[0.4].changed
 
 
 def test_real_velocities_that_are_differences_of_unsteady_positions_are_not_taken_for_another_arm(real_data):

@@ -203,6 +203,8 @@ class Session:
             self._recent.append(sample)
             if self._plausibility.look(sample, estimate.health, self._recent):
                 self._doubted()
+            if (advice := self._plausibility.advice()) is not None:
+                self._warn(advice)
         self._answered = self._plausibility.qualified(estimate)
         estimate = self._answered.behind(self.source.lag())
         self.sample, self.estimate = sample if usable else self.sample, estimate
