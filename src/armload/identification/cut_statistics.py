@@ -1,0 +1,183 @@
+"""What the two sides of a cut of a log say of each other: the likeliest of some cuts, and T there.
+
+With the part before a cut as the tare of the part after it (`posterior.solve`), phi is what was added at the cut, and
+
+    T = phi_MLᵀ·(kappa·Λ⁻¹ + C)⁻¹·phi_ML
+
+is chi-squared of ten where nothing was: Λ, phi_ML what the two parts say of it, all that is unknown about the arm
+integrated out, kappa by how much the physics overrates such a log (`posterior.Calibration`), C how much less gears may
+lose of what is held in one part than in the other (`LOSS_DIFFERS`), where that is in the torque. A tare or a profile
+says what the arm does by itself, so that a lighter change shows; what was mounted then is taken off, and a day's drift
+allowed for.
+
+Of something light the mass shows first: with a prior on its moments that lets it lie near the flange, the mass alone is
+chi-squared of one, where there is a tare or a profile.
+
+Which cuts come into question is asked of a model with fewer smooth functions, all cuts of one solution (`cut_scan.py`);
+T, which decides, is of the whole model at the likeliest of them.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import replace
+from functools import cached_property
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm
+from armload.identification.added_mass import MASS_MAY_CHANGE, of_mass
+from armload.identification.cut_scan import added_at_cuts, of_the_log
+from armload.identification.thresholds import LOSS_DIFFERS, PAYLOAD_MAY_CHANGE
+from armload.posterior import SmoothPosteriorLeastSquares
+from armload.posterior.drift import TESTED
+from armload.posterior.scales import Scales
+from armload.posterior.solve import solve
+from armload.regression import JointFeatures, payload_prior_std, solution_prior_std
+from armload.regression.information import RegressionData, Session
+from armload.regression.noise import SMOOTH, NoiseModel
+from armload.regression.rows_of_log import RowsOfLog
+
+_NOISE = replace(SMOOTH, white=True)  # what is left, and looks like a change where it is taken to be less
+_ITERATIONS = 3  # of expectation–maximisation: the scales change little after
+_FEW = 32  # smooth functions of the pose with which cuts are compared: T at the likeliest is of all of them
+_LIKELIEST = 2  # cuts of which T is found with the whole model
+
+
+class Statistics(NamedTuple):
+    """T of a cut, and chi-squared of the mass alone; 0 where that is not tested."""
+
+    T: float
+    of_mass: float
+
+    @property
+    def doubt(self) -> float:
+        """The larger of the two, over what raises a doubt."""
+        return max(self.T / PAYLOAD_MAY_CHANGE, self.of_mass / MASS_MAY_CHANGE)
+
+
+class Likeliest(NamedTuple):
+    """The likeliest of some cuts.
+
+    row: the first one after it. T: its own. of_mass: the largest of any cut. left: the largest doubt, of noise that is
+    no more than its blocks show.
+    """
+
+    row: int
+    T: float
+    of_mass: float
+    left: float
+
+
+class _Model(NamedTuple):
+    """What is known of the arm before the log: by a tare or a profile, and the scales that a solution begins with."""
+
+    known: list[RegressionData]
+    start: Scales | None
+
+    def of_features(self, features: JointFeatures) -> _Model:
+        """The same with the first waves of the pose only."""
+        keep, _ = self.known[0].features.first(features) if self.known else (slice(0), None)
+        start = self.start and replace(self.start, features=self.start.features[:, keep])
+        return _Model([data.of_features(features) for data in self.known], start)
+
+
+class Cuts:
+    """The rows of a log, and what cuts between them say.
+
+    Args:
+        physics: of the arm, with its tare or profile. rows: of the log. kappa: as of `changes_of_payload`.
+        held: mass of what seems to be held [kg].
+    """
+
+    def __init__(self, physics: SmoothPosteriorLeastSquares, rows: RowsOfLog, kappa: float, held: float = 0.0) -> None:
+        self.physics, self.rows, self.kappa = physics, rows, kappa
+        self.weak = solution_prior_std(physics.arm)
+        loss = LOSS_DIFFERS * max(held, 0.0) if physics.arm.motor_torque else 0.0  # [kg]
+        self.lost = np.diag((loss * self.weak / self.weak[0]) ** 2)
+        known = [_without_payload(tare, physics.arm, physics.start) for tare in physics.stream.tares]
+        self.session = Session(1, TESTED) if physics.profile is None and known else physics.session
+        self.few = replace(physics.features, pose=min(_FEW, physics.features.pose))
+        self.whole = _Model(known, physics.start)
+        self.rough = self.whole.of_features(self.few)
+
+    @cached_property
+    def coulomb(self) -> NDArray[np.float64]:
+        """Coulomb friction of the joints (n,) [N·m], as the log and what else is known show it."""
+        data = self._data(slice(0, len(self.rows.t)))
+        data.session = self.session
+        found = solve([*self.whole.known, data], self.weak, None, _NOISE, _ITERATIONS, self.whole.start)
+        return np.abs(self.physics.stream.correction.coulomb(found.eta))
+
+    def likeliest(self, start: int, stop: int, cuts: NDArray[np.int64]) -> Likeliest:
+        """Of cuts between two rows."""
+        stretches = self._stretches(start, stop, cuts)
+        roughly = self._roughly(stretches)
+        likely = np.unique([*np.argsort(roughly[:, 0])[-_LIKELIEST:], np.argmax(roughly[:, 1])])
+        parts = [(stretches[: k + 1], stretches[k + 1 :]) for k in likely]
+        found, left = [self._statistics(*part) for part in parts], [self._statistics(*part, SMOOTH) for part in parts]
+        best = int(np.argmax([each.T for each in found]))
+        of_mass = max(each.of_mass for each in found)
+        return Likeliest(int(cuts[likely[best]]), found[best].T, of_mass, max(each.doubt for each in left))
+
+    def roughly(self, start: int, stop: int, cuts: NDArray[np.int64]) -> NDArray[np.float64]:
+        """T (K,) of cuts between two rows, by few smooth functions."""
+        return self._roughly(self._stretches(start, stop, cuts))[:, 0]
+
+    def at(self, start: int, stop: int, cut: int) -> tuple[Statistics, float]:
+        """Of one cut between two rows, and its doubt with noise that is no more than its blocks show."""
+        before, after = self._stretches(start, stop, np.array([cut]))
+        return self._statistics([before], [after]), self._statistics([before], [after], SMOOTH).doubt
+
+    def _roughly(self, stretches: list[RegressionData]) -> NDArray[np.float64]:
+        """Both statistics of every cut (K, 2), with fewer smooth functions, and scales of the likeliest cut."""
+        for stretch in stretches:
+            stretch.session = self.session
+        cuts = added_at_cuts(self.rough.known, stretches, self.few, self.weak, self.rough.start)
+        best = int(np.argmax([self._tests(*cut).T for cut in cuts])) + 1
+        parts = [RegressionData.joined(part).of_features(self.few) for part in (stretches[:best], stretches[best:])]
+        solution = solve([*self.rough.known, *parts], self.weak, None, _NOISE, _ITERATIONS, self.rough.start)
+        scales = of_the_log(solution.scales, (parts[0].blocks.duration, parts[1].blocks.duration))
+        cuts = added_at_cuts(self.rough.known, stretches, self.few, self.weak, scales)
+        return np.array([self._tests(*cut) for cut in cuts])
+
+    def _stretches(self, start: int, stop: int, cuts: np.ndarray) -> list[RegressionData]:
+        return [self._data(slice(a, b)) for a, b in pairwise([start, *cuts.tolist(), stop])]
+
+    def _data(self, part: slice) -> RegressionData:
+        data = self.physics.empty_data()
+        for rows in self.rows.between(part.start, part.stop):
+            data.take(rows)
+        return data
+
+    def _statistics(
+        self, before: list[RegressionData], after: list[RegressionData], noise: NoiseModel = _NOISE
+    ) -> Statistics:
+        parts = [RegressionData.joined(before), RegressionData.joined(after)]
+        for part in parts:
+            part.session = self.session
+        solution = solve([*self.whole.known, *parts], self.weak, None, noise, _ITERATIONS, self.whole.start)
+        return self._tests(solution.information, solution.vector)
+
+    def _tests(self, information: NDArray[np.float64], vector: NDArray[np.float64]) -> Statistics:
+        """T, and the statistic of the mass alone, of what a cut's two sides say."""
+        P = np.linalg.inv(information + np.diag(self.weak**-2.0))  # there are directions that neither part tells
+        added = P @ vector
+        T = float(added @ np.linalg.solve(self.kappa * P + self.lost, added))
+        if self.physics.arm.motor_torque or not self.whole.known:
+            return Statistics(T, 0.0)  # friction that grows with the load differs from part to part as a weight does
+        return Statistics(T, of_mass(information / self.kappa, vector / self.kappa))
+
+
+def _without_payload(data: RegressionData, arm: Arm, start: Scales | None) -> RegressionData:
+    """What a tare or a profile says of the arm, less what it seems to carry, which is then known to be nothing."""
+    found = solve([data], payload_prior_std(arm), None, SMOOTH, 1, start)
+    out = copy(data)
+    out.A, out.b, out.c, out.blocks = data.A.copy(), data.b.copy(), data.c.copy(), data.blocks.mapped(np.copy)
+    out.less(found.phi)
+    out.A[:, :10], out.A[:, :, :10], out.b[:, :10] = 0.0, 0.0, 0.0
+    out.blocks.sums[:, :, :10] = 0.0
+    return out
