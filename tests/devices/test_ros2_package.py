@@ -39,10 +39,11 @@ def messages(ros_python):
 
 @pytest.mark.full
 @pytest.mark.usefixtures("messages")
-def test_the_lifecycle_node_has_states_services_remapping_and_a_namespace(ros, wait_until):
+@pytest.mark.parametrize("steady", ["false", "true"])
+def test_the_lifecycle_node_has_states_services_remapping_and_a_namespace(ros, wait_until, steady):
     names = ("__ns:=/left", "joint_states:=/joint_states")
     renamed = [word for name in names for word in ("-r", name)]
-    given = [word for name in ("robot:=panda", "tare_duration:=4.0") for word in ("-p", name)]
+    given = [word for name in ("robot:=panda", "tare_duration:=4.0", f"steady:={steady}") for word in ("-p", name)]
     held = example_payload().parameters
     with (
         ros(*ARMLOAD, "simulate", "--robot", "panda", "--payload", "test", "--motion", "taie2024") as robot,

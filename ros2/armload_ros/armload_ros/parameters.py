@@ -20,6 +20,7 @@ DEFAULTS: dict[str, Any] = {
     "tool": "",
     "tare": "",
     "profile": "",
+    "steady": False,
     "tare_duration": 20.0,
     "rate": 10.0,
     "timeout": 2.0,

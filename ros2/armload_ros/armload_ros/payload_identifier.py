@@ -153,7 +153,7 @@ class PayloadIdentifier(LifecycleNode):
     def _identify(self, robot: Arm, tare: Recording | None, known: Known | None = None) -> None:
         """A new stream in the place of the present one, which stays if it cannot be made."""
         given = self.parameters
-        stream = Stream(robot, tare, given.value("method") or None, given.profile(), known)
+        stream = Stream(robot, tare, given.value("method") or None, given.profile(), known, given.value("steady"))
         if self._stream is not None:
             self._stream.close()
         self._stream, self._last = stream, -np.inf
@@ -176,6 +176,10 @@ class PayloadIdentifier(LifecycleNode):
                 self._end_tare()
             return
         estimate = self._stream.update(sample)
+        if estimate is None:
+            return
+        if (advice := self._stream.advice()) is not None:
+            self.get_logger().warning(advice)
         if abs(sample.t - self._last) >= 0.999 / self.parameters.value("rate"):  # a clock set back counts as later
             self._last = sample.t
             self._publish(self._stream, estimate)

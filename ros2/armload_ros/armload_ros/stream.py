@@ -7,7 +7,7 @@ import time
 from armload.arms import Arm
 from armload.online import OnlineEstimate, OnlineIdentifier
 from armload.posterior import Known, Profile
-from armload.recording import Recording, Sample
+from armload.recording import Recording, Sample, Steadying, steadied
 from armload.service.plausible import Plausibility
 from armload.service.recent import Recent
 from armload.service.unknown import Link, why_unknown
@@ -18,6 +18,7 @@ class Stream:
 
     Args:
         arm: with its tool. tare, method, profile, known: see `OnlineIdentifier`.
+        steady: whether velocities are told by the positions, too, 75 ms late (`armload.devices.Steadied`).
     """
 
     def __init__(
@@ -27,23 +28,34 @@ class Stream:
         method: str | None = None,
         profile: Profile | None = None,
         known: Known | None = None,
+        steady: bool = False,
     ) -> None:
-        self.arm, self.tare, self.known = arm, tare, known
-        self._identifier = OnlineIdentifier(arm, tare, method, profile, known)
+        self.arm, self.tare, self.known, self._steady = arm, tare, known, steady
+        told = steadied(tare) if steady and tare is not None else tare
+        self._identifier = OnlineIdentifier(arm, told, method, profile, known)
+        self._steadying = Steadying(arm.n)
         self._recent, self._plausibility = Recent(arm.n), Plausibility(arm, "joint_states")
         self.estimate: OnlineEstimate | None = None
         self.sample: Sample | None = None
         self._left_out = 0
 
-    def update(self, sample: Sample) -> OnlineEstimate:
-        """The answer after one more sample."""
+    def update(self, sample: Sample) -> OnlineEstimate | None:
+        """The answer after one more sample; None where the first ones are held back."""
+        for ready, _ in self._steadying.take(sample) if self._steady else [(sample, None)]:
+            self._take(ready)
+        return self.estimate
+
+    def advice(self) -> str | None:
+        """What would make answers better, once; None: nothing, or it was told."""
+        return self._plausibility.advice()
+
+    def _take(self, sample: Sample) -> None:
         estimate = self._identifier.update(*sample)
         if estimate.health.bad == self._left_out:  # it could be used
             self._recent.append(sample)
             self._plausibility.look(sample, estimate.health, self._recent)
         self._left_out = estimate.health.bad
         self.sample, self.estimate = sample, self._plausibility.qualified(estimate)
-        return self.estimate
 
     def why_unknown(self, heard: float) -> str | None:
         """Why the answer cannot be used, given when the last sample came [s, monotonic]; None: it can."""
@@ -56,6 +68,7 @@ class Stream:
         self._identifier.reset()
         self._recent.clear()
         self._plausibility.reset()
+        self._steadying = Steadying(self.arm.n)
         self.estimate, self.sample, self._left_out = None, None, 0
 
     def close(self) -> None:

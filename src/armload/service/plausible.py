@@ -147,5 +147,5 @@ def _advice(log: Recording) -> str | None:
         return None
     return (
         f"velocities are off by {1e3 * np.sqrt(noise):.0f} mrad/s from what the positions around tell, too: a sound "
-        "stream may be doubted; steady them (armload live --steady, or steady = true for armload serve)"
+        "stream may be doubted; steady them (--steady of armload live, steady of a service or node)"
     )
