@@ -41,7 +41,7 @@ from armload.regression.information import RegressionData, Session
 from armload.regression.noise import SMOOTH, NoiseModel
 from armload.regression.rows_of_log import RowsOfLog
 
-_NOISE = replace(SMOOTH, white=True)  # what is left, and looks like a change where it is taken to be less
+NOISE = replace(SMOOTH, white=True)  # what is left, and looks like a change where it is taken to be less
 _ITERATIONS = 3  # of expectation–maximisation: the scales change little after
 _FEW = 32  # smooth functions of the pose with which cuts are compared: T at the likeliest is of all of them
 _LIKELIEST = 2  # cuts of which T is found with the whole model
@@ -109,7 +109,7 @@ class Cuts:
         """Coulomb friction of the joints (n,) [N·m], as the log and what else is known show it."""
         data = self._data(slice(0, len(self.rows.t)))
         data.session = self.session
-        found = solve([*self.whole.known, data], self.weak, None, _NOISE, _ITERATIONS, self.whole.start)
+        found = solve([*self.whole.known, data], self.weak, None, NOISE, _ITERATIONS, self.whole.start)
         return np.abs(self.physics.stream.correction.coulomb(found.eta))
 
     def likeliest(self, start: int, stop: int, cuts: NDArray[np.int64]) -> Likeliest:
@@ -127,10 +127,10 @@ class Cuts:
         """T (K,) of cuts between two rows, by few smooth functions."""
         return self._roughly(self._stretches(start, stop, cuts))[:, 0]
 
-    def at(self, start: int, stop: int, cut: int) -> tuple[Statistics, float]:
-        """Of one cut between two rows, and its doubt with noise that is no more than its blocks show."""
+    def at(self, start: int, stop: int, cut: int, noise: NoiseModel = NOISE) -> Statistics:
+        """Of one cut between two rows."""
         before, after = self._stretches(start, stop, np.array([cut]))
-        return self._statistics([before], [after]), self._statistics([before], [after], SMOOTH).doubt
+        return self._statistics([before], [after], noise)
 
     def _roughly(self, stretches: list[RegressionData]) -> NDArray[np.float64]:
         """Both statistics of every cut (K, 2), with fewer smooth functions, and scales of the likeliest cut."""
@@ -139,7 +139,7 @@ class Cuts:
         cuts = added_at_cuts(self.rough.known, stretches, self.few, self.weak, self.rough.start)
         best = int(np.argmax([self._tests(*cut).T for cut in cuts])) + 1
         parts = [RegressionData.joined(part).of_features(self.few) for part in (stretches[:best], stretches[best:])]
-        solution = solve([*self.rough.known, *parts], self.weak, None, _NOISE, _ITERATIONS, self.rough.start)
+        solution = solve([*self.rough.known, *parts], self.weak, None, NOISE, _ITERATIONS, self.rough.start)
         scales = of_the_log(solution.scales, (parts[0].blocks.duration, parts[1].blocks.duration))
         cuts = added_at_cuts(self.rough.known, stretches, self.few, self.weak, scales)
         return np.array([self._tests(*cut) for cut in cuts])
@@ -154,7 +154,7 @@ class Cuts:
         return data
 
     def _statistics(
-        self, before: list[RegressionData], after: list[RegressionData], noise: NoiseModel = _NOISE
+        self, before: list[RegressionData], after: list[RegressionData], noise: NoiseModel = NOISE
     ) -> Statistics:
         parts = [RegressionData.joined(before), RegressionData.joined(after)]
         for part in parts:

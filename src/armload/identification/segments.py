@@ -33,6 +33,7 @@ from armload.identification.thresholds import (
 from armload.posterior import Profile, SmoothPosteriorLeastSquares
 from armload.recording import Recording
 from armload.regression.lag import GAIN
+from armload.regression.noise import SMOOTH
 from armload.regression.rows_of_log import RowsOfLog
 
 _FINER = 4  # cuts on either side of the best one, twice
@@ -150,10 +151,9 @@ class _Search:
         if most <= _NOWHERE_NEAR:
             return Changes([], most, of_mass, left)
         best = self._finer(start, stop, candidates, best)
-        there, left_there = self.cuts.at(start, stop, best)
-        most, left = max(most, there.T), max(left, left_there)
+        most = max(most, self.cuts.at(start, stop, best).T)
         if most <= PAYLOAD_CHANGED:
-            return Changes([], most, of_mass, left)
+            return Changes([], most, of_mass, max(left, self.cuts.at(start, stop, best, SMOOTH).doubt))
         # the rows' lag still holds what was there before, and the cut is off by some rows
         until, after = (int(np.searchsorted(t, t[best] + aside)) for aside in (-SETTLED, SETTLED))
         earlier, later = self.within(start, until).times, self.within(after, stop).times

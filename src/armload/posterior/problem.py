@@ -7,6 +7,7 @@ linear and Gaussian; `posterior` says what `posterior.solve` does with it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -74,13 +75,16 @@ class _Gaussian:
         shared, own = X[:, : len(E)] @ E - X[:, len(E) :] @ self.slope[j], X[:, len(E) :]
         return shared @ self.covariance @ shared.T + own @ self.rest[j] @ own.T
 
-    def power(self, E: NDArray, run: RegressionData) -> NDArray[np.float64]:
-        """Mean square (n,) over a run of what X_j·[E·z, g_j] is off by: what a fit leaves is smaller by this much."""
-        k, total = len(E), np.zeros(len(run.A))
-        for j, A in enumerate(run.A):
-            B = np.concatenate([E, -self.slope[j]])
-            total[j] = np.sum((A @ B) * (B @ self.covariance)) + np.sum(A[k:, k:] * self.rest[j])
-        return total / max(run.blocks.duration, 1e-9)
+    def squares(self, runs: Sequence[RunInformation]) -> NDArray[np.float64]:
+        """∫ (X_j·[E·z, g_j] − its mean)² dt (K, n) expected of each run: what a fit leaves is smaller by this much."""
+        out = np.zeros((len(runs), len(self.rest)))
+        for j, slope in enumerate(self.slope):
+            cross = slope @ self.covariance
+            own = cross @ slope.T + self.rest[j]
+            for k, run in enumerate(runs):
+                shared = np.sum(run.A[j] * self.covariance) - 2.0 * np.sum(run.A_gz[j] * cross)
+                out[k, j] = shared + np.sum(run.A_gg[j] * own)
+        return out
 
     def spread(self, E: NDArray, j: int, X: NDArray) -> NDArray[np.float64]:
         """Variance (B,) of X·[E·z, g_j], X (B, ·)."""
@@ -218,7 +222,8 @@ class Problem:
     def _noise(self, found: _Gaussian) -> NDArray[np.float64]:
         """S of each run."""
         model, out = self.noise_model, []
-        for run, E, expected in zip(self.runs, self.selections, self.expected, strict=True):
+        squares = found.squares(self.information) if model.white else self.expected  # else not asked for
+        for run, E, expected, hidden in zip(self.runs, self.selections, self.expected, squares, strict=True):
             if run.noise is not None:
                 out.append(run.noise)
                 continue
@@ -227,7 +232,7 @@ class Problem:
             S = run.residual_variance(x, expected, np.inf, found.weights, spread)
             S = np.maximum(S, expected) if model.floor else S
             if model.white:
-                power = run.residual_power(x, found.weights) + found.power(E, run)
+                power = run.residual_power(x, found.weights) + hidden / max(run.blocks.duration, 1e-9)
                 S = np.maximum(S, expected + 2.0 / run.gain * power)
             out.append(S * max(1.0, run.blocks.duration / model.novelty))
         return np.array(out)
