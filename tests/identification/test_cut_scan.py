@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 
 from armload.identification.cut_scan import added_at_cuts, of_the_log
-from armload.identification.segments import _Search
+from armload.identification.cut_statistics import Cuts
 from armload.motion import random_motion
 from armload.payloads import draw_payload
+from armload.posterior import SmoothPosteriorLeastSquares
 from armload.posterior.problem import Problem
 from armload.posterior.solve import solve
 from armload.regression.information import RegressionData
 from armload.regression.noise import SMOOTH
+from armload.regression.rows_of_log import RowsOfLog
 from armload.simulation import World, simulate_inverse
 
 CUTS = [100, 250, 400]
@@ -28,7 +30,8 @@ def log_of(panda, seed, held=((0.0, None),)):
 @pytest.mark.parametrize("tared", [False, True])
 def test_a_cut_says_what_a_solution_of_its_own_with_the_same_scales_does(panda, tared):
     log = log_of(panda, 1, [(0.0, None), (2.5, draw_payload("boxes", 3, 1.0))])
-    search = _Search.of(log, panda, log_of(panda, 2) if tared else None, None, 1.0, 0.0)
+    physics = SmoothPosteriorLeastSquares(panda, log_of(panda, 2) if tared else None)
+    search = Cuts(physics, RowsOfLog(physics.stream.regression(), log), 1.0)
     known, features = search.rough.known, search.few
     stretches = search._stretches(0, len(search.rows.t), np.array(CUTS))
     for stretch in stretches:
