@@ -12,6 +12,7 @@ import pytest
 from armload.app.cli import main
 from armload.arms import arm
 from armload.devices import Replay, Source, Steadied
+from armload.errors import SourceError
 from armload.inertia import InertialParameters
 from armload.lab.episodes.motion_kinds import MotionSource
 from armload.motion import random_motion
@@ -31,11 +32,11 @@ def coarse(log):
 
 
 class Silent(Source):
-    """Sends what a log has, then nothing for a while, then ends."""
+    """Sends what a log has, then nothing for a while, then ends, or is lost."""
 
-    def __init__(self, log: Recording, ticks: int) -> None:
+    def __init__(self, log: Recording, ticks: int, lost: bool = False) -> None:
         self.name, self.n, self.rate, self._log, self._ticks = "silent", log.n, log.rate, log, ticks
-        self._came = 0.0
+        self._came, self._lost = 0.0, lost
 
     def __iter__(self):
         return (sample for sample in self.ticking(0.0) if sample is not None)
@@ -45,6 +46,8 @@ class Silent(Source):
             self._came = 1000.0 + k
             yield sample
         yield from [None] * self._ticks
+        if self._lost:
+            raise SourceError("the connection was lost")
 
     def arrived(self):
         return self._came
@@ -64,6 +67,14 @@ def swinging():
 def test_what_is_held_back_comes_before_the_silence_is_told(swinging):
     ticks = list(Steadied(Silent(swinging, 3)).ticking(0.1))
     assert [None if sample is None else sample.t for sample in ticks] == [*swinging.t, None, None, None]
+
+
+def test_what_came_before_a_connection_was_lost_is_handed_on_first(swinging):
+    seen = []
+    with pytest.raises(SourceError, match="lost"):
+        for sample in Steadied(Silent(swinging, 0, lost=True)):
+            seen.append(sample.t)
+    assert seen == swinging.t.tolist()
 
 
 def test_a_sample_has_arrived_when_it_came_and_not_when_it_is_handed_on(swinging):

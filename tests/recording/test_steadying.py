@@ -67,13 +67,32 @@ def test_a_stretch_ends_where_the_clock_jumps_or_pauses_and_the_next_begins_anew
 
 
 @pytest.mark.parametrize("bad", [None, "x", [0.0], [np.nan, 0.0], [1.0, 2.0, 3.0]])
-def test_what_is_no_sample_is_passed_on_as_it_came_in_its_turn(bad):
+def test_what_is_no_sample_is_handed_on_in_its_turn_and_the_others_are_told_as_without_it(bad):
     log, _ = swinging(200.0, 1.0)
-    samples = list(log)
+    samples, without = list(log), [s for k, s in enumerate(log) if k != 100]
     samples[100] = samples[100]._replace(dq=bad)
     out = through(samples)
     assert [number for _, number, _ in out] == list(range(len(log)))
     assert out[100][2].dq is bad
+    told = [s.dq for k, (_, _, s) in enumerate(out) if k != 100]  # one had not waited for the sample after the bad one
+    np.testing.assert_allclose(told, [s.dq for _, _, s in through(without)], atol=0.1 * NOISE)
+
+
+def test_samples_that_come_twice_tell_nothing_more():
+    log, _ = swinging(200.0, 1.0)
+    once, twice = through(list(log)), through([s for s in log for _ in range(2)])
+    assert [number for _, number, _ in twice] == list(range(2 * len(log)))
+    np.testing.assert_array_equal([s.dq for _, _, s in twice[::2]], [s.dq for _, _, s in once])
+
+
+@pytest.mark.parametrize("t", [None, np.nan, "x"])
+def test_a_sample_without_a_time_waits_for_nobody(t):
+    log, _ = swinging(200.0, 1.0)
+    samples = list(log)
+    samples[100] = samples[100]._replace(t=t)
+    out = through(samples)
+    assert [number for _, number, _ in out] == list(range(len(log)))
+    assert out[100][0] == 100
 
 
 def test_more_samples_than_were_made_room_for_are_kept():

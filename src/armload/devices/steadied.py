@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from armload.devices.source import Source
+from armload.errors import SourceError
 from armload.inertia import InertialParameters
 from armload.recording import Sample, Steadying
 
@@ -59,15 +60,20 @@ class Steadied(Source):
         return self._each(self.source.ticking(tick))
 
     def _each(self, samples: Iterator[Sample | None]) -> Iterator[Sample | None]:
-        steadying = Steadying(self.n)
-        for sample in samples:
-            ready = steadying.flush() if sample is None else steadying.take(sample, (sample, self.source.arrived()))
-            for out, (self._came, self._arrived) in ready:
-                yield out
-            if sample is None:
-                yield None
+        steadying, lost = Steadying(self.n), None
+        try:
+            for sample in samples:
+                ready = steadying.flush() if sample is None else steadying.take(sample, (sample, self.source.arrived()))
+                for out, (self._came, self._arrived) in ready:
+                    yield out
+                if sample is None:
+                    yield None
+        except SourceError as error:  # what has come is handed on first
+            lost = error
         for out, (self._came, self._arrived) in steadying.flush():
             yield out
+        if lost is not None:
+            raise lost
 
     def as_it_came(self, sample: Sample) -> Sample:
         """With the velocities that the robot told."""

@@ -1,12 +1,15 @@
 """Velocities with less noise on a stream: samples come out as they went in, but later, and with `steadied` velocities.
 
 What comes after a moment tells as much of its velocity as what came before: a sample is held back until the next
-`AROUND` has come. Nothing is told across a gap, or of a sample that is none; neither is left out.
+`AROUND` has come. Nothing is told across a gap or a jump of the clock, nor by a sample that is none, or whose time does
+not rise: such a one is handed on in its turn, as it came.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from collections import deque
+from math import isfinite
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +20,14 @@ from armload.recording.steadied import AROUND, precision_of, told
 _ROWS = 1024  # of the arrays that the last samples are in, at first; they grow where more come within `AROUND`
 _THIRD = np.array([-1.0, 3.0, -3.0, 1.0])  # differences of them: of white noise they have 20 times the power
 _LONG = 2000.0  # [samples] over which noise is averaged: some seconds. It may change with the motion
+
+
+class _Held(NamedTuple):
+    """A sample that waits, and what goes with it; t: its time [s]; None: it tells nothing."""
+
+    sample: Sample
+    tag: Any
+    t: float | None
 
 
 class Steadying:
@@ -35,20 +46,23 @@ class Steadying:
     def _begin(self) -> None:
         """A stretch of its own: what came before tells nothing of what comes."""
         self._first = self._stop = 0  # rows that are kept
-        self._held: list[tuple[Sample, Any]] = []  # given back next, the last ones; and what goes with each
+        self._held: deque[_Held] = deque()
 
     def take(self, sample: Sample, tag: Any = None) -> list[tuple[Sample, Any]]:
         """Take a sample; those whose time has come, in order, each with the tag that it was given with."""
-        good = self._of(sample)
-        if good is None:
-            return [*self.flush(), (sample, tag)]
-        out = []
-        t, both = good
-        if self._stop and not 0.0 < t - self._t[self._stop - 1] <= GAP:
-            out = self.flush()
-        self._append(t, both)
-        self._held.append((sample, tag))
-        while self._held and float(self._held[0][0].t) <= t - AROUND:
+        t, both = self._of(sample)
+        if t is None:
+            self._held.append(_Held(sample, tag, None))
+            return self.flush()  # nobody knows how long
+        out, step = [], t - self._t[self._stop - 1] if self._stop else 1.0
+        if self._stop and not -GAP <= step <= GAP:
+            out, step = self.flush(), 1.0
+        if both is not None and step > 0.0:
+            self._append(t, both)
+            self._held.append(_Held(sample, tag, t))
+        else:
+            self._held.append(_Held(sample, tag, None))
+        while self._held and (self._held[0].t is None or self._held[0].t <= t - AROUND):
             out.append(self._next())
         return out
 
@@ -58,14 +72,15 @@ class Steadying:
         self._begin()
         return out
 
-    def _of(self, sample: Sample) -> tuple[float, NDArray[np.float64]] | None:
-        """Time, and q and dq·AROUND, of a sample that can be used."""
+    def _of(self, sample: Sample) -> tuple[float | None, NDArray[np.float64] | None]:
+        """Time of a sample, and its q and dq·AROUND, as far as they can be used."""
         try:
             t = float(sample.t)
             both = np.concatenate([np.asarray(sample.q, float), AROUND * np.asarray(sample.dq, float)])
         except (TypeError, ValueError):
-            return None
-        return (t, both) if both.shape == (2 * self._n,) and np.isfinite(both.sum() + t) else None
+            return _finite(sample.t), None
+        good = both.shape == (2 * self._n,) and np.isfinite(both.sum())
+        return _finite(t), both if good else None
 
     def _append(self, t: float, both: NDArray[np.float64]) -> None:
         if self._stop == len(self._t):
@@ -82,8 +97,9 @@ class Steadying:
 
     def _next(self) -> tuple[Sample, Any]:
         """The sample that is held back longest."""
-        sample, tag = self._held.pop(0)
-        t = float(sample.t)
+        sample, tag, t = self._held.popleft()
+        if t is None:
+            return sample, tag
         kept = self._t[self._first : self._stop]
         first, stop = np.searchsorted(kept, t - AROUND), np.searchsorted(kept, t + AROUND, side="right")
         near = slice(self._first + int(first), self._first + int(stop))
@@ -94,6 +110,14 @@ class Steadying:
         precision = precision_of(std[: self._n], std[self._n :] / AROUND)
         dq = told(powers.sum(axis=1)[:, None], sums[:, None, : self._n], sums[:3, None, self._n :], precision)[0]
         return sample._replace(dq=dq), tag
+
+
+def _finite(t: Any) -> float | None:
+    """A time that is a number; None: it is none."""
+    try:
+        return float(t) if isfinite(t) else None
+    except TypeError:
+        return None
 
 
 def _moved(x: NDArray[np.float64], size: int) -> NDArray[np.float64]:
