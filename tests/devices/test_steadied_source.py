@@ -18,6 +18,7 @@ from armload.lab.episodes.motion_kinds import MotionSource
 from armload.motion import random_motion
 from armload.payloads import draw_payload
 from armload.recording import Recording, read_recording, steadied, write_recording
+from armload.service.session import Session
 from armload.simulation import Sensors, World, simulate
 
 STEP = 2.0 * np.pi / 2.0**17  # [rad]
@@ -41,11 +42,13 @@ class Silent(Source):
     def __iter__(self):
         return (sample for sample in self.ticking(0.0) if sample is not None)
 
-    def ticking(self, tick):  # noqa: ARG002
+    def ticking(self, tick):
         for k, sample in enumerate(self._log):
             self._came = 1000.0 + k
             yield sample
-        yield from [None] * self._ticks
+        for _ in range(self._ticks):
+            time.sleep(tick)
+            yield None
         if self._lost:
             raise SourceError("the connection was lost")
 
@@ -64,9 +67,12 @@ def swinging():
     return Recording(t, q, np.gradient(q, t, axis=0) + 2e-3 * rng.normal(size=q.shape), q)
 
 
-def test_what_is_held_back_comes_before_the_silence_is_told(swinging):
-    ticks = list(Steadied(Silent(swinging, 3)).ticking(0.1))
-    assert [None if sample is None else sample.t for sample in ticks] == [*swinging.t, None, None, None]
+def test_what_is_held_back_comes_once_nothing_has_come_for_as_long_as_a_gap(swinging):
+    ticks = list(Steadied(Silent(swinging, 3)).ticking(0.06))
+    assert [sample.t for sample in ticks if sample is not None] == swinging.t.tolist()
+    silent = [k for k, sample in enumerate(ticks) if sample is None]
+    assert len(swinging) > silent[0] > len(swinging) - 10  # too short a pause to be one
+    assert silent[1:] == [len(swinging) + 1, len(swinging) + 2]
 
 
 def test_what_came_before_a_connection_was_lost_is_handed_on_first(swinging):
@@ -123,6 +129,41 @@ def test_a_stream_of_coarse_velocities_is_told_how_they_can_be_steadied_and_then
     assert last[True]["event"] is None
     assert last[True]["interval"] == "calibrated"
     assert last[True]["phi_low"][0] <= mass <= last[True]["phi_high"][0]
+
+
+def test_velocities_that_are_no_velocities_are_doubted_as_they_came(logs):
+    """In degrees per second: told by the positions, too, they look like velocities."""
+    robot, (run, _, _) = arm("gen3"), logs
+    log = read_recording(run, robot)
+    session = Session(Steadied(Replay(replace(log, dq=np.rad2deg(log.dq)), speed=None)), robot, method="map")
+    session.run()
+    session.close()
+    assert session.doubt is not None
+    assert "derivative" in session.doubt
+    assert session.estimate.interval == "approximate"
+
+
+def test_a_tare_taken_from_a_steadied_stream_is_steadied_too(logs):
+    """The samples are kept as they came; an answer from both kinds would be of two different arms."""
+    robot, (_, empty, _) = arm("gen3"), logs
+    log = read_recording(empty, robot).between(0.0, 8.0)
+    session = Session(Steadied(Replay(log, speed=None)), robot, method="map")
+    for k, _ in enumerate(session.estimates()):
+        if k == 500:
+            session.take_tare()
+    session.close()
+    kept = session.tare
+    assert kept is not None
+    np.testing.assert_array_equal(kept.dq, log.between(kept.t[0], kept.t[-1] + 1e-9).dq)
+    assert session.estimate.relative_to == "tare"
+    assert abs(session.estimate.phi[0]) < 0.3
+
+
+def test_a_profile_and_steadied_velocities_are_refused_together(capsys):
+    assert main(["live", "sim", "--headless", "--steady", "--profile", "arm.profile"]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "leave one of the two out" in err
 
 
 def test_a_record_of_a_steadied_stream_has_the_samples_as_they_came(logs, tmp_path, capsys):

@@ -85,6 +85,15 @@ def test_samples_that_come_twice_tell_nothing_more():
     np.testing.assert_array_equal([s.dq for _, _, s in twice[::2]], [s.dq for _, _, s in once])
 
 
+def test_a_clock_that_stands_still_holds_nothing_back():
+    log, _ = swinging(200.0, 0.5)
+    steadying, out = Steadying(2), []
+    for k, sample in enumerate([*log, *1000 * [list(log)[-1]]]):
+        out += [number for _, number in steadying.take(sample, k)]
+        assert len(out) >= k + 1 - (3 if k > len(log) + 3 else 20)
+    assert out == list(range(len(out)))
+
+
 @pytest.mark.parametrize("t", [None, np.nan, "x"])
 def test_a_sample_without_a_time_waits_for_nobody(t):
     log, _ = swinging(200.0, 1.0)

@@ -54,6 +54,7 @@ def test_a_file_says_what_it_says_with_paths_from_its_own_folder(tmp_path):
         (("gravity = [0, 0, -9.8]", "gravity = [0, 0]"), "expected three"),
         (("https://", "mqtt://"), "expected an address"),
         (("every = 0.5", 'every = 0.5\nhost = "0.0.0.0"'), "give it a token"),
+        (("steady = true", 'steady = true\nprofile = "arm.profile"'), "leave one out"),
         (("every = 0.5", 'token_file = "short"'), "expected 16 or more"),
     ],
 )

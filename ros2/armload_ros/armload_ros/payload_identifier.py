@@ -32,11 +32,12 @@ from armload import Recording
 from armload.arms import Arm
 from armload.devices.ros2 import announced, parameters_of
 from armload.devices.ros2.joint_states import JointStates
-from armload.errors import ArmloadError
+from armload.errors import ArmloadError, UsageError
 from armload.identification import check_usable
 from armload.identification.identify_log import plausible_tool
 from armload.online import OnlineEstimate
 from armload.posterior import Known
+from armload.recording import GAP
 
 from .applying import Applying, applying_of
 from .diagnostics import status_of, values_of
@@ -153,6 +154,8 @@ class PayloadIdentifier(LifecycleNode):
     def _identify(self, robot: Arm, tare: Recording | None, known: Known | None = None) -> None:
         """A new stream in the place of the present one, which stays if it cannot be made."""
         given = self.parameters
+        if given.value("steady") and given.value("profile"):
+            raise UsageError("steady and profile: a profile is learned from velocities as they come; leave one out")
         stream = Stream(robot, tare, given.value("method") or None, given.profile(), known, given.value("steady"))
         if self._stream is not None:
             self._stream.close()
@@ -199,6 +202,8 @@ class PayloadIdentifier(LifecycleNode):
         stream = self._stream
         if self._outputs is None or stream is None:
             return
+        if time.monotonic() - self._heard > GAP:
+            stream.flush()
         why = None if stream.estimate is None else stream.why_unknown(self._heard)
         status = status_of(self._in_the_way(), stream.estimate, why)
         tared = "yes" if stream.tare is not None else "no"

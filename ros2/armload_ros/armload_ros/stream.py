@@ -41,19 +41,32 @@ class Stream:
 
     def update(self, sample: Sample) -> OnlineEstimate | None:
         """The answer after one more sample; None where the first ones are held back."""
-        for ready, _ in self._steadying.take(sample) if self._steady else [(sample, None)]:
-            self._take(ready)
+        if self._steady:
+            self._take_late(self._steadying.take(sample, (sample, time.monotonic())))
+        else:
+            self._take(sample, sample)
         return self.estimate
+
+    def flush(self) -> None:
+        """Take what is held back: no sample has come for a while."""
+        self._take_late(self._steadying.flush())
+
+    def _take_late(self, ready: list[tuple[Sample, tuple[Sample, float]]]) -> None:
+        for sample, (came, arrived) in ready:
+            self._take(sample, came)
+            assert self.estimate is not None
+            self.estimate = self.estimate.behind(time.monotonic() - arrived)
 
     def advice(self) -> str | None:
         """What would make answers better, once; None: nothing, or it was told."""
-        return self._plausibility.advice()
+        return None if self._steady else self._plausibility.advice()
 
-    def _take(self, sample: Sample) -> None:
+    def _take(self, sample: Sample, came: Sample) -> None:
+        """A sample, and the same as it came."""
         estimate = self._identifier.update(*sample)
         if estimate.health.bad == self._left_out:  # it could be used
-            self._recent.append(sample)
-            self._plausibility.look(sample, estimate.health, self._recent)
+            self._recent.append(came)
+            self._plausibility.look(came, estimate.health, self._recent)
         self._left_out = estimate.health.bad
         self.sample, self.estimate = sample, self._plausibility.qualified(estimate)
 

@@ -14,7 +14,7 @@ from typing import Any, Self
 
 from armload.errors import SourceError
 from armload.inertia import InertialParameters
-from armload.recording import Sample
+from armload.recording import Recording, Sample
 
 
 class Source(ABC):
@@ -70,6 +70,10 @@ class Source(ABC):
     def as_it_came(self, sample: Sample) -> Sample:
         """The sample handed on last, before anything was made of it."""
         return sample
+
+    def as_handed_on(self, log: Recording) -> Recording:
+        """A log of samples as they came, with what this source makes of them: a tare of its stream."""
+        return log
 
     @property
     def simulated(self) -> bool:

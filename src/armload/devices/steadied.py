@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from typing import Any
 
 from armload.devices.source import Source
-from armload.errors import SourceError
+from armload.errors import ArmloadError
 from armload.inertia import InertialParameters
-from armload.recording import Sample, Steadying
+from armload.recording import GAP, Recording, Sample, Steadying, steadied
 
 
 class Steadied(Source):
     """Another source's samples with `recording.steadied` velocities, `AROUND` = 75 ms after they came.
 
     For robots whose velocities are differences of coarse positions, seldom sampled or late: there the noise of the
-    velocity, which is in both sides of the regression, looks like a change of payload. A tare is steadied by whoever
-    reads it (`recording.steadied`). What is no sample is passed on as it came, in its turn.
+    velocity, which is in both sides of the regression, looks like a change of payload. What is no sample is handed on
+    as it came, in its turn; all that is held back is, once no sample has come for `GAP`.
 
     Args:
         source: whose they are; closed with it.
@@ -60,15 +61,18 @@ class Steadied(Source):
         return self._each(self.source.ticking(tick))
 
     def _each(self, samples: Iterator[Sample | None]) -> Iterator[Sample | None]:
-        steadying, lost = Steadying(self.n), None
+        steadying, lost, heard = Steadying(self.n), None, time.monotonic()
         try:
             for sample in samples:
-                ready = steadying.flush() if sample is None else steadying.take(sample, (sample, self.source.arrived()))
+                if sample is not None:
+                    heard, ready = time.monotonic(), steadying.take(sample, (sample, self.source.arrived()))
+                else:
+                    ready = steadying.flush() if (time.monotonic() - heard) * self.speed > GAP else []
                 for out, (self._came, self._arrived) in ready:
                     yield out
                 if sample is None:
                     yield None
-        except SourceError as error:  # what has come is handed on first
+        except ArmloadError as error:  # what has come is handed on first
             lost = error
         for out, (self._came, self._arrived) in steadying.flush():
             yield out
@@ -78,6 +82,10 @@ class Steadied(Source):
     def as_it_came(self, sample: Sample) -> Sample:
         """With the velocities that the robot told."""
         return self._came or sample
+
+    def as_handed_on(self, log: Recording) -> Recording:
+        """With steadied velocities."""
+        return steadied(log)
 
     def arrived(self) -> float | None:
         """When the sample handed on last had come [s, monotonic]: it has waited since."""

@@ -122,7 +122,8 @@ class Cuts:
         roughly = self._roughly(stretches)
         likely = np.unique([*np.argsort(roughly[:, 0])[-_LIKELIEST:], np.argmax(roughly[:, 1])])
         parts = [(stretches[: k + 1], stretches[k + 1 :]) for k in likely]
-        found, left = [self._statistics(*part) for part in parts], [self._statistics(*part, SMOOTH) for part in parts]
+        found = [self._statistics(*part) for part in parts]
+        left = found if self.noise is SMOOTH else [self._statistics(*part, SMOOTH) for part in parts]
         best = int(np.argmax([each.T for each in found]))
         of_mass = max(each.of_mass for each in found)
         return Likeliest(int(cuts[likely[best]]), found[best].T, of_mass, max(each.doubt for each in left))

@@ -37,7 +37,7 @@ MAY_CHANGE = (
 
 ALLOWED = (
     "this log fits better with the noise of its velocities taken out and friction that grows with the load allowed "
-    "for: the answer is made so; on a stream of this robot: armload live --steady"
+    "for: the answer is made so"
 )
 
 

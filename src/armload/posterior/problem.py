@@ -222,8 +222,8 @@ class Problem:
     def _noise(self, found: _Gaussian) -> NDArray[np.float64]:
         """S of each run."""
         model, out = self.noise_model, []
-        squares = found.squares(self.information) if model.white else self.expected  # else not asked for
-        for run, E, expected, hidden in zip(self.runs, self.selections, self.expected, squares, strict=True):
+        squares = found.squares(self.information) if model.white else None
+        for k, (run, E, expected) in enumerate(zip(self.runs, self.selections, self.expected, strict=True)):
             if run.noise is not None:
                 out.append(run.noise)
                 continue
@@ -231,8 +231,8 @@ class Problem:
             x = E @ found.mean
             S = run.residual_variance(x, expected, np.inf, found.weights, spread)
             S = np.maximum(S, expected) if model.floor else S
-            if model.white:
-                power = run.residual_power(x, found.weights) + hidden / max(run.blocks.duration, 1e-9)
+            if squares is not None:
+                power = run.residual_power(x, found.weights) + squares[k] / max(run.blocks.duration, 1e-9)
                 S = np.maximum(S, expected + 2.0 / run.gain * power)
             out.append(S * max(1.0, run.blocks.duration / model.novelty))
         return np.array(out)

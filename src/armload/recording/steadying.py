@@ -19,6 +19,7 @@ from armload.recording.steadied import AROUND, precision_of, told
 
 _ROWS = 1024  # of the arrays that the last samples are in, at first; they grow where more come within `AROUND`
 _THIRD = np.array([-1.0, 3.0, -3.0, 1.0])  # differences of them: of white noise they have 20 times the power
+_STUCK = 3  # samples in a row whose time does not rise: nobody knows for how long the others would wait
 _LONG = 2000.0  # [samples] over which noise is averaged: some seconds. It may change with the motion
 
 
@@ -46,6 +47,7 @@ class Steadying:
     def _begin(self) -> None:
         """A stretch of its own: what came before tells nothing of what comes."""
         self._first = self._stop = 0  # rows that are kept
+        self._stuck = 0
         self._held: deque[_Held] = deque()
 
     def take(self, sample: Sample, tag: Any = None) -> list[tuple[Sample, Any]]:
@@ -57,11 +59,13 @@ class Steadying:
         out, step = [], t - self._t[self._stop - 1] if self._stop else 1.0
         if self._stop and not -GAP <= step <= GAP:
             out, step = self.flush(), 1.0
+        self._stuck = 0 if step > 0.0 else self._stuck + 1
+        good = both is not None and step > 0.0
+        self._held.append(_Held(sample, tag, t if good else None))
+        if self._stuck >= _STUCK:
+            return out + self.flush()
         if both is not None and step > 0.0:
             self._append(t, both)
-            self._held.append(_Held(sample, tag, t))
-        else:
-            self._held.append(_Held(sample, tag, None))
         while self._held and (self._held[0].t is None or self._held[0].t <= t - AROUND):
             out.append(self._next())
         return out

@@ -21,13 +21,13 @@ from pathlib import Path
 from typing import Any
 
 from armload.arms import Arm
-from armload.devices import Detached, Reader, Source, Steadied, controller_of
+from armload.devices import Detached, Reader, Steadied, controller_of
 from armload.devices.reader import columns_of
 from armload.errors import ArmloadError, IdentificationError
 from armload.online import OnlineEstimate, OnlineIdentifier
 from armload.online.state import saved_at
 from armload.posterior import load_profile
-from armload.recording import read_recording, steadied
+from armload.recording import read_recording
 from armload.runtime.kernels import COMPILING
 from armload.service.feedback import Feedback
 from armload.service.finite import finite
@@ -184,9 +184,7 @@ class ArmProcess:
             except (IdentificationError, OSError) as error:
                 self.note(f"{error}: begun anew")
         tare = None if settings.tare is None else read_recording(settings.tare, self.arm)
-        source: Source = self.source
-        if settings.steady:
-            source, tare = Steadied(source), None if tare is None else steadied(tare)
+        source = Steadied(self.source) if settings.steady else self.source
         return Session(source, self.arm, tare, settings.method, self.note, profile, identifier, every=self.every)
 
     def _save(self, session: Session) -> None:

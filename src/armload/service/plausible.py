@@ -20,12 +20,12 @@ _IMPLAUSIBLE = "the samples are not plausible, the answer is not to be trusted"
 _SOONEST, _LATEST = 3.0, 24.0
 _SINCE = 2.0  # [s] of these since the last interruption or change of payload, at least
 _LOOKED_AT = 15.0  # [s] at most
-# [rad²/s] noise of a velocity, per Hz, from which on it is advised to steady them: that of a Panda, a UR10e and of what
-# the simulator draws at 100 to 1000 Hz is 0.4 to 0.9e-7; of three times as much 1.8e-7, of differences of positions of
-# 17 bits 2.5e-7 and more, of a KUKA's log 160e-7
+# [rad²/s] noise of a velocity, per Hz, from which on it is advised to steady them. Of a Panda at 1 kHz it is 0.9e-7,
+# of a KUKA's positions differenced at 100 Hz 500e-7; the simulator draws 0.05e-7 at 1 kHz to 0.7e-7 at 50 Hz, and
+# differences of positions of 17 bits at 100 Hz have 2e-7 and more
 # (test_a_stream_of_coarse_velocities_is_told_how_they_can_be_steadied_and_then_not_doubted)
 _ROUGH = 1.5e-7
-_ROUGH_SECONDS = 3.0  # [s] of samples that tell it
+_ROUGH_SECONDS = 1.0  # [s] of samples that tell it
 _STEP, _MOVED = 0.25, 0.01  # [s] between two looks at the joints; [rad] that one has to move meanwhile
 
 
@@ -114,7 +114,6 @@ class Plausibility:
         self._checked = True
         if log is None:
             return False
-        self._advice = None if self._arm.motor_torque else _advice(log)
         try:
             check_plausible(replace(log, source=self._name), self._arm)
         except ArmloadError as error:
@@ -123,6 +122,8 @@ class Plausibility:
             scale = torque_scale(log, self._arm)
             self._wrong = scale if scale is not None and scale.is_wrong else self._wrong
         else:
+            if not (self._advised or self._arm.motor_torque):
+                self._advice = _advice(log)
             if before is not None and self._speaks_against_the_doubt(log):
                 self.doubt = self._wrong = None
         return (self.doubt is None) != (before is None)

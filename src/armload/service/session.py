@@ -16,7 +16,7 @@ from queue import SimpleQueue
 import numpy as np
 
 from armload.arms import Arm
-from armload.devices import Recorder, Source
+from armload.devices import Recorder, Source, Steadied
 from armload.errors import IdentificationError, SourceError
 from armload.inertia import Z95, InertialParameters
 from armload.online import OnlineEstimate, OnlineIdentifier
@@ -154,6 +154,7 @@ class Session:
                 break
         if self._plausibility.look_at_last(self._recent):
             self._doubted()
+        self._advise()
         if self.estimate is not None:
             self.estimate = self._plausibility.qualified(self._identifier.conclude()).behind(self.source.lag())
             self._keep(self.estimate, True)
@@ -189,8 +190,9 @@ class Session:
             self._recorder.close()
 
     def _take(self, sample: Sample) -> OnlineEstimate:
+        came = self.source.as_it_came(sample)
         if self._recorder is not None:
-            self._recorder.append(self.source.as_it_came(sample))
+            self._recorder.append(came)
         before, used = self.estimate, self._identifier.health.used
         estimate = self._identifier.update(*sample)
         event = estimate.event
@@ -200,11 +202,10 @@ class Session:
             self._plausibility.forget()
         usable = estimate.health.used > used
         if usable:
-            self._recent.append(sample)
-            if self._plausibility.look(sample, estimate.health, self._recent):
+            self._recent.append(came)
+            if self._plausibility.look(came, estimate.health, self._recent):
                 self._doubted()
-            if (advice := self._plausibility.advice()) is not None:
-                self._warn(advice)
+            self._advise()
         self._answered = self._plausibility.qualified(estimate)
         estimate = self._answered.behind(self.source.lag())
         self.sample, self.estimate = sample if usable else self.sample, estimate
@@ -228,6 +229,11 @@ class Session:
     def _doubted(self) -> None:
         doubt = self._plausibility.doubt
         self._write("the samples are plausible now") if doubt is None else self._warn(doubt)
+
+    def _advise(self) -> None:
+        advice = self._plausibility.advice()
+        if advice is not None and not isinstance(self.source, Steadied):
+            self._warn(advice)
 
     def truth(self, t: float) -> InertialParameters | None:
         """What was added since the tare, or is held at all, at time t [s]; None where the source does not know."""
@@ -293,6 +299,7 @@ class Session:
 
     def _made(self, tare: Recording | None, method: str | Path | None) -> OnlineIdentifier:
         # an arm's model computes in a memory of its own, which two threads must not share
+        tare = None if tare is None else self.source.as_handed_on(tare)
         return OnlineIdentifier(replace(self.arm), tare, method, self.profile, self._known, self._every)
 
     def _write(self, text: str) -> None:

@@ -56,6 +56,10 @@ class ArmSettings(ArmOptions):
     def __post_init__(self) -> None:
         if self.record is not None and Path(self.record).suffix.lower() not in RECORDS:
             raise UsageError(f"{self.name}: record is {self.record}: expected a name that ends in .csv or .mcap")
+        if self.steady and self.profile is not None:
+            raise UsageError(
+                f"{self.name}: steady and profile: a profile is learned from velocities as they come; leave one out"
+            )
         if self.apply not in (None, "auto"):
             raise UsageError(f'{self.name}: apply is {self.apply!r}: expected "auto"')
         if self.apply is not None and not self._has_controller:
@@ -75,6 +79,8 @@ class ArmSettings(ArmOptions):
             return None
         beside = ("save", "record", "rating", "com_range", "apply", "mounted")
         asked = {key: value for key, value in self.to_dict().items() if key not in beside}
+        if not self.steady:  # a state of a version without it goes on
+            del asked["steady"]
         for key in ("tare", "profile", "tool"):
             if asked[key] is not None and (path := Path(asked[key])).is_file():
                 asked[key] = [asked[key], hashlib.sha256(path.read_bytes()).hexdigest()]

@@ -120,11 +120,15 @@ def run(options: argparse.Namespace) -> int | None:
     from armload.app.cli.headless import lines
     from armload.devices import Detached, Recorder, Steadied, open_source
     from armload.posterior import Known, load_profile
-    from armload.recording import ColumnSpec, check_own_measurements, has_topics, steadied
+    from armload.recording import ColumnSpec, check_own_measurements, has_topics
     from armload.service.session import Session
 
     options.robot = options.robot or robot_of(options.source)
     arm = _arm_of(options)
+    if options.steady and options.profile is not None:
+        raise UsageError(
+            "--steady and --profile: a profile is learned from velocities as they come; leave one of the two out"
+        )
     if options.learn and options.profile is None:
         raise UsageError("--learn adds to a profile, but there is no --profile; make one with `armload profile`")
     profile = None if options.profile is None else load_profile(options.profile)
@@ -150,9 +154,7 @@ def run(options: argparse.Namespace) -> int | None:
     )
     if isinstance(source, Detached) and "://" in options.source:
         source = _reopened(source, options, arm, None if mcap else options.record)
-    if options.steady:
-        source, tare = Steadied(source), None if tare is None else steadied(tare)
-    with source:
+    with Steadied(source) if options.steady else source as source:
         recorder = Recorder(mcap, arm.n, arm.joint_names) if mcap else None
         known = Known.of(options.mass, options.com, if_held=True)
         session = Session(source, arm, tare, options.method, _warn, profile, known=known, recorder=recorder)
