@@ -86,7 +86,7 @@ def drift_of(found: Posterior, correction: Correction, explained: Session) -> Dr
     own = [change[j::n] @ np.linalg.solve(C[j::n, j::n], change[j::n]) for j in range(n)]
     statistic = float(change @ np.linalg.solve(C, change))
     if not correction.loss_std:  # else it is an unknown of its own
-        rubs = correction.coulomb(np.arange(len(change)))
+        rubs = correction.coulomb(np.arange(len(change))).astype(int)
         C[rubs, rubs] += (LINK_LOSS * found.borne) ** 2
     return Drift(
         offset=correction.offset(change),
