@@ -9,6 +9,7 @@ import pytest
 
 from armload import identify
 from armload.arms import arm
+from armload.identification.choice import choose
 from armload.identification.notes import ALLOWED, UNCHECKED
 from armload.identification.segments import changes_of_payload
 from armload.inertia import InertialParameters
@@ -76,7 +77,8 @@ def test_joints_that_rub_more_for_what_was_added_are_no_arm_that_changed_and_hid
     robot, found = arm("gen3"), {}
     for changed in (0.0, 0.4):
         run, tare, _ = logs_of(robot, k, 0.01, 200.0, False, changed)
-        identifier = HybridIdentifier(robot, tare)
+        identifier = choose(robot, tare, live=True).identifier
+        assert isinstance(identifier, HybridIdentifier)
         identifier.run(run)
         found[changed] = identifier.stream.drift
     assert found[0.0].statistic > CHANGED

@@ -11,7 +11,7 @@ from armload.arms import Arm
 from armload.errors import IdentificationError, ModelError
 from armload.estimators import Identifier
 from armload.identification.methods import METHODS
-from armload.posterior import Profile
+from armload.posterior import PosteriorLeastSquares, Profile
 from armload.recording import Recording
 
 DEFAULT = "hybrid"  # the method where nothing is named and the arm has a trained model
@@ -54,7 +54,13 @@ def choose(
     Raises:
         ArmloadError: an unknown method, a model that is missing or of another arm, or a tare the method has no use for.
     """
-    name = default_for(arm) if method is None else str(method)
+    choice = _chosen(arm, tare, default_for(arm) if method is None else str(method), live, profile)
+    if live and isinstance(choice.identifier, PosteriorLeastSquares):
+        choice.identifier.read_once = True
+    return choice
+
+
+def _chosen(arm: Arm, tare: Recording | None, name: str, live: bool, profile: Profile | None) -> Choice:
     entry = METHODS.get(name)
     if entry is not None and not (Path(name).is_file() and entry.needs == "training"):
         if live and name not in LIVE:

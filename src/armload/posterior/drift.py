@@ -8,9 +8,9 @@ The run's rows have unknowns of their own, delta ~ N(0, D), by which offsets and
 is small where nothing else has changed. It is large for a tare of another day, of another arm, or of another base.
 With a profile, E is the drift of the arm's own sessions, and T is large where this one is not of their kind.
 
-A joint that rubs more under load rubs more than at the tare by a share of what was added: that is no drift. Before an
-arm is called changed, E has it, too, for a joint that loses `LINK_LOSS` of the torque that it bears; a log of which T
-is large without that is read once more (`identification.identify_log`).
+A joint that rubs more under load rubs more than at the tare by a share of what was added: that is no drift. A log of
+which T is large is read once more with it (`identification.identify_log`). Of a stream, which is not, E has it, for
+joints that lose `LINK_LOSS` of the torque that they bear, before its arm is called changed.
 
 Motor currents cannot be asked: friction differs from run to run on a sound arm, too, by more than T allows (T = 1000 of
 the real UR10e pair, though what its gears lose is an unknown). They are told by friction that only gears have
@@ -49,8 +49,7 @@ class Drift:
     """By how much an arm differs from what it was at its tare.
 
     offset, coulomb: (n,) change of the torque offsets and of the Coulomb friction [N·m]. statistic: T.
-    joint: the joint whose own T is largest, from 0. changed: whether T is beyond what sound logs show, with joints that
-    rub under load among them.
+    joint: the joint whose own T is largest, from 0. changed: whether T is beyond what sound logs show.
     """
 
     offset: NDArray[np.float64]
@@ -66,26 +65,31 @@ def drift_since_tare(
     prior: GaussianPrior | None,
     noise: NoiseModel,
     found: Posterior,
+    read_once: bool = False,
 ) -> Drift:
     """Test whether the last run's arm is that of the runs before it.
 
     Args:
-        runs, prior_std, prior, noise: as of `solve`. found: their solution, for its scales.
+        runs, prior_std, prior, noise: as of `solve`. found: their solution, for its scales. read_once: as of `drift_of`.
     """
     run, explained = copy(runs[-1]), runs[-1].session
     if explained.drift < TESTED:  # else the solution itself has allowed for as much
         run.session = replace(explained, number=1, drift=TESTED)
         found = solve([*runs[:-1], run], prior_std, prior, noise, _STEPS, found.scales)
-    return drift_of(found, run.correction, explained)
+    return drift_of(found, run.correction, explained, read_once)
 
 
-def drift_of(found: Posterior, correction: Correction, explained: Session) -> Drift:
-    """The test of a solution that has allowed for a drift; `explained`: the session, with what its age explains."""
+def drift_of(found: Posterior, correction: Correction, explained: Session, read_once: bool = False) -> Drift:
+    """The test of a solution that has allowed for a drift.
+
+    Args:
+        explained: the session, with what its age explains. read_once: whether joints may rub more for what was added.
+    """
     n, change = correction.arm.n, found.drift
     C = found.drift_covariance + np.diag(explained.variance(correction))
     own = [change[j::n] @ np.linalg.solve(C[j::n, j::n], change[j::n]) for j in range(n)]
     statistic = float(change @ np.linalg.solve(C, change))
-    if not correction.loss_std:  # else it is an unknown of its own
+    if read_once and not correction.loss_std:  # else it is an unknown of its own
         rubs = correction.coulomb(np.arange(len(change))).astype(int)
         C[rubs, rubs] += (LINK_LOSS * found.borne) ** 2
     return Drift(

@@ -64,6 +64,7 @@ class PosteriorLeastSquares(Identifier):
     _smooth = False  # whether the arm's smooth mismatch is an unknown, too
     _same_motion: SameMotion | None = None
     test_tare = True  # whether an answer tests that arm and gravity are as stated; episodes of a training do not
+    read_once = False  # whether it follows a stream, of which nobody reads what looks wrong once more
     publish = PUBLISH  # [s] between two live answers; a service that speaks ten times a second asks for fewer
     louder = 1.0  # how large the noise is seen to be, in units of what the scales say; whoever watches the rows tells
     known: Known | None = None  # of the payload, apart from the log
@@ -219,6 +220,7 @@ class PosteriorLeastSquares(Identifier):
                 self._same_motion,
                 self.session,
                 self.test_tare,
+                self.read_once,
             )
         return self._stream
 

@@ -43,6 +43,7 @@ class StreamingPosterior:
         session: of the run; the tares' is session 0 unless they are of this one.
         test_tare: whether `conclude` asks if the arm is as it was at the tare, or another one, and allows for it if
             not; and if gravity is as it was given.
+        read_once: whether nobody reads what looks wrong once more (`drift`): of a live stream.
 
     Attributes:
         posterior: the last full solution; its scales, ratios and torque side hold until the next.
@@ -68,10 +69,11 @@ class StreamingPosterior:
         same_motion: SameMotion | None = None,
         session: Session = SAME,
         test_tare: bool = True,
+        read_once: bool = False,
     ) -> None:
         self.correction, self.features, self.noise = correction, features, noise
         self.prior_std, self.prior, self.iterations, self.session = prior_std, prior, iterations, session
-        self._test_tare = test_tare
+        self._test_tare, self._read_once = test_tare, read_once
         mean, root = (np.zeros(10), np.diag(prior_std)) if prior is None else (prior.mean.copy(), prior.root)
         self._gaussian = mean, np.ascontiguousarray(root), np.ascontiguousarray(root.T)
         self.tares, self.gain, self.start = tuple(tares), gain, start
@@ -224,7 +226,7 @@ class StreamingPosterior:
         about = (self.prior_std, self.prior, self.noise)
         self._adopt(self._solved(runs, self.start, self.iterations - 1))
         if self.tares and self._test_tare and not self.posterior.gears:
-            self.drift = drift_since_tare(runs, *about, self.posterior)
+            self.drift = drift_since_tare(runs, *about, self.posterior, self._read_once)
             if self.drift.changed:
                 run.session = replace(self.session, number=1, drift=max(ALLOWED, self.session.drift))
                 self._adopt(self._solved(runs, self.start, self.iterations - 1))
@@ -270,7 +272,7 @@ class StreamingPosterior:
             self.solutions += 1
             self.another = found_so_far(self.another, solution.another)
             if self._asked(solution, self.seconds):
-                self.drift = drift_of(solution.posterior, self.correction, self.session)
+                self.drift = drift_of(solution.posterior, self.correction, self.session, self._read_once)
         elif self._state is None:
             self.prepare()
             assert self._base is not None

@@ -47,8 +47,8 @@ _MOTOR_FRICTION = {"coulomb": 5.0, "viscous": 5.0}
 # of its joints (`benchmarks/real_residuals.py`)
 _LOSS = 0.08
 # [1] the same where torque is measured behind the gears, for arms of which it is asked (`Arm.gear_loss`), and of what
-# was added since a tare, before an arm is called changed (`posterior.drift`): 0.3 % of a Panda's and 0.9 % of a KUKA's
-# joints that bear most, neither told from nothing (`benchmarks/real_residuals.py`)
+# was added since a tare, before a stream's arm is called changed (`posterior.drift`): 0.3 % of a Panda's and 0.9 % of a
+# KUKA's joints that bear most, neither told from nothing (`benchmarks/real_residuals.py`)
 LINK_LOSS = 0.01
 # [1] standard deviation of the share of its Coulomb friction by which a joint rubs more one way than the other: what
 # moves one way mostly has it as an offset. A stated prior, as of the simulated arms (`simulation/model_error.py`)
