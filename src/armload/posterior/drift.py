@@ -70,7 +70,8 @@ def drift_since_tare(
     """Test whether the last run's arm is that of the runs before it.
 
     Args:
-        runs, prior_std, prior, noise: as of `solve`. found: their solution, for its scales. read_once: as of `drift_of`.
+        runs, prior_std, prior, noise: as of `solve`. found: their solution, for its scales.
+        read_once: as of `drift_of`.
     """
     run, explained = copy(runs[-1]), runs[-1].session
     if explained.drift < TESTED:  # else the solution itself has allowed for as much
