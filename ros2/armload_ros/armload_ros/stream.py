@@ -34,7 +34,7 @@ class Stream:
         told = steadied(tare) if steady and tare is not None else tare
         self._identifier = OnlineIdentifier(arm, told, method, profile, known)
         self._steadying = Steadying(arm.n)
-        self._recent, self._plausibility = Recent(arm.n), Plausibility(arm, "joint_states")
+        self._recent, self._plausibility = Recent(arm.n), Plausibility(arm, "joint_states", steady)
         self.estimate: OnlineEstimate | None = None
         self.sample: Sample | None = None
         self._left_out = 0
@@ -59,7 +59,7 @@ class Stream:
 
     def advice(self) -> str | None:
         """What would make answers better, once; None: nothing, or it was told."""
-        return None if self._steady else self._plausibility.advice()
+        return self._plausibility.advice()
 
     def _take(self, sample: Sample, came: Sample) -> None:
         """A sample, and the same as it came."""

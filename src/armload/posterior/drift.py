@@ -89,14 +89,15 @@ def drift_of(found: Posterior, correction: Correction, explained: Session, read_
     n, change = correction.arm.n, found.drift
     C = found.drift_covariance + np.diag(explained.variance(correction))
     own = [change[j::n] @ np.linalg.solve(C[j::n, j::n], change[j::n]) for j in range(n)]
-    statistic = float(change @ np.linalg.solve(C, change))
+    statistic = within = float(change @ np.linalg.solve(C, change))
     if read_once and not correction.loss_std:  # else it is an unknown of its own
         rubs = correction.coulomb(np.arange(len(change))).astype(int)
         C[rubs, rubs] += (LINK_LOSS * found.borne) ** 2
+        within = float(change @ np.linalg.solve(C, change))
     return Drift(
         offset=correction.offset(change),
         coulomb=correction.coulomb(change),
         statistic=statistic,
         joint=int(np.argmax(own)),
-        changed=float(change @ np.linalg.solve(C, change)) > CHANGED,
+        changed=within > CHANGED,
     )

@@ -37,15 +37,17 @@ class Plausibility:
     seen takes nothing back. While there is a doubt the checks come every 3 s; once it is taken back, as at first.
 
     Args:
-        arm: the arm. name: what the stream is called in messages.
+        arm: the arm. name: what the stream is called in messages. steadied: whether its velocities are told by
+            positions, too, so that nobody need be advised to (`devices.Steadied`).
 
     Attributes:
         doubt: the message of the last check that failed, one sentence; None: nothing is in doubt.
     """
 
-    def __init__(self, arm: Arm, name: str) -> None:
+    def __init__(self, arm: Arm, name: str, steadied: bool = False) -> None:
         # what is attached is a payload to the checks; and a model computes in a memory that two threads must not share
         self._arm, self._name = replace(arm, attached=None), name
+        self._advises = not (steadied or arm.motor_torque)
         self.reset()
 
     def reset(self) -> None:
@@ -122,7 +124,7 @@ class Plausibility:
             scale = torque_scale(log, self._arm)
             self._wrong = scale if scale is not None and scale.is_wrong else self._wrong
         else:
-            if not (self._advised or self._arm.motor_torque):
+            if self._advises and not self._advised:
                 self._advice = _advice(log)
             if before is not None and self._speaks_against_the_doubt(log):
                 self.doubt = self._wrong = None

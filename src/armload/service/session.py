@@ -89,7 +89,7 @@ class Session:
         self.error: Exception | None = None
         self._orders: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._recent = Recent(arm.n)
-        self._plausibility = Plausibility(arm, source.name)
+        self._plausibility = Plausibility(arm, source.name, isinstance(source, Steadied))
         self._thread: threading.Thread | None = None
         self._stop = False
 
@@ -232,7 +232,7 @@ class Session:
 
     def _advise(self) -> None:
         advice = self._plausibility.advice()
-        if advice is not None and not isinstance(self.source, Steadied):
+        if advice is not None:
             self._warn(advice)
 
     def truth(self, t: float) -> InertialParameters | None:
