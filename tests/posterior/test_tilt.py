@@ -80,6 +80,8 @@ def test_a_base_that_leans_is_found_and_answered_for(panda, leaning):
         assert answer.interval == "approximate"
         assert told.interval == "calibrated"
         assert answer.notes[0].startswith("the base leans by ")
+        assert len(answer.segments) == 1  # a base that leans looks like a payload that changes, from pose to pose
+        assert not any("the payload" in note for note in answer.notes)
         gravity = [float(x) for x in answer.notes[0].split("--gravity=")[1].split(" ")[0].rstrip(",").split(",")]
         np.testing.assert_allclose(gravity, panda.leaning(ANGLES).gravity, atol=9.81 * np.radians(0.6))
         half = 0.5 * (told.phi_high - told.phi_low)

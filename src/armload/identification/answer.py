@@ -96,6 +96,7 @@ class Identification:
     moves: whether no rigid body explains the torques; not in the JSON. another: whether the arm is another one than at
         its tare, or than the profile's; not in the JSON.
     health: the arm itself, as the log shows it, of a method that asks; not in the JSON.
+    gravity: (3,) [m/s²] with which it was found, where that is not what was given; not in the JSON.
     doubts: how much speaks against the answer; not in the JSON.
     gain_known: whether a known weight fixed the torque's scale; not in the JSON.
     """
@@ -134,6 +135,7 @@ class Identification:
     another: bool = field(default=False, metadata={"json": False})
     health: ArmHealth | None = field(default=None, metadata={"json": False})
     gain_known: bool = field(default=False, metadata={"json": False})
+    gravity: tuple[float, float, float] | None = field(default=None, metadata={"json": False})
     doubts: int = field(default=0, metadata={"json": False})
 
     def __post_init__(self) -> None:

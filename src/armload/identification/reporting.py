@@ -117,6 +117,7 @@ def answered(
         another=found.another is not None and found.another.found,
         health=found.health,
         same_arm_assumed=tared and found.another is None,
+        gravity=found.gravity,
         doubts=len(doubts),
     )
 
