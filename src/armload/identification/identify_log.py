@@ -134,7 +134,9 @@ def _account(
     """The answer for a log, part by part where the payload changes within it."""
     whole = _of_one_payload(recording, arm, tare, mounted, asked, notes)
     of_arm = (None, None) if whole.another else (tare, asked.profile)
-    level = arm if whole.gravity is None else replace(arm, gravity=whole.gravity)  # a base that leans looks like a change
+    level = (
+        arm if whole.gravity is None else replace(arm, gravity=whole.gravity)
+    )  # a base that leans looks like a change
     changes = changes_of_payload(recording, level, *of_arm, whole.kappa, whole.mass)
     times = changes.times
     edges, answers = [recording.t[0], *times, recording.t[-1]], [whole]
