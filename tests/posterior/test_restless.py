@@ -10,6 +10,7 @@ import pytest
 from armload import arm
 from armload.identification import identify
 from armload.lab.episodes import draw_episodes, simulate_episodes
+from armload.online import OnlineIdentifier
 from armload.posterior import HybridIdentifier
 from armload.regression import Correction, JointFeatures
 from armload.regression.information import RegressionData
@@ -68,3 +69,14 @@ def test_a_payload_that_swings_is_said_to(panda, sound):
     answer = identify(swinging(panda, log.run), panda, tare=log.tare)
     assert answer.interval == "approximate"
     assert any("swing, slosh or slip" in note for note in answer.notes)
+
+
+def test_a_stream_says_while_it_runs_that_what_is_held_swings(panda, sound):
+    log = sound[1]
+    for run, moves in ((swinging(panda, log.run, force=2.0), True), (log.run, False)):
+        online = OnlineIdentifier(panda, log.tare)
+        said = [online.update(*sample) for sample in run.between(0.0, 4.0)]
+        online.close()
+        late = [each for each in said if each.t - run.t[0] >= 2.0 and not each.settling]
+        assert any("swing, slosh or slip" in note for each in late for note in each.notes) == moves
+        assert any(each.interval == "calibrated" for each in late) != moves

@@ -15,7 +15,7 @@ from armload.identification.notes import gravity_doubted
 from armload.lab.episodes import draw_episodes, simulate_episodes
 from armload.online import OnlineIdentifier
 from armload.posterior import HybridIdentifier
-from armload.posterior.tilt import Tilt
+from armload.posterior.scales import Tilt
 from armload.regression import Correction
 
 ANGLES = np.radians([3.0, -4.0])  # 5° together
@@ -116,6 +116,17 @@ def test_a_concluded_stream_says_that_the_base_leans(panda, leaning):
     online.close()
     assert said.interval == "approximate"
     assert any(note.startswith("the base leans by ") for note in said.notes)
+
+
+def test_a_stream_says_within_a_second_that_the_base_leans_and_goes_on_saying_it(panda, leaning):
+    for log, leans in ((leaning[0], True), (logs_of(panda, panda, count=1)[0], False)):
+        online = OnlineIdentifier(panda, log.tare)
+        for sample in log.run.between(0.0, 3.0):
+            said = online.update(*sample)
+            if sample.t >= 1.0:
+                assert (said.interval == "approximate") == leans
+                assert any(note.startswith("the base leans by ") for note in said.notes) == leans
+        online.close()
 
 
 def test_a_lean_in_doubt_is_said_beyond_what_a_level_base_shows_of_an_arm_whose_links_are_known(panda):

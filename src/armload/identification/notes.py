@@ -10,8 +10,8 @@ from armload.identification.thresholds import KNOWN, MOVES, NOMINAL, PAUSE_SAID
 from armload.inertia import NAMES, SHRINK, Z95
 from armload.posterior import KnownCentre, KnownMass
 from armload.posterior.drift import Drift
-from armload.posterior.scales import AnotherArm
-from armload.posterior.tilt import MAY_LEAN, Tilt
+from armload.posterior.scales import AnotherArm, Tilt
+from armload.posterior.tilt import MAY_LEAN
 from armload.recording import Recording
 
 RECORD = "record the arm as it is, without the payload, on any motion of 20 s, and name the log with --tare"

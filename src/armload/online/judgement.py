@@ -18,7 +18,8 @@ from armload.identification.reporting import doubt_of
 from armload.inertia import determined, held, held_probability
 from armload.online.thresholds import STANDS
 from armload.posterior import PosteriorLeastSquares
-from armload.posterior.scales import AnotherArm
+from armload.posterior.restless import PERIOD
+from armload.posterior.scales import AnotherArm, Tilt
 from armload.regression import payload_prior_std
 
 _STANDING = "standing: nothing new is learned until the arm moves, or what it holds changes"
@@ -39,6 +40,7 @@ class Judgement:
         determined: which parameters (10,) the data determine. held: whether anything is. p_held: how probable that is.
         newest: time of the newest sample that counts in it [s]; −∞ before one does.
         another: that the arm is not the one of its tare or profile, once a run has found so; None: none has.
+        tilt: by how much gravity is turned from what was given, as a run asked last; None: none has.
         doubted: whether something speaks against its error bars. notes: what else there is to say.
     """
 
@@ -54,18 +56,23 @@ class Judgement:
         self.around, self.doubted = mean, False
         self.run: Identifier | None = None
         self.another: AnotherArm | None = None
+        self.tilt: Tilt | None = None
         self._than: str | None = None  # what it is another one than, as of `OnlineEstimate.relative_to`
         self.newest = -np.inf
         self.determined, self.held, self.p_held = np.zeros(10, dtype=bool), False, 0.0
         self.notes: tuple[str, ...] = ()
 
-    def take(self, estimate: Estimate, run: Identifier | None) -> None:
-        """A newer answer, of which the last judgement holds; of no run alone while samples are left out."""
+    def take(self, estimate: Estimate, run: Identifier | None, relative_to: str) -> None:
+        """A newer answer, of which the last judgement holds; of no run alone while samples are left out.
+
+        Args: as of `judge`.
+        """
         self.estimate, self.run, self.around = estimate, run, estimate.phi
         if isinstance(run, PosteriorLeastSquares):
             another = run.stream.another
             self.another = another if another is not None and another.found else self.another
-            self.doubted = arm_changed(run.stream.drift, self.another or another) is not None
+            self.tilt = run.stream.tilt or self.tilt
+            self.doubted = bool(self._doubts(run, relative_to))
         elif run is not None:
             self.doubted = False
 
@@ -79,6 +86,14 @@ class Judgement:
         if not isinstance(run, PosteriorLeastSquares):
             return None
         return arm_changed(run.stream.drift, self.another or run.stream.another, relative_to)
+
+    def _doubts(self, run: PosteriorLeastSquares, relative_to: str) -> list[str]:
+        """What speaks against a run's error bars, a sentence each: as of a log, but for what only its end shows."""
+        stream, changed = run.stream, self.arm_changed(run, relative_to)
+        restless = stream.restlessness if stream.seconds >= PERIOD else 0.0
+        doubts = [doubt_of(False, True, changed, restless)]
+        doubts.append(leaning(self._arm, stream.tilt or self.tilt, stream.posterior.torque))
+        return [doubt for doubt in doubts if doubt is not None]
 
     def counts(self, t: float, run: Identifier) -> tuple[bool, bool]:
         """Whether a sample at t [s] that a run took makes `newest` newer, or says nothing new, as the arm stands."""
@@ -116,8 +131,8 @@ class Judgement:
         if stands:
             motor = posterior is not None and posterior.stream.posterior.torque == "motor"
             notes.append(_STANDING_MOTOR if motor else _STANDING)
-        if (changed := self.arm_changed(run, relative_to)) is not None:
-            notes.append(changed)
+        if posterior is not None:
+            notes += self._doubts(posterior, relative_to)
         if self.held and posterior is not None and taken is None:
             denied = denied_by(posterior.known, posterior.log_only)
             notes += [] if denied is None else [denied]
@@ -134,4 +149,4 @@ class Judgement:
         self.estimate = replace(estimate, phi=body_of(estimate, bool(self.determined[0]), exchanged))
         self.run, self.around, self.newest = run, estimate.phi, t
         self.doubted = doubt is not None or leans is not None
-        self.notes += tuple(note for note in (doubt, leans) if note is not None and note is not changed)
+        self.notes += tuple(note for note in (doubt, leans) if note is not None and note not in self.notes)

@@ -241,12 +241,12 @@ class OnlineIdentifier:
             estimate = watch.track(sample.t) if watch is not None and mixed else estimate
             self._judge(estimate, run, stands)
         if fresh or not mixed:
-            judgement.take(estimate, run)
+            judgement.take(estimate, run, self.relative_to)
 
     def _track(self, watch: PayloadWatch, sample: Sample) -> None:
         """While samples are left out: what all that may have happened makes of the payload."""
         self._published, estimate = sample.t, watch.track(sample.t)
-        self._judgement.take(estimate, None)
+        self._judgement.take(estimate, None, self.relative_to)
         if watch.settling or watch.likely[0] > 0.5:  # then phi follows what the samples say
             self._judgement.newest = sample.t
         self._judge(estimate, watch.run)

@@ -136,7 +136,7 @@ class Problem:
                 E[10 : 10 + d, self._drift(self.sessions.index(run.session))] = np.eye(d)
             self.selections.append(E)
         self.information = [RunInformation.of(run, E) for run, E in zip(runs, self.selections, strict=True)]
-        self._eliminated: tuple[Scales, Eliminated] | None = None  # and of which scales
+        self._eliminated: tuple[Scales, Eliminated] | None = None  # and of which noise and features
         group = np.repeat([_POSE, _VELOCITY], [self.features.pose, self.features.velocity])
         self.feature_variance = (np.outer(self.correction.effort, group)) ** 2
 
@@ -195,8 +195,10 @@ class Problem:
 
     def _without_features(self, scales: Scales) -> Eliminated:
         """The runs with each g_j integrated out; to be read alone: the answer and the state share it."""
-        if self._eliminated is None or self._eliminated[0] is not scales:
+        seen = self._eliminated and self._eliminated[0]
+        if seen is None or seen.noise is not scales.noise or seen.features is not scales.features:
             self._eliminated = scales, eliminated(self.information, scales.noise, scales.features)
+        assert self._eliminated is not None
         return self._eliminated[1]
 
     def improved(self, scales: Scales, found: _Gaussian) -> Scales:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 # times that the torques are as restless as they should be: sound simulated logs of Pandas stay below 1.9, a real one
 # below 1.7; what swings or sloshes is above in half of the logs (`benchmarks/wrong_logs.py`)
 RESTLESS = 2.0
+PERIOD = 1.0  # [s] of a live run before it is asked: what swings or sloshes does so once a second at least
 
 
 def restlessness(power: NDArray[np.float64], expected: NDArray[np.float64]) -> float:

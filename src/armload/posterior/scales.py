@@ -40,6 +40,18 @@ class AnotherArm:
 
 
 @dataclass(frozen=True, eq=False)
+class Tilt:
+    """By how much gravity is turned from what was given (`posterior.tilt`).
+
+    angles: (2,) about `Arm.horizontal` [rad]. statistic: T. found: whether gravity is turned beyond doubt.
+    """
+
+    angles: NDArray[np.float64]
+    statistic: float
+    found: bool
+
+
+@dataclass(frozen=True, eq=False)
 class Posterior:
     """Mean and covariance of phi, and of what else was found along the way.
 

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
 from armload.posterior.problem import Problem
-from armload.posterior.scales import AnotherArm, Posterior, Scales
+from armload.posterior.scales import AnotherArm, Posterior, Scales, Tilt
 from armload.posterior.sequential import SequentialPosterior
 from armload.regression import GaussianPrior
 from armload.regression.information import RegressionData
@@ -42,11 +42,18 @@ class Solution:
     """The posterior of the accumulated rows, and the same as a state that takes further rows of the last run.
 
     another: whether the last run is of another arm than the first; None: not tested.
+    tilt: by how much gravity is turned from what was given; None: not tested.
     """
 
     posterior: Posterior
     state: SequentialPosterior
     another: AnotherArm | None = None
+    tilt: Tilt | None = None
+
+    @classmethod
+    def of(cls, problem: Problem, scales: Scales) -> Solution:
+        """Of a problem at some scales."""
+        return cls(problem.answer(scales, problem.posterior(scales)), problem.sequential(scales))
 
 
 def solve(
@@ -65,7 +72,7 @@ def solve(
     expectation–maximisation fewer than `iterations` is made from there.
     """
     with threads().limit(limits=1):
-        problem, scales = _improved(runs, prior_std, prior, noise, iterations - 1, start)
+        problem, scales = improved(runs, prior_std, prior, noise, iterations - 1, start)
         return problem.answer(scales, problem.posterior(scales))
 
 
@@ -79,11 +86,10 @@ def solve_to_go_on(
 ) -> Solution:
     """The same, with the state that takes further rows. Arguments as of `solve`."""
     with threads().limit(limits=1):
-        problem, scales = _improved(runs, prior_std, prior, noise, iterations - 1, start)
-        return Solution(problem.answer(scales, problem.posterior(scales)), problem.sequential(scales))
+        return Solution.of(*improved(runs, prior_std, prior, noise, iterations - 1, start))
 
 
-def _improved(
+def improved(
     runs: list[RegressionData],
     prior_std: NDArray[np.float64],
     prior: GaussianPrior | None,
@@ -91,6 +97,7 @@ def _improved(
     steps: int,
     start: Scales | None,
 ) -> tuple[Problem, Scales]:
+    """The problem, and its scales after so many steps of expectation–maximisation. Arguments as of `solve`."""
     problem = Problem(runs, prior_std, prior, noise)
     scales = problem.scales(start)
     for _ in range(steps):

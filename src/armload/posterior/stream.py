@@ -19,10 +19,10 @@ from armload.posterior.drift import ALLOWED, TESTED, Drift, drift_of, drift_sinc
 from armload.posterior.joint_gains import spread
 from armload.posterior.restless import RESTLESS, restlessness
 from armload.posterior.same_motion import Difference, SameMotion
-from armload.posterior.scales import AnotherArm, Posterior, Scales
+from armload.posterior.scales import AnotherArm, Posterior, Scales, Tilt
 from armload.posterior.sequential import SequentialPosterior
-from armload.posterior.solve import Solution, solve_to_go_on
-from armload.posterior.tilt import Tilt, tilt_of_base
+from armload.posterior.solve import Solution, improved, solve_to_go_on, threads
+from armload.posterior.tilt import tilt_of_base, tilt_so_far
 from armload.posterior.under_prior import under_prior
 from armload.regression import Correction, GaussianPrior, JointFeatures
 from armload.regression.information import SAME, RegressionData, Session
@@ -52,6 +52,7 @@ class StreamingPosterior:
         another: whether the arm is another one than at its tare; None: not asked yet.
         without_tare: whether the last solution does without what the tare says of the arm.
         tilt: by how much gravity is turned from what was given; None: not asked yet.
+        restlessness: how restless the torques are in the run, of what they were at the tare; 0 where that is not known.
         solutions: full solutions so far. rows: how many. row: the last one; seconds: what all rows stand for [s].
     """
 
@@ -97,6 +98,7 @@ class StreamingPosterior:
         self.another: AnotherArm | None = None
         self.without_tare = False
         self.tilt: Tilt | None = None
+        self.restlessness = 0.0
         self._posterior: Posterior | None = None
 
     def prepare(self) -> None:
@@ -158,13 +160,6 @@ class StreamingPosterior:
     def look(self, t: float, q: NDArray, dq: NDArray, tau: NDArray) -> Row | None:
         """Pass a sample over: the row it completes, if it does, counts for nothing here."""
         return self._regression.row(t, q, dq, tau)
-
-    @property
-    def restlessness(self) -> float:
-        """How restless the torques are in the run, of what they were at the tare; 0 where that cannot be found."""
-        if len(self.posterior.power) < 2 or self.posterior.torque != "link":
-            return 0.0
-        return self._restlessness()
 
     def _restlessness(self) -> float:
         return restlessness(self.posterior.power, self.noise.residual * self.correction.effort)
@@ -251,7 +246,12 @@ class StreamingPosterior:
     def _step(self, run: RegressionData) -> Solution:
         """One step of expectation–maximisation from the last solution's scales."""
         runs = [*self.tares, run]
-        solution = self._solved(runs, self.posterior.scales if self.solutions else self.start, 1)
+        start = self.posterior.scales if self.solutions else self.start
+        with threads().limit(limits=1):
+            problem, scales = improved(runs, self.prior_std, self.prior, self.noise, 1, start)
+            solution = Solution.of(problem, scales)
+            if self._test_tare and (solution.posterior.torque == "link" or run.blocks.duration >= FROM):
+                solution.tilt = tilt_so_far(problem, scales)  # friction of gears looks like a base that leans, at first
         if self._asked(solution, run.blocks.duration):
             solution.another = another_arm(runs, self.prior_std, self.prior, self.noise, solution.posterior)
         return solution
@@ -270,7 +270,10 @@ class StreamingPosterior:
         if np.isfinite(solution.state.information.sum() + solution.state.vector.sum()):  # else the last one goes on
             self._posterior, self._state = solution.posterior, solution.state
             self.solutions += 1
+            known = len(self.posterior.power) > 1 and self.posterior.torque == "link"
+            self.restlessness = self._restlessness() if known else 0.0
             self.another = found_so_far(self.another, solution.another)
+            self.tilt = solution.tilt
             if self._asked(solution, self.seconds):
                 self.drift = drift_of(solution.posterior, self.correction, self.session, self._read_once)
         elif self._state is None:

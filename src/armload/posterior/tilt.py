@@ -13,12 +13,13 @@ turned answers the log once more, with gravity as it was found.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.posterior.scales import Posterior
+from armload.posterior.problem import Problem
+from armload.posterior.scales import Posterior, Scales, Tilt
 from armload.posterior.solve import solve
 from armload.regression import GaussianPrior
 from armload.regression.information import RegressionData
@@ -39,18 +40,6 @@ TURNED, TURNS = np.radians(0.2), 3
 _STEPS = 2  # of expectation–maximisation from the scales of the solution that is tested
 
 
-@dataclass(frozen=True, eq=False)
-class Tilt:
-    """By how much gravity is turned from what was given.
-
-    angles: (2,) about `Arm.horizontal` [rad]. statistic: T. found: whether gravity is turned beyond doubt.
-    """
-
-    angles: NDArray[np.float64]
-    statistic: float
-    found: bool
-
-
 def tilt_of_base(
     runs: Sequence[RegressionData],
     prior_std: NDArray[np.float64],
@@ -63,10 +52,29 @@ def tilt_of_base(
     Args:
         runs, prior_std, prior, noise: as of `solve`. found: their solution, for its scales.
     """
-    eta = found.scales.eta.copy()
-    eta[runs[-1].correction.tilt] = WIDE**2
-    there = solve(list(runs), prior_std, prior, noise, _STEPS, replace(found.scales, eta=eta))
-    statistic = float(
-        there.tilt @ np.linalg.solve(noise.overrated * there.tilt_covariance + LEVEL**2 * np.eye(2), there.tilt)
-    )
-    return Tilt(there.tilt, statistic, statistic > LEANS)
+    start = _wide(found.scales, runs[-1].correction.tilt)
+    there = solve(list(runs), prior_std, prior, noise, _STEPS, start)
+    return _tilt(there.tilt, there.tilt_covariance, noise.overrated)
+
+
+def tilt_so_far(problem: Problem, scales: Scales) -> Tilt:
+    """The same of a stream, at the scales of its last solution: it is asked often, and this costs next to nothing.
+
+    A base that leans makes the noise look larger, so that T is smaller than that of `tilt_of_base`.
+    """
+    which = problem.correction.tilt
+    there = problem.posterior(_wide(scales, which))
+    C = there.covariance[problem.eta, problem.eta][which, which]
+    return _tilt(there.mean[problem.eta][which], C, problem.noise_model.overrated)
+
+
+def _wide(scales: Scales, which: slice) -> Scales:
+    """Scales with which gravity is not believed."""
+    eta = scales.eta.copy()
+    eta[which] = WIDE**2
+    return replace(scales, eta=eta)
+
+
+def _tilt(angles: NDArray[np.float64], covariance: NDArray[np.float64], overrated: float) -> Tilt:
+    statistic = float(angles @ np.linalg.solve(overrated * covariance + LEVEL**2 * np.eye(2), angles))
+    return Tilt(angles, statistic, statistic > LEANS)
