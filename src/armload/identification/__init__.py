@@ -10,9 +10,10 @@ if TYPE_CHECKING:
     from armload.identification.answer import Identification
     from armload.identification.arm_health import ArmHealth
     from armload.identification.choice import DEFAULT, Choice, choose, default_for
-    from armload.identification.identify_log import check_usable, identify, plausible_tool
+    from armload.identification.identify_log import check_usable, identify
     from armload.identification.left_out import LEFT_OUT
     from armload.identification.methods import METHODS, Method
+    from armload.identification.one_payload import plausible_tool
     from armload.identification.plausibility import check_plausible
 
 __all__ = [

@@ -8,14 +8,12 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from armload.arms import Arm, rated_mass
+from armload.arms import Arm
 from armload.arms import arm as arm_named
 from armload.errors import IdentificationError
 from armload.identification.answer import Identification, Segment
-from armload.identification.choice import choose
 from armload.identification.found import Asked, found_in
 from armload.identification.notes import (
     ALLOWED,
@@ -27,13 +25,13 @@ from armload.identification.notes import (
     paused,
     rested,
 )
+from armload.identification.one_payload import Question, answer_of_one_payload
 from armload.identification.plausibility import check_plausible
-from armload.identification.reporting import answered
 from armload.identification.segments import changes_of_payload
 from armload.identification.tare_age import drift_since
-from armload.identification.thresholds import DECISIVE, EXPLAINS, HEAVIEST, LOWEST_RATE, SETTLED
+from armload.identification.thresholds import EXPLAINS, LOWEST_RATE, SETTLED
 from armload.inertia import HELD, Z95, InertialParameters
-from armload.payloads import INERTIA_ASSUMED, Payload, read_payload
+from armload.payloads import Payload, read_payload
 from armload.posterior import Known, KnownCentre, KnownMass, Profile, load_profile
 from armload.posterior.drift import CHANGED
 from armload.recording import Recording, check_own_measurements, read_recording, steadied
@@ -95,11 +93,12 @@ def identify(
         _check_same_mounted(tare, arm, profile, asked)
     mounted = read_payload(tool) if isinstance(tool, str | Path) else tool
     say("identifying")
-    account = _account(recording, arm, tare, mounted, asked, notes)
+    question = Question(tare, mounted, asked, notes)
+    account = _account(recording, arm, question)
     if (account.doubts or account.left > 1.0) and not arm.motor_torque:
         say("asking whether noise of the velocities, or friction that grows with the load, would explain it")
-        rubbing, calmer = replace(arm, gear_loss=LINK_LOSS), None if tare is None else steadied(tare)
-        other = _account(steadied(recording), rubbing, calmer, mounted, asked, (*notes, ALLOWED))
+        calmer = replace(question, tare=None if tare is None else steadied(tare), notes=(*notes, ALLOWED))
+        other = _account(steadied(recording), replace(arm, gear_loss=LINK_LOSS), calmer)
         if not other.doubts and other.left <= EXPLAINS * max(account.left, 1.0):
             account = other
             if tare is None or profile is not None:
@@ -123,29 +122,22 @@ class _Account(NamedTuple):
     left: float
 
 
-def _account(
-    recording: Recording,
-    arm: Arm,
-    tare: Recording | None,
-    mounted: InertialParameters | Payload | None,
-    asked: Asked,
-    notes: tuple[str, ...],
-) -> _Account:
+def _account(recording: Recording, arm: Arm, question: Question) -> _Account:
     """The answer for a log, part by part where the payload changes within it."""
-    whole = _of_one_payload(recording, arm, tare, mounted, asked, notes)
-    of_arm = (None, None) if whole.another else (tare, asked.profile)
-    level = (
-        arm if whole.gravity is None else replace(arm, gravity=whole.gravity)
-    )  # a base that leans looks like a change
+    whole = answer_of_one_payload(recording, arm, question)
+    of_arm = (None, None) if whole.another else (question.tare, question.asked.profile)
+    # a base that leans looks like a payload that changes
+    level = arm if whole.gravity is None else replace(arm, gravity=whole.gravity)
     changes = changes_of_payload(recording, level, *of_arm, whole.kappa, whole.mass)
     times = changes.times
     edges, answers = [recording.t[0], *times, recording.t[-1]], [whole]
     if times:
         parts = [recording.between(a + SETTLED * (k > 0), b) for k, (a, b) in enumerate(pairwise(edges))]
-        notes = (*notes, changed_within([t - recording.t[0] for t in times], len(parts)))
-        others = replace(asked, known=None)  # what is known is what is held at the end
-        answers = [_of_one_payload(part, arm, tare, mounted, others, notes) for part in parts[:-1]]
-        answers.append(_of_one_payload(parts[-1], arm, tare, mounted, asked, notes))
+        said = (*question.notes, changed_within([t - recording.t[0] for t in times], len(parts)))
+        last = replace(question, notes=said)
+        others = replace(last, asked=replace(question.asked, known=None))  # what is known is what is held at the end
+        answers = [answer_of_one_payload(part, arm, others) for part in parts[:-1]]
+        answers.append(answer_of_one_payload(parts[-1], arm, last))
         if whole.moves and 2 * sum(answer.moves for answer in answers) > len(answers):
             edges, answers = [edges[0], edges[-1]], [whole]  # there is no rigid body in the parts either: it swings
     elif changes.doubted:
@@ -158,92 +150,6 @@ def _account(
     misfit = 0.0 if whole.health is None else whole.health.misfit or 0.0
     doubts = len(times) + changes.doubted + sum(answer.doubts for answer in answers)
     return _Account(answer, doubts, max(changes.left, misfit / CHANGED))
-
-
-def _of_one_payload(
-    recording: Recording,
-    arm: Arm,
-    tare: Recording | None,
-    mounted: InertialParameters | Payload | None,
-    asked: Asked,
-    notes: tuple[str, ...],
-) -> Identification:
-    """The answer for a log, or the part of one, throughout which the payload is the same."""
-    tared = tare is not None or asked.profile is not None
-    without = "profile" if asked.profile is not None else "arm"
-    if mounted is None:
-        relative_to = without if tare is None else "tare"
-        return answered(found_in(recording, arm, tare, asked), arm, recording, tared, relative_to, notes)
-    known = plausible_tool(arm.in_frame(mounted.parameters if isinstance(mounted, Payload) else mounted), arm)
-    unsure, error = None, np.zeros((10, 10))
-    if isinstance(mounted, Payload):
-        error = _in_frame(arm, mounted.uncertainty.covariance(mounted.parameters), mounted.parameters.frame)
-        if not mounted.inertia_known:
-            notes = (*notes, f"tool {mounted.name}: {INERTIA_ASSUMED}; the intervals allow for any other")
-            unsure = known
-    if tare is None and asked.profile is None:
-        arm = arm.with_payload(known)
-        found = found_in(recording, arm, None, asked).with_error(error)
-        return answered(found, arm, recording, False, "tool", notes, unsure=unsure)
-    carried, sure = _carries(arm, known, tare, asked.profile)
-    before = "at the tare" if tare is not None else "in the profile's logs"
-    since = "after the tare" if tare is not None else "after the profile's logs"
-    if carried:  # what it weighs is in both logs, and its error in neither's difference
-        if asked.profile is None:
-            arm = arm.with_payload(known)  # a profile holds what was mounted already
-        found, relative_to = found_in(recording, arm, tare, asked), "profile" if tare is None else "tare"
-        note, otherwise = f"the tool was mounted {before} already", -known.phi
-    else:
-        both = asked.known and asked.known.with_tool(known.phi)  # what was added since the tare
-        found, relative_to = found_in(recording, arm, tare, replace(asked, known=both)).less(known.phi), "tool"
-        found = found.with_error(error)
-        note, otherwise = (
-            f"the tool was mounted {since}: the answer is what was added since, less the tool",
-            known.phi,
-        )
-    if sure:
-        return answered(found, arm, recording, tared, relative_to, (*notes, note), unsure=unsure)
-    who = "tare" if tare is not None else "profile"
-    note = f"it seems that {note}; the {who} does not tell for sure, the intervals hold the other case, too"
-    return answered(found, arm, recording, tared, relative_to, (*notes, note), otherwise, unsure)
-
-
-def _in_frame(arm: Arm, covariance: NDArray[np.float64], frame: str | None) -> NDArray[np.float64]:
-    """A covariance (10, 10) of phi about the arm's payload frame, from another."""
-    T = np.column_stack([arm.in_frame(InertialParameters(e, frame)).phi for e in np.eye(10)])
-    return T @ covariance @ T.T
-
-
-def plausible_tool(tool: InertialParameters, arm: Arm) -> InertialParameters:
-    """The tool, if an arm can carry so much.
-
-    Raises:
-        IdentificationError: it weighs more than three times the rated payload: in grams, say.
-    """
-    most = HEAVIEST * rated_mass(arm)
-    if not abs(tool.mass) <= most:
-        raise IdentificationError(
-            f"the tool weighs {tool.mass:.4g} kg: expected at most {most:.3g} kg, {HEAVIEST:g} times what "
-            f"{arm.name} is rated for; give kilograms and metres"
-        )
-    return tool
-
-
-def _carries(arm: Arm, tool: InertialParameters, tare: Recording | None, profile: Profile | None) -> tuple[bool, bool]:
-    """Whether a tare, or a profile's logs, fit the arm with the tool better than without, and whether beyond doubt.
-
-    The metric is what a tare tells by the method that knows best how far it can be trusted.
-    """
-    if tare is not None:
-        seen = choose(arm).identifier.run(tare)
-        phi, covariance = seen.phi, seen.covariance
-    else:
-        assert profile is not None
-        phi, covariance = profile.mounted(arm)
-    information = np.linalg.inv(covariance)
-    with_tool = phi - tool.phi
-    ahead = float(phi @ information @ phi - with_tool @ information @ with_tool)
-    return ahead > 0.0, abs(ahead) > DECISIVE
 
 
 def _check_same_mounted(tare: Recording, arm: Arm, profile: Profile, asked: Asked) -> None:

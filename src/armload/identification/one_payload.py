@@ -1,0 +1,118 @@
+"""The answer for a log throughout which the payload is the same, with or without a tool whose parameters are known.
+
+Whether such a tool was mounted at the tare, or in a profile's logs, they tell themselves: it is in the difference of
+the two logs, or it is not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.arms import Arm, rated_mass
+from armload.errors import IdentificationError
+from armload.identification.answer import Identification
+from armload.identification.choice import choose
+from armload.identification.found import Asked, found_in
+from armload.identification.reporting import answered
+from armload.identification.thresholds import DECISIVE, HEAVIEST
+from armload.inertia import InertialParameters
+from armload.payloads import INERTIA_ASSUMED, Payload
+from armload.posterior import Profile
+from armload.recording import Recording
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked of a log, apart from the log and the arm.
+
+    tare: an earlier log of the arm. mounted: a tool whose parameters are known. asked: how it is to be identified.
+    notes: what is known before, a sentence each.
+    """
+
+    tare: Recording | None
+    mounted: InertialParameters | Payload | None
+    asked: Asked
+    notes: tuple[str, ...]
+
+
+def answer_of_one_payload(recording: Recording, arm: Arm, question: Question) -> Identification:
+    """The answer for a log, or the part of one, throughout which the payload is the same."""
+    tare, mounted, asked, notes = question.tare, question.mounted, question.asked, question.notes
+    tared = tare is not None or asked.profile is not None
+    without = "profile" if asked.profile is not None else "arm"
+    if mounted is None:
+        relative_to = without if tare is None else "tare"
+        return answered(found_in(recording, arm, tare, asked), arm, recording, tared, relative_to, notes)
+    known = plausible_tool(arm.in_frame(mounted.parameters if isinstance(mounted, Payload) else mounted), arm)
+    unsure, error = None, np.zeros((10, 10))
+    if isinstance(mounted, Payload):
+        error = _in_frame(arm, mounted.uncertainty.covariance(mounted.parameters), mounted.parameters.frame)
+        if not mounted.inertia_known:
+            notes = (*notes, f"tool {mounted.name}: {INERTIA_ASSUMED}; the intervals allow for any other")
+            unsure = known
+    if tare is None and asked.profile is None:
+        arm = arm.with_payload(known)
+        found = found_in(recording, arm, None, asked).with_error(error)
+        return answered(found, arm, recording, False, "tool", notes, unsure=unsure)
+    carried, sure = _carries(arm, known, tare, asked.profile)
+    before = "at the tare" if tare is not None else "in the profile's logs"
+    since = "after the tare" if tare is not None else "after the profile's logs"
+    if carried:  # what it weighs is in both logs, and its error in neither's difference
+        if asked.profile is None:
+            arm = arm.with_payload(known)  # a profile holds what was mounted already
+        found, relative_to = found_in(recording, arm, tare, asked), "profile" if tare is None else "tare"
+        note, otherwise = f"the tool was mounted {before} already", -known.phi
+    else:
+        both = asked.known and asked.known.with_tool(known.phi)  # what was added since the tare
+        found, relative_to = found_in(recording, arm, tare, replace(asked, known=both)).less(known.phi), "tool"
+        found = found.with_error(error)
+        note, otherwise = (
+            f"the tool was mounted {since}: the answer is what was added since, less the tool",
+            known.phi,
+        )
+    if sure:
+        return answered(found, arm, recording, tared, relative_to, (*notes, note), unsure=unsure)
+    who = "tare" if tare is not None else "profile"
+    note = f"it seems that {note}; the {who} does not tell for sure, the intervals hold the other case, too"
+    return answered(found, arm, recording, tared, relative_to, (*notes, note), otherwise, unsure)
+
+
+def _in_frame(arm: Arm, covariance: NDArray[np.float64], frame: str | None) -> NDArray[np.float64]:
+    """A covariance (10, 10) of phi about the arm's payload frame, from another."""
+    T = np.column_stack([arm.in_frame(InertialParameters(e, frame)).phi for e in np.eye(10)])
+    return T @ covariance @ T.T
+
+
+def plausible_tool(tool: InertialParameters, arm: Arm) -> InertialParameters:
+    """The tool, if an arm can carry so much.
+
+    Raises:
+        IdentificationError: it weighs more than three times the rated payload: in grams, say.
+    """
+    most = HEAVIEST * rated_mass(arm)
+    if not abs(tool.mass) <= most:
+        raise IdentificationError(
+            f"the tool weighs {tool.mass:.4g} kg: expected at most {most:.3g} kg, {HEAVIEST:g} times what "
+            f"{arm.name} is rated for; give kilograms and metres"
+        )
+    return tool
+
+
+def _carries(arm: Arm, tool: InertialParameters, tare: Recording | None, profile: Profile | None) -> tuple[bool, bool]:
+    """Whether a tare, or a profile's logs, fit the arm with the tool better than without, and whether beyond doubt.
+
+    The metric is what a tare tells by the method that knows best how far it can be trusted.
+    """
+    if tare is not None:
+        seen = choose(arm).identifier.run(tare)
+        phi, covariance = seen.phi, seen.covariance
+    else:
+        assert profile is not None
+        phi, covariance = profile.mounted(arm)
+    information = np.linalg.inv(covariance)
+    with_tool = phi - tool.phi
+    ahead = float(phi @ information @ phi - with_tool @ information @ with_tool)
+    return ahead > 0.0, abs(ahead) > DECISIVE
