@@ -18,8 +18,7 @@ from armload.identification.known_payload import know
 from armload.identification.thresholds import LARGEST_OFFSET, LEAST_SEEN, MISFIT, MOVES
 from armload.inertia import distance_to_body, is_consistent
 from armload.posterior import HybridIdentifier, Known, PosteriorLeastSquares, Profile
-from armload.posterior.drift import Drift
-from armload.posterior.scales import AnotherArm, Tilt
+from armload.posterior.scales import AnotherArm, Drift, Tilt
 from armload.posterior.tilt import TURNED, TURNS
 from armload.recording import Recording, span
 from armload.regression import payload_prior_std

@@ -9,8 +9,7 @@ from armload.arms import Arm
 from armload.identification.thresholds import KNOWN, MOVES, NOMINAL, PAUSE_SAID
 from armload.inertia import NAMES, SHRINK, Z95
 from armload.posterior import KnownCentre, KnownMass
-from armload.posterior.drift import Drift
-from armload.posterior.scales import AnotherArm, Tilt
+from armload.posterior.scales import AnotherArm, Drift, Tilt
 from armload.posterior.tilt import MAY_LEAN
 from armload.recording import Recording
 
@@ -130,11 +129,11 @@ def arm_changed(drift: Drift | None, another: AnotherArm | None, what: str = "ta
         )
     if drift is None or not drift.changed:
         return None
-    j = drift.joint
+    j, allow = drift.joint, "allow" if drift.allowed else "do not allow"
     offset, friction = (f"{x:+.2g} N·m" if abs(x) >= 5e-4 else "nothing" for x in (drift.offset[j], drift.coulomb[j]))
     return (
         f"the arm is not as {then}: at joint {j + 1} the torque's offset differs by {offset}, the friction by "
-        f"{friction}; the intervals allow for it; record a tare of this arm as it is now, with the same base and tool"
+        f"{friction}; the intervals {allow} for it; record a tare of this arm as it is now, with the same base and tool"
     )
 
 

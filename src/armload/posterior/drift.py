@@ -20,12 +20,12 @@ the real UR10e pair, though what its gears lose is an unknown). They are told by
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.posterior.scales import Posterior
+from armload.posterior.scales import Drift, Posterior
 from armload.posterior.solve import solve
 from armload.regression import Correction, GaussianPrior
 from armload.regression.information import RegressionData, Session
@@ -41,22 +41,8 @@ ALLOWED = 3.0
 CHANGED = 60.0
 # [s] within which a tare is of the same session: an arm that is warm changes little in an hour. A stated prior
 SESSION = 3600.0
+ASKED_FROM = 1.0  # [s] of a stream before it is asked: the wrist has moved
 _STEPS = 2  # of expectation–maximisation from the scales of the solution that is tested
-
-
-@dataclass(frozen=True, eq=False)
-class Drift:
-    """By how much an arm differs from what it was at its tare.
-
-    offset, coulomb: (n,) change of the torque offsets and of the Coulomb friction [N·m]. statistic: T.
-    joint: the joint whose own T is largest, from 0. changed: whether T is beyond what sound logs show.
-    """
-
-    offset: NDArray[np.float64]
-    coulomb: NDArray[np.float64]
-    statistic: float
-    joint: int
-    changed: bool
 
 
 def drift_since_tare(
@@ -78,6 +64,27 @@ def drift_since_tare(
         run.session = replace(explained, number=1, drift=TESTED)
         found = solve([*runs[:-1], run], prior_std, prior, noise, _STEPS, found.scales)
     return drift_of(found, run.correction, explained, read_once)
+
+
+def drift_so_far(
+    runs: list[RegressionData],
+    given: int,
+    prior_std: NDArray[np.float64],
+    prior: GaussianPrior | None,
+    noise: NoiseModel,
+    found: Posterior,
+    read_once: bool = False,
+) -> Drift:
+    """The same of a stream, whose answers do not allow for it: at the scales of its last solution.
+
+    Args:
+        given: how many runs, the first ones, are its tare; the others are of its own session. Else as above.
+    """
+    explained, own = runs[-1].session, [copy(run) for run in runs[given:]]
+    for run in own:
+        run.session = replace(explained, number=1, drift=TESTED)
+    there = solve([*runs[:given], *own], prior_std, prior, noise, 1, found.scales)
+    return replace(drift_of(there, runs[-1].correction, explained, read_once), allowed=False)
 
 
 def drift_of(found: Posterior, correction: Correction, explained: Session, read_once: bool = False) -> Drift:

@@ -221,6 +221,7 @@ class PosteriorLeastSquares(Identifier):
                 self.session,
                 self.test_tare,
                 self.read_once,
+                len(self._tares),
             )
         return self._stream
 

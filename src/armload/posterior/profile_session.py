@@ -17,10 +17,10 @@ from armload.arms import Arm, rated_effort
 from armload.errors import IdentificationError
 from armload.inertia import HELD, Z95
 from armload.posterior.another_arm import another_arm
-from armload.posterior.drift import Drift, drift_of
+from armload.posterior.drift import drift_of
 from armload.posterior.problem import Problem
 from armload.posterior.profile import Profile, SessionRecord, remembered
-from armload.posterior.scales import Posterior
+from armload.posterior.scales import Drift, Posterior
 from armload.posterior.solve import solve
 from armload.recording import Recording, digest_of, marks_of
 from armload.regression import Correction, FilteredRegression, JointFeatures, payload_prior_std

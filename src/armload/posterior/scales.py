@@ -40,6 +40,23 @@ class AnotherArm:
 
 
 @dataclass(frozen=True, eq=False)
+class Drift:
+    """By how much an arm differs from what it was at its tare (`posterior.drift`).
+
+    offset, coulomb: (n,) change of the torque offsets and of the Coulomb friction [N·m]. statistic: T.
+    joint: the joint whose own T is largest, from 0. changed: whether T is beyond what sound logs show.
+    allowed: whether the answer it is of allows for it.
+    """
+
+    offset: NDArray[np.float64]
+    coulomb: NDArray[np.float64]
+    statistic: float
+    joint: int
+    changed: bool
+    allowed: bool = True
+
+
+@dataclass(frozen=True, eq=False)
 class Tilt:
     """By how much gravity is turned from what was given (`posterior.tilt`).
 

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
 from armload.posterior.problem import Problem
-from armload.posterior.scales import AnotherArm, Posterior, Scales, Tilt
+from armload.posterior.scales import AnotherArm, Drift, Posterior, Scales, Tilt
 from armload.posterior.sequential import SequentialPosterior
 from armload.regression import GaussianPrior
 from armload.regression.information import RegressionData
@@ -42,12 +42,14 @@ class Solution:
     """The posterior of the accumulated rows, and the same as a state that takes further rows of the last run.
 
     another: whether the last run is of another arm than the first; None: not tested.
+    drift: by how much the arm differs from what it was at its tare; None: not tested.
     tilt: by how much gravity is turned from what was given; None: not tested.
     """
 
     posterior: Posterior
     state: SequentialPosterior
     another: AnotherArm | None = None
+    drift: Drift | None = None
     tilt: Tilt | None = None
 
     @classmethod

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from armload.posterior.accumulation import Accumulation
 from armload.posterior.another_arm import FROM, another_arm, apart, found_so_far
-from armload.posterior.drift import ALLOWED, TESTED, Drift, drift_of, drift_since_tare
+from armload.posterior.drift import ALLOWED, ASKED_FROM, TESTED, drift_of, drift_since_tare, drift_so_far
 from armload.posterior.joint_gains import spread
 from armload.posterior.restless import RESTLESS, restlessness
 from armload.posterior.same_motion import Difference, SameMotion
-from armload.posterior.scales import AnotherArm, Posterior, Scales, Tilt
+from armload.posterior.scales import AnotherArm, Drift, Posterior, Scales, Tilt
 from armload.posterior.sequential import SequentialPosterior
 from armload.posterior.solve import Solution, improved, solve_to_go_on, threads
 from armload.posterior.tilt import tilt_of_base, tilt_so_far
@@ -43,6 +43,7 @@ class StreamingPosterior:
         session: of the run; the tares' is session 0 unless they are of this one.
         test_tare: whether `conclude` asks if the arm is as it was at the tare, or another one, and allows for it if
             not; and if gravity is as it was given.
+        given: how many of the tares were recorded before the stream.
         read_once: whether nobody reads what looks wrong once more (`drift`): of a live stream.
 
     Attributes:
@@ -71,10 +72,11 @@ class StreamingPosterior:
         session: Session = SAME,
         test_tare: bool = True,
         read_once: bool = False,
+        given: int = 0,
     ) -> None:
         self.correction, self.features, self.noise = correction, features, noise
         self.prior_std, self.prior, self.iterations, self.session = prior_std, prior, iterations, session
-        self._test_tare, self._read_once = test_tare, read_once
+        self._test_tare, self._read_once, self._given = test_tare, read_once, given
         mean, root = (np.zeros(10), np.diag(prior_std)) if prior is None else (prior.mean.copy(), prior.root)
         self._gaussian = mean, np.ascontiguousarray(root), np.ascontiguousarray(root.T)
         self.tares, self.gain, self.start = tuple(tares), gain, start
@@ -254,7 +256,16 @@ class StreamingPosterior:
                 solution.tilt = tilt_so_far(problem, scales)  # friction of gears looks like a base that leans, at first
         if self._asked(solution, run.blocks.duration):
             solution.another = another_arm(runs, self.prior_std, self.prior, self.noise, solution.posterior)
+        if self._not_modelled(runs, solution):
+            about = (self.prior_std, self.prior, self.noise, solution.posterior)
+            solution.drift = drift_so_far(runs, self._given, *about, self._read_once)
         return solution
+
+    def _not_modelled(self, runs: list[RegressionData], solution: Solution) -> bool:
+        """Whether a live solution takes a tare that was given for one of its own session, and can be asked about it."""
+        given = self._test_tare and self._given > 0 and runs[0].noise is None  # a profile's drift is an unknown
+        seconds = sum(run.blocks.duration for run in runs[self._given :])
+        return given and self.session.drift < TESTED and seconds >= ASKED_FROM and not solution.posterior.gears
 
     def _asked(self, solution: Solution, seconds: float) -> bool:
         """Whether a live solution tells if the arm is as at its tare: it does where it has allowed for a drift.
@@ -273,7 +284,7 @@ class StreamingPosterior:
             known = len(self.posterior.power) > 1 and self.posterior.torque == "link"
             self.restlessness = self._restlessness() if known else 0.0
             self.another = found_so_far(self.another, solution.another)
-            self.tilt = solution.tilt
+            self.drift, self.tilt = solution.drift or self.drift, solution.tilt
             if self._asked(solution, self.seconds):
                 self.drift = drift_of(solution.posterior, self.correction, self.session, self._read_once)
         elif self._state is None:
