@@ -13,8 +13,7 @@ from armload.errors import IdentificationError
 from armload.motion import random_motion
 from armload.online import OnlineIdentifier
 from armload.payloads import draw_payload
-from armload.posterior import learn_profile
-from armload.posterior import stream as stream_module
+from armload.posterior import checked_solver, learn_profile
 from armload.posterior.scales import AnotherArm
 from armload.simulation import Run, Sensors, World, simulate_many
 from armload.simulation.resolution import COARSE
@@ -100,8 +99,8 @@ def test_nothing_is_learned_from_another_arm_and_it_is_said_within_a_minute(pand
 @pytest.mark.full  # some seconds
 def test_an_arm_that_was_once_found_to_be_another_stays_one(panda, world, profile, monkeypatch):
     answers = iter([True])  # found once; the evidence falls back afterwards
-    monkeypatch.setattr(stream_module, "FROM", 5.0)
-    monkeypatch.setattr(stream_module, "another_arm", lambda *_: AnotherArm(0.0, 9.0, 1.0, -9.0, next(answers, False)))
+    monkeypatch.setattr(checked_solver, "FROM", 5.0)
+    monkeypatch.setattr(checked_solver, "another_arm", lambda *_: AnotherArm(0.0, 9.0, 1.0, -9.0, next(answers, False)))
     said = []
     held = [(0.0, None), (18.0, draw_payload("boxes", 3, 1.5))]  # its new run has not asked yet
     last, learned = streamed(panda, world, profile, held, lambda stream: said.append(stream.arm_changed is not None))

@@ -16,6 +16,7 @@ from armload.online import OnlineIdentifier
 from armload.posterior import HybridIdentifier, SmoothPosteriorLeastSquares
 from armload.posterior.drift import CHANGED
 from armload.posterior.problem import Problem
+from armload.regression import solution_prior_std
 from armload.simulation import World
 from armload.simulation.friction import Friction
 
@@ -120,7 +121,7 @@ def test_rows_one_by_one_give_the_posterior_of_the_accumulated_rows_with_a_drift
     running = stream.information.copy(), stream.vector.copy()
     scales = stream.posterior.scales
     run = stream.accumulated()
-    problem = Problem([*stream.tares, run], stream.prior_std, stream.prior, stream.noise)
+    problem = Problem([*stream.tares, run], solution_prior_std(panda), identifier.prior, stream.noise)
     whole = problem.sequential(scales)
     assert running[0] == pytest.approx(whole.information, rel=1e-6, abs=1e-6 * np.abs(whole.information).max())
     assert running[1] == pytest.approx(whole.vector, rel=1e-6, abs=1e-6 * np.abs(whole.vector).max())

@@ -37,7 +37,7 @@ from armload.regression.noise import NoiseModel
 SURPRISING = 4.0
 # B above which the same arm is believed no more: it explains the run less than 20 times as well as another one
 LEAST = -3.0
-FROM = 20.0  # [s] of a stream before it is asked: as long as a tare is asked for
+FROM = 19.9  # [s] of a stream before it is asked: at the full solution after 20 s, as long as a tare is asked for
 _DRAWS = 24  # of a mean and a standard deviation, of which the latter is then known to 15 %
 _STEPS = 3  # of expectation–maximisation of the run without its tare, as a tare's scales are another arm's
 _NAT = 1.0  # of B, the least standard deviation: odds that differ by less say nothing, however short the log

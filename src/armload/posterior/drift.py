@@ -41,7 +41,7 @@ ALLOWED = 3.0
 CHANGED = 60.0
 # [s] within which a tare is of the same session: an arm that is warm changes little in an hour. A stated prior
 SESSION = 3600.0
-ASKED_FROM = 1.0  # [s] of a stream before it is asked: the wrist has moved
+ASKED_FROM = 1.0  # [s] of a stream before it is asked, so after 1.5 s: the wrist has moved
 _STEPS = 2  # of expectation–maximisation from the scales of the solution that is tested
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm, rated_effort
 from armload.estimators import ArmMismatch, Estimate, Identifier
+from armload.posterior.checked_solver import CheckedSolver
 from armload.posterior.evidence import Evidence
 from armload.posterior.known import Known
 from armload.posterior.profile import Profile
@@ -207,22 +208,12 @@ class PosteriorLeastSquares(Identifier):
             if self.reference is not None:
                 earlier = self.reference.stream
                 tares, start = (*earlier.tares, earlier.finish()), earlier.posterior.scales
-            self._stream = StreamingPosterior(
-                self._correction,
-                self.features,
-                self._noise,
-                solution_prior_std(self.arm),
-                self.prior,
-                tares,
-                start,
-                self.gain,
-                self._iterations,
-                self._same_motion,
-                self.session,
-                self.test_tare,
-                self.read_once,
-                len(self._tares),
+            asks, given = self.test_tare, len(self._tares)
+            solver = CheckedSolver(
+                solution_prior_std(self.arm), self.prior, self._noise, self.session, asks, given, self.read_once
             )
+            about = (self.gain, self._iterations, self._same_motion)
+            self._stream = StreamingPosterior(self._correction, self.features, solver, tares, start, *about)
         return self._stream
 
     @property

@@ -44,6 +44,8 @@ class Solution:
     another: whether the last run is of another arm than the first; None: not tested.
     drift: by how much the arm differs from what it was at its tare; None: not tested.
     tilt: by how much gravity is turned from what was given; None: not tested.
+    restlessness: how restless the torques are, of what they were at the tare; 0 where that is not known.
+    without_tare: whether it does without what the first run, the tare, says of the arm.
     """
 
     posterior: Posterior
@@ -51,6 +53,13 @@ class Solution:
     another: AnotherArm | None = None
     drift: Drift | None = None
     tilt: Tilt | None = None
+    restlessness: float = 0.0
+    without_tare: bool = False
+
+    @property
+    def finite(self) -> bool:
+        """Whether it is of numbers."""
+        return bool(np.isfinite(self.state.information.sum() + self.state.vector.sum()))
 
     @classmethod
     def of(cls, problem: Problem, scales: Scales) -> Solution:

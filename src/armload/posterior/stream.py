@@ -8,26 +8,23 @@ thread; the posterior at the new scales, brought up to date, replaces the runnin
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armload.posterior.accumulation import Accumulation
-from armload.posterior.another_arm import FROM, another_arm, apart, found_so_far
-from armload.posterior.drift import ALLOWED, ASKED_FROM, TESTED, drift_of, drift_since_tare, drift_so_far
+from armload.posterior.another_arm import found_so_far
+from armload.posterior.checked_solver import CheckedSolver
 from armload.posterior.joint_gains import spread
-from armload.posterior.restless import RESTLESS, restlessness
 from armload.posterior.same_motion import Difference, SameMotion
 from armload.posterior.scales import AnotherArm, Drift, Posterior, Scales, Tilt
 from armload.posterior.sequential import SequentialPosterior
-from armload.posterior.solve import Solution, improved, solve_to_go_on, threads
-from armload.posterior.tilt import tilt_of_base, tilt_so_far
+from armload.posterior.solve import Solution
 from armload.posterior.under_prior import under_prior
-from armload.regression import Correction, GaussianPrior, JointFeatures
-from armload.regression.information import SAME, RegressionData, Session
+from armload.regression import Correction, JointFeatures
+from armload.regression.information import RegressionData
 from armload.regression.lag import GAIN
-from armload.regression.noise import MOMENT, NoiseModel, share_of_noise, whole_noise
+from armload.regression.noise import MOMENT, share_of_noise, whole_noise
 from armload.regression.rows import REGRESSOR_RATE, FilteredRegression, Row
 
 
@@ -35,16 +32,11 @@ class StreamingPosterior:
     """What a stream says about the payload, sample by sample, and once more when it ends.
 
     Args:
-        correction: the unknowns eta of the arm. features: of each joint's nonparametric part. noise: as for `solve`.
-        prior_std: of each payload (10,). prior: of the run's payload, where more is known; None: `prior_std` alone.
+        correction: the unknowns eta of the arm. features: of each joint's nonparametric part.
+        solver: makes full solutions of it: with the priors, the noise and the run's session.
         tares: what earlier runs said, all with the same mounted; `start`: the scales found from them.
         gain: λ of the lag [1/s]. iterations: of expectation–maximisation in the last solution.
         same_motion: asks whether the tare shows the run's motion; None: not tested.
-        session: of the run; the tares' is session 0 unless they are of this one.
-        test_tare: whether `conclude` asks if the arm is as it was at the tare, or another one, and allows for it if
-            not; and if gravity is as it was given.
-        given: how many of the tares were recorded before the stream.
-        read_once: whether nobody reads what looks wrong once more (`drift`): of a live stream.
 
     Attributes:
         posterior: the last full solution; its scales, ratios and torque side hold until the next.
@@ -61,27 +53,21 @@ class StreamingPosterior:
         self,
         correction: Correction,
         features: JointFeatures,
-        noise: NoiseModel,
-        prior_std: NDArray[np.float64],
-        prior: GaussianPrior | None = None,
+        solver: CheckedSolver,
         tares: Sequence[RegressionData] = (),
         start: Scales | None = None,
         gain: float = GAIN,
         iterations: int = 5,
         same_motion: SameMotion | None = None,
-        session: Session = SAME,
-        test_tare: bool = True,
-        read_once: bool = False,
-        given: int = 0,
     ) -> None:
-        self.correction, self.features, self.noise = correction, features, noise
-        self.prior_std, self.prior, self.iterations, self.session = prior_std, prior, iterations, session
-        self._test_tare, self._read_once, self._given = test_tare, read_once, given
-        mean, root = (np.zeros(10), np.diag(prior_std)) if prior is None else (prior.mean.copy(), prior.root)
+        self.correction, self.features, self.noise = correction, features, solver.noise
+        self._solver, self._iterations = solver, iterations
+        prior, std = solver.prior, solver.prior_std
+        mean, root = (np.zeros(10), np.diag(std)) if prior is None else (prior.mean.copy(), prior.root)
         self._gaussian = mean, np.ascontiguousarray(root), np.ascontiguousarray(root.T)
         self.tares, self.gain, self.start = tuple(tares), gain, start
         self._regression = self.regression()
-        self._whole = whole_noise(correction, noise)
+        self._whole = whole_noise(correction, self.noise)
         self._base: SequentialPosterior | None = None
         self._accumulation = Accumulation(self._empty(), same_motion)
         self.reset()
@@ -106,7 +92,7 @@ class StreamingPosterior:
     def prepare(self) -> None:
         """Do now what the first answer would have to wait for: the posterior of the tares alone."""
         if self._base is None:
-            first = self._solved([*self.tares, self._empty()], self.start, 0)
+            first = self._solver.solve([*self.tares, self._empty()], self.start, 1)
             self._first, self._base = first.posterior, first.state
             self._base.noise = self._whole
 
@@ -119,7 +105,7 @@ class StreamingPosterior:
         return self._posterior
 
     def _empty(self) -> RegressionData:
-        return RegressionData(self.correction, self.gain, self.features, self.noise.block, self.session)
+        return RegressionData(self.correction, self.gain, self.features, self.noise.block, self._solver.session)
 
     def take(self, t: float, q: NDArray, dq: NDArray, tau: NDArray) -> bool:
         """Take one sample (n,); times rise. True if it completed a row, that is, if there is something new."""
@@ -162,9 +148,6 @@ class StreamingPosterior:
     def look(self, t: float, q: NDArray, dq: NDArray, tau: NDArray) -> Row | None:
         """Pass a sample over: the row it completes, if it does, counts for nothing here."""
         return self._regression.row(t, q, dq, tau)
-
-    def _restlessness(self) -> float:
-        return restlessness(self.posterior.power, self.noise.residual * self.correction.effort)
 
     @property
     def state(self) -> SequentialPosterior | None:
@@ -217,76 +200,24 @@ class StreamingPosterior:
 
     def conclude(self) -> None:
         """A last solution from all rows so far, as no more will come; it begins with the scales found from the tare."""
-        run = self._accumulation.conclude()
-        runs = [*self.tares, run]
+        runs = [*self.tares, self._accumulation.conclude()]
         self.drift = self.another = None
-        about = (self.prior_std, self.prior, self.noise)
-        self._adopt(self._solved(runs, self.start, self.iterations - 1))
-        if self.tares and self._test_tare and not self.posterior.gears:
-            self.drift = drift_since_tare(runs, *about, self.posterior, self._read_once)
-            if self.drift.changed:
-                run.session = replace(self.session, number=1, drift=max(ALLOWED, self.session.drift))
-                self._adopt(self._solved(runs, self.start, self.iterations - 1))
-            self.another = another_arm(runs, *about, self.posterior)
-            if self.another.found:
-                self._adopt(apart(runs, *about, self.iterations, self.posterior))
-                self.without_tare = self._restlessness() <= RESTLESS
-                if self.without_tare:
-                    runs = runs[1:]
-                else:  # no arm explains it: what is held moves on its own
-                    self.another = None
-                    self._adopt(self._solved(runs, self.start, self.iterations - 1))
-        if self._test_tare:
-            self.tilt = tilt_of_base(runs, *about, self.posterior)
-        run.session = self.session
+        self._adopt(self._solver.conclude(runs, self.start, self._iterations))
         changed = self.drift is not None and self.drift.changed  # then the difference is of two arms, too
         self.difference = None if changed or self.without_tare else self._accumulation.better(self.posterior.covariance)
 
-    def _solved(self, runs: list[RegressionData], start: Scales | None, steps: int) -> Solution:
-        return solve_to_go_on(runs, self.prior_std, self.prior, self.noise, steps + 1, start)
-
     def _step(self, run: RegressionData) -> Solution:
-        """One step of expectation–maximisation from the last solution's scales."""
-        runs = [*self.tares, run]
-        start = self.posterior.scales if self.solutions else self.start
-        with threads().limit(limits=1):
-            problem, scales = improved(runs, self.prior_std, self.prior, self.noise, 1, start)
-            solution = Solution.of(problem, scales)
-            if self._test_tare and (solution.posterior.torque == "link" or run.blocks.duration >= FROM):
-                solution.tilt = tilt_so_far(problem, scales)  # friction of gears looks like a base that leans, at first
-        if self._asked(solution, run.blocks.duration):
-            solution.another = another_arm(runs, self.prior_std, self.prior, self.noise, solution.posterior)
-        if self._not_modelled(runs, solution):
-            about = (self.prior_std, self.prior, self.noise, solution.posterior)
-            solution.drift = drift_so_far(runs, self._given, *about, self._read_once)
-        return solution
-
-    def _not_modelled(self, runs: list[RegressionData], solution: Solution) -> bool:
-        """Whether a live solution takes a tare that was given for one of its own session, and can be asked about it."""
-        given = self._test_tare and self._given > 0 and runs[0].noise is None  # a profile's drift is an unknown
-        seconds = sum(run.blocks.duration for run in runs[self._given :])
-        return given and self.session.drift < TESTED and seconds >= ASKED_FROM and not solution.posterior.gears
-
-    def _asked(self, solution: Solution, seconds: float) -> bool:
-        """Whether a live solution tells if the arm is as at its tare: it does where it has allowed for a drift.
-
-        Not before `FROM`: what pushes or pulls for a few seconds is no other arm.
-        """
-        drifts = solution.posterior.drift.size > 0
-        asked = self._test_tare and self.session.drift >= TESTED and seconds >= FROM
-        return asked and drifts and not solution.posterior.gears
+        """The next solution, from the last one's scales."""
+        return self._solver.go_on([*self.tares, run], self.posterior.scales if self.solutions else self.start)
 
     def _adopt(self, solution: Solution) -> None:
         self._early, self.without_tare = None, False
-        if np.isfinite(solution.state.information.sum() + solution.state.vector.sum()):  # else the last one goes on
+        if solution.finite:  # else the last one goes on
             self._posterior, self._state = solution.posterior, solution.state
             self.solutions += 1
-            known = len(self.posterior.power) > 1 and self.posterior.torque == "link"
-            self.restlessness = self._restlessness() if known else 0.0
-            self.another = found_so_far(self.another, solution.another)
             self.drift, self.tilt = solution.drift or self.drift, solution.tilt
-            if self._asked(solution, self.seconds):
-                self.drift = drift_of(solution.posterior, self.correction, self.session, self._read_once)
+            self.another = found_so_far(self.another, solution.another)
+            self.restlessness, self.without_tare = solution.restlessness, solution.without_tare
         elif self._state is None:
             self.prepare()
             assert self._base is not None
