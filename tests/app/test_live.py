@@ -556,6 +556,33 @@ def test_another_method_goes_on_from_nothing_and_an_unknown_one_changes_nothing(
     session.close()
 
 
+def test_a_tare_is_as_old_as_it_was_said_to_be_until_another_is_taken(panda, analytic_log):
+    run, tare = analytic_log(panda, HELD, duration=9.0), analytic_log(panda, None, duration=4.0)
+    session = Session(Replay(run, panda, speed=None), panda, tare, "map", tare_age=4 * 86400.0)
+    estimates, drifts = session.estimates(), []
+
+    def look(count):
+        list(itertools.islice(estimates, count))
+        drifts.append(session._identifier.engine.session.drift)
+
+    look(100)
+    session.use("map-gp")
+    look(700)
+    session.take_tare()
+    look(10)
+    session.close()
+    assert drifts == [2.0, 2.0, 0.0]
+    assert session.tare_age == 0.0
+
+
+@pytest.mark.parametrize("command", [["live", "sim", "--headless"], ["serve", "sim", "--robot", "panda"]])
+def test_the_age_of_no_tare_is_refused(capsys, command):
+    assert main([*command, "--tare-age", "1d"]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert "there is no --tare" in err
+
+
 def test_what_is_held_counts_as_nothing_after_a_tare(panda, analytic_log):
     run = analytic_log(panda, HELD, duration=9.0)
     session = Session(Replay(run, panda, speed=None, payload=HELD), panda, method="map")

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from armload.arms import arm, payload_regressor
+from armload.errors import IdentificationError
 from armload.identification import identify
+from armload.identification.tare_age import DAY
 from armload.inertia import InertialParameters
 from armload.motion import random_motion, taie2024
 from armload.online import OnlineIdentifier
@@ -57,11 +59,11 @@ def case(kind, panda_logs, same_motion):
         robot, run, tare = logs("panda", rate=30.0)
     if kind == "gaps":
         run = with_a_gap(run)
-    wants_tare = kind in ("tare", "same motion", "motor torque")
+    wants_tare = kind in ("tare", "old tare", "same motion", "motor torque")
     return robot, run, tare if wants_tare else None, TOOL if kind == "tool" else None
 
 
-KINDS = ("untared", "tare", "same motion", "tool", "30 Hz", "gaps", "motor torque")
+KINDS = ("untared", "tare", "old tare", "same motion", "tool", "30 Hz", "gaps", "motor torque")
 CASES = [(kind, None) for kind in KINDS]
 CASES += [pytest.param(kind, "map-gp", marks=() if kind == "untared" else pytest.mark.full) for kind in KINDS]
 
@@ -69,9 +71,10 @@ CASES += [pytest.param(kind, "map-gp", marks=() if kind == "untared" else pytest
 @pytest.mark.parametrize(("kind", "method"), CASES)
 def test_identify_says_what_the_concluded_stream_says(kind, method, panda_logs, same_motion):
     robot, run, tare, tool = case(kind, panda_logs, same_motion)
-    answer = identify(run, robot, tare=tare, tool=tool, method=method)
+    age = 9 * DAY if kind == "old tare" else 0.0
+    answer = identify(run, robot, tare=tare, tool=tool, method=method, tare_age=age)
     carrying = robot if tool is None else robot.with_payload(robot.in_frame(tool))
-    stream = OnlineIdentifier(carrying, tare, method)
+    stream = OnlineIdentifier(carrying, tare, method, tare_age=age)
     for sample in run:
         stream.update(*sample)
     end = stream.conclude()
@@ -111,6 +114,25 @@ def test_a_field_means_the_same_in_a_stream_s_json_and_in_a_log_s(method, panda_
         for name in ("mass", "com", "inertia_com"):
             assert np.array(said[name]) == pytest.approx(np.array(answer[name]), rel=1e-3, abs=1e-5), name
     assert answer["interval"] == "approximate"
+
+
+@pytest.mark.full  # some seconds
+def test_a_stream_allows_for_the_age_of_its_tare_also_once_it_was_saved(panda_logs, tmp_path):
+    robot, run, tare = panda_logs
+    widths = {}
+    for age in (0.0, 9 * DAY):
+        stream = OnlineIdentifier(robot, tare, tare_age=age)
+        for sample in run:
+            last = stream.update(*sample)
+        stream.save(tmp_path / "state.npz")
+        again = OnlineIdentifier.restore(tmp_path / "state.npz", robot)
+        widths[age] = last.std[0], stream.conclude().std[0], again.conclude().std[0]
+        for identifier in (stream, again):
+            identifier.close()
+    assert widths[9 * DAY][0] > 1.05 * widths[0.0][0]
+    assert widths[9 * DAY][2] == pytest.approx(widths[9 * DAY][1], rel=1e-9)
+    with pytest.raises(IdentificationError, match="the tare's age is -1 s"):
+        OnlineIdentifier(robot, tare, tare_age=-1.0)
 
 
 def test_a_tare_along_the_same_motion_is_the_better_evidence_on_a_stream_too(same_motion):

@@ -6,7 +6,7 @@ import pytest
 from pyarrow import parquet
 
 from armload.errors import RecordingError
-from armload.identification.tare_age import DAY, drift_since
+from armload.identification.tare_age import DAY, age_of, drift_since
 from armload.recording import Recording, read_recording
 
 START = 1_772_456_709_123_456_789  # [ns] since 1970: 2026-03-02 13:05:09.123456789 UTC
@@ -107,3 +107,8 @@ def test_dates_tell_the_age_of_a_tare(tmp_path):
     assert drift == pytest.approx(2.0, abs=1e-3)
     assert said == ("by the logs' clocks the tare is 4d old: offsets and friction may have changed since",)
     assert drift_since(tare, read_recording(csv(tmp_path / "same.csv", iso(START + STEPS))), None) == (0.0, ())
+    seconds, told = age_of(tare, log.date, None)  # of a stream that begins when the log did
+    assert seconds == pytest.approx(4 * DAY - tare.duration, abs=1.0)
+    assert told == said
+    assert age_of(tare, log.date, DAY) == (DAY, ())
+    assert age_of(tare, None, None) == age_of(None, log.date, None) == (0.0, ())

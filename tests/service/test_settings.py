@@ -18,6 +18,7 @@ name = "left"
 source = "fr3://172.16.0.2"
 robot = "fr3"
 tare = "empty.csv"
+tare_age = "3d"
 save = "state"
 rating = 2.5
 
@@ -37,6 +38,7 @@ def test_a_file_says_what_it_says_with_paths_from_its_own_folder(tmp_path):
     assert (settings.every, settings.port, settings.headers) == (1.0, 0, {"Authorization": "Bearer abc"})
     assert (left.tare, left.save, left.rating) == (str(tmp_path / "empty.csv"), str(tmp_path / "state"), 2.5)
     assert (left.steady, right.steady) == (False, True)
+    assert (left.tare_age, right.tare_age) == (3 * 86400.0, None)
     assert (right.source, right.gravity, right.state) == ("sim", (0.0, 0.0, -9.8), None)
 
 
@@ -56,6 +58,8 @@ def test_a_file_says_what_it_says_with_paths_from_its_own_folder(tmp_path):
         (("every = 0.5", 'every = 0.5\nhost = "0.0.0.0"'), "give it a token"),
         (("steady = true", 'steady = true\nprofile = "arm.profile"'), "leave one out"),
         (("every = 0.5", 'token_file = "short"'), "expected 16 or more"),
+        (('"3d"', '"old"'), "tare_age: 'old' is not a time"),
+        (('tare = "empty.csv"', ""), "there is no tare"),
     ],
 )
 def test_what_cannot_be_meant_is_one_sentence(tmp_path, capsys, change, said):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -9,6 +10,7 @@ from armload import Recording, arm, read_payload, read_recording
 from armload.arms import Arm
 from armload.identification import check_usable
 from armload.identification.identify_log import plausible_tool
+from armload.identification.tare_age import age_of, seconds_of
 from armload.inertia import InertialParameters
 from armload.posterior import Profile, load_profile
 
@@ -19,6 +21,7 @@ DEFAULTS: dict[str, Any] = {
     "method": "",
     "tool": "",
     "tare": "",
+    "tare_age": "",
     "profile": "",
     "steady": False,
     "tare_duration": 20.0,
@@ -68,6 +71,11 @@ class Parameters:
         tare = read_recording(path, robot)
         check_usable(tare, robot)
         return tare
+
+    def tare_age(self, tare: Recording | None) -> tuple[float, tuple[str, ...]]:
+        """How old that is [s] as the stream begins, and what is to be said of it."""
+        stated = self.value("tare_age")
+        return age_of(tare, time.time(), seconds_of(stated) if stated else None)
 
     def profile(self) -> Profile | None:
         """What was learned of the arm from many logs."""

@@ -147,16 +147,21 @@ class PayloadIdentifier(LifecycleNode):
         self._bare, tool = bare, given.tool(bare)
         robot = bare if tool is None else bare.with_payload(tool)
         self._states = JointStates(robot, "joint_states")
-        self._identify(robot, given.tare(robot))
+        tare = given.tare(robot)
+        age, aged = given.tare_age(tare)
+        for note in aged:
+            self.get_logger().warning(note)
+        self._identify(robot, tare, age=age)
         if given.value("apply"):
             self._applying = applying_of(self, given, bare)
 
-    def _identify(self, robot: Arm, tare: Recording | None, known: Known | None = None) -> None:
+    def _identify(self, robot: Arm, tare: Recording | None, known: Known | None = None, age: float = 0.0) -> None:
         """A new stream in the place of the present one, which stays if it cannot be made."""
         given = self.parameters
         if given.value("steady") and given.value("profile"):
             raise UsageError("steady and profile: a profile is learned from velocities as they come; leave one out")
-        stream = Stream(robot, tare, given.value("method") or None, given.profile(), known, given.value("steady"))
+        method = given.value("method") or None
+        stream = Stream(robot, tare, method, given.profile(), known, given.value("steady"), age)
         if self._stream is not None:
             self._stream.close()
         self._stream, self._last = stream, -np.inf
@@ -272,7 +277,7 @@ class PayloadIdentifier(LifecycleNode):
         forgotten = request.mass == 0.0 and request.std == 0.0
         try:
             known = None if forgotten else Known.of((request.mass, request.std), None, if_held=True)
-            self._identify(self._stream.arm, self._stream.tare, known)
+            self._identify(self._stream.arm, self._stream.tare, known, self._stream.tare_age)
         except ArmloadError as error:
             return self._told(response, False, str(error))
         text = "no mass is known" if forgotten else f"the mass is {request.mass:.3f} ± {request.std:.3f} kg"

@@ -17,7 +17,7 @@ class Stream:
     """What `armload serve` knows of an arm, fed sample by sample.
 
     Args:
-        arm: with its tool. tare, method, profile, known: see `OnlineIdentifier`.
+        arm: with its tool. tare, method, profile, known, tare_age: see `OnlineIdentifier`.
         steady: whether velocities are told by the positions, too, 75 ms late (`armload.devices.Steadied`).
     """
 
@@ -29,10 +29,11 @@ class Stream:
         profile: Profile | None = None,
         known: Known | None = None,
         steady: bool = False,
+        tare_age: float = 0.0,
     ) -> None:
-        self.arm, self.tare, self.known, self._steady = arm, tare, known, steady
+        self.arm, self.tare, self.known, self._steady, self.tare_age = arm, tare, known, steady, tare_age
         told = steadied(tare) if steady and tare is not None else tare
-        self._identifier = OnlineIdentifier(arm, told, method, profile, known)
+        self._identifier = OnlineIdentifier(arm, told, method, profile, known, tare_age=tare_age)
         self._steadying = Steadying(arm.n)
         self._recent, self._plausibility = Recent(arm.n), Plausibility(arm, "joint_states", steady)
         self.estimate: OnlineEstimate | None = None

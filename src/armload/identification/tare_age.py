@@ -6,6 +6,7 @@ Offsets and friction are taken for a random walk: after d days they differ by âˆ
 
 from __future__ import annotations
 
+import re
 from math import sqrt
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from armload.posterior.drift import ALLOWED, SESSION
 from armload.recording import Recording
 
 DAY = 86400.0  # [s]
+_UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0, "d": DAY, "w": 7 * DAY}
 
 
 def drift_after(seconds: float) -> float:
@@ -34,19 +36,65 @@ def drift_since(tare: Recording, recording: Recording, age: float | None) -> tup
         IdentificationError: an age that is no time.
     """
     if age is not None:
-        if not (np.isfinite(age) and age >= 0.0):
-            raise IdentificationError(f"the tare's age is {age:g} s: expected a time of 0 or more")
-        return drift_after(age), ()
+        return drift_after(checked_age(age)), ()
     if tare.date is not None and recording.date is not None:
-        seconds = abs(float(recording.epoch - tare.epoch + recording.t[0] - tare.t[-1]))
-        drift = drift_after(seconds)
-        note = f"by the logs' clocks the tare is {in_words(seconds)} old: offsets and friction may have changed since"
-        return drift, (note,) if drift else ()
+        return _by_clocks(abs(float(recording.epoch - tare.epoch + recording.t[0] - tare.t[-1])))
     dates = [_date(log) for log in (tare, recording)]
     if dates[0] is not None and dates[1] is not None and abs(dates[1] - dates[0]) > DAY:
         apart = in_words(abs(dates[1] - dates[0]))
         return 0.0, (f"the files' dates are {apart} apart: if the tare is that old, say --tare-age {apart}",)
     return 0.0, ()
+
+
+def age_of(tare: Recording | None, began: float | None, age: float | None) -> tuple[float, tuple[str, ...]]:
+    """How old the tare of a stream is [s], and what is to be said of it.
+
+    Args:
+        began: when the stream did [s since 1970]; None: nobody knows.
+        age: [s] as the user says; None: the tare's clock tells, if it shows the time of day, else it is of the stream's
+            own session.
+
+    Raises:
+        IdentificationError: an age that is no time.
+    """
+    if age is not None:
+        return checked_age(age), ()
+    if tare is None or tare.date is None or began is None:
+        return 0.0, ()
+    seconds = abs(began - tare.date - tare.duration)
+    return seconds, _by_clocks(seconds)[1]
+
+
+def checked_age(seconds: float) -> float:
+    """An age that is a time.
+
+    Raises:
+        IdentificationError: it is none.
+    """
+    if not (np.isfinite(seconds) and seconds >= 0.0):
+        raise IdentificationError(f"the tare's age is {seconds:g} s: expected a time of 0 or more")
+    return seconds
+
+
+def seconds_of(text: str) -> float:
+    """A time with its unit, in seconds.
+
+    >>> seconds_of("1d"), seconds_of("90min")
+    (86400.0, 5400.0)
+
+    Raises:
+        IdentificationError: it is no time.
+    """
+    found = re.fullmatch(r"\s*([0-9]*\.?[0-9]+(?:e[+-]?\d+)?)\s*(s|min|h|d|w)\s*", text)
+    if found is None:
+        raise IdentificationError(f"{text!r} is not a time: expected a number and s, min, h, d or w, such as 1d")
+    return float(found[1]) * _UNITS[found[2]]
+
+
+def _by_clocks(seconds: float) -> tuple[float, tuple[str, ...]]:
+    drift = drift_after(seconds)
+    note = f"by the logs' clocks the tare is {in_words(seconds)} old: offsets and friction may have changed since"
+    return drift, (note,) if drift else ()
 
 
 def in_words(seconds: float) -> str:

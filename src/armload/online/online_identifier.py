@@ -20,6 +20,7 @@ from armload.errors import IdentificationError
 from armload.estimators import Estimate, Identifier
 from armload.identification.choice import choose
 from armload.identification.known_payload import know
+from armload.identification.tare_age import checked_age, drift_after
 from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
 from armload.online.gate import Health, all_finite
@@ -52,6 +53,7 @@ class OnlineIdentifier:
         known: of a payload, apart from the stream; used while something is held and no sample contradicts (`notes`).
         every: [s] between two new answers of a payload whose run has begun 1.5 s ago, at most 0.1; changes are looked
             for in each row all the same.
+        tare_age: [s]; offsets and friction may have changed since.
 
     Attributes:
         method: its name. event: the last change of payload that was noticed, on the stream's clock.
@@ -68,10 +70,13 @@ class OnlineIdentifier:
         profile: Profile | None = None,
         known: Known | None = None,
         every: float = PUBLISH,
+        tare_age: float = 0.0,
     ) -> None:
         self.arm, self.tare, self.profile, self._tared = arm, tare, profile, tare is not None
         self._engine = first = choose(arm, tare, method, live=True, profile=profile).identifier
         know(first, known)
+        if tare is not None and isinstance(first, PosteriorLeastSquares):
+            first.allow_for(drift_after(checked_age(tare_age)))
         self._watch = PayloadWatch(first) if isinstance(first, PosteriorLeastSquares) else None
         self._every = min(max(every, PUBLISH), SELDOM)
         self.method = self.engine.name
@@ -197,7 +202,8 @@ class OnlineIdentifier:
         """An identifier in the state that was saved.
 
         Args:
-            path: what `save` wrote. arm, method, profile: what the identifier was made with; a tare is in the state.
+            path: what `save` wrote. arm, method, profile: what the identifier was made with; a tare and its age are in
+                the state.
             known: of payloads from now on. every: as for the constructor.
 
         Raises:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.posterior.another_arm import FROM, another_arm, apart
-from armload.posterior.drift import ALLOWED, ASKED_FROM, TESTED, drift_of, drift_since_tare, drift_so_far
+from armload.posterior.drift import ALLOWED, ASKED_FROM, drift_since_tare, drift_so_far
 from armload.posterior.restless import RESTLESS, restlessness
 from armload.posterior.scales import Posterior, Scales
 from armload.posterior.solve import Solution, improved, solve_to_go_on, threads
@@ -55,12 +55,12 @@ class CheckedSolver:
         out.restlessness = self._restlessness(out.posterior, runs[-1])
         if not self.asks or out.posterior.gears:
             return out
-        if self.session.drift >= TESTED:  # so the solution has allowed for it. What pushes for seconds is no other arm
-            if out.posterior.drift.size and seconds >= FROM:
-                out.drift = drift_of(out.posterior, runs[-1].correction, self.session, self.read_once)
-                out.another = another_arm(runs, *about, out.posterior)
-        elif self.given and runs[0].noise is None and self._seconds(runs) >= ASKED_FROM:
+        tared = self.given > 0 and runs[0].noise is None  # else by a profile, which waits: a push is no drift
+        own = sum(run.blocks.duration for run in runs[self.given :])
+        if (tared and own >= ASKED_FROM) or (out.posterior.drift.size and seconds >= FROM):
             out.drift = drift_so_far(runs, self.given, *about, out.posterior, self.read_once)
+        if out.posterior.drift.size and seconds >= FROM:
+            out.another = replace(another_arm(runs, *about, out.posterior), left_out=False)
         return out
 
     def conclude(self, runs: list[RegressionData], start: Scales | None, iterations: int) -> Solution:
@@ -88,9 +88,6 @@ class CheckedSolver:
             run.session = self.session
         out.restlessness = self._restlessness(out.posterior, run)
         return out
-
-    def _seconds(self, runs: list[RegressionData]) -> float:
-        return sum(run.blocks.duration for run in runs[self.given :])
 
     def _restlessness(self, found: Posterior, run: RegressionData) -> float:
         """0 where there is no tare to compare with, and of motor currents."""

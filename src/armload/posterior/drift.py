@@ -75,16 +75,17 @@ def drift_so_far(
     found: Posterior,
     read_once: bool = False,
 ) -> Drift:
-    """The same of a stream, whose answers do not allow for it: at the scales of its last solution.
+    """The same of a stream, whose answers do not allow for what is found: at the scales of its last solution.
 
     Args:
         given: how many runs, the first ones, are its tare; the others are of its own session. Else as above.
     """
     explained, own = runs[-1].session, [copy(run) for run in runs[given:]]
-    for run in own:
-        run.session = replace(explained, number=1, drift=TESTED)
-    there = solve([*runs[:given], *own], prior_std, prior, noise, 1, found.scales)
-    return replace(drift_of(there, runs[-1].correction, explained, read_once), allowed=False)
+    if explained.drift < TESTED:
+        for run in own:
+            run.session = replace(explained, number=1, drift=TESTED)
+        found = solve([*runs[:given], *own], prior_std, prior, noise, 1, found.scales)
+    return replace(drift_of(found, runs[-1].correction, explained, read_once), allowed=False)
 
 
 def drift_of(found: Posterior, correction: Correction, explained: Session, read_once: bool = False) -> Drift:

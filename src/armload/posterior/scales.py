@@ -30,6 +30,7 @@ class AnotherArm:
 
     log_odds: B, what the run's log evidence gains if the tare is taken for another arm's. expected, spread: mean and
     standard deviation of B, were the arm the same. surprise: (B − expected) / spread. found: whether it is another.
+    left_out: whether the answer it is of then does without what its tare or profile says of the arm.
     """
 
     log_odds: float
@@ -37,6 +38,7 @@ class AnotherArm:
     spread: float
     surprise: float
     found: bool
+    left_out: bool = True
 
 
 @dataclass(frozen=True, eq=False)

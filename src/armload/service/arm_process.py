@@ -24,6 +24,7 @@ from armload.arms import Arm
 from armload.devices import Detached, Reader, Steadied, controller_of
 from armload.devices.reader import columns_of
 from armload.errors import ArmloadError, IdentificationError
+from armload.identification.tare_age import age_of
 from armload.online import OnlineEstimate, OnlineIdentifier
 from armload.online.state import saved_at
 from armload.posterior import load_profile
@@ -184,8 +185,12 @@ class ArmProcess:
             except (IdentificationError, OSError) as error:
                 self.note(f"{error}: begun anew")
         tare = None if settings.tare is None else read_recording(settings.tare, self.arm)
+        age, aged = age_of(tare, time.time() if "://" in settings.source else None, settings.tare_age)
+        for note in aged:
+            self.note(note)
         source = Steadied(self.source) if settings.steady else self.source
-        return Session(source, self.arm, tare, settings.method, self.note, profile, identifier, every=self.every)
+        about = (tare, settings.method, self.note, profile, identifier)
+        return Session(source, self.arm, *about, every=self.every, tare_age=age)
 
     def _save(self, session: Session) -> None:
         self._saved, path = time.monotonic(), self.settings.state

@@ -46,8 +46,8 @@ class Session:
 
     Args:
         source: closed with the session.
-        arm: the bare arm, or with a tool that is known. tare: an earlier log of it. method, profile, known, every: see
-            `OnlineIdentifier`. identifier: one that goes on, made with these.
+        arm: the bare arm, or with a tool that is known. tare: an earlier log of it. method, profile, known, every,
+            tare_age: see `OnlineIdentifier`. identifier: one that goes on, made with these.
         warn: called with each warning on the stream, also with the error it ended with in a thread (`start`).
         recorder: keeps every sample that was taken and what was said of it; closed with the session.
 
@@ -55,6 +55,7 @@ class Session:
         sample: the newest that could be used. estimate: the newest. None before the first.
         history: rows (30,) of phi, half-widths of the 95 % intervals and the truth, NaN where it is not known.
         log: what happened, the last 200 entries.
+        tare_age: [s] at the stream's beginning, as far as it is known; 0: of its own session.
         ended: the source has ended. error: what it ended with, if that was one.
 
     Raises:
@@ -73,13 +74,14 @@ class Session:
         known: Known | None = None,
         every: float = PUBLISH,
         recorder: Recorder | None = None,
+        tare_age: float = 0.0,
     ) -> None:
         self.source, self.arm, self.tare, self.profile = source, arm, tare, profile
-        self._known, self._every = known, every
+        self._known, self._every, self.tare_age = known, every, tare_age
         self._recorder, self._kept = recorder, -math.inf  # and when it last kept an estimate, on the stream's clock
         # what was held while the tare was recorded; None: not known
         self._tared = InertialParameters.zero(arm.frame) if tare is None else None
-        self._identifier = self._made(tare, method) if identifier is None else identifier
+        self._identifier = self._made(tare, method, tare_age) if identifier is None else identifier
         self.sample: Sample | None = None
         self.estimate: OnlineEstimate | None = None
         self._answered: OnlineEstimate | None = None  # the same when its sample had just arrived
@@ -248,7 +250,7 @@ class Session:
         Raises:
             ArmloadError: the method cannot be used here; the present one goes on.
         """
-        self._exchange(self.tare, method, f"method {method}", self._tared)
+        self._exchange(self.tare, method, f"method {method}", self._tared, self.tare_age)
 
     def reset(self) -> None:
         """Forget the stream so far; the next sample is the first."""
@@ -279,14 +281,19 @@ class Session:
         self._exchange(tare, self.method, f"tared with the last {seen:.0f} s", self.source.truth(float(tare.t[-1])))
 
     def _exchange(
-        self, tare: Recording | None, method: str | Path, text: str, tared: InertialParameters | None
+        self,
+        tare: Recording | None,
+        method: str | Path,
+        text: str,
+        tared: InertialParameters | None,
+        age: float = 0.0,
     ) -> None:
         self._running()
-        identifier = self._made(tare, method)
+        identifier = self._made(tare, method, age)
 
         def order() -> None:
             self._identifier.close()
-            self._identifier, self.tare, self._tared = identifier, tare, tared
+            self._identifier, self.tare, self._tared, self.tare_age = identifier, tare, tared, age
             self._recent.clear()
             self._plausibility.forget()
             self._write(text)
@@ -297,10 +304,10 @@ class Session:
         if self.ended:
             raise SourceError(f"{self.source.name} has ended: open it again")
 
-    def _made(self, tare: Recording | None, method: str | Path | None) -> OnlineIdentifier:
+    def _made(self, tare: Recording | None, method: str | Path | None, age: float) -> OnlineIdentifier:
         # an arm's model computes in a memory of its own, which two threads must not share
         tare = None if tare is None else self.source.as_handed_on(tare)
-        return OnlineIdentifier(replace(self.arm), tare, method, self.profile, self._known, self._every)
+        return OnlineIdentifier(replace(self.arm), tare, method, self.profile, self._known, self._every, age)
 
     def _write(self, text: str) -> None:
         self.log.write(self._t, text)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 from armload.devices import WITH_CONTROLLER
-from armload.errors import UsageError
+from armload.errors import IdentificationError, UsageError
 from armload.identification.arm_options import ArmOptions
 from armload.recording.growing_file import RECORDS
 from armload.service.mqtt import checked
@@ -38,6 +38,7 @@ class ArmSettings(ArmOptions):
     com_range: the farthest its payload's centre of mass may be [m]. loop: replay a log again and again.
     rate: of the simulator [Hz]. apply: "auto": what is identified is told to the robot's controller (`Feedback`).
     mounted: path of what was on the flange at the tare or profile, or "nothing"; for `apply`.
+    tare_age: [s], in a file also "1d"; None: by the tare's clock.
     steady: whether velocities are told by the positions, too (`devices.Steadied`).
     """
 
@@ -52,8 +53,11 @@ class ArmSettings(ArmOptions):
     apply: str | None = None
     mounted: str | None = None
     steady: bool = False
+    tare_age: float | None = None
 
     def __post_init__(self) -> None:
+        if self.tare_age is not None and self.tare is None:
+            raise UsageError(f"{self.name}: tare_age says how old a tare is, but there is no tare")
         if self.record is not None and Path(self.record).suffix.lower() not in RECORDS:
             raise UsageError(f"{self.name}: record is {self.record}: expected a name that ends in .csv or .mcap")
         if self.steady and self.profile is not None:
@@ -79,8 +83,9 @@ class ArmSettings(ArmOptions):
             return None
         beside = ("save", "record", "rating", "com_range", "apply", "mounted")
         asked = {key: value for key, value in self.to_dict().items() if key not in beside}
-        if not self.steady:  # a state of a version without it goes on
-            del asked["steady"]
+        for key in ("steady", "tare_age"):  # a state of a version without it goes on
+            if not asked[key]:
+                del asked[key]
         for key in ("tare", "profile", "tool"):
             if asked[key] is not None and (path := Path(asked[key])).is_file():
                 asked[key] = [asked[key], hashlib.sha256(path.read_bytes()).hexdigest()]
@@ -190,6 +195,8 @@ def read_token(path: str | Path) -> str:
 
 def _arm(table: dict[str, Any], path: Path) -> ArmSettings:
     where = f"{path}, arm {table.get('name', '?')!r}"
+    if isinstance(table.get("tare_age"), str):
+        table = {**table, "tare_age": _seconds(table["tare_age"], where)}
     settings = _checked(table, ArmSettings, where)
     for key in ("name", "source", "robot"):
         if key not in settings:
@@ -206,6 +213,15 @@ def _arm(table: dict[str, Any], path: Path) -> ArmSettings:
     if not _NAME.fullmatch(settings["name"]):
         raise UsageError(f"{where}: the name is expected to be of letters, digits, '-', '_' and '.'")
     return ArmSettings(**settings)
+
+
+def _seconds(text: str, where: str) -> float:
+    from armload.identification.tare_age import seconds_of  # slow to load, and the supervisor needs none
+
+    try:
+        return seconds_of(text)
+    except IdentificationError as error:
+        raise UsageError(f"{where}: tare_age: {error}") from None
 
 
 def _checked(said: dict[str, Any], kind: type, where: str, without: tuple[str, ...] = ()) -> dict[str, Any]:

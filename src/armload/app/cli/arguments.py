@@ -7,7 +7,7 @@ import re
 from importlib import resources
 from typing import NoReturn
 
-from armload.errors import UsageError
+from armload.errors import IdentificationError, UsageError
 
 # options whose value may begin with a minus sign: argparse would take "-1,0,-9.7" for an option
 _SIGNED = ("--gravity", "--from", "--box", "--floor", "--centre", "--com")
@@ -115,19 +115,18 @@ def _arms() -> list[str]:
     return sorted(sheet.name.removesuffix(".toml") for sheet in sheets if sheet.name.endswith(".toml"))
 
 
-_TIMES = {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0, "w": 7 * 86400.0}
-
-
 def duration(text: str) -> float:
     """A time with its unit, in seconds.
 
     >>> duration("1d"), duration("90min")
     (86400.0, 5400.0)
     """
-    found = re.fullmatch(r"\s*([0-9]*\.?[0-9]+(?:e[+-]?\d+)?)\s*(s|min|h|d|w)\s*", text)
-    if found is None:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a time: expected a number and s, min, h, d or w, such as 1d")
-    return float(found[1]) * _TIMES[found[2]]
+    from armload.identification.tare_age import seconds_of
+
+    try:
+        return seconds_of(text)
+    except IdentificationError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def weighed(text: str) -> tuple[float, float]:
@@ -175,6 +174,16 @@ def add_tare_age_argument(parser: argparse.ArgumentParser) -> None:
         metavar="TIME",
         help="how old the tare is, such as 1d or 8h: the arm may have changed (default: by the logs' clocks)",
     )
+
+
+def check_tare_age(options: argparse.Namespace) -> None:
+    """Refuse the age of a tare that there is none of.
+
+    Raises:
+        UsageError: there is `--tare-age`, but no `--tare`.
+    """
+    if options.tare_age is not None and options.tare is None:
+        raise UsageError("--tare-age says how old a tare is, but there is no --tare")
 
 
 def add_known_arguments(parser: argparse.ArgumentParser) -> None:

@@ -12,6 +12,7 @@ from armload.app.cli.arguments import (
     add_known_arguments,
     add_tare_age_argument,
     add_tool_and_topic_arguments,
+    check_tare_age,
     file_name,
 )
 from armload.app.cli.export import FORMS, write
@@ -89,8 +90,7 @@ def run(options: argparse.Namespace) -> None:
             raise UsageError("--to prints a controller's form alone: leave out --json and --all")
         if options.tare_topic is not None and options.tare is None:
             raise UsageError("--tare-topic names a topic of the tare's bag, but there is no --tare")
-        if options.tare_age is not None and options.tare is None:
-            raise UsageError("--tare-age says how old a tare is, but there is no --tare")
+        check_tare_age(options)
         topics = (options.topic, options.tare_topic or options.topic)
         log, tare = read_logs(options, arm, options.log, options.tare, topics=topics)
         assert log is not None

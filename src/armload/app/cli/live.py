@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import time
 from typing import TYPE_CHECKING
 
 from armload.app.cli.arguments import (
@@ -11,8 +12,10 @@ from armload.app.cli.arguments import (
     add_column_arguments,
     add_identifier_arguments,
     add_known_arguments,
+    add_tare_age_argument,
     add_tool_and_topic_arguments,
     at_least,
+    check_tare_age,
     file_name,
 )
 from armload.app.cli.named import arm_of, columns_of, payload_of, read_logs, robot_of
@@ -67,6 +70,7 @@ def parser() -> Parser:
     )
     add_arm_arguments(parser, required=False)
     add_identifier_arguments(parser)
+    add_tare_age_argument(parser)
     add_known_arguments(parser)
     add_tool_and_topic_arguments(parser)
     add_column_arguments(parser)
@@ -119,11 +123,13 @@ def run(options: argparse.Namespace) -> int | None:
     """Identify until the source ends (--headless) or somebody interrupts; 2 after an error."""
     from armload.app.cli.headless import lines
     from armload.devices import Detached, Recorder, Steadied, open_source
+    from armload.identification.tare_age import age_of
     from armload.posterior import Known, load_profile
     from armload.recording import ColumnSpec, check_own_measurements, has_topics
     from armload.service.session import Session
 
     options.robot = options.robot or robot_of(options.source)
+    check_tare_age(options)
     arm = _arm_of(options)
     if options.steady and options.profile is not None:
         raise UsageError(
@@ -154,10 +160,15 @@ def run(options: argparse.Namespace) -> int | None:
     )
     if isinstance(source, Detached) and "://" in options.source:
         source = _reopened(source, options, arm, None if mcap else options.record)
+    began = time.time() if "://" in options.source else None if log is None else log.date
+    age, aged = age_of(tare, began, options.tare_age)
+    for note in aged:
+        _warn(note)
     with Steadied(source) if options.steady else source as source:
         recorder = Recorder(mcap, arm.n, arm.joint_names) if mcap else None
         known = Known.of(options.mass, options.com, if_held=True)
-        session = Session(source, arm, tare, options.method, _warn, profile, known=known, recorder=recorder)
+        more = {"known": known, "recorder": recorder, "tare_age": age}
+        session = Session(source, arm, tare, options.method, _warn, profile, **more)
         try:
             if not options.headless:
                 return _serve(session, options)

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from armload.app.cli.arguments import check_tare_age
 from armload.app.cli.measure_arguments import parser
 from armload.app.cli.named import arm_of, motion_of, payload_of, read_logs, robot_of, world_of
 from armload.app.cli.printing import print_json, print_note, working, write_json
@@ -52,8 +53,7 @@ def run(options: argparse.Namespace) -> int | None:
     mounted = tool if options.mounted in (None, "nothing") else payload_of(options.mounted, arm)
     if tool is not None and options.mounted is not None:
         raise UsageError("--tool is what is on at the empty run, and so is --mounted: give one of them")
-    if options.tare_age is not None and options.tare is None:
-        raise UsageError("--tare-age says how old a tare is, but there is no --tare")
+    check_tare_age(options)
     _, tare = read_logs(options, arm, None, options.tare)
     folder = options.dir or f"measurement-{datetime.now():%Y%m%d-%H%M%S}"
     simulated = {} if options.source != "sim" else _simulated(options, arm, motion, loaded=tare is not None)

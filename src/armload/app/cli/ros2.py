@@ -3,8 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import time
 
-from armload.app.cli.arguments import COLUMNS, Parser, add_arm_arguments, add_identifier_arguments, at_least, file_name
+from armload.app.cli.arguments import (
+    COLUMNS,
+    Parser,
+    add_arm_arguments,
+    add_identifier_arguments,
+    add_tare_age_argument,
+    at_least,
+    check_tare_age,
+    file_name,
+)
 from armload.app.cli.named import arm_of, motion_of, payload_of, read_logs, world_of
 from armload.app.cli.printing import print_note
 
@@ -43,6 +53,7 @@ def parser() -> Parser:
         "--publish", type=file_name, default="/payload/inertia", metavar="T", help="of the payload (/payload/inertia)"
     )
     add_identifier_arguments(node)
+    add_tare_age_argument(node)
     node.add_argument("--columns", type=file_name, metavar="SPEC", help=f"of the tare: {COLUMNS}")
     node.add_argument(
         "--rate", type=at_least(0.01, float, 1000.0), default=10.0, metavar="HZ", help="messages per second (10)"
@@ -100,14 +111,19 @@ def run(options: argparse.Namespace) -> None:
 def _node(options: argparse.Namespace) -> None:
     from armload.devices import Ros2Source
     from armload.devices.ros2 import PayloadNode
+    from armload.identification.tare_age import age_of
     from armload.inertia import InertialParameters
     from armload.online import OnlineIdentifier
     from armload.posterior import load_profile
 
+    check_tare_age(options)
     arm = arm_of(options)
     _, tare = read_logs(options, arm, None, options.tare, topics=(None, None))
     profile = None if options.profile is None else load_profile(options.profile)
-    identifier = OnlineIdentifier(arm, tare, options.method, profile)
+    age, aged = age_of(tare, time.time(), options.tare_age)
+    for note in aged:
+        print_note(note)
+    identifier = OnlineIdentifier(arm, tare, options.method, profile, tare_age=age)
     begun = False
 
     def tell(body: InertialParameters) -> None:

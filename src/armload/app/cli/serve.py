@@ -16,8 +16,10 @@ from armload.app.cli.arguments import (
     Parser,
     add_arm_arguments,
     add_identifier_arguments,
+    add_tare_age_argument,
     add_tool_argument,
     at_least,
+    check_tare_age,
     file_name,
 )
 from armload.app.cli.named import robot_of
@@ -55,6 +57,7 @@ def parser() -> Parser:
     )
     add_arm_arguments(parser, required=False)
     add_identifier_arguments(parser)
+    add_tare_age_argument(parser)
     add_tool_argument(parser)
     add("--save", type=file_name, metavar="DIR", help="keep the state in this folder, every minute")
     add("--loop", action="store_true", help="replay a log again and again")
@@ -129,11 +132,12 @@ def settings_of(options: argparse.Namespace) -> ServiceSettings:
         raise UsageError(f"--webhook is {options.webhook!r}: expected an address such as https://HOST/PATH")
     if options.mqtt is not None:
         checked(options.mqtt)
-    of_arms = ("frame", "gravity", "tare", "profile", "tool", "method")
+    check_tare_age(options)
+    of_arms = ("frame", "gravity", "tare", "tare_age", "profile", "tool", "method")
     if options.sources[0].endswith(".toml"):
         given = [name for name in ("robot", *of_arms, "apply", "mounted") if getattr(options, name) is not None]
         if given or len(options.sources) > 1 or options.loop:
-            what = f"--{given[0]}" if given else "--loop" if options.loop else options.sources[1]
+            what = f"--{given[0].replace('_', '-')}" if given else "--loop" if options.loop else options.sources[1]
             raise UsageError(f"{options.sources[0]} names the arms, but there is also {what}: write it into the file")
         settings = read_settings(options.sources[0], **over)
         if options.save is None:
