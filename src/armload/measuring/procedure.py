@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,7 @@ from armload.devices.supervision import Thresholds
 from armload.errors import RecordingError, SafetyError, SourceError
 from armload.excitation import Accuracy, Obstacle
 from armload.identification import Identification, identify
+from armload.identification.tare_age import age_of
 from armload.inertia import Z95
 from armload.measuring.plan import APPROACH, BACK, EMPTY, LOADED, TO_START, Plan, plan_of
 from armload.motion import Motion
@@ -194,7 +196,8 @@ class Procedure:
 
     def _warm(self, tare: Recording) -> OnlineIdentifier:
         """An identifier that has compiled and loaded what it needs, and has seen nothing."""
-        identifier = OnlineIdentifier(self.arm, tare, self.method, self.profile)
+        age, _ = age_of(tare, time.time(), self.tare_age)  # that of the log says how old it is
+        identifier = OnlineIdentifier(self.arm, tare, self.method, self.profile, tare_age=age)
         short = tare.between(tare.t[0], tare.t[0] + _WARM_UP)
         for row in zip(short.t, short.q, short.dq, short.tau, strict=True):
             identifier.update(*row)
