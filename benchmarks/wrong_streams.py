@@ -4,7 +4,7 @@
 
 The logs of `wrong_logs.py`, cases that a stream can have, sample by sample with their tares (`OnlineIdentifier`): 6 s
 each. What is asked of a log once is asked of a stream at every full solution, after 0.1, 0.3, 0.5 s and so on;
-whether the arm is as it was at its tare from 1.5 s on.
+whether the arm is as it was at its tare from 1 s on.
 
 false            changes of the payload noticed that are none, in so many streams
 calibrated       share of the moments, from a second on, in which the answer is called calibrated

@@ -5,6 +5,7 @@ armload_msgs in the ROS 2 environment (tests/devices/ros/build_messages.py).
 """
 
 import ast
+import importlib
 import json
 import re
 import subprocess
@@ -290,6 +291,9 @@ def test_the_ros_package_names_what_it_imports_and_installs_what_it_needs():
                 imported.add(node.module.split(".")[0])
             elif isinstance(node, ast.Import):
                 imported |= {alias.name.split(".")[0] for alias in node.names}
+            if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "armload":
+                module = importlib.import_module(node.module)
+                assert all(hasattr(module, alias.name) for alias in node.names), (path.name, node.module)
     ours = {"armload", "numpy", *sys.stdlib_module_names, "__future__"}
     assert imported - ours == needs
     assert manifest.findtext("name") == "armload_ros"

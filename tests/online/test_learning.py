@@ -15,7 +15,7 @@ from armload.online import OnlineIdentifier
 from armload.payloads import draw_payload
 from armload.posterior import checked_solver, learn_profile
 from armload.posterior.scales import AnotherArm
-from armload.simulation import Run, Sensors, World, simulate_many
+from armload.simulation import Run, Sensors, World, simulate, simulate_many
 from armload.simulation.resolution import COARSE
 
 SECONDS = 24.0
@@ -111,6 +111,24 @@ def test_an_arm_that_was_once_found_to_be_another_stays_one(panda, world, profil
     assert learned is None
     assert not last.calibrated
     assert any("not as its profile says" in note for note in last.notes)
+
+
+@pytest.mark.parametrize("found", [True, False])
+def test_an_end_says_once_that_the_arm_is_not_its_profile_s(panda, world, profile, monkeypatch, found):
+    verdicts = iter([True, found])  # while the stream goes on, and at its end
+    monkeypatch.setattr(checked_solver, "FROM", 3.0)
+    monkeypatch.setattr(checked_solver, "another_arm", lambda *_: AnotherArm(9.0, 0.0, 1.0, 9.0, next(verdicts, found)))
+    log = simulate(panda, random_motion(panda, 3, duration=8.0), world=world, rate=100.0).between(0.0, 5.0)
+    stream = OnlineIdentifier(panda, profile=profile)
+    for sample in log:
+        stream.update(*sample)
+    end = stream.conclude()
+    stream.close()
+    said = [note for note in end.notes if note.startswith("the arm is not as")]
+    assert len(said) == 1
+    assert "not as its profile says" in said[0]
+    assert ("do without" in said[0]) == found
+    assert end.interval == "approximate"
 
 
 @pytest.mark.full  # some seconds

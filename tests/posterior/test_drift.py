@@ -9,15 +9,18 @@ import pytest
 
 from armload import arm
 from armload.arms import FRICTION_WIDTH
+from armload.devices import Simulator
 from armload.identification import identify
 from armload.inertia import Z95
 from armload.lab.episodes import draw_episodes, simulate_episodes
+from armload.motion import random_motion
 from armload.online import OnlineIdentifier
+from armload.payloads import draw_payload
 from armload.posterior import HybridIdentifier, SmoothPosteriorLeastSquares
 from armload.posterior.drift import CHANGED
 from armload.posterior.problem import Problem
 from armload.regression import solution_prior_std
-from armload.simulation import World
+from armload.simulation import Sensors, World, simulate
 from armload.simulation.friction import Friction
 
 OFFSET = np.array([0.3, -0.3, 0.3, -0.3, 0.1, -0.1, 0.1])  # [N·m]
@@ -154,3 +157,22 @@ def test_a_stream_says_within_seconds_that_its_tare_is_old_and_nothing_of_a_soun
         assert bool(notes) == changed
         assert all("the intervals do not allow for it" in note for note in notes)
         assert any(each.calibrated for each in said if each.t - log.run.t[0] >= 5.0) != changed
+
+
+@pytest.mark.full  # some seconds
+def test_what_was_found_of_the_arm_holds_for_the_next_payload(panda):
+    now = World.real_like(panda, 8)
+    then = replace(now, offset=now.offset + OFFSET, friction=replace(now.friction, level=1.3 * now.friction.level))
+    about = {"sensors": Sensors.panda(panda), "rate": 200.0}
+    tare = simulate(panda, random_motion(panda, 3), world=then, duration=20.0, **about)
+    held = [(0.0, draw_payload("boxes", 1, 1.2)), (6.0, draw_payload("boxes", 2, 0.5))]
+    source = Simulator(panda, random_motion(panda, 4), held, speed=None, duration=11.0, world=now, **about)
+    stream, found = OnlineIdentifier(panda, tare), False
+    for sample in source:
+        said = stream.update(*sample)
+        found = found or stream.arm_changed is not None
+        assert stream.arm_changed is not None or not found
+        assert not (found and said.calibrated)
+    stream.close()
+    assert said.event is not None
+    assert found

@@ -9,6 +9,7 @@ import pytest
 import scipy.stats
 
 from armload import arm
+from armload.arms import Arm
 from armload.arms.momentum_row import MomentumRow, leaning_row
 from armload.identification import identify
 from armload.identification.notes import gravity_doubted
@@ -127,6 +128,28 @@ def test_a_stream_says_within_a_second_that_the_base_leans_and_goes_on_saying_it
                 assert (said.interval == "approximate") == leans
                 assert any(note.startswith("the base leans by ") for note in said.notes) == leans
         online.close()
+
+
+def test_friction_that_nobody_expects_is_no_base_that_leans():
+    """Of gears, on an arm that is not known to measure motor currents, as those of a URDF are not."""
+    for name in ("ur3e", "ur5e", "ur10e"):
+        robot = arm(name)
+        (log,) = logs_of(robot, robot, "untared", 1)
+        stream = OnlineIdentifier(replace(robot, motor_torque=False))
+        said = {note for sample in log.run.between(0.0, 3.0) for note in stream.update(*sample).notes}
+        stream.close()
+        assert not any("lean" in note for note in said), name
+
+
+def test_the_gravity_of_a_base_that_leans_is_worked_out_once_for_each_solution(panda, leaning, monkeypatch):
+    asked, turned = [], Arm.leaning
+    monkeypatch.setattr(Arm, "leaning", lambda self, angles: asked.append(1) or turned(self, angles))
+    stream = OnlineIdentifier(panda, leaning[0].tare)
+    for sample in leaning[0].run.between(0.0, 3.0):
+        said = stream.update(*sample)
+    stream.close()
+    assert any(note.startswith("the base leans by ") for note in said.notes)
+    assert 0 < len(asked) <= stream.engine.stream.solutions + 1  # and once as restlessness is asked, too
 
 
 def test_a_lean_in_doubt_is_said_beyond_what_a_level_base_shows_of_an_arm_whose_links_are_known(panda):

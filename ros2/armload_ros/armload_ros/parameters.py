@@ -8,8 +8,8 @@ from typing import Any
 
 from armload import Recording, arm, read_payload, read_recording
 from armload.arms import Arm
-from armload.identification import check_usable
-from armload.identification.identify_log import plausible_tool
+from armload.errors import UsageError
+from armload.identification import check_usable, plausible_tool
 from armload.identification.tare_age import age_of, seconds_of
 from armload.inertia import InertialParameters
 from armload.posterior import Profile, load_profile
@@ -75,6 +75,8 @@ class Parameters:
     def tare_age(self, tare: Recording | None) -> tuple[float, tuple[str, ...]]:
         """How old that is [s] as the stream begins, and what is to be said of it."""
         stated = self.value("tare_age")
+        if stated and tare is None:
+            raise UsageError("tare_age says how old a tare is, but there is no tare")
         return age_of(tare, time.time(), seconds_of(stated) if stated else None)
 
     def profile(self) -> Profile | None:

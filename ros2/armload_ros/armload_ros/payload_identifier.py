@@ -33,8 +33,7 @@ from armload.arms import Arm
 from armload.devices.ros2 import announced, parameters_of
 from armload.devices.ros2.joint_states import JointStates
 from armload.errors import ArmloadError, UsageError
-from armload.identification import check_usable
-from armload.identification.identify_log import plausible_tool
+from armload.identification import check_usable, plausible_tool
 from armload.online import OnlineEstimate
 from armload.posterior import Known
 from armload.recording import GAP

@@ -31,7 +31,8 @@ class Stream:
         steady: bool = False,
         tare_age: float = 0.0,
     ) -> None:
-        self.arm, self.tare, self.known, self._steady, self.tare_age = arm, tare, known, steady, tare_age
+        self.arm, self.tare, self.known, self._steady = arm, tare, known, steady
+        self._age, self._began = tare_age, time.monotonic()
         told = steadied(tare) if steady and tare is not None else tare
         self._identifier = OnlineIdentifier(arm, told, method, profile, known, tare_age=tare_age)
         self._steadying = Steadying(arm.n)
@@ -76,6 +77,11 @@ class Stream:
         link = Link("streaming", None, 1, None, heard)
         why = why_unknown(self.estimate, link, time.monotonic(), self._identifier.trouble, self._plausibility.doubt)
         return None if why is None else why.text
+
+    @property
+    def tare_age(self) -> float:
+        """How old the tare is by now [s], as far as that is known."""
+        return self._age + time.monotonic() - self._began
 
     def reset(self) -> None:
         """Forget the samples, not the tare."""

@@ -13,13 +13,11 @@ from armload.identification.answer import body_of
 from armload.identification.found import explained
 from armload.identification.intervals import Before
 from armload.identification.known_payload import denied_by, determined_with
-from armload.identification.notes import arm_changed, leaning
 from armload.identification.reporting import doubt_of
 from armload.inertia import determined, held, held_probability
+from armload.online.doubts import Doubts
 from armload.online.thresholds import STANDS
 from armload.posterior import PosteriorLeastSquares
-from armload.posterior.restless import PERIOD
-from armload.posterior.scales import AnotherArm, Tilt
 from armload.regression import payload_prior_std
 
 _STANDING = "standing: nothing new is learned until the arm moves, or what it holds changes"
@@ -39,14 +37,14 @@ class Judgement:
         estimate: the answer. around: (10,) where its intervals are. run: that it is of; None: of no run alone.
         determined: which parameters (10,) the data determine. held: whether anything is. p_held: how probable that is.
         newest: time of the newest sample that counts in it [s]; −∞ before one does.
-        another: that the arm is not the one of its tare or profile, once a run has found so; None: none has.
-        tilt: by how much gravity is turned from what was given, as a run asked last; None: none has.
+        doubts: what was asked of the runs besides the payload.
         doubted: whether something speaks against its error bars. notes: what else there is to say.
     """
 
     def __init__(self, arm: Arm, prior: tuple[NDArray[np.float64], NDArray[np.float64]] | None) -> None:
         self._arm, self._weak = arm, payload_prior_std(arm)
         self.before = Before(*(prior or (np.zeros(10), self._weak)))
+        self.doubts = Doubts(arm)
         self.reset()
 
     def reset(self) -> None:
@@ -55,45 +53,16 @@ class Judgement:
         self.estimate = Estimate(0.0, mean, np.diag(std**2), 0, str(self._arm.frame))
         self.around, self.doubted = mean, False
         self.run: Identifier | None = None
-        self.another: AnotherArm | None = None
-        self.tilt: Tilt | None = None
-        self._than: str | None = None  # what it is another one than, as of `OnlineEstimate.relative_to`
+        self.doubts.reset()
         self.newest = -np.inf
         self.determined, self.held, self.p_held = np.zeros(10, dtype=bool), False, 0.0
         self.notes: tuple[str, ...] = ()
 
-    def take(self, estimate: Estimate, run: Identifier | None, relative_to: str) -> None:
-        """A newer answer, of which the last judgement holds; of no run alone while samples are left out.
-
-        Args: as of `judge`.
-        """
+    def take(self, estimate: Estimate, run: Identifier | None) -> None:
+        """A newer answer, of which the last judgement holds; of no run alone while samples are left out."""
         self.estimate, self.run, self.around = estimate, run, estimate.phi
-        if isinstance(run, PosteriorLeastSquares):
-            another = run.stream.another
-            self.another = another if another is not None and another.found else self.another
-            self.tilt = run.stream.tilt or self.tilt
-            self.doubted = bool(self._doubts(run, relative_to))
-        elif run is not None:
-            self.doubted = False
-
-    def arm_changed(self, run: Identifier, relative_to: str) -> str | None:
-        """That the arm is not as at its tare or profile, also where an earlier run found it; None: it is.
-
-        Args: as of `judge`.
-        """
-        if self.another is not None:
-            self._than = relative_to = self._than or relative_to
-        if not isinstance(run, PosteriorLeastSquares):
-            return None
-        return arm_changed(run.stream.drift, self.another or run.stream.another, relative_to)
-
-    def _doubts(self, run: PosteriorLeastSquares, relative_to: str) -> list[str]:
-        """What speaks against a run's error bars, a sentence each: as of a log, but for what only its end shows."""
-        stream, changed = run.stream, self.arm_changed(run, relative_to)
-        restless = stream.restlessness if stream.seconds >= PERIOD else 0.0
-        doubts = [doubt_of(False, True, changed, restless)]
-        doubts.append(leaning(self._arm, stream.tilt or self.tilt, stream.posterior.torque))
-        return [doubt for doubt in doubts if doubt is not None]
+        if run is not None:
+            self.doubted = bool(self.doubts.sentences)
 
     def counts(self, t: float, run: Identifier) -> tuple[bool, bool]:
         """Whether a sample at t [s] that a run took makes `newest` newer, or says nothing new, as the arm stands."""
@@ -113,12 +82,12 @@ class Judgement:
         """How much older than now [s] the newest sample is that counts; 0 before one does."""
         return now - self.newest if self.newest > -np.inf else 0.0
 
-    def judge(self, estimate: Estimate, run: Identifier, relative_to: str, moving: bool, stands: bool) -> None:
+    def judge(self, estimate: Estimate, run: Identifier, moving: bool, stands: bool) -> None:
         """What the data determine, and whether anything is there.
 
         Args:
-            estimate: to be judged. run: that it is of. relative_to: what, as of `OnlineEstimate`.
-            moving: whether the arm moves. stands: whether what was seen lately says nothing new, as it stands.
+            estimate: to be judged. run: that it is of. moving: whether the arm moves.
+            stands: whether what was seen lately says nothing new, as it stands.
         """
         std, before, posterior = estimate.std, self.before, run if isinstance(run, PosteriorLeastSquares) else None
         taken = posterior.known if posterior is not None and posterior.taken else None
@@ -131,8 +100,7 @@ class Judgement:
         if stands:
             motor = posterior is not None and posterior.stream.posterior.torque == "motor"
             notes.append(_STANDING_MOTOR if motor else _STANDING)
-        if posterior is not None:
-            notes += self._doubts(posterior, relative_to)
+        notes += self.doubts.sentences
         if self.held and posterior is not None and taken is None:
             denied = denied_by(posterior.known, posterior.log_only)
             notes += [] if denied is None else [denied]
@@ -140,13 +108,9 @@ class Judgement:
 
     def conclude(self, estimate: Estimate, run: Identifier, t: float) -> None:
         """The last answer of a stream, at t [s], already judged: it becomes a body, and is doubted as of a log."""
-        exchanged, changed, restless, leans = False, None, 0.0, None
-        if isinstance(run, PosteriorLeastSquares):
-            stream, exchanged, torque = run.stream, run.exchanged, run.posterior.torque
-            restless, leans = stream.restlessness, leaning(self._arm, stream.tilt, torque)
-            changed = arm_changed(stream.drift, stream.another)  # which the notes say already
-        doubt = doubt_of(exchanged, exchanged or explained(estimate, run.unprojected), changed, restless)
+        exchanged = run.exchanged if isinstance(run, PosteriorLeastSquares) else False
+        doubt = doubt_of(exchanged, exchanged or explained(estimate, run.unprojected), None, 0.0)
         self.estimate = replace(estimate, phi=body_of(estimate, bool(self.determined[0]), exchanged))
         self.run, self.around, self.newest = run, estimate.phi, t
-        self.doubted = doubt is not None or leans is not None
-        self.notes += tuple(note for note in (doubt, leans) if note is not None and note not in self.notes)
+        self.doubted = doubt is not None or bool(self.doubts.sentences)
+        self.notes += () if doubt is None else (doubt,)

@@ -106,7 +106,7 @@ class OnlineIdentifier:
     @property
     def arm_changed(self) -> str | None:
         """That the arm is not as at its tare or profile; None: it is, as far as anybody can tell."""
-        return self._judgement.arm_changed(self.engine, self.relative_to)
+        return self._judgement.doubts.arm_changed
 
     @property
     def health(self) -> Health:
@@ -158,6 +158,7 @@ class OnlineIdentifier:
         if self.health.used:
             estimate = (self._watch or self._engine).conclude()
             if all_finite(estimate.phi):
+                self._judgement.doubts.look(self.engine, self.relative_to)
                 self._judge(estimate, self.engine)
                 self._judgement.conclude(estimate, self.engine, self._internal)
         return self._present()
@@ -171,7 +172,7 @@ class OnlineIdentifier:
         if self.profile is None or self._watch is None:
             raise IdentificationError("nothing is learned without a profile: make one with `armload profile`")
         self._watch.hold()
-        return learned_from(self.profile, () if self._judgement.another else self._watch.runs, name)
+        return learned_from(self.profile, () if self._judgement.doubts.another else self._watch.runs, name)
 
     def close(self) -> None:
         """Stop what runs beside; the identifier may go on."""
@@ -242,17 +243,19 @@ class OnlineIdentifier:
         if counts and self._stream.unseen:
             self._stream.forget_pauses()
         mixed = watch is not None and watch.mixed
+        if fresh or not mixed:
+            judgement.doubts.look(run, self.relative_to)
         if fresh:
             self._published = sample.t
             estimate = watch.track(sample.t) if watch is not None and mixed else estimate
             self._judge(estimate, run, stands)
         if fresh or not mixed:
-            judgement.take(estimate, run, self.relative_to)
+            judgement.take(estimate, run)
 
     def _track(self, watch: PayloadWatch, sample: Sample) -> None:
         """While samples are left out: what all that may have happened makes of the payload."""
         self._published, estimate = sample.t, watch.track(sample.t)
-        self._judgement.take(estimate, None, self.relative_to)
+        self._judgement.take(estimate, None)
         if watch.settling or watch.likely[0] > 0.5:  # then phi follows what the samples say
             self._judgement.newest = sample.t
         self._judge(estimate, watch.run)
@@ -267,7 +270,7 @@ class OnlineIdentifier:
 
     def _judge(self, estimate: Estimate, run: Identifier, stands: bool = False) -> None:
         stands = stands and self.trouble is None
-        self._judgement.judge(estimate, run, self.relative_to, self._moving, stands)
+        self._judgement.judge(estimate, run, self._moving, stands)
 
     @property
     def _moving(self) -> bool:

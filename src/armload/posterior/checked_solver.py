@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from armload.posterior import tilt
 from armload.posterior.another_arm import FROM, another_arm, apart
 from armload.posterior.drift import ALLOWED, ASKED_FROM, drift_since_tare, drift_so_far
 from armload.posterior.restless import RESTLESS, restlessness
 from armload.posterior.scales import Posterior, Scales
 from armload.posterior.solve import Solution, improved, solve_to_go_on, threads
-from armload.posterior.tilt import tilt_of_base, tilt_so_far
 from armload.regression import GaussianPrior
 from armload.regression.information import RegressionData, Session
 from armload.regression.noise import NoiseModel
@@ -46,17 +46,18 @@ class CheckedSolver:
 
     def go_on(self, runs: list[RegressionData], start: Scales | None) -> Solution:
         """One step of expectation–maximisation from the scales of the last solution, and what a stream is asked."""
-        seconds, about = runs[-1].blocks.duration, (self.prior_std, self.prior, self.noise)
+        about, times = (self.prior_std, self.prior, self.noise), [run.blocks.duration for run in runs]
+        seconds, own = times[-1], sum(times[self.given :])
         with threads().limit(limits=1):
             problem, scales = improved(runs, *about, 1, start)
             out = Solution.of(problem, scales)
-            if self.asks and (out.posterior.torque == "link" or seconds >= FROM):
-                out.tilt = tilt_so_far(problem, scales)  # friction of gears looks like a base that leans, at first
+            shown = sum(times) >= tilt.ASKED_FROM if out.posterior.torque == "link" else seconds >= FROM
+            if self.asks and shown:
+                out.tilt = tilt.tilt_so_far(problem, scales)
         out.restlessness = self._restlessness(out.posterior, runs[-1])
         if not self.asks or out.posterior.gears:
             return out
         tared = self.given > 0 and runs[0].noise is None  # else by a profile, which waits: a push is no drift
-        own = sum(run.blocks.duration for run in runs[self.given :])
         if (tared and own >= ASKED_FROM) or (out.posterior.drift.size and seconds >= FROM):
             out.drift = drift_so_far(runs, self.given, *about, out.posterior, self.read_once)
         if out.posterior.drift.size and seconds >= FROM:
@@ -84,7 +85,7 @@ class CheckedSolver:
                     else:
                         another = None
                 out.drift, out.another = drift, another
-            out.tilt = tilt_of_base(runs, *about, out.posterior)
+            out.tilt = tilt.tilt_of_base(runs, *about, out.posterior)
             run.session = self.session
         out.restlessness = self._restlessness(out.posterior, run)
         return out

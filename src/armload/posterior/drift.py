@@ -41,7 +41,7 @@ ALLOWED = 3.0
 CHANGED = 60.0
 # [s] within which a tare is of the same session: an arm that is warm changes little in an hour. A stated prior
 SESSION = 3600.0
-ASKED_FROM = 1.0  # [s] of a stream before it is asked, so after 1.5 s: the wrist has moved
+ASKED_FROM = 0.9  # [s] of a stream before it is asked, at the full solution after 1 s: the wrist has moved
 _STEPS = 2  # of expectation–maximisation from the scales of the solution that is tested
 
 
@@ -75,7 +75,7 @@ def drift_so_far(
     found: Posterior,
     read_once: bool = False,
 ) -> Drift:
-    """The same of a stream, whose answers do not allow for what is found: at the scales of its last solution.
+    """The same of a stream, at the scales of its last solution: its answers allow for what is explained, and no more.
 
     Args:
         given: how many runs, the first ones, are its tare; the others are of its own session. Else as above.
@@ -85,7 +85,7 @@ def drift_so_far(
         for run in own:
             run.session = replace(explained, number=1, drift=TESTED)
         found = solve([*runs[:given], *own], prior_std, prior, noise, 1, found.scales)
-    return replace(drift_of(found, runs[-1].correction, explained, read_once), allowed=False)
+    return replace(drift_of(found, runs[-1].correction, explained, read_once), allowed=explained.drift >= TESTED)
 
 
 def drift_of(found: Posterior, correction: Correction, explained: Session, read_once: bool = False) -> Drift:

@@ -215,7 +215,8 @@ class StreamingPosterior:
         if solution.finite:  # else the last one goes on
             self._posterior, self._state = solution.posterior, solution.state
             self.solutions += 1
-            self.drift, self.tilt = solution.drift or self.drift, solution.tilt
+            self.drift = None if solution.posterior.gears else solution.drift or self.drift
+            self.tilt = solution.tilt
             self.another = found_so_far(self.another, solution.another)
             self.restlessness, self.without_tare = solution.restlessness, solution.without_tare
         elif self._state is None:

@@ -37,6 +37,9 @@ MAY_LEAN = 5.991464547107979
 # [rad] by which gravity still turns once it has been found turned: an answer changes by less than its error bars; and
 # how often it is turned at most (test_a_base_that_leans_is_found_and_answered_for)
 TURNED, TURNS = np.radians(0.2), 3
+# [s] of all logs before a stream is asked: friction behind gears looks like a base that leans until it has shown, after
+# 0.4 s (test_friction_that_nobody_expects_is_no_base_that_leans)
+ASKED_FROM = 0.7
 _STEPS = 2  # of expectation–maximisation from the scales of the solution that is tested
 
 

@@ -186,7 +186,7 @@ class ArmProcess:
                 self.note(f"{error}: begun anew")
         tare = None if settings.tare is None else read_recording(settings.tare, self.arm)
         age, aged = age_of(tare, time.time() if "://" in settings.source else None, settings.tare_age)
-        for note in aged:
+        for note in aged if identifier is None else ():  # a state that goes on has its tare's age
             self.note(note)
         source = Steadied(self.source) if settings.steady else self.source
         about = (tare, settings.method, self.note, profile, identifier)

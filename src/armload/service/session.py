@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -55,7 +56,7 @@ class Session:
         sample: the newest that could be used. estimate: the newest. None before the first.
         history: rows (30,) of phi, half-widths of the 95 % intervals and the truth, NaN where it is not known.
         log: what happened, the last 200 entries.
-        tare_age: [s] at the stream's beginning, as far as it is known; 0: of its own session.
+        tare_age: [s] when the identifier began, as far as that is known; 0: of its own session.
         ended: the source has ended. error: what it ended with, if that was one.
 
     Raises:
@@ -77,7 +78,8 @@ class Session:
         tare_age: float = 0.0,
     ) -> None:
         self.source, self.arm, self.tare, self.profile = source, arm, tare, profile
-        self._known, self._every, self.tare_age = known, every, tare_age
+        self._known, self._every = known, every
+        self.tare_age, self._told = tare_age, time.monotonic()
         self._recorder, self._kept = recorder, -math.inf  # and when it last kept an estimate, on the stream's clock
         # what was held while the tare was recorded; None: not known
         self._tared = InertialParameters.zero(arm.frame) if tare is None else None
@@ -250,7 +252,8 @@ class Session:
         Raises:
             ArmloadError: the method cannot be used here; the present one goes on.
         """
-        self._exchange(self.tare, method, f"method {method}", self._tared, self.tare_age)
+        age = self.tare_age + time.monotonic() - self._told
+        self._exchange(self.tare, method, f"method {method}", self._tared, age)
 
     def reset(self) -> None:
         """Forget the stream so far; the next sample is the first."""
@@ -293,7 +296,8 @@ class Session:
 
         def order() -> None:
             self._identifier.close()
-            self._identifier, self.tare, self._tared, self.tare_age = identifier, tare, tared, age
+            self._identifier, self.tare, self._tared = identifier, tare, tared
+            self.tare_age, self._told = age, time.monotonic()
             self._recent.clear()
             self._plausibility.forget()
             self._write(text)

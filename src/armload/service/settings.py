@@ -6,6 +6,7 @@ import dataclasses
 import hashlib
 import ipaddress
 import json
+import math
 import re
 import tomllib
 from dataclasses import dataclass, field
@@ -58,6 +59,8 @@ class ArmSettings(ArmOptions):
     def __post_init__(self) -> None:
         if self.tare_age is not None and self.tare is None:
             raise UsageError(f"{self.name}: tare_age says how old a tare is, but there is no tare")
+        if self.tare_age is not None and not 0.0 <= self.tare_age < math.inf:
+            raise UsageError(f"{self.name}: tare_age is {self.tare_age:g} s: expected a time of 0 or more")
         if self.record is not None and Path(self.record).suffix.lower() not in RECORDS:
             raise UsageError(f"{self.name}: record is {self.record}: expected a name that ends in .csv or .mcap")
         if self.steady and self.profile is not None:
@@ -83,8 +86,8 @@ class ArmSettings(ArmOptions):
             return None
         beside = ("save", "record", "rating", "com_range", "apply", "mounted")
         asked = {key: value for key, value in self.to_dict().items() if key not in beside}
-        for key in ("steady", "tare_age"):  # a state of a version without it goes on
-            if not asked[key]:
+        for key, unsaid in (("steady", False), ("tare_age", None)):  # a state of a version without it goes on
+            if asked[key] is unsaid:
                 del asked[key]
         for key in ("tare", "profile", "tool"):
             if asked[key] is not None and (path := Path(asked[key])).is_file():

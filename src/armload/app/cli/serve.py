@@ -132,7 +132,6 @@ def settings_of(options: argparse.Namespace) -> ServiceSettings:
         raise UsageError(f"--webhook is {options.webhook!r}: expected an address such as https://HOST/PATH")
     if options.mqtt is not None:
         checked(options.mqtt)
-    check_tare_age(options)
     of_arms = ("frame", "gravity", "tare", "tare_age", "profile", "tool", "method")
     if options.sources[0].endswith(".toml"):
         given = [name for name in ("robot", *of_arms, "apply", "mounted") if getattr(options, name) is not None]
@@ -143,6 +142,7 @@ def settings_of(options: argparse.Namespace) -> ServiceSettings:
         if options.save is None:
             return settings
         return replace(settings, arms=tuple(replace(arm, save=options.save) for arm in settings.arms))
+    check_tare_age(options)
     more = {name: getattr(options, name) for name in (*of_arms, "save", "loop", "apply", "mounted")}
     arms = []
     for k, source in enumerate(options.sources):

@@ -1,0 +1,65 @@
+"""What speaks against a stream's error bars: as of a log, but for what only its end shows."""
+
+from __future__ import annotations
+
+from armload.arms import Arm
+from armload.estimators import Identifier
+from armload.identification.notes import arm_changed, leaning
+from armload.identification.reporting import doubt_of
+from armload.posterior import PosteriorLeastSquares
+from armload.posterior.restless import PERIOD
+from armload.posterior.scales import AnotherArm, Drift, Tilt
+
+
+class Doubts:
+    """What the runs of a stream have found of arm, gravity and load; of arm and gravity it holds until a run says else.
+
+    Args:
+        arm: whose stream it is.
+
+    Attributes:
+        another: that the arm is not the one of its tare or profile, once a run has found so; None: none has.
+        arm_changed: that it is another one, or not as it was then, in words; None: it is as it was.
+        sentences: all that speaks against the error bars, in words.
+    """
+
+    def __init__(self, arm: Arm) -> None:
+        self._arm = arm
+        self.reset()
+
+    def reset(self) -> None:
+        """Nothing is found."""
+        self.another: AnotherArm | None = None
+        self._drift: Drift | None = None
+        self._tilt: Tilt | None = None
+        self._torque = "link"  # the side that the torque was of when gravity was asked
+        self._than = ""  # what the arm is not as, as of `OnlineEstimate.relative_to`
+        self._looked: tuple[int, int, bool, str] | None = None
+        self.arm_changed: str | None = None
+        self.sentences: tuple[str, ...] = ()
+
+    def look(self, run: Identifier, relative_to: str) -> None:
+        """Take what a run's last solution was asked, if that is new.
+
+        Args:
+            run: any. relative_to: what its answers are, as of `OnlineEstimate`.
+        """
+        if not isinstance(run, PosteriorLeastSquares):
+            return
+        stream = run.stream
+        now = id(stream), stream.solutions, stream.seconds >= PERIOD, relative_to
+        if now == self._looked:
+            return
+        self._looked, torque = now, stream.posterior.torque
+        if stream.another is not None and stream.another.found:
+            self.another = stream.another
+        if stream.drift is not None or stream.posterior.gears:
+            self._drift = stream.drift
+        if stream.tilt is not None or torque != self._torque:  # what gears lose had looked like a base that leans
+            self._tilt, self._torque = stream.tilt, torque
+        if self.arm_changed is None:
+            self._than = relative_to
+        self.arm_changed = arm_changed(self._drift, self.another, self._than)
+        restless = stream.restlessness if stream.seconds >= PERIOD else 0.0
+        doubts = doubt_of(False, True, self.arm_changed, restless), leaning(self._arm, self._tilt, torque)
+        self.sentences = tuple(doubt for doubt in doubts if doubt is not None)
