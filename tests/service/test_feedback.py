@@ -87,10 +87,10 @@ def feedback(controller, mounted=None):
     return Feedback(arm("panda"), controller, mounted, notes.append), notes
 
 
-def told(one, said, known=True, most=200):
+def told(one, said, known=True, most=200, doubts=()):
     """Let it step until it waits."""
     for _ in range(most):
-        one.offer(said, Q, known)
+        one.offer(said, Q, known, doubts)
         one.step()
         if one.waits is None or not one.waits.startswith("told in steps"):
             return one.waits
@@ -120,6 +120,18 @@ def test_what_is_put_down_is_told_in_steps_down_to_nothing(answer):
     before = len(controller.told)
     assert told(one, empty) is None
     assert len(controller.told) - before > 5
+    assert not controller.told[-1].phi.any()
+
+
+def test_an_answer_in_doubt_is_not_told_but_what_was_put_down_is(answer):
+    controller = Asked()
+    one, _ = feedback(controller)
+    doubts = ("the base leans by 5°",)
+    assert told(one, answer, doubts=doubts) == "the answer is in doubt: the base leans by 5°"
+    assert len(controller.told) == 1
+    told(one, answer)
+    empty = changed(answer, phi=np.zeros(10), held=False, determined=np.ones(10, dtype=bool))
+    assert told(one, empty, doubts=doubts) is None
     assert not controller.told[-1].phi.any()
 
 

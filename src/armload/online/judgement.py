@@ -25,6 +25,12 @@ _STANDING_MOTOR = "standing: a change of payload is noticed only when the arm mo
 CHANGING = "the payload is changing"
 LEFT_OUT = "samples that do not fit are left out: something pulls at the arm, or the payload is changing"
 
+MAYBE = (  # of p_change, p_contact and p_drift, the largest while they are large
+    "the payload may be changing",
+    "something may be touching the arm",
+    "the torques drift slowly, as an arm does that warms up: the intervals do not allow for it",
+)
+
 
 class Judgement:
     """The last answer and what is said of it.

@@ -24,7 +24,7 @@ from armload.identification.tare_age import checked_age, drift_after
 from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
 from armload.online.gate import Health, all_finite
-from armload.online.judgement import CHANGING, LEFT_OUT, Judgement
+from armload.online.judgement import CHANGING, LEFT_OUT, MAYBE, Judgement
 from armload.online.learning import learned_from
 from armload.online.listening import Listening
 from armload.online.state import load_state, save_state
@@ -107,6 +107,11 @@ class OnlineIdentifier:
     def arm_changed(self) -> str | None:
         """That the arm is not as at its tare or profile; None: it is, as far as anybody can tell."""
         return self._judgement.doubts.arm_changed
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What speaks against the error bars, but for what only the end shows."""
+        return self._judgement.doubts.sentences
 
     @property
     def health(self) -> Health:
@@ -279,6 +284,10 @@ class OnlineIdentifier:
     def _present(self) -> OnlineEstimate:
         stream, judged, watch = self._stream, self._judgement, self._watch
         change, contact, drift = (None, None, None) if watch is None else watch.likely
+        maybe: tuple[str, ...] = ()
+        if watch is not None and not watch.sure and not {CHANGING, LEFT_OUT} & set(judged.notes):
+            maybe = (MAYBE[int(np.argmax(watch.likely))],)
+        trouble = () if stream.trouble is None else (stream.trouble,)
         return OnlineEstimate.of(
             {
                 **vars(judged.estimate),
@@ -301,6 +310,6 @@ class OnlineIdentifier:
                 "settling": watch is not None and watch.settling,
                 "event": self.event,
                 "health": self.health,
-                "notes": judged.notes if stream.trouble is None else (*judged.notes, stream.trouble),
+                "notes": (*judged.notes, *maybe, *trouble),
             }
         )

@@ -118,7 +118,7 @@ class ArmProcess:
         if estimate is None and _compiling.is_set() and source.state == "streaming":
             why = Why(Unknown.COMPILING, COMPILING)
         if self._feedback is not None and estimate is not None and session.sample is not None:
-            self._feedback.offer(estimate, session.sample.q, why is None)
+            self._feedback.offer(estimate, session.sample.q, why is None, session.doubts)
         self._say(estimate, why)
 
     def _say(self, estimate: OnlineEstimate | None, why: Why | None) -> None:

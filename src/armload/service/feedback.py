@@ -44,6 +44,7 @@ class _Answer(NamedTuple):
     q: NDArray[np.float64]
     known: bool
     at: float
+    doubts: tuple[str, ...]
 
 
 class Feedback:
@@ -73,9 +74,14 @@ class Feedback:
         self._gone = threading.Event()
         self._thread: threading.Thread | None = None
 
-    def offer(self, estimate: OnlineEstimate, q: NDArray[np.float64], known: bool) -> None:
-        """The newest answer, where the arm is, and whether the answer can be used; returns at once."""
-        self._answer = _Answer(estimate, q, known, time.monotonic())
+    def offer(
+        self, estimate: OnlineEstimate, q: NDArray[np.float64], known: bool, doubts: tuple[str, ...] = ()
+    ) -> None:
+        """The newest answer, where the arm is, whether the answer can be used, and what speaks against it.
+
+        Returns at once.
+        """
+        self._answer = _Answer(estimate, q, known, time.monotonic(), doubts)
 
     def start(self) -> None:
         """Begin."""
@@ -124,6 +130,8 @@ class Feedback:
             return "the arm has stood for long: it moves first"
         if answer.estimate.held and not all(answer.estimate.determined[:4]):
             return "the centre of mass is undetermined"
+        if answer.estimate.held and answer.doubts:  # what was put down is told all the same
+            return f"the answer is in doubt: {answer.doubts[0]}"
         counted = self._controller.counted()
         self.mass = counted.load.mass
         if is_moving(counted.dq):

@@ -117,6 +117,11 @@ class Session:
         """That the arm is not as at its tare or profile; None: it is, as far as anybody can tell."""
         return self._identifier.arm_changed
 
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What speaks against the answer's error bars."""
+        return self._identifier.doubts
+
     def save(self, path: str | Path) -> Path:
         """Write the identifier's state (`OnlineIdentifier.save`); only from the thread that runs the loop."""
         return self._identifier.save(path)

@@ -61,6 +61,11 @@ class ArmSettings(ArmOptions):
             raise UsageError(f"{self.name}: tare_age says how old a tare is, but there is no tare")
         if self.tare_age is not None and not 0.0 <= self.tare_age < math.inf:
             raise UsageError(f"{self.name}: tare_age is {self.tare_age:g} s: expected a time of 0 or more")
+        if self.tool is not None and (self.tare is not None or self.profile is not None):
+            raise UsageError(
+                f"{self.name}: whether the tool was mounted at the tare, or in the profile's logs, cannot be found out "
+                "on a stream: give the tool, or the tare or profile"
+            )
         if self.record is not None and Path(self.record).suffix.lower() not in RECORDS:
             raise UsageError(f"{self.name}: record is {self.record}: expected a name that ends in .csv or .mcap")
         if self.steady and self.profile is not None:

@@ -106,7 +106,12 @@ def parser() -> Parser:
         help="of a log or the simulator (1: real time)",
     )
     add("--loop", action="store_true", help="replay a log again and again")
-    add("--duration", type=at_least(0.0, float), metavar="S", help="end after so many seconds of samples")
+    add(
+        "--duration",
+        type=at_least(0.0, float),
+        metavar="S",
+        help="take so many seconds of samples (a page stays open)",
+    )
     add("--host", default="127.0.0.1", metavar="H", help="interface of the page (127.0.0.1); others ask for a token")
     add("--token-file", type=file_name, metavar="F", help="holds that token (without it, one is drawn for this run)")
     add(
