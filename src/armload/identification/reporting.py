@@ -63,10 +63,10 @@ def answered(
     leans = np.zeros(10, dtype=bool)
     if found.weak_std is not None:
         leans = determined & (found.weak_std > LEANS * estimate.std)
-    if found.known is not None and denied_by(found.known, found.log_only) is None:
-        # what was given is known, whatever the log tells, and does not rest on the prior
-        determined = determined_with(determined, found.known, estimate.std, before)
-        leans = leans & ~found.known.which
+    given = found.known if found.known is None or found.log_only is None else found.known.believed(*found.log_only)
+    if given is not None:  # it is known, whatever the log tells, and does not rest on the prior
+        determined = determined_with(determined, given, estimate.std, before)
+        leans = leans & ~given.which
     phi = body_of(estimate, determined[0], found.exchanged)
     low, high = phi_interval(phi, estimate.phi, estimate.std, determined, before, otherwise)
     if unsure is not None:

@@ -158,6 +158,12 @@ class Known:
             return self.mass
         return self.com if self.com is not None and self.com.away(own, covariance) > FAR else None
 
+    def believed(self, mean: NDArray[np.float64], covariance: NDArray[np.float64]) -> Self | None:
+        """What of it phi ~ N(mean, covariance) does not deny; None: nothing."""
+        denied = self.denied(mean, covariance)
+        mass, com = (None if one is denied else one for one in (self.mass, self.com))
+        return None if mass is None and com is None else replace(self, mass=mass, com=com)
+
     def given(self, mean: NDArray[np.float64], covariance: NDArray[np.float64]) -> Gaussian | None:
         """phi ~ N(mean, covariance), (10,), (10, 10), given what of it that does not deny; None: nothing is taken.
 
