@@ -132,7 +132,7 @@ def test_the_age_of_a_tare_is_counted_from_when_it_was_taken_or_recorded(panda, 
     monkeypatch.setattr("time.time", lambda: 1e9 + float(log.t[-1]) + 600.0)
     assert watcher.look(50.0).tare == "empty.csv, 10 min old"
     session.tare_age = 7200.0  # as somebody said
-    assert watcher.look(monotonic()).tare == "empty.csv, 2 h old"
+    assert watcher.look().tare == "empty.csv, 2 h old"
     session.tare, session.tare_age = replace(log, epoch=0.0), 0.0  # as an order to tare leaves it
     watcher.look(60.0)
     assert watcher.look(75.0).tare == "taken 15.0 s ago"

@@ -35,10 +35,9 @@ def drift_since(tare: Recording, recording: Recording, age: float | None) -> tup
     Raises:
         IdentificationError: an age that is no time.
     """
-    if age is not None:
-        return drift_after(checked_age(age)), ()
-    if tare.date is not None and recording.date is not None:
-        return _by_clocks(abs(float(recording.epoch - tare.epoch + recording.t[0] - tare.t[-1])))
+    if age is not None or (tare.date is not None and recording.date is not None):
+        seconds, told = age_of(tare, recording.date, age)
+        return drift_after(seconds), told
     dates = [_date(log) for log in (tare, recording)]
     if dates[0] is not None and dates[1] is not None and abs(dates[1] - dates[0]) > DAY:
         apart = in_words(abs(dates[1] - dates[0]))
@@ -47,12 +46,12 @@ def drift_since(tare: Recording, recording: Recording, age: float | None) -> tup
 
 
 def age_of(tare: Recording | None, began: float | None, age: float | None) -> tuple[float, tuple[str, ...]]:
-    """How old the tare of a stream is [s], and what is to be said of it.
+    """How old the tare of a log or stream is [s], and what is to be said of it.
 
     Args:
-        began: when the stream did [s since 1970]; None: nobody knows.
-        age: [s] as the user says; None: the tare's clock tells, if it shows the time of day, else it is of the stream's
-            own session.
+        began: when the log or stream did [s since 1970]; None: nobody knows.
+        age: [s] as the user says; None: the tare's clock tells, if it shows the time of day, else it is of the same
+            session.
 
     Raises:
         IdentificationError: an age that is no time.
@@ -62,7 +61,8 @@ def age_of(tare: Recording | None, began: float | None, age: float | None) -> tu
     if tare is None or tare.date is None or began is None:
         return 0.0, ()
     seconds = abs(began - tare.date - tare.duration)
-    return seconds, _by_clocks(seconds)[1]
+    note = f"by the logs' clocks the tare is {in_words(seconds)} old: offsets and friction may have changed since"
+    return seconds, (note,) if drift_after(seconds) else ()
 
 
 def checked_age(seconds: float) -> float:
@@ -89,12 +89,6 @@ def seconds_of(text: str) -> float:
     if found is None:
         raise IdentificationError(f"{text!r} is not a time: expected a number and s, min, h, d or w, such as 1d")
     return float(found[1]) * _UNITS[found[2]]
-
-
-def _by_clocks(seconds: float) -> tuple[float, tuple[str, ...]]:
-    drift = drift_after(seconds)
-    note = f"by the logs' clocks the tare is {in_words(seconds)} old: offsets and friction may have changed since"
-    return drift, (note,) if drift else ()
 
 
 def in_words(seconds: float) -> str:

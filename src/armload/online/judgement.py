@@ -24,7 +24,6 @@ _STANDING = "standing: nothing new is learned until the arm moves, or what it ho
 _STANDING_MOTOR = "standing: a change of payload is noticed only when the arm moves"
 CHANGING = "the payload is changing"
 LEFT_OUT = "samples that do not fit are left out: something pulls at the arm, or the payload is changing"
-
 MAYBE = (  # of p_change, p_contact and p_drift, the largest while they are large
     "the payload may be changing",
     "something may be touching the arm",

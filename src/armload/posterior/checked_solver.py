@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from armload.posterior import tilt
 from armload.posterior.another_arm import FROM, another_arm, apart
-from armload.posterior.drift import ALLOWED, ASKED_FROM, drift_since_tare, drift_so_far
+from armload.posterior.drift import ALLOWED, ASKED_FROM, TESTED, drift_since_tare
 from armload.posterior.restless import RESTLESS, restlessness
 from armload.posterior.scales import Posterior, Scales
 from armload.posterior.solve import Solution, improved, solve_to_go_on, threads
@@ -59,7 +59,8 @@ class CheckedSolver:
             return out
         tared = self.given > 0 and runs[0].noise is None  # else by a profile, which waits: a push is no drift
         if (tared and own >= ASKED_FROM) or (out.posterior.drift.size and seconds >= FROM):
-            out.drift = drift_so_far(runs, self.given, *about, out.posterior, self.read_once)
+            drift = drift_since_tare(runs, *about, out.posterior, self.read_once, self.given, steps=1)
+            out.drift = replace(drift, allowed=self.session.drift >= TESTED)
         if out.posterior.drift.size and seconds >= FROM:
             out.another = replace(another_arm(runs, *about, out.posterior), left_out=False)
         return out

@@ -42,7 +42,7 @@ CHANGED = 60.0
 # [s] within which a tare is of the same session: an arm that is warm changes little in an hour. A stated prior
 SESSION = 3600.0
 ASKED_FROM = 0.9  # [s] of a stream before it is asked, at the full solution after 1 s: the wrist has moved
-_STEPS = 2  # of expectation–maximisation from the scales of the solution that is tested
+STEPS = 2  # of expectation–maximisation from the scales of the solution that is tested
 
 
 def drift_since_tare(
@@ -52,40 +52,22 @@ def drift_since_tare(
     noise: NoiseModel,
     found: Posterior,
     read_once: bool = False,
+    given: int = -1,
+    steps: int = STEPS,
 ) -> Drift:
-    """Test whether the last run's arm is that of the runs before it.
+    """Test whether the last run's arm is that of its tare.
 
     Args:
         runs, prior_std, prior, noise: as of `solve`. found: their solution, for its scales.
-        read_once: as of `drift_of`.
-    """
-    run, explained = copy(runs[-1]), runs[-1].session
-    if explained.drift < TESTED:  # else the solution itself has allowed for as much
-        run.session = replace(explained, number=1, drift=TESTED)
-        found = solve([*runs[:-1], run], prior_std, prior, noise, _STEPS, found.scales)
-    return drift_of(found, run.correction, explained, read_once)
-
-
-def drift_so_far(
-    runs: list[RegressionData],
-    given: int,
-    prior_std: NDArray[np.float64],
-    prior: GaussianPrior | None,
-    noise: NoiseModel,
-    found: Posterior,
-    read_once: bool = False,
-) -> Drift:
-    """The same of a stream, at the scales of its last solution: its answers allow for what is explained, and no more.
-
-    Args:
-        given: how many runs, the first ones, are its tare; the others are of its own session. Else as above.
+        read_once: as of `drift_of`. given: the first run that is of the last one's session; those before are its tare.
+        steps: of expectation–maximisation; with 1 the scales stay.
     """
     explained, own = runs[-1].session, [copy(run) for run in runs[given:]]
-    if explained.drift < TESTED:
+    if explained.drift < TESTED:  # else the solution itself has allowed for as much
         for run in own:
             run.session = replace(explained, number=1, drift=TESTED)
-        found = solve([*runs[:given], *own], prior_std, prior, noise, 1, found.scales)
-    return replace(drift_of(found, runs[-1].correction, explained, read_once), allowed=explained.drift >= TESTED)
+        found = solve([*runs[:given], *own], prior_std, prior, noise, steps, found.scales)
+    return drift_of(found, runs[-1].correction, explained, read_once)
 
 
 def drift_of(found: Posterior, correction: Correction, explained: Session, read_once: bool = False) -> Drift:

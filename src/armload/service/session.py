@@ -122,6 +122,11 @@ class Session:
         """What speaks against the answer's error bars."""
         return self._identifier.doubts
 
+    @property
+    def tare_age_now(self) -> float:
+        """How old the tare is by now [s], as far as `tare_age` is known."""
+        return self.tare_age + time.monotonic() - self._told
+
     def save(self, path: str | Path) -> Path:
         """Write the identifier's state (`OnlineIdentifier.save`); only from the thread that runs the loop."""
         return self._identifier.save(path)
@@ -257,8 +262,7 @@ class Session:
         Raises:
             ArmloadError: the method cannot be used here; the present one goes on.
         """
-        age = self.tare_age + time.monotonic() - self._told
-        self._exchange(self.tare, method, f"method {method}", self._tared, age)
+        self._exchange(self.tare, method, f"method {method}", self._tared, self.tare_age_now)
 
     def reset(self) -> None:
         """Forget the stream so far; the next sample is the first."""

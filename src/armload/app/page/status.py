@@ -60,7 +60,6 @@ class Watcher:
         self._estimate: OnlineEstimate | None = None
         self._answered = 0.0  # when the newest answer was first seen [s, monotonic]
         self._tare, self._tared = session.tare, None  # and when it was taken, if on this stream [s, monotonic]
-        self._began = time.monotonic()
 
     def look(self, now: float | None = None) -> Status:
         """How the newest answer is to be taken.
@@ -87,7 +86,7 @@ class Watcher:
         if self._tared is not None:
             return f"taken {in_words(now - self._tared)} ago"
         if self._session.tare_age:
-            return f"{tare.source}, {in_words(self._session.tare_age + now - self._began)} old"
+            return f"{tare.source}, {in_words(self._session.tare_age_now)} old"
         if tare.epoch:
             return f"{tare.source}, {in_words(max(time.time() - tare.epoch - float(tare.t[-1]), 0.0))} old"
         return f"{tare.source}, which does not say when it was recorded"
