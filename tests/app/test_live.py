@@ -572,7 +572,7 @@ def test_a_tare_is_as_old_as_it_was_said_to_be_until_another_is_taken(panda, ana
     look(10)
     session.close()
     assert drifts == pytest.approx([2.0, 2.0, 0.0], rel=1e-4)  # some seconds later
-    assert session.tare_age == 0.0
+    assert (session.tare.age, session.tare.taken) == (0.0, True)
 
 
 @pytest.mark.parametrize("command", [["live", "sim", "--headless"], ["serve", "sim", "--robot", "panda"]])

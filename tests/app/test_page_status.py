@@ -13,6 +13,7 @@ from armload.devices import Replay, Simulator, Source, open_source
 from armload.errors import SourceError
 from armload.payloads import test_payload
 from armload.service import Session, Unknown
+from armload.service.tare import Tare
 
 HELD = test_payload().parameters
 
@@ -129,14 +130,17 @@ def test_the_age_of_a_tare_is_counted_from_when_it_was_taken_or_recorded(panda, 
     log = replace(analytic_log(panda, duration=4.0), source="empty.csv", epoch=1e9)
     session = Session(simulated(panda, duration=8.0), panda, tare=log, method="map")
     watcher = Watcher(session)
+    now = monotonic()
     monkeypatch.setattr("time.time", lambda: 1e9 + float(log.t[-1]) + 600.0)
-    assert watcher.look(50.0).tare == "empty.csv, 10 min old"
-    session.tare_age = 7200.0  # as somebody said
-    assert watcher.look().tare == "empty.csv, 2 h old"
-    session.tare, session.tare_age = replace(log, epoch=0.0), 0.0  # as an order to tare leaves it
-    watcher.look(60.0)
-    assert watcher.look(75.0).tare == "taken 15.0 s ago"
-    assert "does not say when" in Watcher(session).look().tare
+    monkeypatch.setattr("time.monotonic", lambda: now)
+    assert watcher.look().tare == "empty.csv, 10 min old"
+    for tare, words in (
+        (Tare(log, age=7200.0, given=now), "empty.csv, 2 h old"),  # as somebody said
+        (Tare(log, taken=True, given=now - 15.0), "taken 15.0 s ago"),
+        (Tare(replace(log, epoch=0.0)), "empty.csv, which does not say when it was recorded"),
+    ):
+        session.tare = tare
+        assert watcher.look().tare == words
     session.close()
 
 

@@ -152,8 +152,8 @@ def test_a_tare_taken_from_a_steadied_stream_is_steadied_too(logs):
         if k == 500:
             session.take_tare()
     session.close()
-    kept = session.tare
-    assert kept is not None
+    assert session.tare is not None
+    kept = session.tare.recording
     np.testing.assert_array_equal(kept.dq, log.between(kept.t[0], kept.t[-1] + 1e-9).dq)
     assert session.estimate.relative_to == "tare"
     assert abs(session.estimate.phi[0]) < 0.3

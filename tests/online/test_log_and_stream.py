@@ -86,6 +86,9 @@ def test_identify_says_what_the_concluded_stream_says(kind, method, panda_logs, 
     np.testing.assert_allclose((end.phi - answer.phi) / unit, 0.0, rtol=0, atol=1e-5)
     assert end.determined.tolist() == answer.determined.tolist()
     assert end.held == answer.held
+    assert end.rests_on_prior.tolist() == answer.rests_on_prior.tolist()
+    assert end.torque_gain_std == answer.torque_gain_std
+    assert end.same_arm_assumed == answer.same_arm_assumed == (kind == "motor torque")
     for ours, theirs in ((end.low, answer.phi_low), (end.high, answer.phi_high)):
         np.testing.assert_allclose((ours - theirs) / unit, 0.0, rtol=0, atol=1e-5)
 
@@ -106,7 +109,8 @@ def test_a_field_means_the_same_in_a_stream_s_json_and_in_a_log_s(method, panda_
             stream.update(*sample)
         said = stream.conclude().to_dict()
         stream.close()
-        for name in ("method", "frame", "relative_to", "n_samples", "interval", "determined", "consistent", "held"):
+        same = ("method", "frame", "relative_to", "n_samples", "interval", "determined", "consistent", "held")
+        for name in (*same, "rests_on_prior", "torque_gain_std", "same_arm_assumed"):
             assert said[name] == answer[name], name
         unit = np.maximum(np.array(answer["phi_high"]) - answer["phi_low"], 1e-6)
         for name in ("phi", "phi_low", "phi_high"):

@@ -37,6 +37,7 @@ from armload.identification import check_usable, plausible_tool
 from armload.online import OnlineEstimate
 from armload.posterior import Known
 from armload.recording import GAP
+from armload.service.tare import Tare
 
 from .applying import Applying, applying_of
 from .diagnostics import status_of, values_of
@@ -146,21 +147,21 @@ class PayloadIdentifier(LifecycleNode):
         self._bare, tool = bare, given.tool(bare)
         robot = bare if tool is None else bare.with_payload(tool)
         self._states = JointStates(robot, "joint_states")
-        tare = given.tare(robot)
-        age, aged = given.tare_age(tare)
+        log = given.tare(robot)
+        age, aged = given.tare_age(log)
         for note in aged:
             self.get_logger().warning(note)
-        self._identify(robot, tare, age=age)
+        self._identify(robot, None if log is None else Tare(log, age))
         if given.value("apply"):
             self._applying = applying_of(self, given, bare)
 
-    def _identify(self, robot: Arm, tare: Recording | None, known: Known | None = None, age: float = 0.0) -> None:
+    def _identify(self, robot: Arm, tare: Tare | None, known: Known | None = None) -> None:
         """A new stream in the place of the present one, which stays if it cannot be made."""
         given = self.parameters
         if given.value("steady") and given.value("profile"):
             raise UsageError("steady and profile: a profile is learned from velocities as they come; leave one out")
         method = given.value("method") or None
-        stream = Stream(robot, tare, method, given.profile(), known, given.value("steady"), age)
+        stream = Stream(robot, tare, method, given.profile(), known, given.value("steady"))
         if self._stream is not None:
             self._stream.close()
         self._stream, self._last = stream, -np.inf
@@ -250,7 +251,7 @@ class PayloadIdentifier(LifecycleNode):
         samples, self._taring = list(self._taring), None
         t, q, dq, tau = map(np.array, zip(*samples, strict=True))
         try:
-            tare = Recording(t, q, dq, tau, joint_names=self._bare.joint_names)
+            tare = Tare(Recording(t, q, dq, tau, joint_names=self._bare.joint_names), taken=True)
             check_usable(tare, self._stream.arm)
             self._identify(self._stream.arm, tare, self._stream.known)
         except ArmloadError as error:
@@ -276,7 +277,7 @@ class PayloadIdentifier(LifecycleNode):
         forgotten = request.mass == 0.0 and request.std == 0.0
         try:
             known = None if forgotten else Known.of((request.mass, request.std), None, if_held=True)
-            self._identify(self._stream.arm, self._stream.tare, known, self._stream.tare_age)
+            self._identify(self._stream.arm, self._stream.tare, known)
         except ArmloadError as error:
             return self._told(response, False, str(error))
         text = "no mass is known" if forgotten else f"the mass is {request.mass:.3f} ± {request.std:.3f} kg"

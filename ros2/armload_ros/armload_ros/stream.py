@@ -7,9 +7,10 @@ import time
 from armload.arms import Arm
 from armload.online import OnlineEstimate, OnlineIdentifier
 from armload.posterior import Known, Profile
-from armload.recording import Recording, Sample, Steadying, steadied
+from armload.recording import Sample, Steadying, steadied
 from armload.service.plausible import Plausibility
 from armload.service.recent import Recent
+from armload.service.tare import Tare
 from armload.service.unknown import Link, why_unknown
 
 
@@ -17,24 +18,23 @@ class Stream:
     """What `armload serve` knows of an arm, fed sample by sample.
 
     Args:
-        arm: with its tool. tare, method, profile, known, tare_age: see `OnlineIdentifier`.
+        arm: with its tool. tare: what answers are relative to. method, profile, known: see `OnlineIdentifier`.
         steady: whether velocities are told by the positions, too, 75 ms late (`armload.devices.Steadied`).
     """
 
     def __init__(
         self,
         arm: Arm,
-        tare: Recording | None = None,
+        tare: Tare | None = None,
         method: str | None = None,
         profile: Profile | None = None,
         known: Known | None = None,
         steady: bool = False,
-        tare_age: float = 0.0,
     ) -> None:
         self.arm, self.tare, self.known, self._steady = arm, tare, known, steady
-        self._age, self._began = tare_age, time.monotonic()
-        told = steadied(tare) if steady and tare is not None else tare
-        self._identifier = OnlineIdentifier(arm, told, method, profile, known, tare_age=tare_age)
+        log, age = (None, 0.0) if tare is None else (tare.recording, tare.age_now)
+        told = steadied(log) if steady and log is not None else log
+        self._identifier = OnlineIdentifier(arm, told, method, profile, known, tare_age=age)
         self._steadying = Steadying(arm.n)
         self._recent, self._plausibility = Recent(arm.n), Plausibility(arm, "joint_states", steady)
         self.estimate: OnlineEstimate | None = None
@@ -77,11 +77,6 @@ class Stream:
         link = Link("streaming", None, 1, None, heard)
         why = why_unknown(self.estimate, link, time.monotonic(), self._identifier.trouble, self._plausibility.doubt)
         return None if why is None else why.text
-
-    @property
-    def tare_age(self) -> float:
-        """How old the tare is by now [s], as far as that is known."""
-        return self._age + time.monotonic() - self._began
 
     def reset(self) -> None:
         """Forget the samples, not the tare."""

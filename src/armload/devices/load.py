@@ -70,8 +70,9 @@ class Load:
         if isinstance(result, Load):
             return result
         if isinstance(result, OnlineEstimate):
-            known = tuple(bool(x) for x in result.determined)
-            return cls(result.parameters, known, None if arm is None else arm.name, result.relative_to, result.std)
+            known, robot = tuple(bool(x) for x in result.determined), None if arm is None else arm.name
+            remarks = _leaning(known, result.rests_on_prior.tolist())
+            return cls(result.parameters, known, robot, result.relative_to, result.std, remarks)
         std = (result.phi_high - result.phi_low) / (2 * Z95)
         known, resting = tuple(result.determined.tolist()), result.rests_on_prior.tolist()
         inertia = (result.inertia_com, result.inertia_com_low, result.inertia_com_high)

@@ -9,6 +9,7 @@ from armload.errors import IdentificationError
 from armload.estimators import Identifier
 from armload.identification.intervals import Before
 from armload.identification.notes import other_than_given
+from armload.identification.thresholds import LEANS
 from armload.inertia import determined as determined_by
 from armload.posterior import Known, PosteriorLeastSquares
 
@@ -48,3 +49,17 @@ def determined_with(
     given = determined_by(std, before.std) & known.which
     given[1:4] &= given[0] | determined[0]
     return determined | given
+
+
+def rests_on_prior(
+    determined: NDArray[np.bool_], known: Known | None, std: NDArray[np.float64], weak_std: NDArray[np.float64] | None
+) -> NDArray[np.bool_]:
+    """Which parameters (10,) are determined, though what is learned of payloads says more of them than the log does.
+
+    Args:
+        determined, known, std: of the answer. weak_std: (10,) without what was learned; None: nothing was.
+    """
+    if weak_std is None:
+        return np.zeros(10, dtype=bool)
+    leans = determined & (weak_std > LEANS * std)
+    return leans if known is None else leans & ~known.which  # what is known does not rest on the prior

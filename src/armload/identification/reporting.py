@@ -12,7 +12,7 @@ from armload.arms import Arm
 from armload.identification.answer import Identification, body_of, is_removal
 from armload.identification.found import Found
 from armload.identification.intervals import about_com, intervals, phi_interval
-from armload.identification.known_payload import denied_by, determined_with
+from armload.identification.known_payload import denied_by, determined_with, rests_on_prior
 from armload.identification.notes import (
     COMPUTED,
     another_model,
@@ -24,7 +24,6 @@ from armload.identification.notes import (
     less_than_nothing,
     not_rigid,
 )
-from armload.identification.thresholds import LEANS
 from armload.inertia import HELD, Z95, InertialParameters, held, is_consistent, vech
 from armload.inertia import determined as determined_by
 from armload.posterior.restless import RESTLESS
@@ -60,13 +59,9 @@ def answered(
     determined = determined_by(estimate.std, before.std, found.weak_std, weak)
     log_only = found.log_only or (estimate.phi, estimate.covariance)  # whether anything is held, only the log tells
     is_held = held(float(log_only[0][0]), float(np.sqrt(log_only[1][0, 0])), bool(determined[0]))
-    leans = np.zeros(10, dtype=bool)
-    if found.weak_std is not None:
-        leans = determined & (found.weak_std > LEANS * estimate.std)
     given = found.known if found.known is None or found.log_only is None else found.known.believed(*found.log_only)
-    if given is not None:  # it is known, whatever the log tells, and does not rest on the prior
-        determined = determined_with(determined, given, estimate.std, before)
-        leans = leans & ~given.which
+    leans = rests_on_prior(determined, given, estimate.std, found.weak_std)
+    determined = determined_with(determined, given, estimate.std, before)
     phi = body_of(estimate, determined[0], found.exchanged)
     low, high = phi_interval(phi, estimate.phi, estimate.std, determined, before, otherwise)
     if unsure is not None:

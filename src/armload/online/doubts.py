@@ -19,6 +19,7 @@ class Doubts:
 
     Attributes:
         another: that the arm is not the one of its tare or profile, once a run has found so; None: none has.
+        asked_whose: whether any run could be asked if its arm is that one.
         arm_changed: that it is another one, or not as it was then, in words; None: it is as it was.
         sentences: all that speaks against the error bars, in words.
     """
@@ -30,6 +31,7 @@ class Doubts:
     def reset(self) -> None:
         """Nothing is found."""
         self.another: AnotherArm | None = None
+        self.asked_whose = False
         self._drift: Drift | None = None
         self._tilt: Tilt | None = None
         self._torque = "link"  # the side that the torque was of when gravity was asked
@@ -51,8 +53,9 @@ class Doubts:
         if now == self._looked:
             return
         self._looked, torque = now, stream.posterior.torque
-        if stream.another is not None and stream.another.found:
-            self.another = stream.another
+        if stream.another is not None:
+            self.asked_whose = True
+            self.another = stream.another if stream.another.found else self.another
         if stream.drift is not None or stream.posterior.gears:
             self._drift = stream.drift
         if stream.tilt is not None or torque != self._torque:  # what gears lose had looked like a base that leans

@@ -30,6 +30,8 @@ class OnlineEstimate(Estimate):
     relative_to: "arm", "tool" (which the arm was given with), "tare", or "before": the run of the empty arm before the
         last change was taken for a tare. method: its name.
     determined: which parameters (10,) the data determine. held: whether anything is there at all.
+    rests_on_prior, torque_gain_std, same_arm_assumed: as of an `Identification`; the arm is taken for the tare's until
+        there was enough to ask.
     around: (10,) the posterior's mean, about which the intervals are; phi is the nearest body, on a concluded stream.
     before: what was known of the payload before the data.
     calibrated: whether ±1.96 std were checked to be 95 % intervals, and nothing speaks against it.
@@ -50,6 +52,9 @@ class OnlineEstimate(Estimate):
     method: str
     determined: NDArray[np.bool_]
     held: bool
+    rests_on_prior: NDArray[np.bool_]
+    torque_gain_std: float | None
+    same_arm_assumed: bool
     around: NDArray[np.float64]
     before: Before
     calibrated: bool
@@ -130,6 +135,9 @@ class OnlineEstimate(Estimate):
             "inertia_com": inertia_com,
             "consistent": consistent,
             "held": self.held,
+            "rests_on_prior": self.rests_on_prior.tolist(),
+            "torque_gain_std": self.torque_gain_std,
+            "same_arm_assumed": self.same_arm_assumed,
             "p_held": self.p_held,
             "p_change": self.p_change,
             "p_contact": self.p_contact,

@@ -12,7 +12,7 @@ from armload.estimators import Estimate, Identifier
 from armload.identification.answer import body_of
 from armload.identification.found import explained
 from armload.identification.intervals import Before
-from armload.identification.known_payload import denied_by, determined_with
+from armload.identification.known_payload import denied_by, determined_with, rests_on_prior
 from armload.identification.reporting import doubt_of
 from armload.inertia import determined, held, held_probability
 from armload.online.doubts import Doubts
@@ -41,6 +41,8 @@ class Judgement:
         before: what is known beforehand.
         estimate: the answer. around: (10,) where its intervals are. run: that it is of; None: of no run alone.
         determined: which parameters (10,) the data determine. held: whether anything is. p_held: how probable that is.
+        rests_on_prior: which of them (10,) owe their intervals more to what is known of payloads.
+        gain_std: of the torque's scale, of a method that allows for one.
         newest: time of the newest sample that counts in it [s]; −∞ before one does.
         doubts: what was asked of the runs besides the payload.
         doubted: whether something speaks against its error bars. notes: what else there is to say.
@@ -61,6 +63,7 @@ class Judgement:
         self.doubts.reset()
         self.newest = -np.inf
         self.determined, self.held, self.p_held = np.zeros(10, dtype=bool), False, 0.0
+        self.rests_on_prior, self.gain_std = np.ones(10, dtype=bool), None
         self.notes: tuple[str, ...] = ()
 
     def take(self, estimate: Estimate, run: Identifier | None) -> None:
@@ -96,7 +99,10 @@ class Judgement:
         """
         std, before, posterior = estimate.std, self.before, run if isinstance(run, PosteriorLeastSquares) else None
         taken = posterior.known if posterior is not None and posterior.taken else None
-        self.determined = determined_with(determined(std, before.std, run.weak_std, self._weak), taken, std, before)
+        shown = determined(std, before.std, run.weak_std, self._weak)
+        self.determined = determined_with(shown, taken, std, before)
+        self.rests_on_prior = ~self.determined | rests_on_prior(shown, taken, std, run.weak_std)
+        self.gain_std = None if posterior is None else posterior.stream.posterior.gain_std
         self.held = held(float(estimate.phi[0]), float(std[0]), bool(self.determined[0]))
         self.p_held = held_probability(float(estimate.phi[0]), float(std[0]), float(self._weak[0]))
         notes = []

@@ -287,7 +287,7 @@ class OnlineIdentifier:
         maybe: tuple[str, ...] = ()
         if watch is not None and not watch.sure and not {CHANGING, LEFT_OUT} & set(judged.notes):
             maybe = (MAYBE[int(np.argmax(watch.likely))],)
-        trouble = () if stream.trouble is None else (stream.trouble,)
+        trouble, told_by = () if stream.trouble is None else (stream.trouble,), self.relative_to
         return OnlineEstimate.of(
             {
                 **vars(judged.estimate),
@@ -295,10 +295,13 @@ class OnlineIdentifier:
                 "age": float(stream.unseen + stream.ahead + judged.age(self._internal)),
                 "lag": 0.0,
                 "since": stream.clock if self._since is None else self._since,
-                "relative_to": self.relative_to,
+                "relative_to": told_by,
                 "method": self.method,
                 "determined": judged.determined,
                 "held": judged.held,
+                "rests_on_prior": judged.rests_on_prior,
+                "torque_gain_std": judged.gain_std,
+                "same_arm_assumed": told_by in ("tare", "profile") and not judged.doubts.asked_whose,
                 "around": judged.around,
                 "before": judged.before,
                 "calibrated": self.engine.calibrated and not judged.doubted and (watch is None or watch.sure),

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import threading
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -28,6 +27,7 @@ from armload.service.history import History
 from armload.service.plausible import Plausibility
 from armload.service.recent import Recent
 from armload.service.session_log import SessionLog
+from armload.service.tare import Tare
 
 _KEPT = 0.1  # [s] between two estimates of a record: as often as lines come
 TICK = 0.1  # [s] between two looks at a silent source: as often as lines come
@@ -56,7 +56,7 @@ class Session:
         sample: the newest that could be used. estimate: the newest. None before the first.
         history: rows (30,) of phi, half-widths of the 95 % intervals and the truth, NaN where it is not known.
         log: what happened, the last 200 entries.
-        tare_age: [s] when the identifier began, as far as that is known; 0: of its own session.
+        tare: what answers are relative to; None: the arm as it was given.
         ended: the source has ended. error: what it ended with, if that was one.
 
     Raises:
@@ -77,13 +77,11 @@ class Session:
         recorder: Recorder | None = None,
         tare_age: float = 0.0,
     ) -> None:
-        self.source, self.arm, self.tare, self.profile = source, arm, tare, profile
+        self.source, self.arm, self.profile = source, arm, profile
+        self.tare = None if tare is None else Tare(tare, tare_age)
         self._known, self._every = known, every
-        self.tare_age, self._told = tare_age, time.monotonic()
         self._recorder, self._kept = recorder, -math.inf  # and when it last kept an estimate, on the stream's clock
-        # what was held while the tare was recorded; None: not known
-        self._tared = InertialParameters.zero(arm.frame) if tare is None else None
-        self._identifier = self._made(tare, method, tare_age) if identifier is None else identifier
+        self._identifier = self._made(self.tare, method) if identifier is None else identifier
         self.sample: Sample | None = None
         self.estimate: OnlineEstimate | None = None
         self._answered: OnlineEstimate | None = None  # the same when its sample had just arrived
@@ -121,11 +119,6 @@ class Session:
     def doubts(self) -> tuple[str, ...]:
         """What speaks against the answer's error bars."""
         return self._identifier.doubts
-
-    @property
-    def tare_age_now(self) -> float:
-        """How old the tare is by now [s], as far as `tare_age` is known."""
-        return self.tare_age + time.monotonic() - self._told
 
     def save(self, path: str | Path) -> Path:
         """Write the identifier's state (`OnlineIdentifier.save`); only from the thread that runs the loop."""
@@ -251,8 +244,10 @@ class Session:
 
     def truth(self, t: float) -> InertialParameters | None:
         """What was added since the tare, or is held at all, at time t [s]; None where the source does not know."""
-        held, tared = self.source.truth(t), self._tared
-        return None if held is None or tared is None else held - tared
+        held, before = self.source.truth(t), InertialParameters.zero(self.arm.frame)
+        if self.tare is not None:
+            before = self.tare.held
+        return None if held is None or before is None else held - before
 
     # ------------------------------------------------------------------ orders, from any thread
 
@@ -262,7 +257,7 @@ class Session:
         Raises:
             ArmloadError: the method cannot be used here; the present one goes on.
         """
-        self._exchange(self.tare, method, f"method {method}", self._tared, self.tare_age_now)
+        self._exchange(self.tare, method, f"method {method}")
 
     def reset(self) -> None:
         """Forget the stream so far; the next sample is the first."""
@@ -283,30 +278,23 @@ class Session:
             ArmloadError: too little was seen since the payload last changed, or the method can use no tare.
         """
         self._running()
-        tare = self._recent.recording(_TARE_LONGEST)
-        seen = 0.0 if tare is None else tare.duration
-        if tare is None or seen < _TARE_SHORTEST:
+        log = self._recent.recording(_TARE_LONGEST)
+        seen = 0.0 if log is None else log.duration
+        if log is None or seen < _TARE_SHORTEST:
             raise IdentificationError(
                 f"{seen:.1f} s were seen since the payload changed: a tare needs at least {_TARE_SHORTEST:.0f} s of "
                 "motion; wait and try again"
             )
-        self._exchange(tare, self.method, f"tared with the last {seen:.0f} s", self.source.truth(float(tare.t[-1])))
+        tare = Tare(log, held=self.source.truth(float(log.t[-1])), taken=True)
+        self._exchange(tare, self.method, f"tared with the last {seen:.0f} s")
 
-    def _exchange(
-        self,
-        tare: Recording | None,
-        method: str | Path,
-        text: str,
-        tared: InertialParameters | None,
-        age: float = 0.0,
-    ) -> None:
+    def _exchange(self, tare: Tare | None, method: str | Path, text: str) -> None:
         self._running()
-        identifier = self._made(tare, method, age)
+        identifier = self._made(tare, method)
 
         def order() -> None:
             self._identifier.close()
-            self._identifier, self.tare, self._tared = identifier, tare, tared
-            self.tare_age, self._told = age, time.monotonic()
+            self._identifier, self.tare = identifier, tare
             self._recent.clear()
             self._plausibility.forget()
             self._write(text)
@@ -317,10 +305,10 @@ class Session:
         if self.ended:
             raise SourceError(f"{self.source.name} has ended: open it again")
 
-    def _made(self, tare: Recording | None, method: str | Path | None, age: float) -> OnlineIdentifier:
+    def _made(self, tare: Tare | None, method: str | Path | None) -> OnlineIdentifier:
+        log, age = (None, 0.0) if tare is None else (self.source.as_handed_on(tare.recording), tare.age_now)
         # an arm's model computes in a memory of its own, which two threads must not share
-        tare = None if tare is None else self.source.as_handed_on(tare)
-        return OnlineIdentifier(replace(self.arm), tare, method, self.profile, self._known, self._every, age)
+        return OnlineIdentifier(replace(self.arm), log, method, self.profile, self._known, self._every, age)
 
     def _write(self, text: str) -> None:
         self.log.write(self._t, text)

@@ -10,6 +10,7 @@ from armload.inertia import NAMES
 from armload.online import OnlineEstimate
 from armload.service.reconnecting import Reconnecting
 from armload.service.session import Session
+from armload.service.tare import Tare
 from armload.service.unknown import Link, Unknown, Why, why_unknown
 
 # reasons for which the last answer says nothing of the present: it is shown as what it was, with its age
@@ -59,7 +60,6 @@ class Watcher:
         self._session = session
         self._estimate: OnlineEstimate | None = None
         self._answered = 0.0  # when the newest answer was first seen [s, monotonic]
-        self._tare, self._tared = session.tare, None  # and when it was taken, if on this stream [s, monotonic]
 
     def look(self, now: float | None = None) -> Status:
         """How the newest answer is to be taken.
@@ -71,25 +71,21 @@ class Watcher:
         estimate = session.estimate
         if estimate is not self._estimate:
             self._estimate, self._answered = estimate, now
-        if session.tare is not self._tare:
-            self._tare, self._tared = session.tare, now
         why = why_unknown(estimate, _link(session, now), now, session.trouble, session.doubt)
         age = None if estimate is None else estimate.age + now - self._answered
-        return Status(
-            why, waits_for(estimate, why), session.doubt or session.arm_changed, age, self._tare_in_words(now)
-        )
+        tare = None if session.tare is None else _tare_in_words(session.tare)
+        return Status(why, waits_for(estimate, why), session.doubt or session.arm_changed, age, tare)
 
-    def _tare_in_words(self, now: float) -> str | None:
-        tare = self._tare
-        if tare is None:
-            return None
-        if self._tared is not None:
-            return f"taken {in_words(now - self._tared)} ago"
-        if self._session.tare_age:
-            return f"{tare.source}, {in_words(self._session.tare_age_now)} old"
-        if tare.epoch:
-            return f"{tare.source}, {in_words(max(time.time() - tare.epoch - float(tare.t[-1]), 0.0))} old"
-        return f"{tare.source}, which does not say when it was recorded"
+
+def _tare_in_words(tare: Tare) -> str:
+    log, age = tare.recording, tare.age_now
+    if tare.taken:
+        return f"taken {in_words(age)} ago"
+    if tare.age:
+        return f"{log.source}, {in_words(age)} old"
+    if log.epoch:
+        return f"{log.source}, {in_words(max(time.time() - log.epoch - float(log.t[-1]), 0.0))} old"
+    return f"{log.source}, which does not say when it was recorded"
 
 
 def waits_for(estimate: OnlineEstimate | None, why: Why | None) -> str | None:
