@@ -10,6 +10,7 @@ from armload.online import OnlineIdentifier
 from armload.payloads import test_payload
 from armload.recording import write_recording
 from armload.service import ArmSettings
+from armload.service.arm_process import ArmProcess
 from armload.service.spare import Spare, order
 
 PATIENCE = 120.0  # [s]
@@ -43,3 +44,30 @@ def test_what_a_saved_state_holds_is_unconfirmed_until_a_second_has_told(panda, 
     # the line is of a moment 1 s after the first sample, and an answer that is 0.5 s late is `behind`
     assert 0.5 <= answers[-1]["t"] < 1000.0
     assert {line["unknown"] for line in answers[:-1]} <= {"unconfirmed", "behind", "silent"}
+
+
+@pytest.mark.parametrize(("ago", "goes_on"), [(1800.0, True), (3 * 86400.0, False)])
+def test_a_state_is_gone_on_from_while_the_arm_is_that_of_the_same_session(
+    ago, goes_on, panda, analytic_log, tmp_path, monkeypatch
+):
+    path = tmp_path / "run.csv"
+    write_recording(path, analytic_log(panda, duration=2.0))
+    settings = ArmSettings(name="left", source=str(path), robot="panda", method="map", save=str(tmp_path))
+    identifier, now = OnlineIdentifier(panda, method="map"), time.time()
+    for sample in analytic_log(panda, test_payload().parameters, duration=2.0):
+        identifier.update(*sample)
+    with monkeypatch.context() as earlier:
+        earlier.setattr("time.time", lambda: now - ago)
+        identifier.save(settings.state)
+    identifier.close()
+    process, notes = ArmProcess(settings, 0.1, ()), []
+    monkeypatch.setattr(process, "note", notes.append)
+    found = process._restored(None)
+    process.source.close()
+    assert (found is not None) == goes_on
+    if found is None:
+        assert "saved 3d ago" in notes[0]
+        assert notes[0].endswith("begun anew")
+    else:
+        assert found.conclude().phi[0] == pytest.approx(identifier.conclude().phi[0])
+        found.close()

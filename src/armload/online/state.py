@@ -9,6 +9,7 @@ import hashlib
 import json
 import time
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from os import PathLike
 from pathlib import Path
@@ -56,26 +57,36 @@ def load_state(path: str | PathLike[str], arm: Arm, method: str, engine: Identif
     Raises:
         IdentificationError: missing, damaged or foreign file, one of another armload, arm or trained model.
     """
+    with _opened(path) as (text, data):
+        if text["format"] != FORMAT:
+            raise IdentificationError(f"{path} belongs to another version of armload: begin anew")
+        _check_origin(path, text["origin"], _origin(arm, method, engine))
+        arrays = [data[f"a{k}"] for k in range(len(data.files) - 1)]
+        return Unpacker(text["objects"], arrays, _known(arm, engine)).value(text["tree"])
+
+
+def saved_at(path: str | PathLike[str]) -> float:
+    """When a state was saved [s since 1970], as it says itself: a copy's file has another date.
+
+    Raises:
+        IdentificationError: missing, damaged or foreign file.
+    """
+    with _opened(path) as (text, _):
+        return float(text["saved"])
+
+
+@contextmanager
+def _opened(path: str | PathLike[str]) -> Iterator[tuple[dict[str, Any], Any]]:
+    """What a state says, and its arrays; whatever is wrong with them is an `IdentificationError`."""
     try:
         with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as data:
-            text = json.loads(data["tree"].tobytes().decode())
-            if text["format"] != FORMAT:
-                raise IdentificationError(f"{path} belongs to another version of armload: begin anew")
-            _check_origin(path, text["origin"], _origin(arm, method, engine))
-            arrays = [data[f"a{k}"] for k in range(len(data.files) - 1)]
-        return Unpacker(text["objects"], arrays, _known(arm, engine)).value(text["tree"])
+            yield json.loads(data["tree"].tobytes().decode()), data
     except FileNotFoundError:
         raise IdentificationError(f"no saved state at {path}: begin without it") from None
     except IdentificationError:
         raise
     except Exception as error:
         raise IdentificationError(f"{path} is no state of a live identifier ({error}): begin without it") from None
-
-
-def saved_at(path: str | PathLike[str]) -> float:
-    """When a state that can be read was saved [s since 1970], as it says itself: a copy's file has another date."""
-    with np.load(path, allow_pickle=False) as data:
-        return float(json.loads(data["tree"].tobytes())["saved"])
 
 
 def _known(arm: Arm, engine: Identifier) -> dict[str, Any]:

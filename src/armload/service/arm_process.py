@@ -24,10 +24,11 @@ from armload.arms import Arm
 from armload.devices import Detached, Reader, Steadied, controller_of
 from armload.devices.reader import columns_of
 from armload.errors import ArmloadError, IdentificationError
-from armload.identification.tare_age import age_of
+from armload.identification.tare_age import age_of, in_words
 from armload.online import OnlineEstimate, OnlineIdentifier
 from armload.online.state import saved_at
-from armload.posterior import load_profile
+from armload.posterior import Profile, load_profile
+from armload.posterior.drift import SESSION
 from armload.recording import read_recording
 from armload.runtime.kernels import COMPILING
 from armload.service.feedback import Feedback
@@ -176,14 +177,7 @@ class ArmProcess:
     def _made_session(self) -> Session:
         settings = self.settings
         profile = None if settings.profile is None else load_profile(settings.profile)
-        kept, identifier = settings.state, None
-        if kept is not None and kept.exists():
-            try:
-                identifier = OnlineIdentifier.restore(kept, self.arm, settings.method, profile, every=self.every)
-                self._kept, self._continued = saved_at(kept), True
-                self.note(f"continued from {kept}, saved {time.time() - self._kept:.0f} s ago")
-            except (IdentificationError, OSError) as error:
-                self.note(f"{error}: begun anew")
+        identifier = self._restored(profile)
         tare = None if settings.tare is None else read_recording(settings.tare, self.arm)
         age, aged = age_of(tare, time.time() if "://" in settings.source else None, settings.tare_age)
         for note in aged if identifier is None else ():  # a state that goes on has its tare's age
@@ -191,6 +185,27 @@ class ArmProcess:
         source = Steadied(self.source) if settings.steady else self.source
         about = (tare, settings.method, self.note, profile, identifier)
         return Session(source, self.arm, *about, every=self.every, tare_age=age)
+
+    def _restored(self, profile: Profile | None) -> OnlineIdentifier | None:
+        """What goes on from the saved state, unless that is of a time when the arm may have been another."""
+        path = self.settings.state
+        if path is None or not path.exists():
+            return None
+        try:
+            saved = saved_at(path)
+            ago = time.time() - saved
+            if ago > SESSION:
+                self.note(
+                    f"{path} was saved {in_words(ago)} ago, and offsets and friction change within hours: begun anew"
+                )
+                return None
+            identifier = OnlineIdentifier.restore(path, self.arm, self.settings.method, profile, every=self.every)
+        except (IdentificationError, OSError) as error:
+            self.note(f"{error}: begun anew")
+            return None
+        self._kept, self._continued = saved, True
+        self.note(f"continued from {path}, saved {ago:.0f} s ago")
+        return identifier
 
     def _save(self, session: Session) -> None:
         self._saved, path = time.monotonic(), self.settings.state
