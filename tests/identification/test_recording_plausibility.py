@@ -408,10 +408,14 @@ def test_motor_currents_are_called_so_with_what_to_do(real_data, name):
     """The real logs' torque is current times these constants: divided by them again it is what the robot measured."""
     robot, constants = arm("ur10e"), np.array([11.98, 11.976, 9.836, 10.70, 10.70, 10.70])
     log = read_recording(real_data / name, robot)
-    with pytest.raises(RecordingError, match=r"look like currents, in A.*multiply each .*11\.98, 11\.976, 9\.836"):
+    with pytest.raises(
+        RecordingError, match=r"look like currents, in A.*tau_unit=A multiplies each .*11\.98, 11\.976, 9\.836"
+    ):
         check_plausible(replace(log, tau=log.tau / constants), robot)
     stranger = replace(robot, known_as=None)
-    with pytest.raises(RecordingError, match=r"look like currents, in A.*torque constant .*from the maker"):
+    with pytest.raises(
+        RecordingError, match=r'look like currents, in A.*"torque_constants=…", 6 numbers .*from the maker'
+    ):
         check_plausible(replace(log, tau=log.tau / constants), stranger)
 
 

@@ -1,5 +1,6 @@
 """ROS bags, written by rosbags: ROS 1, ROS 2 sqlite3 and MCAP, with all that a bag may do to its joints and times."""
 
+import json
 import shutil
 import sqlite3
 from contextlib import closing
@@ -15,7 +16,7 @@ from rosbags.typesys import Stores, get_typestore
 from armload.app.cli import main
 from armload.arms import arm
 from armload.errors import RecordingError
-from armload.recording import read_recording
+from armload.recording import read_recording, recording_chunks, write_recording
 from armload.recording.ros1_index import CompactReader
 
 ROS1, ROS2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
@@ -297,3 +298,81 @@ def test_a_compact_index_gives_the_messages_of_rosbags_in_the_same_order(tmp_pat
             found.append([(c.topic, time, raw) for c, time, raw in reader.messages(chosen)])
     assert found[1] == found[0]
     assert len(found[0]) == {2: 200, 0: 200, 1: 67}[len(asked)]
+
+
+CONSTANTS = np.array([11.98, 11.976, 9.836, 10.70, 10.70, 10.70])  # [N·m/A] of a UR10e, as its sheet has them
+
+
+def bag_of_currents(folder, kind, rows=20):
+    """As UR's ROS 2 driver publishes them, its joints in an order of its own; and the same log in N·m."""
+    names = arm("ur10e").joint_names
+    turned = (names[2], names[1], names[0], *names[3:])
+    path = write_bag(folder, kind, {"/joint_states": samples(turned, rows=rows)})
+    return path, read_recording(path, arm("ur10e"))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("said", "constants"),
+    [
+        ("tau_unit=A", CONSTANTS),
+        ("torque_constants=1 2 3 4 5 6", np.arange(1.0, 7.0)),
+        ("tau_unit=A,torque_constants=1 2 3 4 5 6", np.arange(1.0, 7.0)),
+    ],
+)
+def test_efforts_that_are_motor_currents_are_multiplied_joint_by_joint(tmp_path, kind, said, constants):
+    path, plain = bag_of_currents(tmp_path, kind)
+    log = read_recording(path, arm("ur10e"), columns=said)
+    np.testing.assert_allclose(log.tau, plain.tau * constants, rtol=1e-15)
+    np.testing.assert_array_equal(log.q, plain.q)
+    assert log.notes[-1].endswith("N·m/A, with the gears' friction in it")
+    chunks = list(recording_chunks(path, arm("ur10e"), columns=said, size=6))
+    np.testing.assert_array_equal(np.concatenate([chunk.tau for chunk in chunks]), log.tau)
+    assert len(chunks) > 2
+
+
+def test_units_of_positions_in_a_bag_may_be_said_and_nothing_else(tmp_path):
+    path, plain = bag_of_currents(tmp_path, "mcap")
+    log = read_recording(path, arm("ur10e"), columns="q_unit=deg,dq_unit=deg/s")
+    np.testing.assert_allclose(log.q, np.radians(plain.q), rtol=1e-14)
+    np.testing.assert_allclose(log.dq, np.radians(plain.dq), rtol=1e-14)
+    np.testing.assert_array_equal(log.tau, plain.tau)
+    for said in ("tau=effort", "t_unit=ms", "rate=100"):
+        with pytest.raises(RecordingError, match=r"leave them out .units may be said: q_unit, dq_unit, tau_unit"):
+            read_recording(path, arm("ur10e"), columns=said)
+
+
+def test_currents_without_constants_and_constants_of_another_count_are_refused(tmp_path):
+    path, _ = bag_of_currents(tmp_path, "db3")
+    with pytest.raises(RecordingError, match="5 torque constants for 6 joints"):
+        read_recording(path, arm("ur10e"), columns="torque_constants=1 2 3 4 5")
+    other = write_bag(tmp_path, "db3", {"/joint_states": samples()}, name="panda")
+    with pytest.raises(
+        RecordingError, match=r"efforts are motor currents \[A\], and no torque constants are known for p"
+    ):
+        read_recording(other, arm("panda"), columns="tau_unit=A")
+
+
+def test_a_real_log_in_a_bag_of_currents_is_answered_like_the_log_itself(tmp_path, real_data, capsys):
+    """The front door: two bags as UR's driver writes them, log and tare, and a table for tare beside a bag."""
+    paths, robot = [], arm(real_data / "ur10e.urdf")
+    for name in ("ur10e_loaded_2805g.csv", "ur10e_unloaded.csv"):
+        log = read_recording(real_data / name, robot)
+        log = log.between(log.t[0] + 10.0, log.t[0] + 18.0)
+        stamps = EPOCH + np.round(1e9 * log.t).astype(np.int64)
+        rows = zip(stamps, log.q, log.dq, log.tau / CONSTANTS, strict=True)
+        messages = [(int(t), int(t), robot.joint_names, *values) for t, *values in rows]
+        paths.append(write_bag(tmp_path, "mcap", {"/joint_states": messages}, name=name[:-4]))
+        write_recording(tmp_path / name, log)
+    command = ["identify", "--robot", str(real_data / "ur10e.urdf"), "--json"]
+    assert main([*command, str(paths[0]), "--tare", str(paths[1])]) == 2
+    assert "--columns tau_unit=A multiplies each" in capsys.readouterr().err
+    assert main([*command, str(paths[0]), "--tare", str(paths[1]), "--columns", "tau_unit=A"]) == 0
+    mine = json.loads(capsys.readouterr().out)
+    tables = [str(tmp_path / "ur10e_loaded_2805g.csv"), "--tare", str(tmp_path / "ur10e_unloaded.csv")]
+    assert main([*command, *tables]) == 0
+    theirs = json.loads(capsys.readouterr().out)
+    np.testing.assert_allclose(mine["phi"], theirs["phi"], atol=1e-4)
+    mixed = [str(paths[0]), "--columns", "tau_unit=A", "--tare", tables[2], "--tare-columns", "none"]
+    assert main([*command, *mixed]) == 0
+    np.testing.assert_allclose(json.loads(capsys.readouterr().out)["phi"], theirs["phi"], atol=1e-4)

@@ -174,10 +174,11 @@ def _currents(recording: Recording, arm: Arm, seen: TorqueScale) -> RecordingErr
     """That these are motor currents, and what to do."""
     facts = ARMS.get(arm.known_as or "")
     if facts is None or facts.torque_constants is None:
-        how = "multiply each by its joint's torque constant [N·m/A, at the joint], from the maker"
+        n = arm.n
+        how = f'--columns "torque_constants=…", {n} numbers in N·m/A at the joint, from the maker, multiplies them'
     else:
         each = ", ".join(f"{k:g}" for k in facts.torque_constants)
-        how = f"multiply each by its joint's torque constant ({each} N·m/A)"
+        how = f"--columns tau_unit=A multiplies each by its joint's torque constant ({each} N·m/A)"
     less = f"holds only {max(seen.scale, 0.0):.0%} of" if seen.is_wrong else "is not"
     return RecordingError(
         f"{recording.source}: tau {less} the torque {arm.name} needs to carry itself: these look like currents, in A; "

@@ -52,8 +52,8 @@ def recording_chunks(
     """
     path, spec = Path(path), ColumnSpec.of(columns)
     read = _TABLES.get(path.suffix.lower())
-    if path.exists() and has_topics(path) and spec == ColumnSpec():
-        yield from bag_chunks(path, str(path), arm, topic, size)
+    if path.exists() and has_topics(path) and spec == spec.of_values:
+        yield from bag_chunks(path, str(path), arm, topic, size, spec)
         return
     if read is None or topic is not None or not path.is_file():
         yield read_recording(path, arm, topic=topic, columns=columns)

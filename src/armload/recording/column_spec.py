@@ -12,6 +12,7 @@ from armload.errors import RecordingError, one_line
 from armload.recording.aliases import QUANTITIES, UNITS
 
 _COLUMNS = ("t", *QUANTITIES)
+_OF_VALUES = (*(f"{key}_unit" for key in QUANTITIES), "torque_constants")
 _HINT = 'expected KEY=VALUE pairs such as "t=time,q=joint_pos_{i},dq=joint_vel_{i},tau=effort_{i}", or a .toml file'
 
 
@@ -75,6 +76,11 @@ class ColumnSpec:
         """What is not left open, as JSON can hold it; `of` reads it back."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         return {key: value for key, value in values.items() if value is not None}
+
+    @property
+    def of_values(self) -> ColumnSpec:
+        """What it says of units of position, velocity and torque: all that a bag leaves open."""
+        return ColumnSpec(**{key: getattr(self, key) for key in _OF_VALUES})
 
     def over(self, **more: Any) -> ColumnSpec:
         """These columns, with what is given besides.

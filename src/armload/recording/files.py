@@ -55,7 +55,8 @@ def read_recording(
         arm: the arm that made the log, if known: the number of joints is checked, and joints that have names are taken
             by them, in the arm's order.
         topic: the JointState topic of a bag, where several have the arm's joints.
-        columns: names and units of a table's columns (`ColumnSpec.of`), where its header leaves them open.
+        columns: names and units of a table's columns (`ColumnSpec.of`), where its header leaves them open; of a bag,
+            units alone.
         rate: samples per second [Hz] of a table without times.
         episode: which one of a table that holds several.
 
@@ -72,13 +73,13 @@ def read_recording(
             raise RecordingError(f"{where} is not a regular file: expected a log ({_FORMS})")
         suffix = path.suffix.lower()
         if has_topics(path):
-            if spec != ColumnSpec():
+            if spec != spec.of_values:
                 raise RecordingError(
                     f"{where}: columns, a rate or an episode were named, but a ROS bag has its joints by name; leave "
-                    "them out"
+                    "them out (units may be said: q_unit, dq_unit, tau_unit, torque_constants)"
                 )
             if path.is_dir():
-                return read_bag(path, where, arm, topic)
+                return read_bag(path, where, arm, topic, spec)
         elif path.is_dir():
             if topic is not None:
                 raise RecordingError(_without_topics(where, topic))
@@ -94,7 +95,7 @@ def read_recording(
             raise RecordingError(_without_topics(where, topic))
         if hint := _looks_like(path, suffix):
             raise RecordingError(f"{where} is not a {suffix} file{hint}")
-        return read_bag(path, where, arm, topic) if has_topics(path) else _READERS[suffix](path, where, arm, spec)
+        return read_bag(path, where, arm, topic, spec) if has_topics(path) else _READERS[suffix](path, where, arm, spec)
     except OSError as error:
         raise RecordingError(f"{where} cannot be read: {error.strerror or error}") from None
 

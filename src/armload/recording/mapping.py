@@ -11,12 +11,13 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from armload.arms import ARMS, Arm
+from armload.arms import Arm
 from armload.errors import RecordingError
 from armload.recording.aliases import AMPERE, CALLED, EPISODE, FORMS, QUANTITIES, UNITS, WANTED, Form
 from armload.recording.choice import WHY_NOT, Header, TimeColumns, some
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.columns import check_joint_count, column_names
+from armload.recording.currents import no_constants, of_currents, torque_constants
 from armload.recording.header import Family, Reading, families_of, read_name, words_of
 from armload.recording.templates import abridged, named_columns
 
@@ -84,7 +85,8 @@ def map_columns(
             '--columns "t=TIME,q=POSITION{i},dq=VELOCITY{i},tau=TORQUE{i}"'
         )
     header = Header(names, families, times, form, _joint_count(families, given, where, arm), arm, where, dates)
-    places, scales, notes, wanted = {}, {}, [], None
+    places: dict[str, list[int]] = {}
+    scales, notes, wanted = {}, [], None
     for key in QUANTITIES:
         places[key] = given[key] if key in given else header.family(key).order(header.n, header.joints)
         if len(places[key]) != header.n:
@@ -94,7 +96,9 @@ def map_columns(
             )
         scale = _scale(header, key, places[key], spec)
         if scale is None and (wanted := _wanted(header)) is None:
-            raise _no_constants(header, places[key])
+            what = f"{some([header.names[place] for place in places[key]])} look like"
+            instead = f"log {WANTED[0]} and {WANTED[1]} as well, from which they follow, or "
+            raise no_constants(header.where, what, header.arm, header.n, instead)
         scales[key], note = scale or ((1.0,) * header.n, [])
         notes += note
     notes += _not_measured(header, places["tau"])
@@ -180,7 +184,8 @@ def _scale(header: Header, key: str, places: list[int], spec: ColumnSpec) -> tup
     if unit is None and len(units) == 1:
         (unit,) = units
         currents = {reading is not None and reading.kind == "current" for reading in readings}
-        unit = "A" if key == "tau" and unit is None and currents == {True} else unit
+        if key == "tau" and unit is None and (currents == {True} or spec.torque_constants is not None):
+            unit = AMPERE
     elif unit is None:
         stated = sorted(str(unit or "none") for unit in units)
         raise RecordingError(
@@ -196,7 +201,7 @@ def _scale(header: Header, key: str, places: list[int], spec: ColumnSpec) -> tup
         )
     if unit.strip().lower() != AMPERE:
         return (UNITS[key][unit.strip().lower()],) * header.n, []
-    constants = _torque_constants(header, spec)
+    constants = torque_constants(spec, header.arm, header.n, header.where)
     return None if constants is None else (constants, [of_currents(header.where, constants)])
 
 
@@ -211,24 +216,6 @@ def _not_measured(header: Header, places: list[int]) -> list[str]:
     ]
 
 
-def of_currents(where: str, constants: Sequence[float], by: str = "") -> str:
-    """A note of what the torque was made of; `by`: where the constants come from."""
-    shown = " ".join(f"{constant:.4g}" for constant in constants)
-    return f"{where}: torque is motor current times {shown} N·m/A{by}, with the gears' friction in it"
-
-
-def _torque_constants(header: Header, spec: ColumnSpec) -> tuple[float, ...] | None:
-    """Joint torque per motor current (n,) [N·m/A]: the user's, or those of the arm's sheet; None: not known."""
-    arm = header.arm
-    facts = None if arm is None else ARMS.get(arm.known_as or arm.name)
-    constants = spec.torque_constants or (None if facts is None else facts.torque_constants)
-    if constants is not None and len(constants) != header.n:
-        raise RecordingError(
-            f"{header.where}: {len(constants)} torque constants for {header.n} joints: expected one per joint"
-        )
-    return constants
-
-
 def _wanted(header: Header) -> tuple[list[int], list[int]] | None:
     """Places of the moments and of the currents (n,) that the controller wanted, where the header has all of them."""
     at = {tuple(words_of(name)): place for place, name in enumerate(header.names)}
@@ -239,16 +226,6 @@ def _wanted(header: Header) -> tuple[list[int], list[int]] | None:
         if len(moments) == len(currents) == header.n:
             return moments, currents
     return None
-
-
-def _no_constants(header: Header, places: list[int]) -> RecordingError:
-    called = "this arm" if header.arm is None else header.arm.name
-    return RecordingError(
-        f"{header.where}: {some([header.names[place] for place in places])} look like motor currents [A], and no "
-        f"torque constants are known for {called}: log {WANTED[0]} and {WANTED[1]} as well, from which they follow, or "
-        f"give {header.n} numbers in N·m/A, from a scale test with a known load, with "
-        '--columns "torque_constants=12 12 10 11 11 11"'
-    )
 
 
 def _check_bases(header: Header, places: dict[str, list[int]]) -> None:

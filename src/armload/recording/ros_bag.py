@@ -19,13 +19,17 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm, names_among
 from armload.errors import RecordingError, one_line
+from armload.recording.aliases import AMPERE, QUANTITIES, UNITS
 from armload.recording.checked import Chunks
+from armload.recording.column_spec import ColumnSpec
+from armload.recording.currents import no_constants, of_currents, torque_constants
 from armload.recording.mcap_file import is_cut_off, mended
 from armload.recording.recording import Recording
 from armload.runtime.extras import missing
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 BAG_SUFFIXES = (".bag", ".db3", ".mcap")
+IN_SI = ColumnSpec()
 
 
 class _Message(NamedTuple):
@@ -35,15 +39,24 @@ class _Message(NamedTuple):
     values: tuple[NDArray[np.float64], ...]  # position, velocity, effort
 
 
-def read_bag(path: Path, where: str, arm: Arm | None = None, topic: str | None = None) -> Recording:
+def read_bag(
+    path: Path, where: str, arm: Arm | None = None, topic: str | None = None, spec: ColumnSpec = IN_SI
+) -> Recording:
     """Read the JointState messages of a bag; see `read_recording` for what it raises."""
-    return next(bag_chunks(path, where, arm, topic))
+    return next(bag_chunks(path, where, arm, topic, spec=spec))
 
 
 def bag_chunks(
-    path: Path, where: str, arm: Arm | None = None, topic: str | None = None, size: int | None = None
+    path: Path,
+    where: str,
+    arm: Arm | None = None,
+    topic: str | None = None,
+    size: int | None = None,
+    spec: ColumnSpec = IN_SI,
 ) -> Iterator[Recording]:
     """The JointState messages of a bag, `size` at a time (None: all at once), read as they are asked for.
+
+    `spec` says the units of their values, where they are not SI.
 
     Raises:
         RecordingError: as `read_recording`.
@@ -52,7 +65,7 @@ def bag_chunks(
         with ExitStack() as stack:
             notes: list[str] = []
             bag = _Bag([stack.enter_context(reader) for reader in _readers(path, where, stack, notes)], notes)
-            yield from _recordings(bag, _choose(bag, where, arm, topic), where, arm, size)
+            yield from _recordings(bag, _choose(bag, where, arm, topic), where, arm, size, spec)
     except RecordingError:
         raise
     except ModuleNotFoundError as error:
@@ -173,17 +186,22 @@ def _choose(bag: _Bag, where: str, arm: Arm | None, topic: str | None) -> str:
     return candidates[0]
 
 
-def _recordings(bag: _Bag, topic: str, where: str, arm: Arm | None, size: int | None) -> Iterator[Recording]:
+def _recordings(
+    bag: _Bag, topic: str, where: str, arm: Arm | None, size: int | None, spec: ColumnSpec
+) -> Iterator[Recording]:
     wanted = None if arm is None else arm.joint_names
     called: tuple[str, ...] | None = None  # what the log calls the arm's joints
     columns: dict[tuple[str, ...], list[int] | None] = {}  # by names in a message: places of the arm's joints
     messages: list[tuple[int, int, int, NDArray[np.float64]]] = []  # number, stamp, time of logging, values
+    scale, said = None, ()  # what values are multiplied with, and why
     channel = "desired" if "desired" in topic.rsplit("/", 1)[-1] else "measured"
     tables = _Tables(where, topic)
     chunks = Chunks(where, channel)
     for number, message in enumerate(bag.messages(topic), start=1):
         if wanted is None:
             wanted = message.names
+        if scale is None:
+            scale, said = _scale(spec, arm, len(wanted), f"{where}, {topic}")
         if message.names not in columns:
             if called is None:
                 called = wanted if arm is None else names_among(arm, message.names)
@@ -192,7 +210,7 @@ def _recordings(bag: _Bag, topic: str, where: str, arm: Arm | None, size: int | 
         order = columns[message.names]
         if order is None:
             continue  # another device on the same topic, such as a gripper
-        values = np.concatenate(_values(message, order, f"{where}, {topic} message {number}"))
+        values = scale * np.concatenate(_values(message, order, f"{where}, {topic} message {number}"))
         messages.append((number, message.stamp, message.log_time, values))
         if len(messages) == size:
             yield from chunks.take(*tables.of(messages), joint_names=wanted, epoch=tables.epoch)
@@ -204,7 +222,27 @@ def _recordings(bag: _Bag, topic: str, where: str, arm: Arm | None, size: int | 
             _refuse_joints(where, f"topic {topic}", arm, sorted({name for names in columns for name in names}))
     if messages:
         yield from chunks.take(*tables.of(messages), joint_names=wanted, epoch=tables.epoch)
-    yield chunks.last((*bag.notes, *tables.notes))
+    yield chunks.last((*bag.notes, *tables.notes, *said))
+
+
+def _scale(spec: ColumnSpec, arm: Arm | None, n: int, where: str) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+    """What the values of a message (3n,) are multiplied with to be in rad, rad/s, N·m, and a note on currents.
+
+    Raises:
+        RecordingError: they are motor currents, of constants that nobody knows.
+    """
+    scale = np.ones((3, n))
+    for row, key in zip(scale, QUANTITIES, strict=True):
+        unit = getattr(spec, f"{key}_unit")
+        row *= 1.0 if unit is None else UNITS[key][unit.strip().lower()]
+    unit = AMPERE if spec.tau_unit is None and spec.torque_constants is not None else spec.tau_unit
+    if unit is None or unit.strip().lower() != AMPERE:
+        return scale.ravel(), ()
+    constants = torque_constants(spec, arm, n, where)
+    if constants is None:
+        raise no_constants(where, "efforts are", arm, n)
+    scale[2] = constants
+    return scale.ravel(), (of_currents(where, constants),)
 
 
 class _Tables:

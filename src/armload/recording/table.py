@@ -15,7 +15,8 @@ from armload.recording.checked import Chunks
 from armload.recording.choice import DATE, TimeColumns
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.columns import checked_recording
-from armload.recording.mapping import ColumnMap, map_columns, of_currents
+from armload.recording.currents import of_currents
+from armload.recording.mapping import ColumnMap, map_columns
 from armload.recording.recording import GAP, Recording
 from armload.recording.torque_constants import controller_constants
 

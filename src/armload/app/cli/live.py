@@ -18,7 +18,7 @@ from armload.app.cli.arguments import (
     check_tare_age,
     file_name,
 )
-from armload.app.cli.named import arm_of, columns_of, payload_of, read_logs, robot_of
+from armload.app.cli.named import arm_of, columns_for, columns_of, payload_of, read_logs, robot_of
 from armload.app.cli.printing import print_note
 from armload.errors import ArmloadError, UsageError
 from armload.runtime.interruption import held_back
@@ -130,7 +130,7 @@ def run(options: argparse.Namespace) -> int | None:
     from armload.devices import Detached, Recorder, Steadied, open_source
     from armload.identification.tare_age import age_of
     from armload.posterior import Known, load_profile
-    from armload.recording import ColumnSpec, check_own_measurements, has_topics
+    from armload.recording import ColumnSpec, check_own_measurements
     from armload.service.session import Session
 
     options.robot = options.robot or robot_of(options.source)
@@ -161,7 +161,7 @@ def run(options: argparse.Namespace) -> int | None:
         speed=options.speed,
         loop=options.loop,
         topic=options.topic,
-        columns=columns if of_log and not (has_topics(options.source) and options.tare is not None) else None,
+        columns=columns_for(options, options.source, options.tare, False) if of_log else None,
     )
     if isinstance(source, Detached) and "://" in options.source:
         source = _reopened(source, options, arm, None if mcap else options.record)

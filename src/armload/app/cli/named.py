@@ -37,6 +37,17 @@ def columns_of(options: argparse.Namespace, of_tare: bool = False) -> ColumnSpec
     return spec if episode is None else replace(spec, episode=episode)
 
 
+def columns_for(options: argparse.Namespace, log: str | None, tare: str | None, of_tare: bool) -> ColumnSpec | None:
+    """What `--columns` says of a log, or of its tare: nothing of a bag where the other is a table, which it is of."""
+    from armload.recording import has_topics
+
+    path, other = (tare, log) if of_tare else (log, tare)
+    own = getattr(options, "tare_columns", None) or (of_tare and getattr(options, "tare_episode", None) is not None)
+    if not own and path is not None and other is not None and has_topics(path) and not has_topics(other):
+        return None
+    return columns_of(options, of_tare)
+
+
 def read_logs(
     options: argparse.Namespace,
     arm: Arm,
@@ -60,14 +71,12 @@ def read_logs(
     if of_tare != [None, None] and options.tare is None:
         raise UsageError("--tare-columns and --tare-episode are for a tare, but there is no --tare")
     bags = [path is not None and has_topics(path) for path in (log, tare)]
-    tables = [path is not None and not bag for path, bag in zip((log, tare), bags, strict=True)]
     read: list[Recording | None] = [None, None]
     for k, path in enumerate((log, tare)):
         if path is None:
             continue
-        columns, own = columns_of(options, of_tare=k == 1), k == 1 and of_tare != [None, None]
-        if bags[k] and any(tables) and not own:
-            columns = None
+        own = k == 1 and of_tare != [None, None]
+        columns = columns_for(options, log, tare, of_tare=k == 1)
         topic = (topics or (getattr(options, "topic", None),) * 2)[k]
         topic = topic if bags[k] or not any(bags) else None
         try:

@@ -1,0 +1,39 @@
+"""Motor currents in a log: the torque of an ampere, and what is said of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from armload.arms import ARMS, Arm
+from armload.errors import RecordingError
+from armload.recording.column_spec import ColumnSpec
+
+_SAY = '--columns "torque_constants=12 12 10 11 11 11"'
+
+
+def of_currents(where: str, constants: Sequence[float], by: str = "") -> str:
+    """A note of what the torque was made of; `by`: where the constants come from."""
+    shown = " ".join(f"{constant:.4g}" for constant in constants)
+    return f"{where}: torque is motor current times {shown} N·m/A{by}, with the gears' friction in it"
+
+
+def torque_constants(spec: ColumnSpec, arm: Arm | None, n: int, where: str) -> tuple[float, ...] | None:
+    """Joint torque per motor current (n,) [N·m/A]: the user's, or those of the arm's sheet; None: not known.
+
+    Raises:
+        RecordingError: the user's are not one per joint.
+    """
+    facts = None if arm is None else ARMS.get(arm.known_as or arm.name)
+    constants = spec.torque_constants or (None if facts is None else facts.torque_constants)
+    if constants is not None and len(constants) != n:
+        raise RecordingError(f"{where}: {len(constants)} torque constants for {n} joints: expected one per joint")
+    return constants
+
+
+def no_constants(where: str, what: str, arm: Arm | None, n: int, instead: str = "") -> RecordingError:
+    """That nobody knows the torque of an ampere; `instead`: what else would tell it."""
+    called = "this arm" if arm is None else arm.name
+    return RecordingError(
+        f"{where}: {what} motor currents [A], and no torque constants are known for {called}: {instead}give {n} "
+        f"numbers in N·m/A, from a scale test with a known load, with {_SAY}"
+    )
