@@ -167,6 +167,7 @@ def measured_stream(stream: Stream) -> dict[str, Any]:
         "false": left,
         "inside": None if stream.base is None else float(inside[every].mean()),
         "calibrated": float(table[every, 4].mean()),
+        "calibrated_and_out": None if stream.base is None else float((~inside & (table[:, 4] == 1.0))[every].mean()),
         "reliability": reliability_of(stream, table, held, every),
     }
 

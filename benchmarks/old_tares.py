@@ -137,7 +137,7 @@ def left(world: World, log: Recording, payload: Payload | None) -> NDArray[np.fl
     true = world.arm(PANDA) if payload is None else world.arm(PANDA).with_payload(payload.parameters)
     data = RegressionData(Correction(true, CORRECTION.effort), GAIN, None, SMOOTH.block)
     data.add(log.t, log.q, log.dq, log.tau - world.disturbance(log.q, log.dq) - world.offset)
-    means, times = data.blocks.means()
+    means, times, _ = data.blocks.means()
     return times @ means[:, :, -1] ** 2 / len(times)
 
 

@@ -47,7 +47,7 @@ def test_joining_blocks_keeps_total_time_and_mean_and_memory():
     size = len(pickle.dumps(blocks))
     for value in values:
         blocks.add(0.01, value)
-    means, times = blocks.means()
+    means, times, _ = blocks.means()
     assert blocks.block > 0.1
     assert blocks.duration == pytest.approx(90.0)
     assert np.average(means, axis=0, weights=times) == pytest.approx(values.mean(axis=0), abs=2e-3)

@@ -31,15 +31,15 @@ def box(mass):
 HALF_KILO = box(0.5)
 
 
-def stream(seed, payloads, seconds, rate=200.0, motion=None):
-    """The log of a real-like Panda that holds a payload, or nothing, from each time on."""
-    panda = arm("panda")
+def stream(seed, payloads, seconds, rate=200.0, motion=None, name="panda"):
+    """The log of a real-like arm that holds a payload, or nothing, from each time on."""
+    robot = arm(name)
     source = Simulator(
-        panda,
-        motion or random_motion(panda, seed),
+        robot,
+        motion or random_motion(robot, seed),
         payloads,
-        world=World.real_like(panda, seed),
-        sensors=Sensors.panda(panda),
+        world=World.real_like(robot, seed),
+        sensors=Sensors.of(robot),
         rate=rate,
         speed=None,
         duration=seconds,
@@ -48,9 +48,9 @@ def stream(seed, payloads, seconds, rate=200.0, motion=None):
     return Recording(*map(np.array, zip(*source, strict=True)))  # type: ignore[arg-type]
 
 
-def said(log, method=None, pause=None, **more):
+def said(log, method=None, pause=None, name="panda", **more):
     """All estimates of a new identifier, and its events in order, each as it was called in the end."""
-    identifier = OnlineIdentifier(arm("panda"), method=method, **more)
+    identifier = OnlineIdentifier(arm(name), method=method, **more)
     estimates, events = [], {}
     for k, sample in enumerate(log):
         if pause is not None and k % 97 == 0:
@@ -196,6 +196,20 @@ def test_a_change_while_the_arm_stands_is_noticed_then():
     assert not estimates[-1].moving
 
 
+def test_nothing_is_called_calibrated_while_friction_would_hide_a_change():
+    """A UR takes hold at a standstill: nothing shows it until the arm moves, and no answer may say otherwise."""
+    body, name = box(2.0), "ur10e"
+    motion = Stopping(random_motion(arm(name), 13), 5.0)
+    log = stream(13, [(-1.0, None), (7.0, body)], 9.5, motion=motion, name=name)
+    world = World.real_like(arm(name), 13)
+    tare = simulate(arm(name), random_motion(arm(name), 14, duration=12.0), world=world, rate=200.0, seed=3)
+    estimates, _ = said(log, name=name, tare=tare)
+    assert any(e.interval == "calibrated" for e in estimates if 3.0 < e.t < 5.0)
+    resting = [e for e in estimates if e.t > 7.0]
+    assert not any(e.interval == "calibrated" for e in resting)
+    assert all(any(note.startswith("standing") for note in e.notes) or e.settling for e in resting)
+
+
 def test_a_change_is_noticed_though_the_arm_has_stood_since_the_first_sample():
     """As after a service was begun again beside a parked robot: no tare, and no motion yet."""
     body, motion = box(1.0), Stopping(random_motion(arm("panda"), 13), -1.0)
@@ -297,6 +311,21 @@ def test_what_is_put_down_is_gone_and_what_is_taken_up_again_is_recognised():
         max(estimate.age for estimate in estimates) < 0.05
     )  # samples get lost; an answer of seconds ago never returns
     assert np.all(again.std[:4] < first.std[:4])
+
+
+def test_what_a_run_knew_counts_for_less_when_it_is_taken_up_again(monkeypatch):
+    """The empty arm of long ago does not outweigh that of now: of 4.6 s before a payload 2 s count, and all since."""
+    monkeypatch.setattr("armload.online.runs.REMEMBERED", 2.0)
+    identifier = OnlineIdentifier(arm("panda"), method="map-gp")
+    first = identifier.engine
+    for sample in stream(2, [(5.0, HALF_KILO), (10.0, None)], 14.9):
+        estimate = identifier.update(*sample)
+    identifier._watch.hold()
+    seen = first.stream.accumulated().blocks.duration
+    identifier.close()
+    assert estimate.event.kind == "return"
+    assert identifier.engine is first
+    assert seen == pytest.approx(first.stream.seconds - 4.6 + 2.0, abs=0.3)
 
 
 @pytest.mark.full  # some seconds

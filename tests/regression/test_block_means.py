@@ -25,3 +25,35 @@ def test_joined_stretches_have_the_sums_of_groups_of_blocks_that_follow_each_oth
     assert joined.duration == len(signal)
     assert joined.rate == 1.0
     assert group == 1 or 2 * len(signal) / group > len(joined.sums)  # no coarser than it must be
+
+
+def test_what_is_discounted_counts_for_its_share_of_a_variance_and_of_the_time():
+    rng = np.random.default_rng(2)
+    old, new = 2.0 * rng.normal(size=40), rng.normal(size=60)
+    blocks = BlockMeans(1, 1.0)
+    blocks.extend(np.ones(40), old[:, None])
+    blocks.discount(0.25)
+    blocks.extend(np.ones(60), new[:, None])
+    weights = np.r_[np.full(39, 0.25), np.ones(61)]  # the last of the old was the block being filled
+    expected = np.average(np.r_[old, new] ** 2, weights=weights)
+    assert blocks.long_run_variance()[0] == pytest.approx(expected, rel=1e-12)
+    assert blocks.duration == pytest.approx(weights.sum(), rel=1e-12)
+
+
+def test_blocks_that_are_joined_keep_what_their_parts_count_for():
+    rng, parts, weights = np.random.default_rng(3), [], []
+    for count, share in ((300, 0.5), (500, 1.0), (77, 0.1)):
+        part = BlockMeans(1, 1.0)
+        part.extend(np.ones(count), rng.normal(size=(count, 1)))
+        part.discount(share)
+        part.extend(np.ones(1), np.ones((1, 1)))
+        weights.append(part.duration)
+        assert part.duration == pytest.approx(share * (count + 1) + (1.0 - share) * 2.0, abs=2.0 * (1.0 - share))
+        parts.append(part)
+    assert BlockMeans.joined(parts).duration == pytest.approx(sum(weights), rel=1e-12)
+    more = BlockMeans(1, 1.0)
+    more.extend(np.ones(200), np.ones((200, 1)))
+    more.discount(0.3)
+    before = more.duration
+    more.extend(np.ones(100), np.ones((100, 1)))  # pairs are joined
+    assert more.duration == pytest.approx(before + 100.0, rel=1e-12)

@@ -147,7 +147,7 @@ class DifferenceLeastSquares(NormalLeastSquares):
         rows = super()._residual_variance(phi) + (_RESOLUTION * rated_effort(self.arm)) ** 2
         if not self._blocks.ready:
             return rows
-        means, times = self._blocks.means()
+        means, times, _ = self._blocks.means()
         square = (means[..., 10] - means[..., :10] @ phi) ** 2 * times[:, None] * self._blocks.rate
         scale = np.exp(np.mean(np.log(np.maximum(square.mean(axis=0), 1e-12) / rows)))
         return (_PRIOR_BLOCKS * scale * rows + square.sum(axis=0)) / (_PRIOR_BLOCKS + len(times))

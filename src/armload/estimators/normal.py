@@ -121,7 +121,7 @@ class NormalLeastSquares(Identifier):
         return np.maximum(square / self._rows_seen, RESOLUTION**2)
 
     def _covariance(self, phi: NDArray, G: NDArray, w: NDArray) -> NDArray[np.float64]:
-        means, times = self._blocks.means()
+        means, times, _ = self._blocks.means()
         if not self._blocks.ready:
             return np.diag(UNKNOWN**2)
         residual = means[..., 10] - means[..., :10] @ phi

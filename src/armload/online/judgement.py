@@ -21,7 +21,7 @@ from armload.posterior import PosteriorLeastSquares
 from armload.regression import payload_prior_std
 
 _STANDING = "standing: nothing new is learned until the arm moves, or what it holds changes"
-_STANDING_MOTOR = "standing: a change of payload is noticed only when the arm moves"
+STANDING_MOTOR = "standing: a change of payload is noticed only when the arm moves"
 CHANGING = "the payload is changing"
 LEFT_OUT = "samples that do not fit are left out: something pulls at the arm, or the payload is changing"
 MAYBE = (  # of p_change, p_contact and p_drift, the largest while they are large
@@ -110,7 +110,7 @@ class Judgement:
             notes.append("not moving: inertia undetermined" if not self.determined[4:].all() else "not moving")
         if stands:
             motor = posterior is not None and posterior.stream.posterior.torque == "motor"
-            notes.append(_STANDING_MOTOR if motor else _STANDING)
+            notes.append(STANDING_MOTOR if motor else _STANDING)
         notes += self.doubts.sentences
         if self.held and posterior is not None and taken is None:
             denied = denied_by(posterior.known, posterior.log_only)

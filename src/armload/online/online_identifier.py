@@ -24,7 +24,7 @@ from armload.identification.tare_age import checked_age, drift_after
 from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
 from armload.online.gate import Health, all_finite
-from armload.online.judgement import CHANGING, LEFT_OUT, MAYBE, Judgement
+from armload.online.judgement import CHANGING, LEFT_OUT, MAYBE, STANDING_MOTOR, Judgement
 from armload.online.learning import learned_from
 from armload.online.listening import Listening
 from armload.online.state import load_state, save_state
@@ -130,6 +130,7 @@ class OnlineIdentifier:
         self._internal = 0.0
         self._moved = self._published = -np.inf
         self._since: float | None = None
+        self._blind = False  # whether a change of payload would not be seen now
         self.event: Event | None = None
         self._judgement.reset()
 
@@ -151,6 +152,7 @@ class OnlineIdentifier:
         if sample.t - self._moved > 0.1 * RECENT and np.abs(sample.dq).max() > MOVING:
             self._moved = sample.t
         self._identify(sample)
+        self._blind = self._watch is not None and self._watch.blind
         return self._present()
 
     def conclude(self) -> OnlineEstimate:
@@ -161,6 +163,7 @@ class OnlineIdentifier:
         if self._watch is not None and self._watch.undecided:
             return self._present()
         if self.health.used:
+            self._blind = False
             estimate = (self._watch or self._engine).conclude()
             if all_finite(estimate.phi):
                 self._judgement.doubts.look(self.engine, self.relative_to)
@@ -287,6 +290,8 @@ class OnlineIdentifier:
         maybe: tuple[str, ...] = ()
         if watch is not None and not watch.sure and not {CHANGING, LEFT_OUT} & set(judged.notes):
             maybe = (MAYBE[int(np.argmax(watch.likely))],)
+        if self._blind and STANDING_MOTOR not in judged.notes:
+            maybe += (STANDING_MOTOR,)
         trouble, told_by = () if stream.trouble is None else (stream.trouble,), self.relative_to
         return OnlineEstimate.of(
             {
@@ -304,7 +309,10 @@ class OnlineIdentifier:
                 "same_arm_assumed": told_by in ("tare", "profile") and not judged.doubts.asked_whose,
                 "around": judged.around,
                 "before": judged.before,
-                "calibrated": self.engine.calibrated and not judged.doubted and (watch is None or watch.sure),
+                "calibrated": self.engine.calibrated
+                and not judged.doubted
+                and not self._blind
+                and (watch is None or watch.sure),
                 "p_held": judged.p_held,
                 "p_change": change,
                 "p_contact": contact,

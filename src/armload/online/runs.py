@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.online.thresholds import SAME_RUN, STEP_STD, TARE_FROM
+from armload.online.thresholds import REMEMBERED, SAME_RUN, STEP_STD, TARE_FROM
 from armload.posterior import PosteriorLeastSquares
 from armload.regression import payload_prior_std
 
@@ -49,6 +49,7 @@ class Runs:
         """Take the earlier run up again; the current one is returned, if it is none of the others."""
         assert self.earlier is not None
         dropped, self.current, self.earlier = self.current, self.earlier, None
+        self.current.stream.remember(REMEMBERED)
         return self._unless_kept(dropped)
 
     def _unless_kept(self, run: PosteriorLeastSquares | None) -> PosteriorLeastSquares | None:

@@ -140,6 +140,9 @@ RETURN_STD = 0.01
 SAME_RUN = 7.779440339734858  # the 90 % quantile of a chi-square distribution of four degrees of freedom
 # [s] an empty run must have lasted to be a tare: with less it knows the arm no better than the prior
 TARE_FROM = 3.0
+# [s] that all a run knew counts for when it is taken up again: an arm that warms up is not what it was half an hour
+# ago. Of one that stays as it is, no answer is worse or wider for it (`benchmarks/warming_up.py`)
+REMEMBERED = 100.0
 # [payloads] standard deviation of the change of mass, below which it is reported: 150 g of a Panda
 # (test_the_mass_of_a_change_is_what_the_runs_tell_once_its_kind_is_known)
 STEP_STD = 0.1

@@ -106,6 +106,11 @@ class PayloadWatch:
         """Whether nothing but the arm as it was and the same payload explains the last rows."""
         return self.phase == FOLLOWING and sum(self.likely) < 1.0 - LIKELY
 
+    @property
+    def blind(self) -> bool:
+        """Whether a change of payload would not show yet (`Weighing.blind`)."""
+        return self._weighing.blind
+
     def track(self, t: float) -> Estimate:
         """At t [s], by the run and by all that the last rows may be besides."""
         last = self.run.last

@@ -20,6 +20,7 @@ from armload.online.thresholds import (
     FIRST_TARED,
     FIRST_UNTARED,
     HOLDS,
+    LAG,
     LIGHT,
     LIKELY,
     PATIENCE,
@@ -56,6 +57,7 @@ class Weighing:
         self._impossible_since = np.inf  # when what would be held first was no payload
         self._gaussian: tuple[PosteriorLeastSquares, Gaussian] | None = None  # before the row, and of which run
         self._at_rest: tuple[SequentialPosterior, NDArray[np.float64]] | None = None  # foreseen by, and where
+        self._moved = np.inf  # for how long a joint has moved, by its row's weight, since the arm last stood [s]
         self._seen_steady = False  # whether the arm was steady there: what the pose is wrong by is known
         self.row_t = self.steady_t = -np.inf
         self._first_t = np.inf  # of the run's first row
@@ -78,6 +80,14 @@ class Weighing:
         as its size is known, while an arm does not jump.
         """
         return self.modes.steady - self.modes.drift if self._touched else self.modes.steady
+
+    @property
+    def blind(self) -> bool:
+        """Whether a change would not show yet, as the arm has stood, and its torque is measured at the motors.
+
+        There friction hides a payload until a joint moves: slow rows weigh little.
+        """
+        return self._moved < LAG and self.modes.side == "motor"
 
     def changed(self) -> bool:
         """Whether the last row shows that the payload is surely another one than the run's."""
@@ -109,6 +119,7 @@ class Weighing:
         if (state := stream.state) is None or (row := stream.row) is None:
             return False
         self.modes.side = stream.posterior.torque
+        self._moved = 0.0 if row.h <= 0.0 else self._moved + row.h * float(row.weights.max())
         h, self.row_t = row.t - self.row_t, row.t
         first = FIRST_TARED if stream.tares else FIRST_UNTARED
         known, link = stream.seconds > first, stream.posterior.torque == "link"

@@ -104,6 +104,11 @@ class Accumulation:
             self._add(Rows.of(kept))
         return rows[len(kept) :]
 
+    def remember(self, seconds: float) -> None:
+        """Let all rows so far count for at most so long, however many they are; after `finish`."""
+        if (so_far := self.run.blocks.duration) > seconds:
+            self.run.discount(seconds / so_far)
+
     def all_rows(self) -> RegressionData:
         """A copy of the run with all rows so far; `hold` first."""
         return self._with(self._waiting)

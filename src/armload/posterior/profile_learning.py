@@ -237,7 +237,7 @@ def _log_density(e: NDArray[np.float64], V: NDArray[np.float64]) -> float:
 
 def _blocks(data: RegressionData) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Means (B, n, size + 1) and durations (B,) of blocks of `_PREDICTED` or longer, `_MOST_BLOCKS` at most."""
-    means, times = data.blocks.means()
+    means, times, _ = data.blocks.means()
     each = max(round(_PREDICTED / data.blocks.block), -(-len(times) // _MOST_BLOCKS), 1)
     each = min(each, len(times))
     whole = len(times) // each * each

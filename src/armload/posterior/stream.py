@@ -241,6 +241,10 @@ class StreamingPosterior:
             self._adopt(self._step(self._accumulation.run))
         return self._accumulation.run
 
+    def remember(self, seconds: float) -> None:
+        """Let all rows so far count for at most so long, from the next solution on; after `finish`."""
+        self._accumulation.remember(seconds)
+
     def accumulated(self) -> RegressionData:
         """All rows so far, accumulated in a copy; `hold` first."""
         return self._accumulation.all_rows()

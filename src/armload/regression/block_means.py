@@ -33,7 +33,7 @@ class BlockMeans:
     def __init__(self, shape: int | tuple[int, ...], block: float = BLOCK) -> None:
         self.block = block
         self.sums = np.zeros((_MOST_BLOCKS, *np.atleast_1d(shape)))
-        self._times = np.zeros(_MOST_BLOCKS)
+        self._times, self._weights = np.zeros(_MOST_BLOCKS), np.ones(_MOST_BLOCKS)
         self._filled = 0  # index of the block being filled
         self._count = 0
 
@@ -71,27 +71,33 @@ class BlockMeans:
         """Whether there are blocks enough for a variance."""
         return int(np.sum(self._times >= 0.5 * self.block)) >= 2
 
-    def means(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Means (B, *shape) and durations (B,) [s] of the blocks that are at least half full."""
+    def means(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Means (B, *shape), durations (B,) [s] and weights (B,) of the blocks that are at least half full."""
         keep = self._times >= 0.5 * self.block
-        return self.sums[keep] / self._times[keep].reshape(-1, *[1] * (self.sums.ndim - 1)), self._times[keep]
+        times, weights = self._times[keep], self._weights[keep]
+        return self.sums[keep] / times.reshape(-1, *[1] * (self.sums.ndim - 1)), times, weights
 
     @property
     def duration(self) -> float:
-        """Total time of the values [s]."""
-        return float(self._times.sum())
+        """Total time of the values [s], that of each block by its weight."""
+        return float(self._times @ self._weights)
+
+    def discount(self, share: float) -> None:
+        """Let all values so far, but those in the block being filled, count for a share of what they did."""
+        self._weights[: self._filled] *= share
 
     def long_run_variance(self) -> NDArray[np.float64]:
         """S (shape) [unit²·s] about zero; infinite while fewer than two blocks are full."""
-        means, times = self.means()
+        means, times, weights = self.means()
         if not self.ready:
             return np.full(self.sums.shape[1:], np.inf)
-        return np.mean(means**2 * times.reshape(-1, *[1] * (means.ndim - 1)), axis=0)
+        shape = (-1, *[1] * (means.ndim - 1))
+        return np.average(means**2 * times.reshape(shape), axis=0, weights=weights)
 
     def mapped(self, change: Callable[[NDArray], NDArray]) -> BlockMeans:
         """The blocks of a linear function of the signal; change: (B, *shape) → (B, *new)."""
         out = copy(self)
-        out.sums, out._times = change(self.sums), self._times.copy()
+        out.sums, out._times, out._weights = change(self.sums), self._times.copy(), self._weights.copy()
         return out
 
     @classmethod
@@ -99,7 +105,7 @@ class BlockMeans:
         """The blocks of several stretches of one signal, one after another, to be read and not to be added to."""
         out = cls(parts[0].sums.shape[1:], max(part.block for part in parts))
         counts = [part._filled + 1 for part in parts]
-        total, halvings = sum(counts), 0
+        total, halvings, weighted = sum(counts), 0, np.zeros(_MOST_BLOCKS)
         while total > _MOST_BLOCKS << halvings:
             halvings += 1
         for part, first, count in zip(parts, np.cumsum([0, *counts]), counts, strict=False):
@@ -107,15 +113,23 @@ class BlockMeans:
             starts = np.flatnonzero(np.diff(into, prepend=-1))
             out.sums[into[starts]] += np.add.reduceat(part.sums[:count], starts, axis=0)
             out._times[into[starts]] += np.add.reduceat(part._times[:count], starts)
+            weighted[into[starts]] += np.add.reduceat(part._times[:count] * part._weights[:count], starts)
+        out._weights = _share(weighted, out._times)
         out.block *= 2.0**halvings
         out._filled = (total - 1) >> halvings
         out._count = sum(part._count for part in parts)
         return out
 
     def _join_pairs(self) -> None:
-        half = _MOST_BLOCKS // 2
+        half, weighted = _MOST_BLOCKS // 2, self._times * self._weights
         self.sums[:half] = self.sums[0::2] + self.sums[1::2]
         self._times[:half] = self._times[0::2] + self._times[1::2]
         self.sums[half:], self._times[half:] = 0.0, 0.0
+        self._weights[:half], self._weights[half:] = _share(weighted[0::2] + weighted[1::2], self._times[:half]), 1.0
         self.block *= 2.0
         self._filled = half
+
+
+def _share(weighted: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The weight of each block, of its time and of that time by the weights of its parts; 1 where there is none."""
+    return np.divide(weighted, times, out=np.ones_like(times), where=times > 0.0)

@@ -113,6 +113,12 @@ class RegressionData:
         out.blocks = BlockMeans.joined([part.blocks for part in parts])
         return out
 
+    def discount(self, share: float) -> None:
+        """Let all rows so far count for a share of what they did, as the arm may have changed since."""
+        for values in (self.A, self.b, self.c):
+            values *= share
+        self.blocks.discount(share)
+
     def less(self, phi: NDArray[np.float64]) -> None:
         """Take the torque of a known body (10,) off all rows so far."""
         self.c -= (2.0 * self.b[:, :10] - self.A[:, :10, :10] @ phi) @ phi
@@ -178,14 +184,15 @@ class RegressionData:
             spread: spread(j, X) is the variance (B,) of X·[x, weights_j], X (B, size): what a fit with many unknowns
                 leaves is smaller than the noise, by this much.
         """
-        means, times = self.blocks.means()
+        means, times, weights_of = self.blocks.means()
         total = np.zeros(len(self.b))
         for j in range(len(total)):
             X, full = means[:, j, :-1], x if weights is None else np.concatenate([x, weights[j]])
             squared = (means[:, j, -1] - X[:, : len(full)] @ full) ** 2
             if spread is not None:
                 squared += spread(j, X)
-            total[j] = times @ squared
-        free = len(times) if spread is not None else max(len(times) - 2, 0)
+            total[j] = (times * weights_of) @ squared
+        blocks = float(weights_of.sum())
+        free = blocks if spread is not None else max(blocks - 2.0, 0.0)
         S = (_PRIOR_COUNT * prior + total) / (_PRIOR_COUNT + free)
         return S * max(1.0, self.blocks.duration / novelty)
