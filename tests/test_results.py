@@ -114,7 +114,7 @@ def test_how_often_intervals_held_is_that_of_the_committed_benchmark():
         name: 100 * np.mean(found["methods"]["hybrid"]["coverage"], axis=1).min() for name, found in populations.items()
     }
     assert min(worst, key=lambda name: worst[name]) == "odd"
-    assert f"({worst['repeat']:.0f} % from three seconds on), {worst['odd']:.0f} % of payloads unlike all" in page
+    assert f"({worst['repeat']:.0f} % at worst, after one second), {worst['odd']:.0f} % of payloads unlike all" in page
     assert f"unlike all families of the training, then {worst['odd']:.0f} % of the intervals hold in the first" in words
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 TITLE = "Benchmark"
 APPENDIX = "Benchmark: all tables"
-COMMAND = "armload benchmark"
+_COMMAND = "armload benchmark"
 SHOWN = (0.1, 1.0, 6.0)  # [s]
 PAIRS = (("hybrid", "map-gp"), ("hybrid", "rls-filter+tare"))
 _TARGETS = f"""A cell is one population, time and group of parameters. {tables.AHEAD} marks a row that is ahead by more
@@ -93,12 +93,20 @@ def _times(size: Size) -> tuple[float, ...]:
     return tuple(time for time in SHOWN if time in size.times) or size.times[-2:]
 
 
+def command_of(size: Size) -> str:
+    """What measures as much again."""
+    usual = Size()
+    more = f" --episodes {size.episodes}" if size.episodes != usual.episodes else ""
+    return f"{_COMMAND}{more}" + (f" --rate {size.rate:g}" if size.rate != usual.rate else "")
+
+
 def _what_was_run(results: Results, size: Size) -> str:
     trained = {row: text for m in results.values() for row, text in m.trained.items()}
     split = "; ".join(f"`{row}` was trained on other episodes ({text})" for row, text in trained.items())
     parts = [
-        f"`{COMMAND}` on simulated logs of a {size.robot} at {size.rate:g} Hz, {sum(m.runs for m in results.values())} "
-        f"episodes. Split: no method sees these episodes before it answers them, and nothing is trained on their seeds"
+        f"`{command_of(size)}` on simulated logs of a {size.robot} at {size.rate:g} Hz, "
+        f"{sum(m.runs for m in results.values())} episodes. Split: no method sees these episodes before it answers "
+        "them, and nothing is trained on their seeds"
         + (f"; {split}." if split else ".")
         + " All arms are simulated, in the ways their populations say; no real arm is among them.",
         "A time counts from a run's first sample; an estimate rests on all samples up to then.",

@@ -12,7 +12,7 @@ import numpy as np
 
 from armload.errors import ReportError
 from armload.inertia import NAMES, UNITS
-from armload.lab.benchmark.benchmark_page import APPENDIX, COMMAND, PAIRS, TITLE, sections
+from armload.lab.benchmark.benchmark_page import APPENDIX, PAIRS, TITLE, command_of, sections
 from armload.lab.benchmark.benchmark_run import Size
 from armload.lab.benchmark.benchmark_tables import Results, losses
 from armload.lab.benchmark.front import front, picture
@@ -26,7 +26,7 @@ from armload.lab.report.shown import GROUPS
 from armload.lab.report.style import look
 from armload.runtime.atomic import replacing
 
-_NOTE = f"Written by `{COMMAND}`; every number on this page comes from its cells."
+_NOTE = "Written by `{}`; every number on this page comes from its cells."
 _rounded = partial(listed, digits=4)
 
 
@@ -48,14 +48,14 @@ def write_results(
     """
     results = gather(cells, size)
     if not results:
-        raise ReportError(f"nothing is measured yet: run `{COMMAND}` until a part of it is finished")
+        raise ReportError(f"nothing is measured yet: run `{command_of(size)}` until a part of it is finished")
     written = {"summary": Path(summary), "report": Path(report), **pages(page)}
     for path in written.values():
         path.parent.mkdir(parents=True, exist_ok=True)
     numbers = summary_json(results, size)
     write_json(written["summary"], numbers, indent=None)
     write_front(numbers, written["page"])
-    write_markdown(written["tables"], sections(results, size), APPENDIX, _NOTE)
+    write_markdown(written["tables"], sections(results, size), APPENDIX, _NOTE.format(command_of(size)))
     first = front(numbers)
     first[0] = replace(first[0], figures=((picture(numbers), "Errors over time and coverage."),))
     write_report(written["report"], [*first, *sections(results, size, figures(results))], f"armload {TITLE.lower()}")
@@ -89,7 +89,7 @@ def write_front(numbers: Mapping[str, Any], page: str | Path) -> None:
             f"the picture cannot be written to {drawn}: {error.strerror}; name a page elsewhere"
         ) from None
     link = drawn.relative_to(paths["page"].parent).as_posix()
-    write_markdown(paths["page"], front(numbers, link, paths["tables"].name), TITLE, _NOTE)
+    write_markdown(paths["page"], front(numbers, link, paths["tables"].name), TITLE, _NOTE.format(numbers["command"]))
 
 
 def summary_json(results: Results, size: Size) -> dict[str, Any]:
@@ -115,7 +115,7 @@ def summary_json(results: Results, size: Size) -> dict[str, Any]:
         if a in m.rows and b in m.rows
     ]
     return {
-        "command": COMMAND,
+        "command": command_of(size),
         "robot": size.robot,
         "rate": size.rate,
         "times": list(size.times),
