@@ -26,7 +26,7 @@ from events import PAGE, measured_stream, of_part
 from script import ROOT, markdown_table, options, say, write, write_table
 from threadpoolctl import threadpool_limits
 
-import armload.online
+import armload
 from armload import Recording, arm
 from armload.arms import rated_mass
 from armload.devices import Simulator
@@ -113,9 +113,9 @@ def main() -> None:
         __doc__, streams=4, minutes=0.0, seed=SEED, jobs=1, arms=",".join(ARMS), cells=ROOT / "out" / "events-of-arms"
     )
     here, names = Path(__file__).parent, asked.arms.split(",")
-    code = source_key(
-        *sorted(Path(armload.online.__path__[0]).glob("*.py")), here / "event_scenes.py", here / "events_of_arms.py"
-    )
+    rooms = (Path(armload.__path__[0]) / room for room in ("online", "posterior", "regression"))
+    files = sorted(file for room in rooms for file in room.glob("*.py"))
+    code = source_key(*files, *(here / script for script in ("events.py", "event_scenes.py", "events_of_arms.py")))
     scenes = [Scene(n, share, asked.seed + k) for k in range(asked.streams) for n in names for share in SHARES]
     tasks = [Task.of_one(f"{x.arm}-{x.share:g}-{x.seed}", key_of(asdict(x), code), measured, x) for x in scenes]
     with threadpool_limits(1):

@@ -30,7 +30,7 @@ from events import PAGE, measured_stream, of_part
 from script import ROOT, markdown_table, options, say, write, write_table
 from threadpoolctl import threadpool_limits
 
-import armload.online
+import armload
 from armload import Recording, arm
 from armload.arms import rated_effort
 from armload.devices import Simulator
@@ -126,9 +126,10 @@ def show(parts: dict[str, Any]) -> None:
 def main() -> None:
     asked = options(__doc__, arms=4, minutes=0.0, seed=SEED, jobs=1, cells=ROOT / "out" / "warming-up")
     here = Path(__file__).parent
-    code = source_key(
-        *sorted(Path(armload.online.__path__[0]).glob("*.py")), here / "event_scenes.py", here / "warming_up.py"
-    )
+    rooms = (Path(armload.__path__[0]) / room for room in ("online", "posterior", "regression"))
+    files = sorted(file for room in rooms for file in room.glob("*.py"))
+    scripts = ("events.py", "event_scenes.py", "cell_hours.py", "warming_up.py")
+    code = source_key(*files, *(here / script for script in scripts))
     shifts = [Shift(kind, asked.seed + k) for k in range(asked.arms) for kind in KINDS]
     tasks = [Task.of_one(f"{x.kind}-{x.seed}", key_of(asdict(x), code), measured, x) for x in shifts]
     with threadpool_limits(1):

@@ -135,12 +135,13 @@ def test_the_age_of_a_tare_is_counted_from_when_it_was_taken_or_recorded(panda, 
     monkeypatch.setattr("time.monotonic", lambda: now)
     assert watcher.look().tare == "empty.csv, 10 min old"
     for tare, words in (
-        (Tare(log, age=7200.0, given=now), "empty.csv, 2 h old"),  # as somebody said
+        (Tare(log, age=7200.0, given=now - 1.0), "empty.csv, 2 h old"),  # as somebody said
         (Tare(log, taken=True, given=now - 15.0), "taken 15.0 s ago"),
-        (Tare(replace(log, epoch=0.0)), "empty.csv, which does not say when it was recorded"),
+        (Tare(replace(log, epoch=0.0), given=now), "empty.csv, which does not say when it was recorded"),
     ):
         session.tare = tare
         assert watcher.look().tare == words
+        assert tare.age_now == tare.age  # of a replay, which takes no minute, always the same
     session.close()
 
 

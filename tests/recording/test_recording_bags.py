@@ -18,6 +18,8 @@ from armload.arms import arm
 from armload.errors import RecordingError
 from armload.recording import read_recording, recording_chunks, write_recording
 from armload.recording.ros1_index import CompactReader
+from armload.survey.logs import Log
+from armload.survey.settings import Settings
 
 ROS1, ROS2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
 JOINT_STATE = "sensor_msgs/msg/JointState"
@@ -342,10 +344,22 @@ def test_units_of_positions_in_a_bag_may_be_said_and_nothing_else(tmp_path):
             read_recording(path, arm("ur10e"), columns=said)
 
 
+def test_a_survey_reads_the_units_of_bags_too(tmp_path):
+    path, plain = bag_of_currents(tmp_path, "mcap")
+    settings = Settings("ur10e", columns=(("tau_unit", "A"), ("rate", 100.0)))  # the rate is of its tables
+    np.testing.assert_allclose(settings.recording(Log(str(path), ""), path).tau, plain.tau * CONSTANTS, rtol=1e-15)
+
+
 def test_currents_without_constants_and_constants_of_another_count_are_refused(tmp_path):
     path, _ = bag_of_currents(tmp_path, "db3")
     with pytest.raises(RecordingError, match="5 torque constants for 6 joints"):
         read_recording(path, arm("ur10e"), columns="torque_constants=1 2 3 4 5")
+    for said, why in (
+        ("tau_unit=Nm,torque_constants=1 2 3 4 5 6", "leave one out"),
+        ("torque_constants=1 nan", "positive"),
+    ):
+        with pytest.raises(RecordingError, match=why):
+            read_recording(path, arm("ur10e"), columns=said)
     other = write_bag(tmp_path, "db3", {"/joint_states": samples()}, name="panda")
     with pytest.raises(
         RecordingError, match=r"efforts are motor currents \[A\], and no torque constants are known for p"
@@ -373,6 +387,9 @@ def test_a_real_log_in_a_bag_of_currents_is_answered_like_the_log_itself(tmp_pat
     assert main([*command, *tables]) == 0
     theirs = json.loads(capsys.readouterr().out)
     np.testing.assert_allclose(mine["phi"], theirs["phi"], atol=1e-4)
-    mixed = [str(paths[0]), "--columns", "tau_unit=A", "--tare", tables[2], "--tare-columns", "none"]
+    mixed = [str(paths[0]), "--columns", "tau_unit=A", "--tare", tables[2]]
+    assert main([*command, *mixed]) == 2
+    assert "say those of the tare with --tare-columns (none, if" in capsys.readouterr().err
+    mixed += ["--tare-columns", "none"]
     assert main([*command, *mixed]) == 0
     np.testing.assert_allclose(json.loads(capsys.readouterr().out)["phi"], theirs["phi"], atol=1e-4)

@@ -34,7 +34,7 @@ def test_what_is_discounted_counts_for_its_share_of_a_variance_and_of_the_time()
     blocks.extend(np.ones(40), old[:, None])
     blocks.discount(0.25)
     blocks.extend(np.ones(60), new[:, None])
-    weights = np.r_[np.full(39, 0.25), np.ones(61)]  # the last of the old was the block being filled
+    weights = np.r_[np.full(40, 0.25), np.ones(60)]
     expected = np.average(np.r_[old, new] ** 2, weights=weights)
     assert blocks.long_run_variance()[0] == pytest.approx(expected, rel=1e-12)
     assert blocks.duration == pytest.approx(weights.sum(), rel=1e-12)
@@ -47,8 +47,8 @@ def test_blocks_that_are_joined_keep_what_their_parts_count_for():
         part.extend(np.ones(count), rng.normal(size=(count, 1)))
         part.discount(share)
         part.extend(np.ones(1), np.ones((1, 1)))
-        weights.append(part.duration)
-        assert part.duration == pytest.approx(share * (count + 1) + (1.0 - share) * 2.0, abs=2.0 * (1.0 - share))
+        weights.append(share * count + 1.0)
+        assert part.duration == pytest.approx(weights[-1], rel=1e-12)
         parts.append(part)
     assert BlockMeans.joined(parts).duration == pytest.approx(sum(weights), rel=1e-12)
     more = BlockMeans(1, 1.0)
@@ -57,3 +57,23 @@ def test_blocks_that_are_joined_keep_what_their_parts_count_for():
     before = more.duration
     more.extend(np.ones(100), np.ones((100, 1)))  # pairs are joined
     assert more.duration == pytest.approx(before + 100.0, rel=1e-12)
+
+
+def test_a_run_that_is_discounted_for_days_keeps_blocks_enough_and_its_rate():
+    """As an empty arm's that is taken up again every half minute: all that it holds counts for 100 s each time."""
+    rng, blocks, held = np.random.default_rng(4), BlockMeans(1, 1.0), 0.0
+    for _ in range(3000):  # a day
+        blocks.extend(np.full(120, 0.25), 3.0 * rng.normal(size=(120, 1)))
+        held += 30.0
+        if held > 100.0:
+            share = 100.0 / blocks.duration
+            blocks.discount(share)
+            held *= share
+    _, times, weights = blocks.means()
+    assert held == pytest.approx(100.0, abs=1.5)
+    assert blocks.duration == pytest.approx(100.0, abs=0.5)
+    assert weights.sum() > 20.0
+    assert blocks.block <= 4.0
+    assert blocks.rate == pytest.approx(4.0, rel=0.02)
+    assert blocks.long_run_variance()[0] == pytest.approx(9.0 * 0.25, rel=0.4)
+    assert (times > 0.0).all()

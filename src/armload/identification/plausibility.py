@@ -71,7 +71,7 @@ def _check_radians(recording: Recording, arm: Arm) -> None:
         q = float(recording.q[k : k + 1][0, j])
         raise RecordingError(
             f"{recording.source}: positions look like degrees (q{j + 1} = {q:.4g} at {row_of(recording, k)}): "
-            "expected radians; of a table say so with --columns q_unit=deg,dq_unit=deg/s, else multiply by pi/180"
+            "expected radians; say so with --columns q_unit=deg,dq_unit=deg/s, or multiply by pi/180"
         )
 
 

@@ -22,6 +22,7 @@ from armload.regression import payload_prior_std
 
 _STANDING = "standing: nothing new is learned until the arm moves, or what it holds changes"
 STANDING_MOTOR = "standing: a change of payload is noticed only when the arm moves"
+SLOW_MOTOR = "too slow: friction hides a change of payload until a joint moves faster"
 CHANGING = "the payload is changing"
 LEFT_OUT = "samples that do not fit are left out: something pulls at the arm, or the payload is changing"
 MAYBE = (  # of p_change, p_contact and p_drift, the largest while they are large

@@ -24,7 +24,7 @@ from armload.identification.tare_age import checked_age, drift_after
 from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
 from armload.online.gate import Health, all_finite
-from armload.online.judgement import CHANGING, LEFT_OUT, MAYBE, STANDING_MOTOR, Judgement
+from armload.online.judgement import CHANGING, LEFT_OUT, MAYBE, SLOW_MOTOR, STANDING_MOTOR, Judgement
 from armload.online.learning import learned_from
 from armload.online.listening import Listening
 from armload.online.state import load_state, save_state
@@ -291,8 +291,9 @@ class OnlineIdentifier:
         if watch is not None and not watch.sure and not {CHANGING, LEFT_OUT} & set(judged.notes):
             maybe = (MAYBE[int(np.argmax(watch.likely))],)
         if self._blind and STANDING_MOTOR not in judged.notes:
-            maybe += (STANDING_MOTOR,)
-        trouble, told_by = () if stream.trouble is None else (stream.trouble,), self.relative_to
+            maybe += (SLOW_MOTOR if self._moving else STANDING_MOTOR,)
+        trouble = () if stream.trouble is None else (stream.trouble,)
+        known_by_log = self._tared or self.profile is not None
         return OnlineEstimate.of(
             {
                 **vars(judged.estimate),
@@ -300,13 +301,13 @@ class OnlineIdentifier:
                 "age": float(stream.unseen + stream.ahead + judged.age(self._internal)),
                 "lag": 0.0,
                 "since": stream.clock if self._since is None else self._since,
-                "relative_to": told_by,
+                "relative_to": self.relative_to,
                 "method": self.method,
                 "determined": judged.determined,
                 "held": judged.held,
                 "rests_on_prior": judged.rests_on_prior,
                 "torque_gain_std": judged.gain_std,
-                "same_arm_assumed": told_by in ("tare", "profile") and not judged.doubts.asked_whose,
+                "same_arm_assumed": known_by_log and not judged.doubts.asked_whose,
                 "around": judged.around,
                 "before": judged.before,
                 "calibrated": self.engine.calibrated

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from armload.errors import RecordingError, one_line
-from armload.recording.aliases import QUANTITIES, UNITS
+from armload.recording.aliases import AMPERE, QUANTITIES, UNITS
 
 _COLUMNS = ("t", *QUANTITIES)
 _OF_VALUES = (*(f"{key}_unit" for key in QUANTITIES), "torque_constants")
@@ -51,6 +51,14 @@ class ColumnSpec:
             unit = getattr(self, f"{key}_unit")
             if unit is not None and unit.strip().lower() not in UNITS[key]:
                 raise RecordingError(f"columns: {key}_unit is {unit!r}: expected one of {', '.join(UNITS[key])}")
+        if self.torque_constants is not None:
+            if self.tau_unit is not None and self.tau_unit.strip().lower() != AMPERE:
+                raise RecordingError(
+                    f"columns: torque_constants are for motor currents [A], and tau_unit is {self.tau_unit!r}: leave "
+                    "one out"
+                )
+            if not all(0.0 < constant < float("inf") for constant in self.torque_constants):
+                raise RecordingError("columns: torque_constants must be positive numbers [N·m/A], one for each joint")
         if self.rate is not None and not 0.0 < self.rate < float("inf"):
             raise RecordingError(f"columns: rate is {self.rate:g}: expected a positive number of samples per second")
 

@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 _MOST_BLOCKS = 256  # when they are full, pairs are joined: a variance of 128 blocks is known to 12 %
+# [1] weight of a block at which it is left out: all that are lighter hold a hundredth of what counts
+_FORGOTTEN = 0.01
 # [s] of a block to begin with: residuals of real arms stay correlated for about a second (two Pandas, a UR10e)
 BLOCK = 1.0
 
@@ -55,9 +57,12 @@ class BlockMeans:
         self._put(durations[first:], values[first:])
 
     def _put(self, durations: NDArray[np.float64], values: NDArray[np.float64]) -> None:
-        """Into the block being filled."""
-        self.sums[self._filled] += np.tensordot(durations, values, 1)
-        self._times[self._filled] += durations.sum()
+        """Into the block being filled; its weight is that of its parts."""
+        k, more = self._filled, float(durations.sum())
+        if self._weights[k] != 1.0 and more > 0.0:
+            self._weights[k] = (self._weights[k] * self._times[k] + more) / (self._times[k] + more)
+        self.sums[k] += np.tensordot(durations, values, 1)
+        self._times[k] += more
         self._count += int(np.count_nonzero(durations > 0))
 
     @property
@@ -83,8 +88,17 @@ class BlockMeans:
         return float(self._times @ self._weights)
 
     def discount(self, share: float) -> None:
-        """Let all values so far, but those in the block being filled, count for a share of what they did."""
-        self._weights[: self._filled] *= share
+        """Let all values so far count for a share of what they did; the oldest that count for hardly anything are left.
+
+        Else blocks would grow with all that ever was, and few be left to tell a variance of what counts.
+        """
+        weights = self._weights[: self._filled + 1]
+        weights *= share
+        if old := int(np.argmax(weights > _FORGOTTEN)):
+            self._count = round(self._count * float(self._times[old:].sum() / self._times.sum()))
+            for values, blank in ((self.sums, 0.0), (self._times, 0.0), (self._weights, 1.0)):
+                values[:-old], values[-old:] = values[old:].copy(), blank
+            self._filled -= old
 
     def long_run_variance(self) -> NDArray[np.float64]:
         """S (shape) [unit²·s] about zero; infinite while fewer than two blocks are full."""

@@ -29,7 +29,7 @@ from armload.online import OnlineEstimate, OnlineIdentifier
 from armload.online.state import saved_at
 from armload.posterior import Profile, load_profile
 from armload.posterior.drift import SESSION
-from armload.recording import read_recording
+from armload.recording import Sample, read_recording
 from armload.runtime.kernels import COMPILING
 from armload.service.feedback import Feedback
 from armload.service.finite import finite
@@ -55,6 +55,7 @@ class ArmProcess:
         self._kept: float | None = None  # when the state was last saved or taken up, by the wall's clock
         self._continued = False  # whether it goes on from a state
         self._failed: str | None = None  # why it could not be saved
+        self._newest: Sample | None = None  # that the state saved last is of
         self._line = threading.Lock()
         self.arm = self._made_arm()
         for reader in readers:
@@ -209,12 +210,12 @@ class ArmProcess:
 
     def _save(self, session: Session) -> None:
         self._saved, path = time.monotonic(), self.settings.state
-        if path is None:
+        if path is None or session.sample is self._newest:  # what was not seen since is not of now
             return
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             session.save(path)
-            self._kept, self._failed = time.time(), None
+            self._kept, self._failed, self._newest = time.time(), None, session.sample
         except (ArmloadError, OSError) as error:
             if str(error) != self._failed:
                 self.note(f"the state cannot be saved: {error}")

@@ -27,5 +27,5 @@ class Tare:
 
     @property
     def age_now(self) -> float:
-        """How old it is by now [s], as far as `age` is known."""
-        return self.age + time.monotonic() - self.given
+        """How old it is by now [s], as far as `age` is known; in whole minutes since then, so that replays agree."""
+        return self.age + 60.0 * ((time.monotonic() - self.given) // 60.0)

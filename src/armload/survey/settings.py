@@ -76,7 +76,8 @@ class Settings(ArmOptions):
         from armload.recording import has_topics
 
         wanted = log.episode if episode is None else episode
-        columns = None if has_topics(path) else ColumnSpec.of(dict(self.columns)).over(episode=wanted)
+        spec = ColumnSpec.of(dict(self.columns))
+        columns = spec.of_values if has_topics(path) else spec.over(episode=wanted)
         topic = self.topic if has_topics(path) else None
         return read_long(path, self.arm(), topic=topic, columns=columns)
 

@@ -38,12 +38,22 @@ def columns_of(options: argparse.Namespace, of_tare: bool = False) -> ColumnSpec
 
 
 def columns_for(options: argparse.Namespace, log: str | None, tare: str | None, of_tare: bool) -> ColumnSpec | None:
-    """What `--columns` says of a log, or of its tare: nothing of a bag where the other is a table, which it is of."""
-    from armload.recording import has_topics
+    """What `--columns` says of a log, or of its tare: nothing of a bag where the other is a table, which it is of.
+
+    Raises:
+        UsageError: it says units, which a bag has, too, and not of which of the two.
+    """
+    from armload.recording import ColumnSpec, has_topics
 
     path, other = (tare, log) if of_tare else (log, tare)
     own = getattr(options, "tare_columns", None) or (of_tare and getattr(options, "tare_episode", None) is not None)
     if not own and path is not None and other is not None and has_topics(path) and not has_topics(other):
+        spec = columns_of(options)
+        if spec.of_values != ColumnSpec():
+            raise UsageError(
+                "--columns says units, and of log and tare one is a bag, the other a table: say those of the tare with "
+                f"--tare-columns ({AS_NAMED}, if its own header says all)"
+            )
         return None
     return columns_of(options, of_tare)
 

@@ -56,7 +56,7 @@ def parser() -> Parser:
     add("--tare", type=file_name, metavar="LOG0", help="an empty log of the arm, or of each: empty/{arm}.csv")
     add("--tool", type=file_name, metavar="FILE", help="a mounted tool that is known (JSON, or franka-hand)")
     add("--method", type=file_name, metavar="M", help="as of `armload identify` (default: the most trustworthy)")
-    add("--columns", type=file_name, metavar="SPEC", help=f"of logs that are tables: {COLUMNS}")
+    add("--columns", type=file_name, metavar="SPEC", help=f"of logs that are tables, units of bags, too: {COLUMNS}")
     add("--topic", metavar="T", help="JointState topic of bags that have several")
     add("--jobs", type=at_least(1), metavar="N", help="processes (default: all cores); same rows")
     add_cluster_argument(parser)

@@ -78,7 +78,7 @@ class Watcher:
 
 
 def _tare_in_words(tare: Tare) -> str:
-    log, age = tare.recording, tare.age_now
+    log, age = tare.recording, tare.age + time.monotonic() - tare.given
     if tare.taken:
         return f"taken {in_words(age)} ago"
     if tare.age:
