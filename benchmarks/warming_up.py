@@ -1,6 +1,6 @@
 """A cell whose arm warms up: forty minutes of hand-overs while friction falls and the sensors' offsets move.
 
-    python benchmarks/warming_up.py [--arms 4] [--minutes 0] [--seed 80000] [--jobs 1] [--cells out/warming-up]
+    python benchmarks/warming_up.py [--arms 2] [--minutes 0] [--seed 80000] [--jobs 1] [--cells out/warming-up]
 
 Streams as the moving ones of `cell_hours.py` (real-like Pandas, random motions, no tare, something of 0.2 kg and more
 taken up and put down in turn, 8 to 40 s apart, within 0.05 to 2 s), at 100 Hz. An arm of the kind
@@ -124,7 +124,7 @@ def show(parts: dict[str, Any]) -> None:
 
 
 def main() -> None:
-    asked = options(__doc__, arms=4, minutes=0.0, seed=SEED, jobs=1, cells=ROOT / "out" / "warming-up")
+    asked = options(__doc__, arms=2, minutes=0.0, seed=SEED, jobs=1, cells=ROOT / "out" / "warming-up")
     here = Path(__file__).parent
     rooms = (Path(armload.__path__[0]) / room for room in ("online", "posterior", "regression"))
     files = sorted(file for room in rooms for file in room.glob("*.py"))
