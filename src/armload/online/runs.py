@@ -48,6 +48,7 @@ class Runs:
     def go_back(self) -> PosteriorLeastSquares | None:
         """Take the earlier run up again; the current one is returned, if it is none of the others."""
         assert self.earlier is not None
+        self.current.stream.hold()  # a solution of it may read what is discounted
         dropped, self.current, self.earlier = self.current, self.earlier, None
         self.current.stream.remember(REMEMBERED)
         return self._unless_kept(dropped)
