@@ -251,14 +251,14 @@ class PayloadIdentifier(LifecycleNode):
         samples, self._taring = list(self._taring), None
         t, q, dq, tau = map(np.array, zip(*samples, strict=True))
         try:
-            tare = Tare(Recording(t, q, dq, tau, joint_names=self._bare.joint_names), taken=True)
-            check_usable(tare, self._stream.arm)
-            self._identify(self._stream.arm, tare, self._stream.known)
+            log = Recording(t, q, dq, tau, joint_names=self._bare.joint_names)
+            check_usable(log, self._stream.arm)
+            self._identify(self._stream.arm, Tare(log, taken=True), self._stream.known)
         except ArmloadError as error:
             self._said = f"no tare: {error}"
             self.get_logger().error(self._said)
             return
-        self._said = f"tared with {tare.duration:.1f} s"
+        self._said = f"tared with {log.duration:.1f} s"
         self.get_logger().info(self._said)
 
     def _set_tool(self, request: SetTool.Request, response: SetTool.Response) -> SetTool.Response:
