@@ -24,15 +24,14 @@ from typing import Any
 
 import numpy as np
 from event_scenes import LOOKED, STEP, Change, Resting, Stream, body, torque_of
-from events import PAGE, measured_stream, of_part
-from script import ROOT, markdown_table, options, say, write, write_table
-from threadpoolctl import threadpool_limits
+from events import PAGE, finished_cells, measured_stream, of_part
+from script import ROOT, markdown_table, options, write, write_table
 
 import armload.online
 from armload import Recording, arm
 from armload.devices import Simulator
 from armload.lab.cells import key_of
-from armload.lab.experiment import Task, run_tasks, source_key
+from armload.lab.experiment import Task, source_key
 from armload.motion import Motion, random_motion
 from armload.simulation import Sensors, World
 
@@ -130,9 +129,7 @@ def main() -> None:
     for k in range(asked.streams):
         scene = Hours(KINDS[k % len(KINDS)], asked.seed + k)
         tasks.append(Task.of_one(f"{scene.kind}-{scene.seed}", key_of(asdict(scene), code), measured, scene))
-    with threadpool_limits(1):
-        until = 60.0 * asked.minutes if asked.minutes else None
-        cells = run_tasks(tasks, asked.cells, jobs=asked.jobs, until=until, say=say)
+    cells = finished_cells(tasks, asked)
     parts = {kind: of_part([x for name, x in cells.items() if name.startswith(kind)]) for kind in KINDS}
     result = {"seeds_from": asked.seed, "streams": len(cells), "parts": parts}
     print(json.dumps(result, indent=1))

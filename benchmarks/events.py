@@ -41,6 +41,7 @@ others.
 
 from __future__ import annotations
 
+import argparse
 import json
 from dataclasses import asdict
 from pathlib import Path
@@ -172,6 +173,13 @@ def measured_stream(stream: Stream) -> dict[str, Any]:
     }
 
 
+def finished_cells(tasks: list[Task], asked: argparse.Namespace) -> dict[str, dict[str, Any]]:
+    """The cells of streams, measured on one thread each, as far as `asked` has them: its cells, jobs and minutes."""
+    until = 60.0 * asked.minutes if asked.minutes else None
+    with threadpool_limits(1):
+        return run_tasks(tasks, asked.cells, jobs=asked.jobs, until=until, say=say)
+
+
 # ---------------------------------------------------------------------- what the cells say
 
 
@@ -207,11 +215,13 @@ def of_part(cells: list[dict[str, Any]]) -> dict[str, Any]:
     lates = [late(cell) for cell in cells]
     after_all, false = [x for delays, _ in lates for x in delays], [x for _, events in lates for x in events]
     inside = [cell["inside"] for cell in cells if cell["inside"] is not None]
+    wrong = [x for cell in cells if (x := cell["calibrated_and_out"]) is not None]
     out: dict[str, Any] = {
         "scenes": len(cells),
         "false": per_hour(len(false), sum(cell["seconds"] for cell in cells) / 3600.0) | {"which": false},
         "inside": round(float(np.mean(inside)), 3) if inside else None,
         "calibrated": round(float(np.mean([cell["calibrated"] for cell in cells])), 3),
+        "calibrated_and_out": round(float(np.mean(wrong)), 4) if wrong else None,
         "p_change": reliability(cells)["p_change"],
     }
     if changes:
@@ -402,9 +412,7 @@ def main() -> None:
         for part in (x for x in parts if k < streams[x]):
             scene = Scene(part, asked.seed + k)
             tasks.append(Task.of_one(f"{part}-{scene.seed}", key_of(asdict(scene), code), measured, scene))
-    with threadpool_limits(1):
-        until = 60.0 * asked.minutes if asked.minutes else None
-        cells = run_tasks(tasks, asked.cells, jobs=asked.jobs, until=until, say=say)
+    cells = finished_cells(tasks, asked)
     found = {part: [x for name, x in cells.items() if name.rpartition("-")[0] == part] for part in parts}
     result: dict[str, Any] = {"seeds_from": asked.seed, "parts": {part: of_part(x) for part, x in found.items() if x}}
     if "early" in parts:

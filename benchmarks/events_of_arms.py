@@ -22,9 +22,8 @@ from typing import Any
 
 import numpy as np
 from event_scenes import LOOKED, Change, Stream
-from events import PAGE, measured_stream, of_part
-from script import ROOT, markdown_table, options, say, write, write_table
-from threadpoolctl import threadpool_limits
+from events import PAGE, finished_cells, measured_stream, of_part
+from script import ROOT, markdown_table, options, write, write_table
 
 import armload
 from armload import Recording, arm
@@ -32,7 +31,7 @@ from armload.arms import rated_mass
 from armload.devices import Simulator
 from armload.inertia import InertialParameters
 from armload.lab.cells import key_of
-from armload.lab.experiment import Task, run_tasks, source_key
+from armload.lab.experiment import Task, source_key
 from armload.motion import random_motion
 from armload.payloads import draw_payload
 from armload.simulation import Sensors, World, simulate
@@ -118,16 +117,12 @@ def main() -> None:
     code = source_key(*files, *(here / script for script in ("events.py", "event_scenes.py", "events_of_arms.py")))
     scenes = [Scene(n, share, asked.seed + k) for k in range(asked.streams) for n in names for share in SHARES]
     tasks = [Task.of_one(f"{x.arm}-{x.share:g}-{x.seed}", key_of(asdict(x), code), measured, x) for x in scenes]
-    with threadpool_limits(1):
-        until = 60.0 * asked.minutes if asked.minutes else None
-        cells = run_tasks(tasks, asked.cells, jobs=asked.jobs, until=until, say=say)
+    cells = finished_cells(tasks, asked)
     parts = {}
     for name in names:
         for share in SHARES:
             of = [cell | {"name": key} for key, cell in cells.items() if key.startswith(f"{name}-{share:g}-")]
-            out = np.mean([cell["calibrated_and_out"] for cell in of])
-            about = {"arm": name, "kg": share * rated_mass(arm(name)), "calibrated_and_out": round(float(out), 4)}
-            parts[f"{name}-{share:g}"] = of_part(of) | about
+            parts[f"{name}-{share:g}"] = of_part(of) | {"arm": name, "kg": share * rated_mass(arm(name))}
     result = {"seeds_from": asked.seed, "streams": len(cells), "parts": parts}
     print(json.dumps(result, indent=1))
     if asked.seed == SEED and names == list(ARMS):

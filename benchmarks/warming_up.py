@@ -26,16 +26,15 @@ from typing import Any
 import numpy as np
 from cell_hours import APART, TAKES
 from event_scenes import LOOKED, STEP, Change, Stream, body, torque_of
-from events import PAGE, measured_stream, of_part
-from script import ROOT, markdown_table, options, say, write, write_table
-from threadpoolctl import threadpool_limits
+from events import PAGE, finished_cells, measured_stream, of_part
+from script import ROOT, markdown_table, options, write, write_table
 
 import armload
 from armload import Recording, arm
 from armload.arms import rated_effort
 from armload.devices import Simulator
 from armload.lab.cells import key_of
-from armload.lab.experiment import Task, run_tasks, source_key
+from armload.lab.experiment import Task, source_key
 from armload.motion import random_motion
 from armload.online import runs
 from armload.regression import Correction
@@ -132,15 +131,12 @@ def main() -> None:
     code = source_key(*files, *(here / script for script in scripts))
     shifts = [Shift(kind, asked.seed + k) for k in range(asked.arms) for kind in KINDS]
     tasks = [Task.of_one(f"{x.kind}-{x.seed}", key_of(asdict(x), code), measured, x) for x in shifts]
-    with threadpool_limits(1):
-        until = 60.0 * asked.minutes if asked.minutes else None
-        cells = run_tasks(tasks, asked.cells, jobs=asked.jobs, until=until, say=say)
+    cells = finished_cells(tasks, asked)
     parts = {}
     for kind in KINDS:
         for memory in MEMORIES:
             of = [cell[memory] | {"name": name} for name, cell in cells.items() if name.startswith(kind)]
-            out = np.mean([cell["calibrated_and_out"] for cell in of])
-            parts[f"{kind}, {memory}"] = of_part(of) | {"calibrated_and_out": round(float(out), 4)}
+            parts[f"{kind}, {memory}"] = of_part(of)
     result = {"seeds_from": asked.seed, "streams": len(cells), "parts": parts}
     print(json.dumps(result, indent=1))
     if asked.seed == SEED:

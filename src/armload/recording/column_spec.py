@@ -90,6 +90,11 @@ class ColumnSpec:
         """What it says of units of position, velocity and torque: all that a bag leaves open."""
         return ColumnSpec(**{key: getattr(self, key) for key in _OF_VALUES})
 
+    @property
+    def of_currents(self) -> bool:
+        """Whether it says that tau is motor current, by its unit or by constants for it."""
+        return self.torque_constants is not None or (self.tau_unit or "").strip().lower() == AMPERE
+
     def over(self, **more: Any) -> ColumnSpec:
         """These columns, with what is given besides.
 

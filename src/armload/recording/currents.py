@@ -1,11 +1,15 @@
-"""Motor currents in a log: the torque of an ampere, and what is said of it."""
+"""Units that are said of a log, and motor currents: the torque of an ampere, and what is said of it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from armload.arms import ARMS, Arm
 from armload.errors import RecordingError
+from armload.recording.aliases import QUANTITIES, UNITS
 from armload.recording.column_spec import ColumnSpec
 
 _SAY = '--columns "torque_constants=12 12 10 11 11 11"'
@@ -37,3 +41,22 @@ def no_constants(where: str, what: str, arm: Arm | None, n: int, instead: str = 
         f"{where}: {what} motor currents [A], and no torque constants are known for {called}: {instead}give {n} "
         f"numbers in N·m/A, from a scale test with a known load, with {_SAY}"
     )
+
+
+def in_si(spec: ColumnSpec, arm: Arm | None, n: int, where: str) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+    """What the values of a message (3n,) are multiplied with to be in rad, rad/s, N·m, and a note on currents.
+
+    Raises:
+        RecordingError: they are motor currents, of constants that nobody knows.
+    """
+    scale = np.ones((3, n))
+    for row, key in zip(scale, QUANTITIES, strict=True):
+        unit = getattr(spec, f"{key}_unit")
+        row *= 1.0 if unit is None else UNITS[key][unit.strip().lower()]
+    if not spec.of_currents:
+        return scale.ravel(), ()
+    constants = torque_constants(spec, arm, n, where)
+    if constants is None:
+        raise no_constants(where, "efforts are", arm, n)
+    scale[2] = constants
+    return scale.ravel(), (of_currents(where, constants),)

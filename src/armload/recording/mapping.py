@@ -184,7 +184,7 @@ def _scale(header: Header, key: str, places: list[int], spec: ColumnSpec) -> tup
     if unit is None and len(units) == 1:
         (unit,) = units
         currents = {reading is not None and reading.kind == "current" for reading in readings}
-        if key == "tau" and unit is None and (currents == {True} or spec.torque_constants is not None):
+        if key == "tau" and unit is None and (currents == {True} or spec.of_currents):
             unit = AMPERE
     elif unit is None:
         stated = sorted(str(unit or "none") for unit in units)

@@ -19,10 +19,9 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm, names_among
 from armload.errors import RecordingError, one_line
-from armload.recording.aliases import AMPERE, QUANTITIES, UNITS
 from armload.recording.checked import Chunks
 from armload.recording.column_spec import ColumnSpec
-from armload.recording.currents import no_constants, of_currents, torque_constants
+from armload.recording.currents import in_si
 from armload.recording.mcap_file import is_cut_off, mended
 from armload.recording.recording import Recording
 from armload.runtime.extras import missing
@@ -201,7 +200,7 @@ def _recordings(
         if wanted is None:
             wanted = message.names
         if scale is None:
-            scale, said = _scale(spec, arm, len(wanted), f"{where}, {topic}")
+            scale, said = in_si(spec, arm, len(wanted), f"{where}, {topic}")
         if message.names not in columns:
             if called is None:
                 called = wanted if arm is None else names_among(arm, message.names)
@@ -223,26 +222,6 @@ def _recordings(
     if messages:
         yield from chunks.take(*tables.of(messages), joint_names=wanted, epoch=tables.epoch)
     yield chunks.last((*bag.notes, *tables.notes, *said))
-
-
-def _scale(spec: ColumnSpec, arm: Arm | None, n: int, where: str) -> tuple[NDArray[np.float64], tuple[str, ...]]:
-    """What the values of a message (3n,) are multiplied with to be in rad, rad/s, N·m, and a note on currents.
-
-    Raises:
-        RecordingError: they are motor currents, of constants that nobody knows.
-    """
-    scale = np.ones((3, n))
-    for row, key in zip(scale, QUANTITIES, strict=True):
-        unit = getattr(spec, f"{key}_unit")
-        row *= 1.0 if unit is None else UNITS[key][unit.strip().lower()]
-    unit = AMPERE if spec.tau_unit is None and spec.torque_constants is not None else spec.tau_unit
-    if unit is None or unit.strip().lower() != AMPERE:
-        return scale.ravel(), ()
-    constants = torque_constants(spec, arm, n, where)
-    if constants is None:
-        raise no_constants(where, "efforts are", arm, n)
-    scale[2] = constants
-    return scale.ravel(), (of_currents(where, constants),)
 
 
 class _Tables:
