@@ -11,27 +11,26 @@ standing   the arm stands from 2 s before to 2 s after, as at a gripper; each ta
 
 What is handed over is added to the sensors' torque, as in the scenes of `events.py` that take time; what counts as
 noticed, late, false and inside is said there. Streams are cells in out/cell-hours, and are not measured again while
-`armload.online` and the scenes stay as they are. Constants were set on other seeds. Printed, and written to
-benchmarks/results/cell_hours.json and a table of docs/online.md; printed only with another seed than 70000.
+`armload.online`, `armload.posterior`, `armload.regression` and the scenes stay as they are. Constants were set on other
+seeds. Printed, and written to benchmarks/results/cell_hours.json and a table of docs/online.md; printed only with
+another seed than 70000.
 """
 
 from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from event_scenes import LOOKED, STEP, Change, Resting, Stream, body, torque_of
-from events import PAGE, finished_cells, measured_stream, of_part
+from events import PAGE, code_of_streams, finished_cells, measured_stream, of_part
 from script import ROOT, markdown_table, options, write, write_table
 
-import armload.online
 from armload import Recording, arm
 from armload.devices import Simulator
 from armload.lab.cells import key_of
-from armload.lab.experiment import Task, source_key
+from armload.lab.experiment import Task
 from armload.motion import Motion, random_motion
 from armload.simulation import Sensors, World
 
@@ -121,10 +120,7 @@ def show(parts: dict[str, Any]) -> None:
 
 def main() -> None:
     asked = options(__doc__, streams=60, minutes=0.0, seed=SEED, jobs=1, cells=ROOT / "out" / "cell-hours")
-    here = Path(__file__).parent
-    code = source_key(
-        *sorted(Path(armload.online.__path__[0]).glob("*.py")), here / "event_scenes.py", here / "cell_hours.py"
-    )
+    code = code_of_streams("event_scenes.py", "cell_hours.py")
     tasks = []
     for k in range(asked.streams):
         scene = Hours(KINDS[k % len(KINDS)], asked.seed + k)

@@ -28,7 +28,7 @@ LOOKED = (0.5, 1.0, 2.0, 5.0)  # [s] after the end of a change
 RATES = {"rate_25": 25.0, "rate_50": 50.0, "rate_100": 100.0, "rate_500": 500.0, "rate_1000": 1000.0}  # [Hz]
 PARTS = (
     "steps", *RAMPS, "slow", "standing", "early", "swaps", "light", "drop", "shift", "cycles", *RATES,
-    "drift", "quiet", "pushes", "real", "real_tared", "real_as_is",
+    "drift", "quiet", "pushes", "real", "real_tared", "real_motor", "real_as_is",
 )  # fmt: skip
 # log, arm, what is bolted to it [kg]; None: nobody says
 REAL = (
@@ -302,8 +302,9 @@ def _thinned(log: Recording, part: str, rng: np.random.Generator) -> Recording:
 
 
 def _real(scene: Scene, rng: np.random.Generator) -> Stream:
-    """A real log as it is, or with a payload's torque added and taken away, or that after its first ten seconds."""
-    name, robot, base = REAL[0 if scene.part == "real_tared" else scene.seed % len(REAL)]
+    """A real log as it is, or with a payload's torque added and taken away, or so with a tare of the same arm."""
+    which = {"real_tared": 0, "real_motor": 1 + scene.seed % 2}.get(scene.part, scene.seed % len(REAL))
+    name, robot, base = REAL[which]
     known = arm(data() / robot, "tool0") if robot.endswith(".urdf") else arm(robot)
     log, tare = read_recording(data() / name, known), None
     if scene.part == "real_as_is":
@@ -312,6 +313,11 @@ def _real(scene: Scene, rng: np.random.Generator) -> Stream:
     if scene.part == "real_tared":
         cut = log.t[0] + 10.0
         log, tare, first = log.between(cut, log.t[-1]), log.between(log.t[0], cut), 2.5
+    elif scene.part == "real_motor" and base:
+        tare = read_recording(data() / REAL[1][0], known)
+    elif scene.part == "real_motor":
+        cut = 0.5 * (log.t[0] + log.t[-1])
+        log, tare = log.between(cut, log.t[-1]), log.between(log.t[0], cut)
     t = log.t[0] + first + rng.uniform(0.0, 1.5)
     while t < end:
         phi = body(rng) if phi[0] == 0.0 else np.zeros(10)

@@ -24,6 +24,7 @@ quiet        nothing changes; every other arm holds a payload since 4 s
 pushes       the same, and a person pushes with 10–60 N for 0.3–3 s, at the flange or at the forearm
 real         five real logs (Panda, UR10e empty and loaded, UR10, KUKA), payloads' torque added and taken away at once
 real_tared   the Panda's log after its first ten seconds, which are the tare
+real_motor   the loaded UR10e with the empty one as its tare, and the empty one after its first half, which is the tare
 real_as_is   the five real logs as they are
 
 A change counts as noticed with its first event from its beginning until a second after its end, else as missed; of the
@@ -32,11 +33,11 @@ push and a second after it, which are counted there. *inside* is the share of ma
 their 95 % interval some time after the end. Of all moments, in tenths of a second, `reliability` says how often a
 probability was right; event_truth.py says what was true.
 
-Scenes are cells in out/events: a scene measured once is not measured again while `armload.online`, the streams and what
-is true of them stay as they are. They are measured one of each part in turn; --minutes: begin none after so many
-minutes, and tell of those that are there. Written to benchmarks/results/events.json and from there to docs/online.md;
-printed only: --quick, two of each part; some --parts; another --seed to begin with than 90000. Constants were set on
-others.
+Scenes are cells in out/events: a scene measured once is not measured again while `armload.online`, `armload.posterior`,
+`armload.regression`, the streams and what is true of them stay as they are. They are measured one of each part in turn;
+--minutes: begin none after so many minutes, and tell of those that are there. Written to benchmarks/results/events.json
+and from there to docs/online.md; printed only: --quick, two of each part; some --parts; another --seed to begin with
+than 90000. Constants were set on others.
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ from scipy.stats import beta, chi2
 from script import ROOT, markdown_table, options, say, write, write_table
 from threadpoolctl import threadpool_limits
 
-import armload.online
+import armload
 from armload.lab.cells import key_of
 from armload.lab.experiment import Task, run_tasks, source_key
 from armload.online import OnlineIdentifier
@@ -86,6 +87,7 @@ NAMES = {
     "rate_1000": "1000 Hz",
     "real": "added to real logs",
     "real_tared": "the real Panda, tared",
+    "real_motor": "the real UR10e, tared",
 }  # rows of the page
 
 
@@ -171,6 +173,13 @@ def measured_stream(stream: Stream) -> dict[str, Any]:
         "calibrated_and_out": None if stream.base is None else float((~inside & (table[:, 4] == 1.0))[every].mean()),
         "reliability": reliability_of(stream, table, held, every),
     }
+
+
+def code_of_streams(*scripts: str) -> str:
+    """What a stream's answers depend on: the rooms of the package that say them, and these scripts."""
+    rooms = (Path(armload.__path__[0]) / room for room in ("online", "posterior", "regression"))
+    files = sorted(file for room in rooms for file in room.glob("*.py"))
+    return source_key(*files, *(Path(__file__).parent / script for script in scripts))
 
 
 def finished_cells(tasks: list[Task], asked: argparse.Namespace) -> dict[str, dict[str, Any]]:
@@ -399,10 +408,7 @@ def main() -> None:
         jobs=1,
         cells=ROOT / "out" / "events",
     )
-    here = Path(__file__).parent
-    code = source_key(
-        *sorted(Path(armload.online.__path__[0]).glob("*.py")), here / "event_scenes.py", here / "event_truth.py"
-    )
+    code = code_of_streams("event_scenes.py", "event_truth.py")
     parts, scenes = asked.parts.split(","), 2 if asked.quick else asked.scenes
     streams = {part: scenes * (1 if asked.quick else MORE.get(part, 1)) for part in parts}
     if "real_as_is" in streams:

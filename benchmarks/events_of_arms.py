@@ -17,21 +17,19 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from event_scenes import LOOKED, Change, Stream
-from events import PAGE, finished_cells, measured_stream, of_part
+from events import PAGE, code_of_streams, finished_cells, measured_stream, of_part
 from script import ROOT, markdown_table, options, write, write_table
 
-import armload
 from armload import Recording, arm
 from armload.arms import rated_mass
 from armload.devices import Simulator
 from armload.inertia import InertialParameters
 from armload.lab.cells import key_of
-from armload.lab.experiment import Task, source_key
+from armload.lab.experiment import Task
 from armload.motion import random_motion
 from armload.payloads import draw_payload
 from armload.simulation import Sensors, World, simulate
@@ -111,10 +109,7 @@ def main() -> None:
     asked = options(
         __doc__, streams=4, minutes=0.0, seed=SEED, jobs=1, arms=",".join(ARMS), cells=ROOT / "out" / "events-of-arms"
     )
-    here, names = Path(__file__).parent, asked.arms.split(",")
-    rooms = (Path(armload.__path__[0]) / room for room in ("online", "posterior", "regression"))
-    files = sorted(file for room in rooms for file in room.glob("*.py"))
-    code = source_key(*files, *(here / script for script in ("events.py", "event_scenes.py", "events_of_arms.py")))
+    names, code = asked.arms.split(","), code_of_streams("events.py", "event_scenes.py", "events_of_arms.py")
     scenes = [Scene(n, share, asked.seed + k) for k in range(asked.streams) for n in names for share in SHARES]
     tasks = [Task.of_one(f"{x.arm}-{x.share:g}-{x.seed}", key_of(asdict(x), code), measured, x) for x in scenes]
     cells = finished_cells(tasks, asked)

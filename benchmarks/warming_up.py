@@ -20,21 +20,19 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from cell_hours import APART, TAKES
 from event_scenes import LOOKED, STEP, Change, Stream, body, torque_of
-from events import PAGE, finished_cells, measured_stream, of_part
+from events import PAGE, code_of_streams, finished_cells, measured_stream, of_part
 from script import ROOT, markdown_table, options, write, write_table
 
-import armload
 from armload import Recording, arm
 from armload.arms import rated_effort
 from armload.devices import Simulator
 from armload.lab.cells import key_of
-from armload.lab.experiment import Task, source_key
+from armload.lab.experiment import Task
 from armload.motion import random_motion
 from armload.online import runs
 from armload.regression import Correction
@@ -124,11 +122,7 @@ def show(parts: dict[str, Any]) -> None:
 
 def main() -> None:
     asked = options(__doc__, arms=2, minutes=0.0, seed=SEED, jobs=1, cells=ROOT / "out" / "warming-up")
-    here = Path(__file__).parent
-    rooms = (Path(armload.__path__[0]) / room for room in ("online", "posterior", "regression"))
-    files = sorted(file for room in rooms for file in room.glob("*.py"))
-    scripts = ("events.py", "event_scenes.py", "cell_hours.py", "warming_up.py")
-    code = source_key(*files, *(here / script for script in scripts))
+    code = code_of_streams("events.py", "event_scenes.py", "cell_hours.py", "warming_up.py")
     shifts = [Shift(kind, asked.seed + k) for k in range(asked.arms) for kind in KINDS]
     tasks = [Task.of_one(f"{x.kind}-{x.seed}", key_of(asdict(x), code), measured, x) for x in shifts]
     cells = finished_cells(tasks, asked)

@@ -457,15 +457,15 @@ def test_an_offset_that_jumps_and_stays_is_believed_at_last():
     assert not any("do not fit" in note for e in estimates if e.t > 73.0 for note in e.notes)
 
 
-@pytest.mark.parametrize(("std", "tare"), [(0.02, True), (2.0, False)])
-def test_a_run_of_which_nobody_knows_whether_it_held_anything_is_no_tare_of_the_next(std, tare):
+@pytest.mark.parametrize(("mass", "std", "tare"), [(0.0, 0.02, True), (0.0, 2.0, False), (0.5, 0.02, False)])
+def test_a_run_that_held_something_or_of_which_nobody_knows_is_no_tare_of_the_next(mass, std, tare):
     first = SimpleNamespace(
         arm=arm("panda"),
         reference=None,
         stream=SimpleNamespace(seconds=10.0),
-        last=SimpleNamespace(std=np.full(10, std)),
+        last=SimpleNamespace(phi=np.r_[mass, np.zeros(9)], std=np.full(10, std)),
     )
-    assert Runs(first).reference_for_next(held=False) is (first if tare else None)  # type: ignore[arg-type]
+    assert Runs(first).reference_for_next() is (first if tare else None)  # type: ignore[arg-type]
 
 
 def test_a_replay_says_the_same_bit_for_bit_however_the_second_thread_fares():

@@ -10,12 +10,13 @@ import pytest
 from armload import arm
 from armload.arms import rated_effort
 from armload.motion import random_motion
+from armload.posterior.problem import Problem
 from armload.posterior.solve import solve
 from armload.regression import Correction, JointFeatures, payload_prior_std
 from armload.regression.information import RegressionData
 from armload.regression.lag import GAIN
 from armload.regression.noise import SMOOTH, whole_noise
-from armload.simulation import simulate
+from armload.simulation import World, simulate
 
 
 @pytest.mark.parametrize("seed", [0, 1])
@@ -36,3 +37,42 @@ def test_white_noise_is_known_by_its_power_where_few_blocks_and_many_functions_h
     assert np.all((0.4 * expected < found[True]) & (found[True] < 1.5 * expected))
     assert np.median(found[True] / expected) > 0.6
     assert np.median(found[False] / expected) < 0.4
+
+
+def _said(robot, log) -> RegressionData:
+    data = RegressionData(Correction(robot, rated_effort(robot)), GAIN, JointFeatures(robot.n, 8, 4), SMOOTH.block)
+    data.add(log.t, log.q, log.dq, log.tau)
+    return data
+
+
+def test_a_run_too_short_to_tell_is_foreseen_as_noisy_as_its_tare_was():
+    """A tenth of a second shows nothing of a noise of ten times what is expected of any arm."""
+    robot, rate = arm("ur5e"), 100.0
+    correction = Correction(robot, rated_effort(robot))
+    std = 10.0 * np.sqrt(whole_noise(correction, SMOOTH) * rate)
+    tare = simulate(robot, random_motion(robot, 3, duration=20.0), rate=rate)
+    tare = replace(tare, tau=tare.tau + std * np.random.default_rng(0).normal(size=tare.tau.shape))
+    run = simulate(robot, random_motion(robot, 4, duration=5.0), rate=rate).between(0.0, 0.1)
+    said, prior = [_said(robot, tare), _said(robot, run)], payload_prior_std(robot)
+    start = solve(said[:1], prior, None, SMOOTH, 5).scales
+    problem = Problem(said, prior, None, SMOOTH)
+    scales, shown = problem.scales(start), problem.share[-1] * start.noise[0]
+    np.testing.assert_allclose(scales.noise[-1], shown)
+    assert np.median(shown / problem.expected[-1]) > 10.0
+    again = problem.improved(scales, problem.posterior(scales)).noise[-1]
+    assert np.all((0.5 * shown < again) & (again < 2.0 * shown))
+
+
+def test_logs_of_a_profile_are_learned_alike_whichever_comes_last():
+    """Only a run after a tare is foreseen by it: which of several logs stands last must not change what they say."""
+    robot = arm("ur5e")
+    logs = [simulate(robot, random_motion(robot, k, duration=6.0), world=World.real_like(robot, 2)) for k in (1, 2)]
+    data, prior = [_said(robot, log) for log in logs], payload_prior_std(robot)
+    found = []
+    for order in (data, data[::-1]):
+        problem = Problem(order, prior, None, SMOOTH, same=True)
+        scales = problem.scales(None)
+        for _ in range(3):
+            scales = problem.improved(scales, problem.posterior(scales))
+        found.append(scales.noise)
+    np.testing.assert_allclose(found[0], found[1][::-1], rtol=1e-6)

@@ -15,7 +15,7 @@ from armload.runtime.kernels import kernel
 @kernel
 def take_row(
     h, seen, X, wrench, scale, mean, covariance, taken, error, loud, level, listening, rest,
-    root, effort, pushes, hands, sides, rates, p, b, f, x, P, A, c, since
+    root, effort, pushes, hands, others, rates, p, b, f, x, P, A, c, since
 ):  # fmt: skip  # pragma: no cover - compiled
     """Take a row; returns the probabilities of each kind, and for how long the likeliest other body has been there [s].
 
@@ -24,21 +24,21 @@ def take_row(
             and the block's length so far [s]. listening: what decides about it. rest: (2, n) mean and variance of the
             error of what is foreseen of an arm that stands [N·m]; the variance is negative before its first row.
         root: (10, 10) mass·R. effort: (n,). pushes: sizes and times of drifts and contacts. hands: (2, K, 6) deviations
-            and times of a hand's force and moment; none of deviation 0. sides: sizes and times of bodies. rates: how
-            often each kind begins or ends, and how. p … c: probabilities, states; of a hand f (K, 7, 6) mean and
-            covariance. since: moments, evidence, ages.
+            and times of a hand's force and moment. others: sizes and times of bodies. rates: how often each kind begins
+            or ends, and how. p … c: probabilities, states; of a hand f (K, 7, 6) mean and covariance. since: moments,
+            evidence, ages.
     """
     shared = 1.0 if taken else 1.0 + 2.0 * listening[0] / h
     U, d, v = _innovation(seen, X, scale, root, mean, covariance, shared, level[0], error, rest)
     if taken:
         _listen(h, scale, d, v, p[0], loud, level, listening)
-    _weigh(h, U, d, v, wrench, scale, effort, pushes, hands, sides, rates, p, b, f, x, P, A, c, since)
+    _weigh(h, U, d, v, wrench, scale, effort, pushes, hands, others, rates, p, b, f, x, P, A, c, since)
     if error[0] > 0.0 and p[0] + p[1] > listening[5]:
         for j in range(len(d)):
             rest[0, j] += rest[1, j] * scale[j] * d[j] / v[j]
             rest[1, j] *= level[0] / v[j]
     handing_from = 1 + pushes.shape[1] + hands.shape[1]
-    other_from = handing_from + sides.shape[1]
+    other_from = handing_from + others.shape[1]
     contact = handing = other = 0.0
     best = other_from
     for k in range(2, handing_from):
@@ -102,10 +102,10 @@ def _innovation(seen, X, scale, root, mean, covariance, shared, level, error, re
 
 @kernel
 def _weigh(
-    h, U, d, v, wrench, scale, effort, pushes, hands, sides, rates, p, b, f, x, P, A, c, since
+    h, U, d, v, wrench, scale, effort, pushes, hands, others, rates, p, b, f, x, P, A, c, since
 ):  # fmt: skip  # pragma: no cover - compiled
     """One row: what may have begun and ended (p), how likely each hypothesis is beside steady, and its state."""
-    sizes, times, bodies, slow = pushes[0], pushes[1], sides[0], sides[1]
+    sizes, times, bodies, slow = pushes[0], pushes[1], others[0], others[1]
     starts, found, age = since[0], since[1], since[2]
     rare, drift_rare, lasts, handed = rates[0], rates[1], rates[2], rates[3]
     n, hand_from, handing_from = len(d), 1 + len(sizes), 1 + len(sizes) + hands.shape[1]
@@ -145,7 +145,7 @@ def _weigh(
     p[0] += back - drifts - 3.0 * begins * p[0] + over * contact + 0.2 * done * nothing
     p[1] += drifts - back - 3.0 * begins * p[1]
     for k in range(2, handing_from):
-        starts_now = touches if k < hand_from else (pulls if hands[0, k - hand_from, 0] > 0.0 else 0.0)
+        starts_now = touches if k < hand_from else pulls
         p[k] += starts_now * (steady + other) - over * p[k]
     for k in range(handing_from, other_from):
         p[k] += begins * (steady + contact + 10.0 * other) / len(bodies) - 0.2 * done * gone[k - handing_from] * p[k]
@@ -174,8 +174,7 @@ def _weigh(
             b[0, k, j] += g * e / s
             b[1, k, j] *= v[j] / s
     for k in range(hands.shape[1]):
-        if hands[0, k, 0] > 0.0:
-            gains[hand_from + k] = _pulled(h, d, v, wrench, scale, hands[0, k], hands[1, k], f[k, 0], f[k, 1:])
+        gains[hand_from + k] = _pulled(h, d, v, wrench, scale, hands[0, k], hands[1, k], f[k, 0], f[k, 1:])
     for k in range(len(starts)):
         for j in range(n):
             for i in range(10):

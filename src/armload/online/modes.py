@@ -56,7 +56,7 @@ from armload.online.thresholds import (
 )
 
 _CONTACT = 2  # where each kind begins among the probabilities; 0: steady, 1: drifting
-_HANDING, _BODIES = _CONTACT + len(PUSH_SIZES) + len(HAND_SIZES), len(BODY_SIZES["link"])
+_HANDING, _BODIES = _CONTACT + len(PUSH_SIZES) + len(HAND_SIZES), len(BODY_SIZES)
 _OTHER = _HANDING + _BODIES
 
 
@@ -77,7 +77,6 @@ class Modes:
         mass: of a payload as the arm usually holds [kg]. effort: torque scale of each joint (n,) [N·m].
 
     Attributes:
-        side: "link" or "motor", where the torque is measured.
         steady: probability that the arm holds what it held, and nothing else pulls at it; drifting or not.
         drift: that the arm itself changes, slowly. contact: that something touches it. handing: that the payload is
             changing. other: that it has changed, and stays. stays: for how long the likeliest other payload has been
@@ -87,14 +86,12 @@ class Modes:
     def __init__(self, mass: float, effort: NDArray[np.float64]) -> None:
         n, bodies, starts = len(effort), _BODIES, len(STARTS)
         self.root, self.effort = mass * body_root(), effort
-        self.side = "link"
         # what is handed to compiled code comes in few arrays: each costs as much as a hundred products
         self._pushes = np.array([[DRIFT_SIZE, *PUSH_SIZES], [DRIFT_TIME, *(CONTACT_TIME for _ in PUSH_SIZES)]])
         force = 9.81 * mass * HAND_SIZES  # (K,) [N]
         size = np.column_stack([*(3 * [force]), *(3 * [HAND_LEVER * force])])  # (K, 6) force, then moment
-        self._hands = {"link": np.array([size, np.full_like(size, HAND_TIME)])}
-        self._hands["motor"] = self._hands["link"] * np.array([0.0, 1.0])[:, None, None]
-        self._sides = {side: np.array([BODY_SIZES[side], HANDING_TIMES[side]]) for side in BODY_SIZES}
+        self._hands = np.array([size, np.full_like(size, HAND_TIME)])
+        self._others = np.array([BODY_SIZES, HANDING_TIMES])
         self._rates = np.array([RARE, DRIFT_RARE, CONTACT_LASTS, HANDED_OVER, LETS_GO, HAND_RARE])
         self._weights = np.zeros(_OTHER + starts)
         self._b = np.zeros((2, len(self._pushes[0]), n))  # mean and variance of each joint's torque
@@ -153,8 +150,7 @@ class Modes:
         """
         row = (h, seen, X, wrench, scale, mean, covariance, taken, np.zeros(len(scale)) if error is None else error)
         noise = (self._loud, self._level, self._about_level, self._rest)
-        own = (self._pushes, self._hands[self.side], self._sides[self.side])
-        known = (self.root, self.effort, *own, self._rates)
+        known = (self.root, self.effort, self._pushes, self._hands, self._others, self._rates)
         state = (self._weights, self._b, self._f, self._x, self._P, self._A, self._c, self._since)
         found = take_row(*row, *noise, *known, *state)
         self.steady, self.drift, self.contact, self.handing, self.other, self.stays = found
@@ -171,9 +167,9 @@ class Modes:
         else:
             k -= _BODIES
             A, c = self._A[k] + np.tril(self._A[k], -1).T, self._c[k]
-            P = np.linalg.inv(A + np.eye(10) / BODY_SIZES[self.side][:, None, None] ** 2)
+            P = np.linalg.inv(A + np.eye(10) / BODY_SIZES[:, None, None] ** 2)
             x = P @ c
-            likely = x @ c + np.linalg.slogdet(P)[1] - 20.0 * np.log(BODY_SIZES[self.side])
+            likely = x @ c + np.linalg.slogdet(P)[1] - 20.0 * np.log(BODY_SIZES)
             p = np.exp(0.5 * (likely - likely.max()))
         p = p / max(float(p.sum()), 1e-300)
         mean = p @ x

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from armload.inertia import held
 from armload.online.thresholds import REMEMBERED, SAME_RUN, STEP_STD, TARE_FROM
 from armload.posterior import PosteriorLeastSquares
 from armload.regression import payload_prior_std
@@ -56,11 +57,14 @@ class Runs:
     def _unless_kept(self, run: PosteriorLeastSquares | None) -> PosteriorLeastSquares | None:
         return None if any(run is kept for kept in (self.current, self.previous, self.earlier)) else run
 
-    def reference_for_next(self, held: bool) -> PosteriorLeastSquares | None:
-        """The run that the next one takes for a tare: the empty arm's, if it was known to be empty for long enough."""
-        run = self.current
-        known = float(run.last.std[0]) <= STEP_STD * self.unit  # else nobody can tell whether anything is held
-        if run.reference is None and known and not held and run.stream.seconds >= TARE_FROM:
+    def reference_for_next(self) -> PosteriorLeastSquares | None:
+        """The run that the next one takes for a tare: the empty arm's, if it was known to be empty for long enough.
+
+        By its own rows: while the payload changes, or may, an answer is of both, and holds less than either.
+        """
+        run, mass, std = self.current, float(self.current.last.phi[0]), float(self.current.last.std[0])
+        known = std <= STEP_STD * self.unit  # else nobody can tell whether anything is held
+        if run.reference is None and known and not held(mass, std, known) and run.stream.seconds >= TARE_FROM:
             return run
         return run.reference
 

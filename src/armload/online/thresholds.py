@@ -15,14 +15,14 @@ from armload.regression.noise import SMOOTH
 
 # ---------------------------------------------------------------------- the hypotheses, `modes.py`
 
-# [payloads] sizes of another body, in half of what the arm is rated for, by the side its torque is measured on: 75 g to
-# 2 kg of a Panda. With 0.3 kg as the smallest, intervals after 30 to 200 g left the mass out (seeds 95000 to 95005); at
-# the motors, friction that turns round looks like a light body (the real UR10e, loaded)
-BODY_SIZES = {"link": np.array([0.05, 0.2, 0.53, 1.33]), "motor": np.array([0.2, 0.33, 0.53, 1.33])}
+# [payloads] sizes of another body, in half of what the arm is rated for: 75 g to 2 kg of a Panda. With 0.3 kg as the
+# smallest, intervals after 30 to 200 g left the mass out (seeds 95000 to 95005); where the torque is measured at the
+# motors, too (0.3 kg on a UR10e of another simulator: nothing, ± 0.07 kg, for four seconds)
+BODY_SIZES = np.array([0.05, 0.2, 0.53, 1.33])
 # [s] correlation times of bodies of these sizes that are handed over: a heavy one is seen at once, whatever its pace.
 # Without the slow one of 0.2, what is handed over within 1 to 2 s is told as two (seeds 95000 to 95003); if the
 # lightest were as slow, a drift would be taken for it
-HANDING_TIMES = {"link": np.array([1.5, 5.0, 1.5, 0.5]), "motor": np.array([5.0, 3.0, 1.5, 0.5])}
+HANDING_TIMES = np.array([1.5, 5.0, 1.5, 0.5])
 # [effort limits] sizes of a contact, a factor of 3 apart: 2 to 17 N·m of a Panda's large joints
 PUSH_SIZES = np.array([0.02, 0.06, 0.2])
 # [s] correlation time of a contact's torque: of what a hand does, which changes within half a second
@@ -118,6 +118,9 @@ FIRST_TARED = 0.2
 # [s] the same without a tare: how much friction there is must have shown, the posterior knows how little it knows of
 # offsets (changes within the first 2 s; nothing is seen in real logs as they are, seeds 95000 to 95005)
 FIRST_UNTARED = 0.5
+# [s] the same where the torque is measured at the motors, tare or not: an arm that starts from rest rubs as no model
+# says (seeds 50000 to 50003 of `benchmarks/events_of_arms.py`: with the two above half as many false events again)
+FIRST_MOTOR = 1.0
 # [s] of a new run from which its kind is decided: before, the prior alone says whether something is held
 KIND_FROM = 0.25
 # [s] of a new run after which its kind is decided, however little is known of the mass

@@ -187,7 +187,7 @@ class PayloadWatch:
             sample.t, float(shift[0]) / self.runs.unit
         )
         self._naming.begin(sample.t, began, run, rest)
-        reference = self.runs.reference_for_next(self._naming.held_before)
+        reference = self.runs.reference_for_next()
         following = self._background.submit(next_run, run, reference, until)
         self._change, self.phase = Change(sample.t, began, state, following), SETTLING
 

@@ -17,6 +17,7 @@ from armload.online.runs import Gaussian
 from armload.online.thresholds import (
     AFTER_CONTACT,
     CONTACT_LONGEST,
+    FIRST_MOTOR,
     FIRST_TARED,
     FIRST_UNTARED,
     HOLDS,
@@ -52,6 +53,7 @@ class Weighing:
     def reset(self, run: PosteriorLeastSquares) -> None:
         """Forget the stream; the next row is the first of a run."""
         self.modes = Modes(self._unit, run.stream.correction.effort)
+        self._motor = False  # whether its torque is measured at the motors
         self._touched = False  # whether something has touched the arm since it was steady
         self._sure_since = np.inf  # when the payload was first surely another one
         self._impossible_since = np.inf  # when what would be held first was no payload
@@ -87,7 +89,7 @@ class Weighing:
 
         There friction hides a payload until a joint moves: slow rows weigh little.
         """
-        return self._moved < LAG and self.modes.side == "motor"
+        return self._moved < LAG and self._motor
 
     def changed(self) -> bool:
         """Whether the last row shows that the payload is surely another one than the run's."""
@@ -118,19 +120,21 @@ class Weighing:
         stream = run.stream
         if (state := stream.state) is None or (row := stream.row) is None:
             return False
-        self.modes.side = stream.posterior.torque
+        self._motor = stream.posterior.torque == "motor"
         self._moved = 0.0 if row.h <= 0.0 else self._moved + row.h * float(row.weights.max())
         h, self.row_t = row.t - self.row_t, row.t
-        first = FIRST_TARED if stream.tares else FIRST_UNTARED
-        known, link = stream.seconds > first, stream.posterior.torque == "link"
+        first = FIRST_MOTOR if self._motor else FIRST_TARED if stream.tares else FIRST_UNTARED
+        known = stream.seconds > first
         self._first_t = min(self._first_t, row.t)
-        # there friction hides no load. Its rows stand for a quarter of a second, however long it has stood
-        if link and (known or row.t - self._first_t > first) and self._rests(row, state):
+        # behind the gears friction hides no load. Its rows stand for a quarter of a second, however long it has stood
+        if not self._motor and (known or row.t - self._first_t > first) and self._rests(row, state):
             known = True
             if 0.0 < h <= GAP:
                 self._weigh(row, h, state, run)
-        elif known and row.h > 0.0:
+        elif row.h > 0.0 and (known or self._motor):
             self._take(row.h, row, state.seen, state.scale, run, True)
+            if not known:  # how large the noise is shows all the same
+                self.modes.reset()
         if row.h > 0.0:
             self._gaussian = (run, stream.answer())
         return known

@@ -121,11 +121,12 @@ class Problem:
         self.mean, self.root = np.zeros(self.size), None
         if prior is not None:
             self.mean[self.last], self.root = prior.mean, prior.root
-        share = [share_of_noise(run.blocks.duration) for run in runs]
-        self.expected = np.outer(share, whole_noise(self.correction, noise))  # (K, n)
+        self.share = np.array([share_of_noise(run.blocks.duration) for run in runs])
+        self.expected = np.outer(self.share, whole_noise(self.correction, noise))  # (K, n)
         for k, run in enumerate(runs):
             if run.noise is not None:
                 self.expected[k] = run.noise
+        self._tell = [] if same else runs[:-1]  # how large the last run's residual will be
         self.selections = []
         for run in runs:
             E = np.zeros((10 + p, self.size))
@@ -152,6 +153,8 @@ class Problem:
             eta = self.correction.prior_std**2
             return Scales(noise, eta, self.feature_variance, self.payload_variance, self.drift_variance)
         noise[: len(start.noise)] = start.noise[: len(noise)]
+        if len(start.noise) < len(noise):
+            noise[-1] = self._of_the_last(noise[:-1])
         same = start.drifts.shape == self.drift_variance.shape
         drifts = start.drifts if same else self.drift_variance
         return Scales(noise, start.eta, start.features, self.payload_variance, drifts)
@@ -221,14 +224,31 @@ class Problem:
         drifts = 0.5 * (self.drift_variance + (z**2 + variance)[self.eta.stop :].reshape(self.drift_variance.shape))
         return Scales(self._noise(found), eta, features, self._payloads(z, variance), drifts)
 
+    def _of_the_last(self, noise: NDArray[np.float64]) -> NDArray[np.float64]:
+        """S (n,) expected of the last run: no less than the runs before it have shown, whose S is `noise` (K - 1, n).
+
+        The arm is the same, and what is expected of any arm is too little for many whose torque is motor current.
+        """
+        seconds, shown = np.zeros(len(self._tell)), np.zeros((len(self._tell), self.correction.arm.n))
+        for k, run in enumerate(self._tell):
+            if run.usual is not None:
+                seconds[k], shown[k] = run.usual
+            elif run.noise is None:
+                seconds[k] = run.blocks.duration
+                shown[k] = noise[k] / (self.share[k] * max(1.0, seconds[k] / self.noise_model.novelty))
+        if not seconds.any():
+            return self.expected[-1]
+        return np.maximum(self.expected[-1], self.share[-1] * np.average(shown, axis=0, weights=seconds))
+
     def _noise(self, found: _Gaussian) -> NDArray[np.float64]:
         """S of each run."""
         model, out = self.noise_model, []
         squares = found.squares(self.information) if model.white else None
-        for k, (run, E, expected) in enumerate(zip(self.runs, self.selections, self.expected, strict=True)):
+        for k, (run, E) in enumerate(zip(self.runs, self.selections, strict=True)):
             if run.noise is not None:
                 out.append(run.noise)
                 continue
+            expected = self._of_the_last(np.array(out)) if run is self.runs[-1] else self.expected[k]
             spread = partial(found.spread, E) if self.features.size else None
             x = E @ found.mean
             S = run.residual_variance(x, expected, np.inf, found.weights, spread)

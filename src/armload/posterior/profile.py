@@ -23,7 +23,7 @@ from armload.recording import Recording, digest_of, marks_of
 from armload.regression import Correction, JointFeatures, payload_prior_std
 from armload.regression.information import RegressionData, Session
 from armload.regression.lag import GAIN
-from armload.regression.noise import SMOOTH
+from armload.regression.noise import SMOOTH, whole_noise
 
 # marks of samples that a profile remembers, 0.8 MB of its file: with more, every other one is forgotten, the samples
 # themselves decide which (test_a_profile_of_many_logs_remembers_a_bounded_number_of_their_samples)
@@ -149,6 +149,10 @@ class Profile:
         else:
             out.A, out.b = A, b
         out.noise = np.ones(self.n)
+        if self.duration > 0.0:
+            ratios = np.array([one.noise for one in self.sessions]) ** 2
+            ratio = np.average(ratios, axis=0, weights=[one.duration for one in self.sessions])
+            out.usual = self.duration, ratio * whole_noise(correction, SMOOTH)
         return out
 
     def start(self, correction: Correction) -> Scales:

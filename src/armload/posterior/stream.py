@@ -94,6 +94,7 @@ class StreamingPosterior:
         if self._base is None:
             first = self._solver.solve([*self.tares, self._empty()], self.start, 1)
             self._first, self._base = first.posterior, first.state
+            self._whole = first.posterior.scales.noise[-1] / share_of_noise(0.0)  # as the tares show it
             self._base.noise = self._whole
 
     @property

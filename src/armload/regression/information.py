@@ -63,9 +63,12 @@ class RegressionData:
 
     Attributes:
         noise: long-run variance (n,) of the residual, where it is known; None: the data tell.
+        usual: where the data are in units of that noise, for how long [s] the arm was seen, and what the long-run
+            variance (n,) [N²·m²·s] of its runs is.
     """
 
     noise: NDArray[np.float64] | None = None
+    usual: tuple[float, NDArray[np.float64]] | None = None
 
     def __init__(
         self,
@@ -128,7 +131,7 @@ class RegressionData:
     def of_features(self, features: JointFeatures) -> RegressionData:
         """The same with the first waves of the pose only, to be read and not to be added to."""
         out = RegressionData(self.correction, self.gain, features, self.blocks.block, self.session)
-        out.noise = self.noise
+        out.noise, out.usual = self.noise, self.usual
         rows, by = self._of(features)
         out.A = self.A[:, rows[:, None], rows] * np.outer(by, by)
         out.b, out.c = self.b[:, rows] * by, self.c

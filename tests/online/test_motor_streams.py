@@ -1,0 +1,70 @@
+"""Streams of arms whose torque is motor current, with a tare: what starts from rest, and what is light."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import savgol_filter
+
+from armload import OnlineIdentifier, Recording, arm, read_recording
+from armload.arms import payload_regressor, rated_mass
+from armload.devices import Simulator
+from armload.inertia import InertialParameters, com_to_phi
+from armload.motion import random_motion
+from armload.payloads import draw_payload
+from armload.simulation import Sensors, World, simulate
+
+RATE = 200.0
+
+
+def _stream(name: str, seed: int, seconds: float, kg: float = 0.0, taken: float = 0.0):
+    """Samples of an arm that starts from rest, and takes something up at once; its tare is of another motion."""
+    robot = arm(name)
+    world, sensors = World.real_like(robot, seed), Sensors.of(robot)
+    phi = draw_payload("boxes", seed, rated=rated_mass(robot)).parameters.phi
+    held = InertialParameters(phi * kg / phi[0], robot.frame)
+    more = {"rate": RATE, "speed": None, "duration": seconds, "seed": seed}
+    payloads = [(taken, held)] if kg else []
+    source = Simulator(robot, random_motion(robot, seed), payloads, world=world, sensors=sensors, **more)
+    log = Recording(*map(np.array, zip(*source, strict=True)))
+    before = random_motion(robot, seed + 50_000, duration=20.0)
+    return robot, log, simulate(robot, before, world=world, sensors=sensors, rate=RATE, seed=seed + 1)
+
+
+def _told(robot, log, tare):
+    """Every estimate of a stream."""
+    identifier = OnlineIdentifier(robot, tare)
+    estimates = [identifier.update(*sample) for sample in log]
+    identifier.close()
+    return estimates
+
+
+@pytest.mark.parametrize(("name", "seed"), [("ur5e", 54007), ("xarm7", 54000), ("xarm7", 54007)])
+def test_an_empty_arm_that_starts_from_rest_is_no_change_of_payload(name, seed):
+    estimates = _told(*_stream(name, seed, 4.0))
+    assert estimates[-1].event is None
+    assert all(one.low[0] <= 0.0 <= one.high[0] for one in estimates if one.interval == "calibrated")
+
+
+@pytest.fixture(scope="module")
+def real_pair(real_data):
+    """The real UR10e: its arm, its log with 2.805 kg, and the empty one, which is the tare."""
+    robot = arm(real_data / "ur10e.urdf", "tool0")
+    loaded, empty = (read_recording(real_data / f"ur10e_{name}.csv", robot) for name in ("loaded_2805g", "unloaded"))
+    return robot, loaded, empty
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("taken", [10.0, 25.0, 40.0])
+def test_half_a_kilogram_more_on_a_real_arm_is_never_denied(real_pair, taken):
+    """4 % of what it may carry: it may be noticed late, but the interval holds what the arm holds all the time."""
+    robot, loaded, empty = real_pair
+    log = loaded.between(taken - 10.0, taken + 5.0)
+    more = com_to_phi(0.5, np.array([0.0, 0.0, 0.08]), 1e-3 * np.eye(3))
+    ddq = savgol_filter(np.gradient(log.dq, log.t, axis=0), 11, 2, axis=0)
+    added = payload_regressor(robot.frame_motion(log.q), log.dq, ddq) @ more
+    log = Recording(log.t, log.q, log.dq, log.tau + added * (log.t > taken)[:, None])
+    estimates = _told(robot, log, empty)
+    for after in (0.5, 1.0, 2.0, 4.9):
+        one = estimates[np.searchsorted(log.t, taken + after) - 1]
+        assert one.low[0] <= 2.805 + 0.5 <= one.high[0]
