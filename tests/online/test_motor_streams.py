@@ -1,6 +1,9 @@
-"""Streams of arms whose torque is motor current, with a tare: what starts from rest, and what is light."""
+"""Streams of arms whose torque is motor current, with a tare: what starts from rest or stops, and what is light."""
 
 from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -10,7 +13,7 @@ from armload import OnlineIdentifier, Recording, arm, read_recording
 from armload.arms import payload_regressor, rated_mass
 from armload.devices import Simulator
 from armload.inertia import InertialParameters, com_to_phi
-from armload.motion import random_motion
+from armload.motion import JoinedMotion, StraightMotion, random_motion
 from armload.payloads import draw_payload
 from armload.simulation import Sensors, World, simulate
 
@@ -44,6 +47,35 @@ def test_an_empty_arm_that_starts_from_rest_is_no_change_of_payload(name, seed):
     estimates = _told(*_stream(name, seed, 4.0))
     assert estimates[-1].event is None
     assert all(one.low[0] <= 0.0 <= one.high[0] for one in estimates if one.interval == "calibrated")
+
+
+def _stopping(name: str, seed: int):
+    """An empty arm that stops four times, whose joints then keep the friction that they had: the gears hold."""
+    robot = arm(name)
+    world, sensors, rng = (
+        replace(World.real_like(robot, seed), stiction=None),
+        Sensors.of(robot),
+        np.random.default_rng(seed),
+    )
+    poses = random_motion(robot, seed, duration=20.0).position(np.sort(rng.uniform(0.0, 20.0, 5)))
+    parts = []
+    for start, stop in pairwise(poses):
+        lasting = max(1.5, 2.2 * float(np.abs(stop - start).max()))
+        parts += [StraightMotion(start, stop, lasting), StraightMotion(stop, stop, 2.5)]
+    motion, more = JoinedMotion(parts), {"world": world, "sensors": sensors, "rate": RATE}
+    log = simulate(robot, motion, seed=seed, **more)
+    friction, sign, kept = world.friction, np.zeros(robot.n), np.zeros_like(log.tau)
+    for k, dq in enumerate(motion.velocity(log.t)):
+        sign = np.where(np.abs(dq) > 1e-3, np.sign(dq), sign)
+        kept[k] = sign * friction.level * (1.0 - np.abs(np.tanh(dq / friction.width)))
+    tare = simulate(robot, random_motion(robot, seed + 50_000, duration=20.0), seed=seed + 1, **more)
+    return robot, Recording(log.t, log.q, log.dq, log.tau + kept), tare
+
+
+@pytest.mark.parametrize(("name", "seed"), [("ur10e", 57004), ("ur5e", 57000)])
+def test_joints_that_keep_their_friction_at_a_stop_are_no_change_of_payload(name, seed):
+    estimates = _told(*_stopping(name, seed))
+    assert {one.event for one in estimates} == {None}
 
 
 @pytest.fixture(scope="module")

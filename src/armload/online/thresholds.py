@@ -16,8 +16,8 @@ from armload.regression.noise import SMOOTH
 # ---------------------------------------------------------------------- the hypotheses, `modes.py`
 
 # [payloads] sizes of another body, in half of what the arm is rated for: 75 g to 2 kg of a Panda. With 0.3 kg as the
-# smallest, intervals after 30 to 200 g left the mass out (seeds 95000 to 95005); where the torque is measured at the
-# motors, too (0.3 kg on a UR10e of another simulator: nothing, ± 0.07 kg, for four seconds)
+# smallest, intervals after 30 to 200 g left the mass out (seeds 95000 to 95005), and with 1.25 kg those of a UR10e half
+# a kilogram (test_half_a_kilogram_more_on_a_real_arm_is_never_denied)
 BODY_SIZES = np.array([0.05, 0.2, 0.53, 1.33])
 # [s] correlation times of bodies of these sizes that are handed over: a heavy one is seen at once, whatever its pace.
 # Without the slow one of 0.2, what is handed over within 1 to 2 s is told as two (seeds 95000 to 95003); if the

@@ -165,6 +165,8 @@ class Weighing:
     def _take(self, h: float, row: Row, seen: NDArray, scale: NDArray, run: PosteriorLeastSquares, *how: Any) -> None:
         """Hand a row to the modes; `how`: whether the run took it, and the error of a standstill."""
         modes = self.modes
+        if self._motor:
+            seen = _rubbing(h, row, seen, scale, run)
         modes.take(h, seen, row.X, wrench_row(*self._chain, row.q), scale, *self._before_row(run), *how)
         impossible = modes.handing + modes.other > 0.5 and not self._possible(run)
         self._impossible_since = min(self._impossible_since, row.t) if impossible else np.inf
@@ -185,3 +187,17 @@ class Weighing:
         if self._gaussian is not None and self._gaussian[0] is run:
             return self._gaussian[1]
         return np.zeros(10), np.diag(payload_prior_std(run.arm) ** 2)
+
+
+def _rubbing(h: float, row: Row, seen: NDArray, scale: NDArray, run: PosteriorLeastSquares) -> NDArray[np.float64]:
+    """`seen` (n, 12) where gears' friction is in the torque: of a slow joint it is anything up to Coulomb's, f.
+
+    The model has f·tanh(dq/w), what sticks has up to ±f at rest: the error is somewhere within ±f·(1 − |tanh|), whose
+    variance is a third of the square, and about the same for a block of rows, so that many say no more than one.
+    """
+    stream = run.stream
+    slow = (1.0 / row.weights - 1.0) / stream.correction.presliding  # 1 − tanh²
+    short = stream.correction.coulomb(stream.posterior.eta) * (1.0 - np.sqrt(np.maximum(1.0 - slow, 0.0)))
+    out = seen.copy()
+    out[:, 11] += scale**2 * short**2 / 3.0 * stream.noise.block / h
+    return out
