@@ -326,7 +326,8 @@ def show(result: dict[str, Any], page: Path = PAGE) -> None:
     """Put a result between its marks on a page: the table of changes, and what was seen beside them."""
     parts, rows = result["parts"], []
     for name, said in NAMES.items():
-        part = parts[name]
+        if (part := parts.get(name)) is None:
+            continue  # of a result that is older than the part
         after = [part[f"after_{s:g}_s"] for s in LOOKED]
         told = [f"{100 * x['inside']['count'] / x['inside']['of']:.0f}" for x in after]
         rows.append(

@@ -10,13 +10,14 @@ import pytest
 from armload import arm
 from armload.arms import rated_effort
 from armload.motion import random_motion
+from armload.posterior import SmoothPosteriorLeastSquares, learn_profile
 from armload.posterior.problem import Problem
 from armload.posterior.solve import solve
 from armload.regression import Correction, JointFeatures, payload_prior_std
 from armload.regression.information import RegressionData
 from armload.regression.lag import GAIN
-from armload.regression.noise import SMOOTH, whole_noise
-from armload.simulation import World, simulate
+from armload.regression.noise import SMOOTH, share_of_noise, whole_noise
+from armload.simulation import Sensors, World, simulate
 
 
 @pytest.mark.parametrize("seed", [0, 1])
@@ -76,3 +77,20 @@ def test_logs_of_a_profile_are_learned_alike_whichever_comes_last():
             scales = problem.improved(scales, problem.posterior(scales))
         found.append(scales.noise)
     np.testing.assert_allclose(found[0], found[1][::-1], rtol=1e-6)
+
+
+def test_a_run_with_a_profile_is_foreseen_as_noisy_as_the_profile_s_logs_were():
+    robot, rate = arm("ur5e"), 100.0
+    world, sensors = World.real_like(robot, 3), Sensors.of(robot)
+    more = {"world": world, "sensors": sensors, "rate": rate}
+    logs = [simulate(robot, random_motion(robot, k, duration=12.0), seed=k, **more) for k in (1, 2)]
+    profile = learn_profile(robot, logs)
+    identifier = SmoothPosteriorLeastSquares(robot, profile=profile)
+    samples, correction = iter(logs[0]), Correction(robot, rated_effort(robot))
+    shown = np.mean([np.square(one.noise) for one in profile.sessions], axis=0) * whole_noise(correction, SMOOTH)
+    assert shown.max() > 2.0 * whole_noise(correction, SMOOTH)[shown.argmax()]
+    expected = np.maximum(shown, whole_noise(correction, SMOOTH))
+    while not identifier.stream.rows:
+        identifier.update(next(samples))
+    state = identifier.stream.state or identifier.stream._current
+    np.testing.assert_allclose(state.noise, share_of_noise(identifier.stream.seconds) * expected, rtol=1e-3)

@@ -118,8 +118,9 @@ FIRST_TARED = 0.2
 # [s] the same without a tare: how much friction there is must have shown, the posterior knows how little it knows of
 # offsets (changes within the first 2 s; nothing is seen in real logs as they are, seeds 95000 to 95005)
 FIRST_UNTARED = 0.5
-# [s] the same where the torque is measured at the motors, tare or not: an arm that starts from rest rubs as no model
-# says (seeds 50000 to 50003 of `benchmarks/events_of_arms.py`: with the two above half as many false events again)
+# [s] the same of each run where the torque is measured at the motors, tare or not: what starts from rest rubs as no
+# model says (with the two above three more false events in 36 streams: seeds 50000 to 50003 of
+# `benchmarks/events_of_arms.py`)
 FIRST_MOTOR = 1.0
 # [s] of a new run from which its kind is decided: before, the prior alone says whether something is held
 KIND_FROM = 0.25

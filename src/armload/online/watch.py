@@ -146,6 +146,8 @@ class PayloadWatch:
         if self.run.stream.rows > before and self._look.row(sample.t):
             self._examine(sample, held)
         self._look.seen(sample.t)
+        if self.run.fresh and self._weighing.steady > LIKELY:
+            self.runs.stay_steady()
         if self._naming.judging and self.run.fresh and self._naming.judge(self.runs, held):
             self._watch_anew(self.runs.go_back())
         return estimate

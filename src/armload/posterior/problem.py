@@ -126,7 +126,8 @@ class Problem:
         for k, run in enumerate(runs):
             if run.noise is not None:
                 self.expected[k] = run.noise
-        self._tell = [] if same else runs[:-1]  # how large the last run's residual will be
+        # these tell how large the last run's residual will be; a profile's logs, and parts of a log, tell their own
+        self._tell = [] if same or noise.white else runs[:-1]
         self.selections = []
         for run in runs:
             E = np.zeros((10 + p, self.size))
@@ -227,7 +228,8 @@ class Problem:
     def _of_the_last(self, noise: NDArray[np.float64]) -> NDArray[np.float64]:
         """S (n,) expected of the last run: no less than the runs before it have shown, whose S is `noise` (K - 1, n).
 
-        The arm is the same, and what is expected of any arm is too little for many whose torque is motor current.
+        The arm is the same, and what is expected of any arm is too little for many whose torque is motor current. As
+        what is expected is the least of S (`NoiseModel.floor`), a run is never taken to be quieter than its tares.
         """
         seconds, shown = np.zeros(len(self._tell)), np.zeros((len(self._tell), self.correction.arm.n))
         for k, run in enumerate(self._tell):
