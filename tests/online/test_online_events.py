@@ -466,7 +466,7 @@ def test_a_run_that_held_something_or_of_which_nobody_knows_is_no_tare_of_the_ne
         last=SimpleNamespace(phi=np.r_[mass, np.zeros(9)], std=np.full(10, std)),
     )
     runs = Runs(first)  # type: ignore[arg-type]
-    runs.stay_steady()
+    runs.note_steady()
     first.last.phi[0] = 1.0  # what is taken up then says nothing of what was held
     assert runs.reference_for_next() is (first if tare else None)
 

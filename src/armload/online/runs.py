@@ -59,7 +59,7 @@ class Runs:
     def _unless_kept(self, run: PosteriorLeastSquares | None) -> PosteriorLeastSquares | None:
         return None if any(run is kept for kept in (self.current, self.previous, self.earlier)) else run
 
-    def stay_steady(self) -> None:
+    def note_steady(self) -> None:
         """The arm is steady: what the current run holds now is what it held before a change that may come.
 
         By its own rows: while the payload changes, or may, an answer is of both, and holds less than either.

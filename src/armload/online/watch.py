@@ -147,7 +147,7 @@ class PayloadWatch:
             self._examine(sample, held)
         self._look.seen(sample.t)
         if self.run.fresh and self._weighing.steady > LIKELY:
-            self.runs.stay_steady()
+            self.runs.note_steady()
         if self._naming.judging and self.run.fresh and self._naming.judge(self.runs, held):
             self._watch_anew(self.runs.go_back())
         return estimate
