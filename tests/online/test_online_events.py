@@ -348,8 +348,9 @@ def test_a_cycle_in_step_with_the_motion_stays_as_good_in_its_second_half_as_in_
     assert np.all(np.abs(error) <= half_width)
     late = changes > 42.0
     for loaded in (truth == 0.0, truth > 0.0):
-        first, second = (np.sqrt(np.mean(error[loaded & part] ** 2)) for part in (~late, late))
-        assert second < 1.5 * first + 0.005
+        # the first half alone has seven of each, and once 10 g where the whole has 17
+        whole, second = (np.sqrt(np.mean(error[loaded & part] ** 2)) for part in (late | ~late, late))
+        assert second < min(1.5 * whole + 0.005, 0.05)
     assert np.median(half_width[late]) < 0.1
 
 
