@@ -18,12 +18,17 @@ from armload.simulation import Sensors, World, simulate
 RATE = 200.0
 
 
+def _simulated(robot, motion, world, seed):
+    """The log of an empty arm along a motion, and its tare of 20 s along another."""
+    more = {"world": world, "sensors": Sensors.of(robot), "rate": RATE}
+    tare = simulate(robot, random_motion(robot, seed + 50_000, duration=20.0), seed=seed + 1, **more)
+    return simulate(robot, motion, seed=seed, **more), tare
+
+
 def _starting(name: str, seed: int):
-    """Four seconds of an empty arm that starts from rest; its tare is of another motion."""
+    """Four seconds of an arm that starts from rest."""
     robot = arm(name)
-    more = {"world": World.real_like(robot, seed), "sensors": Sensors.of(robot), "rate": RATE}
-    log = simulate(robot, random_motion(robot, seed, duration=4.0), seed=seed, **more)
-    return robot, log, simulate(robot, random_motion(robot, seed + 50_000, duration=20.0), seed=seed + 1, **more)
+    return robot, *_simulated(robot, random_motion(robot, seed, duration=4.0), World.real_like(robot, seed), seed)
 
 
 def _told(robot, log, tare):
@@ -44,23 +49,18 @@ def test_an_empty_arm_that_starts_from_rest_is_no_change_of_payload(name, seed):
 def _stopping(name: str, seed: int):
     """An empty arm that stops four times, whose joints then keep the friction that they had: the gears hold."""
     robot = arm(name)
-    world, sensors, rng = (
-        replace(World.real_like(robot, seed), stiction=None),
-        Sensors.of(robot),
-        np.random.default_rng(seed),
-    )
+    world, rng = replace(World.real_like(robot, seed), stiction=None), np.random.default_rng(seed)
     poses = random_motion(robot, seed, duration=20.0).position(np.sort(rng.uniform(0.0, 20.0, 5)))
     parts = []
     for start, stop in pairwise(poses):
         lasting = max(1.5, 2.2 * float(np.abs(stop - start).max()))
         parts += [StraightMotion(start, stop, lasting), StraightMotion(stop, stop, 2.5)]
-    motion, more = JoinedMotion(parts), {"world": world, "sensors": sensors, "rate": RATE}
-    log = simulate(robot, motion, seed=seed, **more)
+    motion = JoinedMotion(parts)
+    log, tare = _simulated(robot, motion, world, seed)
     friction, sign, kept = world.friction, np.zeros(robot.n), np.zeros_like(log.tau)
     for k, dq in enumerate(motion.velocity(log.t)):
         sign = np.where(np.abs(dq) > 1e-3, np.sign(dq), sign)
         kept[k] = sign * friction.level * (1.0 - np.abs(np.tanh(dq / friction.width)))
-    tare = simulate(robot, random_motion(robot, seed + 50_000, duration=20.0), seed=seed + 1, **more)
     return robot, Recording(log.t, log.q, log.dq, log.tau + kept), tare
 
 

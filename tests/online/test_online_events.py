@@ -328,30 +328,30 @@ def test_what_a_run_knew_counts_for_less_when_it_is_taken_up_again(monkeypatch):
     assert seen == pytest.approx(first.stream.seconds - 4.6 + 2.0, abs=0.3)
 
 
-@pytest.mark.full  # some seconds
+@pytest.mark.full  # half a minute
 def test_a_cycle_in_step_with_the_motion_stays_as_good_in_its_second_half_as_in_its_first():
     payload, motion = box(0.3), taie2024()  # always taken up in one pose and put down in another
     changes = np.arange(4.0, 82.0, 0.5 * motion.duration)
     schedule = [(t, None if k % 2 else payload) for k, t in enumerate(changes)]
-    log = stream(22, schedule, 84.0, 100.0, motion)
-    estimates, events = said(log, "map-gp")
-    assert len(events) == len(changes)
-    delays = [event.t - t for event, t in zip(events, changes, strict=True)]
-    assert min(delays) > 0.0
-    assert np.median(delays) < 0.2
-    assert max(delays) < 0.5
-    times = np.array([estimate.t for estimate in estimates])
-    after = [estimates[np.searchsorted(times, t + 1.0) - 1] for t in changes]
-    truth = np.array([0.0 if held is None else payload.mass for _, held in schedule])
-    error = np.array([estimate.phi[0] for estimate in after]) - truth
-    half_width = 1.96 * np.array([estimate.std[0] for estimate in after])
-    assert np.all(np.abs(error) <= half_width)
-    late = changes > 42.0
+    truth, late = np.array([0.0 if held is None else payload.mass for _, held in schedule]), changes > 42.0
+    errors = []
+    for seed in (22, 23, 24, 25):  # of one arm alone, seven changes a half tell errors to a factor of two
+        estimates, events = said(stream(seed, schedule, 84.0, 100.0, motion), "map-gp")
+        assert len(events) == len(changes)
+        delays = [event.t - t for event, t in zip(events, changes, strict=True)]
+        assert min(delays) > 0.0
+        assert np.median(delays) < 0.2
+        assert max(delays) < 0.5
+        times = np.array([estimate.t for estimate in estimates])
+        after = [estimates[np.searchsorted(times, t + 1.0) - 1] for t in changes]
+        error = np.array([estimate.phi[0] for estimate in after]) - truth
+        half_width = 1.96 * np.array([estimate.std[0] for estimate in after])
+        assert np.all(np.abs(error) <= half_width)
+        assert np.median(half_width[late]) < 0.1
+        errors.append(error)
     for loaded in (truth == 0.0, truth > 0.0):
-        # the first half alone has seven of each, and once 10 g where the whole has 17
-        whole, second = (np.sqrt(np.mean(error[loaded & part] ** 2)) for part in (late | ~late, late))
-        assert second < min(1.5 * whole + 0.005, 0.05)
-    assert np.median(half_width[late]) < 0.1
+        first, second = (np.sqrt(np.mean(np.square(errors)[:, loaded & part])) for part in (~late, late))
+        assert second < 1.5 * first + 0.005
 
 
 @pytest.mark.full

@@ -15,6 +15,7 @@ Source: Bishop 2006, section 2.3 (marginal and conditional Gaussians in informat
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -57,6 +58,43 @@ class Eliminated(NamedTuple):
     own: NDArray[np.float64]
     slope: NDArray[np.float64]
     rest: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class JointGaussian:
+    """What the runs say of all unknowns: z ~ N(mean, covariance), g_j | z ~ N(own_j − slope_j·z, rest_j)."""
+
+    mean: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    own: NDArray[np.float64]  # (n, R)
+    slope: NDArray[np.float64]  # (n, R, z)
+    rest: NDArray[np.float64]  # (n, R, R)
+
+    @property
+    def weights(self) -> NDArray[np.float64]:
+        """Mean of g (n, R)."""
+        return self.own - self.slope @ self.mean
+
+    def covariance_of(self, E: NDArray, j: int, X: NDArray) -> NDArray[np.float64]:
+        """Covariance (B, B) of the rows of X·[E·z, g_j], X (B, ·)."""
+        shared, own = X[:, : len(E)] @ E - X[:, len(E) :] @ self.slope[j], X[:, len(E) :]
+        return shared @ self.covariance @ shared.T + own @ self.rest[j] @ own.T
+
+    def squares(self, runs: Sequence[RunInformation]) -> NDArray[np.float64]:
+        """∫ (X_j·[E·z, g_j] − its mean)² dt (K, n) expected of each run: what a fit leaves is smaller by this much."""
+        out = np.zeros((len(runs), len(self.rest)))
+        for j, slope in enumerate(self.slope):
+            cross = slope @ self.covariance
+            own = cross @ slope.T + self.rest[j]
+            for k, run in enumerate(runs):
+                shared = np.sum(run.A[j] * self.covariance) - 2.0 * np.sum(run.A_gz[j] * cross)
+                out[k, j] = shared + np.sum(run.A_gg[j] * own)
+        return out
+
+    def spread(self, E: NDArray, j: int, X: NDArray) -> NDArray[np.float64]:
+        """Variance (B,) of X·[E·z, g_j], X (B, ·)."""
+        shared, own = X[:, : len(E)] @ E - X[:, len(E) :] @ self.slope[j], X[:, len(E) :]
+        return ((shared @ self.covariance) * shared).sum(axis=1) + ((own @ self.rest[j]) * own).sum(axis=1)
 
 
 def eliminated(runs: Sequence[RunInformation], noise: NDArray[np.float64], variance: NDArray[np.float64]) -> Eliminated:

@@ -7,15 +7,13 @@ linear and Gaussian; `posterior` says what `posterior.solve` does with it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
-from armload.posterior.elimination import Eliminated, RunInformation, eliminated
+from armload.posterior.elimination import Eliminated, JointGaussian, RunInformation, eliminated
 from armload.posterior.joint_gains import moved_by_joint, scale_of_joints, spread
 from armload.posterior.scales import Posterior, Scales
 from armload.posterior.sequential import SequentialPosterior
@@ -53,43 +51,6 @@ def of_mounted(prior: NDArray[np.float64], mass: float, variance: float) -> NDAr
     """Prior variance (10,) of what was mounted at a tare, its mass being known to a variance: its moments follow."""
     heaviest = max(abs(mass) + 2.0 * np.sqrt(max(variance, 0.0)), _LIGHTEST)
     return np.r_[prior[:1], np.minimum(prior[1:], (heaviest * _REACH) ** 2)]
-
-
-@dataclass(frozen=True, eq=False)
-class _Gaussian:
-    """z ~ N(mean, covariance); g_j | z ~ N(own − slope·z, rest)."""
-
-    mean: NDArray
-    covariance: NDArray
-    own: NDArray  # (n, R)
-    slope: NDArray  # (n, R, z)
-    rest: NDArray  # (n, R, R)
-
-    @property
-    def weights(self) -> NDArray:
-        """Mean of g (n, R)."""
-        return self.own - self.slope @ self.mean
-
-    def covariance_of(self, E: NDArray, j: int, X: NDArray) -> NDArray[np.float64]:
-        """Covariance (B, B) of the rows of X·[E·z, g_j], X (B, ·)."""
-        shared, own = X[:, : len(E)] @ E - X[:, len(E) :] @ self.slope[j], X[:, len(E) :]
-        return shared @ self.covariance @ shared.T + own @ self.rest[j] @ own.T
-
-    def squares(self, runs: Sequence[RunInformation]) -> NDArray[np.float64]:
-        """∫ (X_j·[E·z, g_j] − its mean)² dt (K, n) expected of each run: what a fit leaves is smaller by this much."""
-        out = np.zeros((len(runs), len(self.rest)))
-        for j, slope in enumerate(self.slope):
-            cross = slope @ self.covariance
-            own = cross @ slope.T + self.rest[j]
-            for k, run in enumerate(runs):
-                shared = np.sum(run.A[j] * self.covariance) - 2.0 * np.sum(run.A_gz[j] * cross)
-                out[k, j] = shared + np.sum(run.A_gg[j] * own)
-        return out
-
-    def spread(self, E: NDArray, j: int, X: NDArray) -> NDArray[np.float64]:
-        """Variance (B,) of X·[E·z, g_j], X (B, ·)."""
-        shared, own = X[:, : len(E)] @ E - X[:, len(E) :] @ self.slope[j], X[:, len(E) :]
-        return ((shared @ self.covariance) * shared).sum(axis=1) + ((own @ self.rest[j]) * own).sum(axis=1)
 
 
 class Problem:
@@ -160,7 +121,7 @@ class Problem:
         drifts = start.drifts if same else self.drift_variance
         return Scales(noise, start.eta, start.features, self.payload_variance, drifts)
 
-    def posterior(self, scales: Scales) -> _Gaussian:
+    def posterior(self, scales: Scales) -> JointGaussian:
         """z and g given the scales."""
         A, b, own, slope, rest = self._without_features(scales)
         root = np.diag(np.sqrt(np.concatenate([scales.payloads, scales.eta, scales.drifts.ravel()])))
@@ -168,7 +129,7 @@ class Problem:
             root[self.last, self.last] = self.root
         P = root @ np.linalg.inv(root.T @ A @ root + np.eye(self.size)) @ root.T
         P = 0.5 * (P + P.T)
-        return _Gaussian(self.mean + P @ (b - A @ self.mean), P, own, slope, rest)
+        return JointGaussian(self.mean + P @ (b - A @ self.mean), P, own, slope, rest)
 
     def sequential(self, scales: Scales) -> SequentialPosterior:
         """The same posterior as a state that takes further rows of the last run: phi last to be integrated out."""
@@ -205,7 +166,7 @@ class Problem:
         assert self._eliminated is not None
         return self._eliminated[1]
 
-    def improved(self, scales: Scales, found: _Gaussian) -> Scales:
+    def improved(self, scales: Scales, found: JointGaussian) -> Scales:
         """One step of expectation–maximisation, each scale held to its stated value by pseudo-observations."""
         z, P = found.mean, found.covariance
         variance = np.diag(P)
@@ -242,7 +203,7 @@ class Problem:
             return self.expected[-1]
         return np.maximum(self.expected[-1], self.share[-1] * np.average(shown, axis=0, weights=seconds))
 
-    def _noise(self, found: _Gaussian) -> NDArray[np.float64]:
+    def _noise(self, found: JointGaussian) -> NDArray[np.float64]:
         """S of each run."""
         model, out = self.noise_model, []
         squares = found.squares(self.information) if model.white else None
@@ -268,7 +229,7 @@ class Problem:
             now[:10] = of_mounted(now[:10], z[0], variance[0])
         return now
 
-    def answer(self, scales: Scales, found: _Gaussian) -> Posterior:
+    def answer(self, scales: Scales, found: JointGaussian) -> Posterior:
         """The payload of the last run."""
         phi, covariance = found.mean[self.last], found.covariance[self.last, self.last]
         eta = found.mean[self.eta]
@@ -310,7 +271,7 @@ class Problem:
             ratios=self._ratios(scales, eta),
         )
 
-    def _moved(self, scales: Scales, found: _Gaussian, gain: float) -> NDArray[np.float64]:
+    def _moved(self, scales: Scales, found: JointGaussian, gain: float) -> NDArray[np.float64]:
         """By what a scale of its own of each joint moves phi (n, 10, 10), 1 sigma."""
         run = self.runs[-1], self.selections[-1], scales.noise[-1]
         return moved_by_joint(*run, found.covariance[self.last], found.slope, scale_of_joints(gain))
