@@ -119,8 +119,8 @@ FIRST_TARED = 0.2
 # offsets (changes within the first 2 s; nothing is seen in real logs as they are, seeds 95000 to 95005)
 FIRST_UNTARED = 0.5
 # [s] the same of each run where the torque is measured at the motors, tare or not: what starts from rest rubs as no
-# model says (with the two above three more false events in 36 streams: seeds 50000 to 50003 of
-# `benchmarks/events_of_arms.py`)
+# model says (seeds 50000 to 50003 of `benchmarks/events_of_arms.py`, 36 streams of xarm7, ur5e and ur10e: 8 false
+# events with 0.2 s, 1 with this)
 FIRST_MOTOR = 1.0
 # [s] of a new run from which its kind is decided: before, the prior alone says whether something is held
 KIND_FROM = 0.25
