@@ -7,9 +7,8 @@ boxes and its arm's sensors. The candidates run on the same worlds, with the sam
 Motions shorter than the run are repeated. The tare of most is 20 s of the empty arm on another motion elsewhere; of the
 pairs it is 5 s at the place itself. Errors are those of mass, of the three moments and of the six inertias (mean of
 their magnitudes); an accuracy is reached when all three are within 10 g, 1.5 g·m, 1e-3 kg·m², and stay so at the times
-that are looked at: `TIMES`, or `TIMES_OF_PAIRS` where it is reached early. "predicted" is the bound's 95 % half-width
-over the one that the estimator gives; "centre" is the distance of the centre of mass from the true one after 6 s. Most
-of what a world costs is the estimator at those times; a bound is of a motion and is the same in all worlds. What is
+that are looked at: `TIMES`, or `TIMES_OF_PAIRS` where it is reached early. "bound / given": the 95 % half-width of the bound
+over that of the estimator; "centre" is the distance of the centre of mass from the true one after 6 s. Most of what a world costs is the estimator at those times; a bound is of a motion and is the same in all worlds. What is
 measured is kept in benchmarks/results/designed_motions_worlds.json, so that a later run adds to it, whatever has
 changed in the code since (--anew: with the code of now only), and where one stops, in out/. Writes
 benchmarks/results/designed_motions.json, the tables in docs/motion.md and docs/pictures/designed_motions.png from the
@@ -28,7 +27,7 @@ import designed_worlds
 import numpy as np
 from designed_worlds import compact, motion_hash
 from numpy.typing import NDArray
-from script import ROOT, markdown_table, options, say, write, write_table
+from script import ROOT, markdown_table, options, say, two_digits, write, write_table
 
 from armload.arms import Arm, arm
 from armload.excitation import Constraints, Criterion, PayloadRange, Surroundings, design_motion, enrich
@@ -260,10 +259,10 @@ def _finite(x: float) -> float | None:
 
 def table(rows: dict[str, dict[str, Any]]) -> str:
     """A row for each candidate: errors, time to reach, predicted over given."""
-    columns = ["motion", *(f"{t:g} s" for t in TIMES), "median [s]", "90 % [s]", "predicted"]
+    columns = ["motion", *(f"{t:g} s" for t in TIMES), "median [s]", "90 % [s]", "bound / given"]
     out = []
     for name, row in rows.items():
-        errors = [" · ".join(f"{1e3 * x:.2g}" for x in row["error"][str(t)]) for t in TIMES]
+        errors = [" · ".join(two_digits(1e3 * x) for x in row["error"][str(t)]) for t in TIMES]
         times = [f"{x:g}" if (x := row[key]) is not None else "> 6" for key in ("reached_median_s", "reached_90_s")]
         middle, low, high = row["predicted_over_given"]
         out.append([NAMES[name], *errors, *times, f"{middle:.2f} ({low:.2f}–{high:.2f})"])

@@ -253,10 +253,13 @@ def main() -> None:
 
 def sentence(found: dict[str, Any]) -> str:
     """What was drawn, and what became of it."""
-    reasons = ", ".join(f"{name} {count}" for name, count in found["refused_for"].items() if count > 1)
+    short = "no motion of"  # so many seconds keeps to the constraints: a sentence of its own for each
+    reasons = {name: count for name, count in found["refused_for"].items() if not name.startswith(short)}
+    reasons["too little time"] = sum(n for name, n in found["refused_for"].items() if name.startswith(short))
+    words = ", ".join(f"{name} {count}" for name, count in reasons.items())
     return (
         f"Of {found['requests']} requests at random (arm, pose, share, payload range, time, joints, tare, boxes,\n"
-        f"held body, floor) {found['designed']} led to motions and {found['refused']} were refused ({reasons}).\n"
+        f"held body, floor) {found['designed']} led to motions and {found['refused']} were refused\n({words}).\n"
         f"Code that shares nothing with the design or with its check rejected {len(found['rejected'])} of the motions\n"
         "(`python benchmarks/motion_requests.py`)."
     )

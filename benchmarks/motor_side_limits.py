@@ -24,7 +24,7 @@ from designed_motions import OUT as DESIGNS
 from designed_motions import POSES, RATED, allowed, followed_for, kept
 from designed_worlds import in_three
 from numpy.typing import NDArray
-from script import ROOT, markdown_table, options, say, write, write_table
+from script import ROOT, markdown_table, options, say, two_digits, write, write_table
 
 from armload.arms import Arm, arm
 from armload.excitation import Criterion, design_motion
@@ -179,7 +179,7 @@ def population_bound(robot: Arm, removed: str, chosen: dict[str, Motion]) -> NDA
 
 def in_words(three: Any) -> str:
     """Mass [g], moments [g·m], inertias [10⁻³ kg·m²]."""
-    return " · ".join(f"{1e3 * x:.2g}" for x in three)
+    return " · ".join(two_digits(1e3 * x) for x in three)
 
 
 def summary(cells: list[dict[str, Any]]) -> dict[str, Any]:

@@ -66,6 +66,11 @@ def rounded(mean: float, spread: float) -> str:
     return f"{mean:.{places}f} ± {spread:.{places}f}"
 
 
+def two_digits(x: float) -> str:
+    """To two digits, without an exponent: 270, 1.3, 0.85."""
+    return f"{float(f'{x:.2g}'):g}"
+
+
 def markdown_table(columns: Sequence[str], align: str, rows: Sequence[Sequence[str]]) -> str:
     """Rows as Markdown; align: a letter for each column, l or r."""
     rule = "|" + "".join({"l": "---|", "r": "---:|"}[letter] for letter in align)

@@ -148,7 +148,7 @@ _CATALOGUE = (
     Method(
         "difference",
         "torque difference with a tare along the same motion, on the filtered regression",
-        "a repeated motion that was also run without the payload: then the most accurate method",
+        "a motion also run without the payload, without any prior (the default takes the same difference by itself)",
         "Atkeson, An & Hollerbach, IJRR 1986; Hsu et al., ICRA 1987",
         tare="same motion",
         prior=False,

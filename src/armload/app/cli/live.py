@@ -38,7 +38,7 @@ examples:
   armload live panda://172.16.0.2 --profile arm.profile --learn
   armload live panda://172.16.0.2 --tool franka-hand
   armload live panda://172.16.0.2 --mass 1.200±0.002      (taken where something is held that may be it)
-  armload live 'ur://192.168.0.10?torque_constants=12,12,10,11,11,11' --robot ur10e
+  armload live 'ur://192.168.0.10?torque_constants=12,12,10,11,11,11' --robot ur5e    (yours; the UR10e's are built in)
   armload live ros2:///joint_states --robot iiwa14 --steady   (velocities that are differences of positions)
   armload live ros2:///joint_states --robot my_arm.urdf --frame tool0
 
