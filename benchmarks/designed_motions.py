@@ -7,8 +7,9 @@ boxes and its arm's sensors. The candidates run on the same worlds, with the sam
 Motions shorter than the run are repeated. The tare of most is 20 s of the empty arm on another motion elsewhere; of the
 pairs it is 5 s at the place itself. Errors are those of mass, of the three moments and of the six inertias (mean of
 their magnitudes); an accuracy is reached when all three are within 10 g, 1.5 g·m, 1e-3 kg·m², and stay so at the times
-that are looked at: `TIMES`, or `TIMES_OF_PAIRS` where it is reached early. "bound / given": the 95 % half-width of the bound
-over that of the estimator; "centre" is the distance of the centre of mass from the true one after 6 s. Most of what a world costs is the estimator at those times; a bound is of a motion and is the same in all worlds. What is
+that are looked at: `TIMES`, or `TIMES_OF_PAIRS` where it is reached early. "bound / given": half-width (95 %) of the
+bound over that of the estimator; "centre" is the distance of the centre of mass from the true one after 6 s. Most of
+what a world costs is the estimator at those times; a bound is of a motion and is the same in all worlds. What is
 measured is kept in benchmarks/results/designed_motions_worlds.json, so that a later run adds to it, whatever has
 changed in the code since (--anew: with the code of now only), and where one stops, in out/. Writes
 benchmarks/results/designed_motions.json, the tables in docs/motion.md and docs/pictures/designed_motions.png from the
