@@ -14,7 +14,7 @@ from armload.arms import payload_regressor
 from armload.devices import Simulator
 from armload.inertia import InertialParameters
 from armload.motion import Motion, random_motion, taie2024
-from armload.online import OnlineIdentifier
+from armload.online import OnlineIdentifier, watch
 from armload.online.event import Naming
 from armload.online.runs import Runs
 from armload.online.thresholds import SAME_RUN
@@ -483,18 +483,73 @@ def test_a_replay_says_the_same_bit_for_bit_however_the_second_thread_fares():
         np.testing.assert_array_equal(a.covariance, b.covariance)
 
 
+@pytest.mark.full  # some seconds
+def test_an_arm_with_motor_currents_says_the_same_however_long_its_next_run_takes_to_be_made(monkeypatch):
+    robot, made = arm("ur10e"), watch.next_run
+    tare = simulate(robot, random_motion(robot, 6, duration=10.0), world=World.real_like(robot, 5), rate=200.0, seed=6)
+    log = stream(5, [(3.0, box(4.0))], 4.5, name="ur10e")
+
+    def told(before, at_once):
+        """Estimates, where the next run is made after so long [s], or before the next sample."""
+        monkeypatch.setattr(watch, "next_run", lambda *of: (time.sleep(before), made(*of))[1])
+        identifier, estimates = OnlineIdentifier(robot, tare, method="map-gp"), []
+        for sample in log:
+            estimates.append(identifier.update(*sample))
+            if at_once and estimates[-1].settling and not estimates[-2].settling:
+                identifier._watch._background.wait()
+        identifier.close()
+        return estimates
+
+    ours, theirs = told(0.0, at_once=True), told(1.0, at_once=False)
+    assert ours[-1].event == theirs[-1].event
+    assert sum(one.settling for one in ours) > 10
+    for a, b in zip(ours, theirs, strict=True):
+        assert (a.p_change, a.p_contact, a.torque_gain_std) == (b.p_change, b.p_contact, b.torque_gain_std)
+        np.testing.assert_array_equal(a.phi, b.phi)
+        np.testing.assert_array_equal(a.covariance, b.covariance)
+
+
+def test_a_pause_before_a_change_has_its_name_does_not_move_the_change():
+    log = stream(1, [(3.0, HALF_KILO)], 4.5)
+    _, (plain,) = said(log, "map-gp")
+    later = np.where(log.t > plain.t + 0.1, 0.7, 0.0)  # [s]
+    estimates, (event,) = said(Recording(log.t + later, log.q, log.dq, log.tau), "map-gp")
+    assert estimates[-1].health.pauses == 1
+    assert (event.kind, event.t, event.began) == ("grasp", plain.t, plain.began)
+
+
+def threads():
+    """How many second threads of runs there are."""
+    return sum(thread.name == "armload-scales" for thread in threading.enumerate())
+
+
+def test_a_stream_that_is_begun_anew_amid_a_change_leaves_no_thread():
+    before, identifier = threads(), OnlineIdentifier(arm("panda"), method="map")
+    for _ in range(3):
+        settled = 0
+        for sample in stream(2, [(3.0, box(2.0))], 4.0):
+            settled += identifier.update(*sample).settling
+            if settled == 40:  # the run after the change has a thread by then
+                break
+        assert settled == 40
+        identifier.reset()
+        assert threads() - before <= 2
+    identifier.close()
+    until = time.monotonic() + 10.0  # they end by themselves
+    while threads() > before and time.monotonic() < until:
+        time.sleep(0.05)
+    assert threads() == before
+
+
 @pytest.mark.full
 def test_threads_do_not_pile_up_with_the_changes():
-    def running():
-        return sum(thread.name == "armload-scales" for thread in threading.enumerate())
-
     schedule = [(3.0 + 3.0 * k, None if k % 2 else HALF_KILO) for k in range(8)]
-    identifier, before, most = OnlineIdentifier(arm("panda"), method="map-gp"), running(), 0
+    identifier, before, most = OnlineIdentifier(arm("panda"), method="map-gp"), threads(), 0
     seen = set()
     for sample in stream(8, schedule, 27.0, 100.0):
         estimate = identifier.update(*sample)
         seen.add(estimate.event and estimate.event.t)
-        most = max(most, running() - before)
+        most = max(most, threads() - before)
     identifier.close()
     assert len(seen) > 8
     assert most <= 6  # the runs kept, and the watch's own

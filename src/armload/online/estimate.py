@@ -15,6 +15,10 @@ from armload.inertia import is_consistent, phi_to_com
 from armload.online.event import Event
 from armload.online.gate import Health
 
+# what a line of JSON has as it is, before phi and after it
+_FIRST = ("t", "method", "frame", "relative_to", "n_samples", "age", "lag", "since")
+_LAST = ("torque_gain_std", "same_arm_assumed", "p_held", "p_change", "p_contact", "p_drift", "moving", "settling")
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OnlineEstimate(Estimate):
@@ -101,11 +105,7 @@ class OnlineEstimate(Estimate):
     @property
     def interval(self) -> str:
         """ "calibrated" or "approximate"; of what no body can be it is never calibrated."""
-        return self._interval(self.calibrated and is_consistent(self.phi))
-
-    @staticmethod
-    def _interval(calibrated: bool) -> str:
-        return "calibrated" if calibrated else "approximate"
+        return "calibrated" if self.calibrated and is_consistent(self.phi) else "approximate"
 
     def to_dict(self) -> dict[str, Any]:
         """One JSON object, its names those of `armload identify --json` where they mean the same.
@@ -115,35 +115,21 @@ class OnlineEstimate(Estimate):
         """
         mass = float(self.phi[0])
         com, inertia_com = (None, None) if mass == 0.0 else (x.tolist() for x in phi_to_com(self.phi)[1:])
-        (low, high), consistent = self._ends, is_consistent(self.phi)
+        (low, high), own = self._ends, vars(self)
         return {
-            "t": self.t,
-            "method": self.method,
-            "frame": self.frame,
-            "relative_to": self.relative_to,
-            "n_samples": self.n_samples,
-            "age": self.age,
-            "lag": self.lag,
-            "since": self.since,
+            **{name: own[name] for name in _FIRST},
             "phi": self.phi.tolist(),
             "phi_low": _finite(low),
             "phi_high": _finite(high),
-            "interval": self._interval(self.calibrated and consistent),
+            "interval": self.interval,
             "determined": self.determined.tolist(),
             "mass": mass,
             "com": com,
             "inertia_com": inertia_com,
-            "consistent": consistent,
+            "consistent": is_consistent(self.phi),
             "held": self.held,
             "rests_on_prior": self.rests_on_prior.tolist(),
-            "torque_gain_std": self.torque_gain_std,
-            "same_arm_assumed": self.same_arm_assumed,
-            "p_held": self.p_held,
-            "p_change": self.p_change,
-            "p_contact": self.p_contact,
-            "p_drift": self.p_drift,
-            "moving": self.moving,
-            "settling": self.settling,
+            **{name: own[name] for name in _LAST},
             "event": None if self.event is None else self.event.to_dict(),
             "left_out": self.health.bad,
             "left_out_why": {reason: count for reason, count in self.health.left_out.items() if count},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,19 +18,21 @@ from armload.identification.reporting import doubt_of
 from armload.inertia import determined, held, held_probability
 from armload.online.doubts import Doubts
 from armload.online.thresholds import STANDS
+from armload.online.watch import PayloadWatch
 from armload.posterior import PosteriorLeastSquares
 from armload.regression import payload_prior_std
 
 _STANDING = "standing: nothing new is learned until the arm moves, or what it holds changes"
-STANDING_MOTOR = "standing: a change of payload is noticed only when the arm moves"
-SLOW_MOTOR = "too slow: friction hides a change of payload until a joint moves faster"
-CHANGING = "the payload is changing"
-LEFT_OUT = "samples that do not fit are left out: something pulls at the arm, or the payload is changing"
-MAYBE = (  # of p_change, p_contact and p_drift, the largest while they are large
+_STANDING_MOTOR = "standing: a change of payload is noticed only when the arm moves"
+_SLOW_MOTOR = "too slow: friction hides a change of payload until a joint moves faster"
+_CHANGING = "the payload is changing"
+_LEFT_OUT = "samples that do not fit are left out: something pulls at the arm, or the payload is changing"
+_MAYBE = (  # of p_change, p_contact and p_drift, the largest while they are large
     "the payload may be changing",
     "something may be touching the arm",
     "the torques drift slowly, as an arm does that warms up: the intervals do not allow for it",
 )
+_FIELDS = ("determined", "held", "rests_on_prior", "torque_gain_std", "around", "before", "p_held")
 
 
 class Judgement:
@@ -43,7 +46,7 @@ class Judgement:
         estimate: the answer. around: (10,) where its intervals are. run: that it is of; None: of no run alone.
         determined: which parameters (10,) the data determine. held: whether anything is. p_held: how probable that is.
         rests_on_prior: which of them (10,) owe their intervals more to what is known of payloads.
-        gain_std: of the torque's scale, of a method that allows for one.
+        torque_gain_std: of the torque's scale, of a method that allows for one.
         newest: time of the newest sample that counts in it [s]; −∞ before one does.
         doubts: what was asked of the runs besides the payload.
         doubted: whether something speaks against its error bars. notes: what else there is to say.
@@ -64,12 +67,12 @@ class Judgement:
         self.doubts.reset()
         self.newest = -np.inf
         self.determined, self.held, self.p_held = np.zeros(10, dtype=bool), False, 0.0
-        self.rests_on_prior, self.gain_std = np.ones(10, dtype=bool), None
+        self.rests_on_prior, self.torque_gain_std = np.ones(10, dtype=bool), None
         self.notes: tuple[str, ...] = ()
 
     def take(self, estimate: Estimate, run: Identifier | None) -> None:
         """A newer answer, of which the last judgement holds; of no run alone while samples are left out."""
-        self.estimate, self.run, self.around = estimate, run, estimate.phi
+        self._take(estimate, run)
         if run is not None:
             self.doubted = bool(self.doubts.sentences)
 
@@ -103,7 +106,6 @@ class Judgement:
         shown = determined(std, before.std, run.weak_std, self._weak)
         self.determined = determined_with(shown, taken, std, before)
         self.rests_on_prior = ~self.determined | rests_on_prior(shown, taken, std, run.weak_std)
-        self.gain_std = None if posterior is None else posterior.stream.posterior.gain_std
         self.held = held(float(estimate.phi[0]), float(std[0]), bool(self.determined[0]))
         self.p_held = held_probability(float(estimate.phi[0]), float(std[0]), float(self._weak[0]))
         notes = []
@@ -111,18 +113,41 @@ class Judgement:
             notes.append("not moving: inertia undetermined" if not self.determined[4:].all() else "not moving")
         if stands:
             motor = posterior is not None and posterior.stream.posterior.torque == "motor"
-            notes.append(STANDING_MOTOR if motor else _STANDING)
+            notes.append(_STANDING_MOTOR if motor else _STANDING)
         notes += self.doubts.sentences
         if self.held and posterior is not None and taken is None:
             denied = denied_by(posterior.known, posterior.log_only)
             notes += [] if denied is None else [denied]
         self.notes = tuple(notes)
 
+    def left_out(self, watch: PayloadWatch) -> None:
+        """Say that samples are left out."""
+        self.notes += (_CHANGING if watch.settling else _LEFT_OUT,)
+
+    def fields(self) -> dict[str, Any]:
+        """What an `OnlineEstimate` says of the payload, by its names."""
+        return {**vars(self.estimate), **{name: getattr(self, name) for name in _FIELDS}}
+
+    def words(self, watch: PayloadWatch | None, blind: bool, moving: bool) -> tuple[str, ...]:
+        """The notes, and what the last rows may be."""
+        notes = self.notes
+        if watch is not None and not watch.sure and not {_CHANGING, _LEFT_OUT} & set(notes):
+            notes += (_MAYBE[int(np.argmax(watch.likely))],)
+        if blind and _STANDING_MOTOR not in self.notes:
+            notes += (_SLOW_MOTOR if moving else _STANDING_MOTOR,)
+        return notes
+
     def conclude(self, estimate: Estimate, run: Identifier, t: float) -> None:
         """The last answer of a stream, at t [s], already judged: it becomes a body, and is doubted as of a log."""
         exchanged = run.exchanged if isinstance(run, PosteriorLeastSquares) else False
         doubt = doubt_of(exchanged, exchanged or explained(estimate, run.unprojected), None, 0.0)
+        self._take(estimate, run)
         self.estimate = replace(estimate, phi=body_of(estimate, bool(self.determined[0]), exchanged))
-        self.run, self.around, self.newest = run, estimate.phi, t
+        self.newest = t
         self.doubted = doubt is not None or bool(self.doubts.sentences)
         self.notes += () if doubt is None else (doubt,)
+
+    def _take(self, estimate: Estimate, run: Identifier | None) -> None:
+        self.estimate, self.run, self.around = estimate, run, estimate.phi
+        if isinstance(run, PosteriorLeastSquares):  # of no other: a run that ends is solved anew in a second thread
+            self.torque_gain_std = run.stream.posterior.gain_std

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
+
+import numpy as np
 
 from armload.arms import Arm
 from armload.online.gate import ANY_TIME, REASONS, Gate
-from armload.online.thresholds import BAD_IN_A_ROW, PAUSES_IN_A_ROW, SILENT
+from armload.online.thresholds import BAD_IN_A_ROW, MOVING, PAUSES_IN_A_ROW, RECENT, SILENT
 from armload.recording import GAP, Sample
 
 UNUSED = "no sample could be used"  # how `trouble` begins while samples are left out one after the other
@@ -20,6 +23,7 @@ class Listening:
         ahead: for how long no sample could be used [s]. unseen: pauses since `forget_pauses`, as far as the gate's
             own clock leaves them out [s].
         trouble: what keeps samples from being used; None while nothing does.
+        now: time of the last sample that counts, on the gate's clock [s].
     """
 
     def __init__(self, arm: Arm) -> None:
@@ -32,7 +36,8 @@ class Listening:
         self.clock = self.ahead = self.unseen = 0.0
         self.trouble: str | None = None
         self._used: float | None = None  # time of the last sample that could be used, or of the first of all
-        self._shift = 0.0
+        self._shift = self.now = 0.0
+        self._moved = -math.inf  # when the arm was last seen to move, on the same clock [s]
         self._apart = self._number = 0  # pauses and bad samples in a row
 
     def take(self, t: Any, q: Any, dq: Any, tau: Any) -> Sample | None:
@@ -43,7 +48,15 @@ class Listening:
             self._left_out(self.gate.now, t, q, dq, tau)
         else:
             self._use(self.gate.now, self.gate.health.pauses > pauses)
+            self.now = sample.t
+            if sample.t - self._moved > 0.1 * RECENT and np.abs(sample.dq).max() > MOVING:
+                self._moved = sample.t
         return sample
+
+    @property
+    def moving(self) -> bool:
+        """Whether the arm was seen to move lately."""
+        return self.now + self.ahead - self._moved < RECENT
 
     def _use(self, t: float, paused: bool) -> None:
         self.unseen += max(self._shift - self.gate.shift, 0.0)

@@ -13,8 +13,6 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Self
 
-import numpy as np
-
 from armload.arms import Arm
 from armload.errors import IdentificationError
 from armload.estimators import Estimate, Identifier
@@ -24,11 +22,11 @@ from armload.identification.tare_age import checked_age, drift_after
 from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
 from armload.online.gate import Health, all_finite
-from armload.online.judgement import CHANGING, LEFT_OUT, MAYBE, SLOW_MOTOR, STANDING_MOTOR, Judgement
+from armload.online.judgement import Judgement
 from armload.online.learning import learned_from
 from armload.online.listening import Listening
 from armload.online.state import load_state, save_state
-from armload.online.thresholds import KIND_LATEST, MOVING, RECENT, SELDOM
+from armload.online.thresholds import KIND_LATEST, SELDOM
 from armload.online.watch import PayloadWatch
 from armload.posterior import Known, PosteriorLeastSquares, Profile
 from armload.posterior.map import PUBLISH
@@ -72,7 +70,7 @@ class OnlineIdentifier:
         every: float = PUBLISH,
         tare_age: float = 0.0,
     ) -> None:
-        self.arm, self.tare, self.profile, self._tared = arm, tare, profile, tare is not None
+        self.arm, self.profile, self._tared = arm, profile, tare is not None
         self._engine = first = choose(arm, tare, method, live=True, profile=profile).identifier
         know(first, known)
         if tare is not None and isinstance(first, PosteriorLeastSquares):
@@ -127,11 +125,11 @@ class OnlineIdentifier:
         """Forget the stream (not the tare); the next sample is the first."""
         (self._watch or self._engine).reset()
         self._stream.reset()
-        self._internal = 0.0
-        self._moved = self._published = -np.inf
+        self._published = -math.inf
         self._since: float | None = None
         self._blind = False  # whether a change of payload would not be seen now
         self.event: Event | None = None
+        self._event_t, self._event_shift = -math.inf, 0.0  # of the event on the samples' clock, and to the stream's [s]
         self._judgement.reset()
 
     def __repr__(self) -> str:
@@ -146,11 +144,8 @@ class OnlineIdentifier:
         sample = self._stream.take(t, q, dq, tau)
         if sample is None:
             return self._present()
-        self._internal = sample.t
         if self._since is None:
             self._since = self._stream.clock
-        if sample.t - self._moved > 0.1 * RECENT and np.abs(sample.dq).max() > MOVING:
-            self._moved = sample.t
         self._identify(sample)
         self._blind = self._watch is not None and self._watch.blind
         return self._present()
@@ -168,7 +163,7 @@ class OnlineIdentifier:
             if all_finite(estimate.phi):
                 self._judgement.doubts.look(self.engine, self.relative_to)
                 self._judge(estimate, self.engine)
-                self._judgement.conclude(estimate, self.engine, self._internal)
+                self._judgement.conclude(estimate, self.engine, self._stream.now)
         return self._present()
 
     def learned(self, name: str = "stream") -> Profile | None:
@@ -195,7 +190,7 @@ class OnlineIdentifier:
         """
         if self._watch is not None:
             self._watch.hold()
-        state = {k: v for k, v in vars(self).items() if k not in ("arm", "tare", "profile", "_every")}
+        state = {k: v for k, v in vars(self).items() if k not in ("arm", "profile", "_every")}
         return save_state(path, state, self.arm, self.method, self._engine)
 
     @classmethod
@@ -224,7 +219,7 @@ class OnlineIdentifier:
         finally:
             new.close()
         new.__dict__.update(saved)
-        for run in [new._engine] if new._watch is None else new._watch.runs:
+        for run in [new._engine] if new._watch is None else new._watch.all_runs:
             know(run, known)
         return new
 
@@ -267,61 +262,47 @@ class OnlineIdentifier:
         if watch.settling or watch.likely[0] > 0.5:  # then phi follows what the samples say
             self._judgement.newest = sample.t
         self._judge(estimate, watch.run)
-        self._judgement.notes += (CHANGING if watch.settling else LEFT_OUT,)
+        self._judgement.left_out(watch)
 
     def _noticed(self, event: Event, settling: bool, shift: float) -> None:
         """A change of payload, or what it was; the stream's clock is ahead of its by `shift` [s]."""
         if settling:
-            self._since, self._published = self._stream.clock, -np.inf
+            self._since, self._published = self._stream.clock, -math.inf
             self._stream.forget_pauses()
-        self.event = replace(event, t=event.t + shift, began=event.began + shift)
+        if self._event_t != event.t:  # the same event keeps its time, however long a pause there was since
+            self._event_t, self._event_shift = event.t, shift
+        self.event = replace(event, t=event.t + self._event_shift, began=event.began + self._event_shift)
 
     def _judge(self, estimate: Estimate, run: Identifier, stands: bool = False) -> None:
         stands = stands and self.trouble is None
-        self._judgement.judge(estimate, run, self._moving, stands)
-
-    @property
-    def _moving(self) -> bool:
-        return self._internal + self._stream.ahead - self._moved < RECENT
+        self._judgement.judge(estimate, run, self._stream.moving, stands)
 
     def _present(self) -> OnlineEstimate:
         stream, judged, watch = self._stream, self._judgement, self._watch
         change, contact, drift = (None, None, None) if watch is None else watch.likely
-        maybe: tuple[str, ...] = ()
-        if watch is not None and not watch.sure and not {CHANGING, LEFT_OUT} & set(judged.notes):
-            maybe = (MAYBE[int(np.argmax(watch.likely))],)
-        if self._blind and STANDING_MOTOR not in judged.notes:
-            maybe += (SLOW_MOTOR if self._moving else STANDING_MOTOR,)
         trouble = () if stream.trouble is None else (stream.trouble,)
         known_by_log = self._tared or self.profile is not None
         return OnlineEstimate.of(
             {
-                **vars(judged.estimate),
+                **judged.fields(),
                 "t": stream.clock,
-                "age": float(stream.unseen + stream.ahead + judged.age(self._internal)),
+                "age": float(stream.unseen + stream.ahead + judged.age(stream.now)),
                 "lag": 0.0,
                 "since": stream.clock if self._since is None else self._since,
                 "relative_to": self.relative_to,
                 "method": self.method,
-                "determined": judged.determined,
-                "held": judged.held,
-                "rests_on_prior": judged.rests_on_prior,
-                "torque_gain_std": judged.gain_std,
                 "same_arm_assumed": known_by_log and not judged.doubts.asked_whose,
-                "around": judged.around,
-                "before": judged.before,
                 "calibrated": self.engine.calibrated
                 and not judged.doubted
                 and not self._blind
                 and (watch is None or watch.sure),
-                "p_held": judged.p_held,
                 "p_change": change,
                 "p_contact": contact,
                 "p_drift": drift,
-                "moving": self._moving,
+                "moving": stream.moving,
                 "settling": watch is not None and watch.settling,
                 "event": self.event,
                 "health": self.health,
-                "notes": (*judged.notes, *maybe, *trouble),
+                "notes": judged.words(watch, self._blind, stream.moving) + trouble,
             }
         )

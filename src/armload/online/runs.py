@@ -25,7 +25,7 @@ class Runs:
 
     def __init__(self, first: PosteriorLeastSquares) -> None:
         self._first = self.current = first
-        self._empty = False  # whether the current run was known to hold nothing, when the arm was steady
+        self._empty: PosteriorLeastSquares | None = None  # the run, where it was known to hold nothing
         self.unit = float(payload_prior_std(first.arm)[0])
         self.previous: PosteriorLeastSquares | None = None
         self.earlier: PosteriorLeastSquares | None = None
@@ -39,20 +39,19 @@ class Runs:
         """Forget the stream; the next sample is the first of the first run."""
         for run in self:
             run.close()
-        self.current, self.previous, self.earlier, self._empty = self._first, None, None, False
+        self.current, self.previous, self.earlier, self._empty = self._first, None, None, None
         self.current.reset()
 
     def follow(self, run: PosteriorLeastSquares) -> PosteriorLeastSquares | None:
         """Begin a new run after the current one; returns one that is not kept any more, if it is none of the others."""
         dropped, self.earlier, self.previous, self.current = self.earlier, self.previous, self.current, run
-        self._empty = False
         return self._unless_kept(dropped)
 
     def go_back(self) -> PosteriorLeastSquares | None:
         """Take the earlier run up again; the current one is returned, if it is none of the others."""
         assert self.earlier is not None
         self.current.stream.hold()  # a solution of it may read what is discounted
-        dropped, self.current, self.earlier, self._empty = self.current, self.earlier, None, False
+        dropped, self.current, self.earlier, self._empty = self.current, self.earlier, None, None
         self.current.stream.remember(REMEMBERED)
         return self._unless_kept(dropped)
 
@@ -66,12 +65,13 @@ class Runs:
         """
         mass, std = float(self.current.last.phi[0]), float(self.current.last.std[0])
         known = std <= STEP_STD * self.unit  # else nobody can tell whether anything is held
-        self._empty = known and not held(mass, std, known)
+        self._empty = self.current if known and not held(mass, std, known) else None
 
     def reference_for_next(self) -> PosteriorLeastSquares | None:
         """The run that the next one takes for a tare: the empty arm's, if it was known to be empty for long enough."""
         run = self.current
-        return run if run.reference is None and self._empty and run.stream.seconds >= TARE_FROM else run.reference
+        empty = run.reference is None and run is self._empty and run.stream.seconds >= TARE_FROM
+        return run if empty else run.reference
 
     def is_earlier(self) -> bool:
         """Whether the mass and first moments of the current run are those of the earlier one."""

@@ -20,9 +20,6 @@ after it, beside the one that was given, if one was. Of a run that ends the last
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
-
-import numpy as np
 
 from armload.estimators import Estimate
 from armload.online.change import Change, next_run
@@ -37,11 +34,6 @@ from armload.posterior import PosteriorLeastSquares
 from armload.posterior.worker import Worker
 from armload.recording import Sample
 
-Phase = Literal["following", "doubting", "settling"]
-FOLLOWING: Phase = "following"
-DOUBTING: Phase = "doubting"
-SETTLING: Phase = "settling"
-
 
 class PayloadWatch:
     """The runs of a stream, and the phase it is in.
@@ -50,9 +42,8 @@ class PayloadWatch:
         first: the identifier of the first run.
 
     Attributes:
-        runs: those that are kept. phase: what becomes of samples at present. answered: the run that the last estimate
-            is of. event: the last change noticed. mixed: whether an interval of the run alone would leave out more than
-            its 5 %, as the payload may have changed.
+        runs: those that are kept. answered: the run that the last estimate is of. mixed: whether an interval of the run
+            alone would leave out more than its 5 %, as the payload may have changed.
     """
 
     def __init__(self, first: PosteriorLeastSquares) -> None:
@@ -60,20 +51,22 @@ class PayloadWatch:
         self._look = Deferred()
         self._background = Worker()
         self._weighing = Weighing(first)
+        self._change: Change | None = None  # settling
         self.reset()
 
     def reset(self) -> None:
         """Forget the stream; the next sample is the first."""
         self._background.wait()
+        if self._change is not None:
+            self._change.run.close()
         self.runs.reset()
         self._look.reset()
-        self.phase: Phase = FOLLOWING
         self.answered, self.mixed = self.run, False
         self._naming, self._tracker = Naming(), Tracker()
         self._weighing.reset(self.run)
-        self._doubted_at = -np.inf
-        self._gave_up = False  # doubting: what does not fit is believed until it fits again
-        self._change: Change | None = None
+        self._doubted_at: float | None = None  # doubting, since then [s]
+        self._gave_up = False  # following: what does not fit is believed until it fits again
+        self._change = None
 
     @property
     def run(self) -> PosteriorLeastSquares:
@@ -88,12 +81,16 @@ class PayloadWatch:
     @property
     def settling(self) -> bool:
         """Whether samples are left out because the payload has just changed."""
-        return self.phase == SETTLING
+        return self._change is not None
+
+    @property
+    def _following(self) -> bool:
+        return self._change is None and self._doubted_at is None
 
     @property
     def undecided(self) -> bool:
         """Whether the last rows are likelier of another payload than of the run's, and no run has them yet."""
-        return self.settling or (self.phase == DOUBTING and self.likely[0] > 0.5)
+        return self.settling or (self._doubted_at is not None and self.likely[0] > 0.5)
 
     @property
     def likely(self) -> tuple[float, float, float]:
@@ -104,7 +101,7 @@ class PayloadWatch:
     @property
     def sure(self) -> bool:
         """Whether nothing but the arm as it was and the same payload explains the last rows."""
-        return self.phase == FOLLOWING and sum(self.likely) < 1.0 - LIKELY
+        return self._following and sum(self.likely) < 1.0 - LIKELY
 
     @property
     def blind(self) -> bool:
@@ -119,16 +116,16 @@ class PayloadWatch:
 
     def update(self, sample: Sample, held: bool) -> Estimate | None:
         """Take one sample; None while it does not count. `held`: whether anything was, by the last estimate."""
-        if self.phase == SETTLING:
-            self._settle(sample)
+        if self._change is not None:
+            self._settle(self._change, sample)
             return None
-        if self.phase == DOUBTING:
+        if self._doubted_at is not None:
             if self._weighing.passed_over(sample, self.run, self.run.stream.state):
                 self._decide(sample, held)
             return None
         if self._look.due(sample.t):
             self._examine(sample, held)
-        return self._follow(sample, held) if self.phase == FOLLOWING else None
+        return self._follow(sample, held) if self._following else None
 
     def conclude(self) -> Estimate:
         """The estimate of the current run after a last solution, and of a hand-over that may go on in it."""
@@ -159,29 +156,29 @@ class PayloadWatch:
         if self._weighing.taken(self.run):
             self._decide(sample, held)
             changed = self._weighing.likely[0] > UNLIKELY
-            self.mixed = self.phase == FOLLOWING and (changed or self._tracker.lasting is not None)
+            self.mixed = self._following and (changed or self._tracker.lasting is not None)
 
     # ------------------------------------------------------------------ doubting
 
     def _decide(self, sample: Sample, held: bool) -> None:
         """What becomes of the run, by what the last rows are."""
+        if self._following:
+            self._naming.held_before = held
         if self._weighing.changed():
-            self._begin_change(sample, held)
+            self._begin_change(sample)
         elif self._weighing.steady > 0.5:
-            self.phase, self._gave_up = FOLLOWING, False
-        elif self.phase == DOUBTING and self._weighing.believed(sample.t - self._doubted_at):
-            self.phase, self._gave_up = FOLLOWING, True
-        elif self.phase == FOLLOWING and not self._gave_up:
-            self.phase, self._doubted_at, self._naming.held_before = DOUBTING, sample.t, held
+            self._doubted_at, self._gave_up = None, False
+        elif self._doubted_at is None:
+            self._doubted_at = None if self._gave_up else sample.t
+        elif self._weighing.believed(sample.t - self._doubted_at):
+            self._doubted_at, self._gave_up = None, True
 
     # ------------------------------------------------------------------ a change, and the run after it
 
-    def _begin_change(self, sample: Sample, held: bool) -> None:
+    def _begin_change(self, sample: Sample) -> None:
         """A change: the next run is made in the background while it settles."""
         run, state = self.run, self.run.stream.state
         assert state is not None
-        if self.phase == FOLLOWING:
-            self._naming.held_before = held
         began = max(self._weighing.steady_t, sample.t - PATIENCE)
         until = began - max(sample.t - began, TAKEN_BACK)
         shift = self._weighing.modes.shift()[0]
@@ -191,36 +188,32 @@ class PayloadWatch:
         self._naming.begin(sample.t, began, run, rest)
         reference = self.runs.reference_for_next()
         following = self._background.submit(next_run, run, reference, until)
-        self._change, self.phase = Change(sample.t, began, state, following), SETTLING
+        self._change, self._doubted_at = Change(sample.t, began, state, following), None
 
-    def _settle(self, sample: Sample) -> None:
+    def _settle(self, change: Change, sample: Sample) -> None:
         """A sample while the payload may go on changing; then the next run begins, or the run before goes on."""
-        change, modes = self._change, self._weighing.modes
-        assert change is not None
+        modes = self._weighing.modes
         looked = self._weighing.passed_over(sample, self.run, change.state)
         if looked and modes.steady + modes.contact > SURE:
-            self._call_off()
+            self._call_off(change)
             return
         if looked:
             change.looked(sample.t, modes, self._weighing.row_t)
         change.take(sample, modes.level)
         stays = looked and modes.other > LIKELY and change.stays(modes, self._weighing.row_t)
         if stays or sample.t - change.t > PATIENCE:
-            self._take_up_the_next()
+            self._take_up_the_next(change)
 
-    def _call_off(self) -> None:
+    def _call_off(self, change: Change) -> None:
         """The payload is what it was: the run before goes on."""
-        assert self._change is not None
-        change, self._change = self._change, None
         self._background.submit(change.run.close)
         self._naming.call_off(self.runs)
-        self.phase, self._doubted_at, self._gave_up = DOUBTING, change.t, False
+        self._change, self._doubted_at, self._gave_up = None, change.t, False
 
-    def _take_up_the_next(self) -> None:
+    def _take_up_the_next(self, change: Change) -> None:
         """The payload stays: the next run begins."""
         self.hold()
-        assert self._change is not None
-        change, self._change = self._change, None
+        self._change = None
         self._watch_anew(self.runs.follow(change.run), change.ended(self._weighing.modes))
         self._naming.judging = True
 
@@ -228,7 +221,7 @@ class PayloadWatch:
         """Begin to watch the current run; one that is not wanted any more has its thread stopped."""
         self._weighing.begin_run()
         self._look.clear()
-        self.phase, self._gave_up, self.mixed = FOLLOWING, False, lasting is not None
+        self._doubted_at, self._gave_up, self.mixed = None, False, lasting is not None
         self._tracker.lasting = lasting
         if dropped is not None:
             self._background.submit(dropped.close)
@@ -236,17 +229,17 @@ class PayloadWatch:
     def hold(self) -> None:
         """Wait for what is done in the background."""
         self._background.wait()
-        for run in self._all:
+        for run in self.all_runs:
             run.stream.hold()
 
     def close(self) -> None:
         """Stop what runs in the background."""
         self.hold()
-        for run in self._all:
+        for run in self.all_runs:
             run.close()
         self._background.stop()
 
     @property
-    def _all(self) -> list[PosteriorLeastSquares]:
+    def all_runs(self) -> list[PosteriorLeastSquares]:
         """The runs that are kept, and the run after a change, waited for."""
         return [*self.runs, *([] if self._change is None else [self._change.run])]

@@ -54,6 +54,8 @@ class Weighing:
         """Forget the stream; the next row is the first of a run."""
         self.modes = Modes(self._unit, run.stream.correction.effort)
         self._motor = False  # whether its torque is measured at the motors
+        # Coulomb friction there (n,) [N·m], as of the last row taken: a run that ends is solved anew beside
+        self._coulomb = np.zeros(len(run.stream.correction.effort))
         self._touched = False  # whether something has touched the arm since it was steady
         self._sure_since = np.inf  # when the payload was first surely another one
         self._impossible_since = np.inf  # when what would be held first was no payload
@@ -121,6 +123,8 @@ class Weighing:
         if (state := stream.state) is None or (row := stream.row) is None:
             return False
         self._motor = stream.posterior.torque == "motor"
+        if self._motor:
+            self._coulomb = stream.correction.coulomb(stream.posterior.eta)
         self._moved = 0.0 if row.h <= 0.0 else self._moved + row.h * float(row.weights.max())
         h, self.row_t = row.t - self.row_t, row.t
         first = FIRST_MOTOR if self._motor else FIRST_TARED if stream.tares else FIRST_UNTARED
@@ -166,7 +170,7 @@ class Weighing:
         """Hand a row to the modes; `how`: whether the run took it, and the error of a standstill."""
         modes = self.modes
         if self._motor:
-            seen = _rubbing(h, row, seen, scale, run)
+            seen = _rubbing(h, row, seen, scale, run, self._coulomb)
         modes.take(h, seen, row.X, wrench_row(*self._chain, row.q), scale, *self._before_row(run), *how)
         impossible = modes.handing + modes.other > 0.5 and not self._possible(run)
         self._impossible_since = min(self._impossible_since, row.t) if impossible else np.inf
@@ -189,7 +193,9 @@ class Weighing:
         return np.zeros(10), np.diag(payload_prior_std(run.arm) ** 2)
 
 
-def _rubbing(h: float, row: Row, seen: NDArray, scale: NDArray, run: PosteriorLeastSquares) -> NDArray[np.float64]:
+def _rubbing(
+    h: float, row: Row, seen: NDArray, scale: NDArray, run: PosteriorLeastSquares, coulomb: NDArray
+) -> NDArray[np.float64]:
     """`seen` (n, 12) where gears' friction is in the torque: of a slow joint it is anything up to Coulomb's, f.
 
     The model has f·tanh(dq/w), what sticks has up to ±f at rest: the error is somewhere within ±f·(1 − |tanh|), whose
@@ -197,7 +203,7 @@ def _rubbing(h: float, row: Row, seen: NDArray, scale: NDArray, run: PosteriorLe
     """
     stream = run.stream
     slow = (1.0 / row.weights - 1.0) / stream.correction.presliding  # 1 − tanh²
-    short = stream.correction.coulomb(stream.posterior.eta) * (1.0 - np.sqrt(np.maximum(1.0 - slow, 0.0)))
+    short = coulomb * (1.0 - np.sqrt(np.maximum(1.0 - slow, 0.0)))
     out = seen.copy()
     out[:, 11] += scale**2 * short**2 / 3.0 * stream.noise.block / h
     return out

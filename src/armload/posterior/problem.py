@@ -83,6 +83,7 @@ class Problem:
         if prior is not None:
             self.mean[self.last], self.root = prior.mean, prior.root
         self.share = np.array([share_of_noise(run.blocks.duration) for run in runs])
+        self._repeats = [max(1.0, run.blocks.duration / noise.novelty) for run in runs]  # of each run's noise
         self.expected = np.outer(self.share, whole_noise(self.correction, noise))  # (K, n)
         for k, run in enumerate(runs):
             if run.noise is not None:
@@ -98,7 +99,8 @@ class Problem:
             if run.session in self.sessions:
                 E[10 : 10 + d, self._drift(self.sessions.index(run.session))] = np.eye(d)
             self.selections.append(E)
-        self.information = [RunInformation.of(run, E) for run, E in zip(runs, self.selections, strict=True)]
+        self._each = list(zip(runs, self.selections, strict=True))
+        self.information = [RunInformation.of(run, E) for run, E in self._each]
         self._eliminated: tuple[Scales, Eliminated] | None = None  # and of which noise and features
         group = np.repeat([_POSE, _VELOCITY], [self.features.pose, self.features.velocity])
         self.feature_variance = (np.outer(self.correction.effort, group)) ** 2
@@ -124,7 +126,7 @@ class Problem:
     def posterior(self, scales: Scales) -> JointGaussian:
         """z and g given the scales."""
         A, b, own, slope, rest = self._without_features(scales)
-        root = np.diag(np.sqrt(np.concatenate([scales.payloads, scales.eta, scales.drifts.ravel()])))
+        root = np.diag(np.sqrt(scales.shared))
         if self.root is not None:
             root[self.last, self.last] = self.root
         P = root @ np.linalg.inv(root.T @ A @ root + np.eye(self.size)) @ root.T
@@ -137,9 +139,7 @@ class Problem:
         first, last = self.last.start, self.last
         shared = np.r_[0:first, last.stop : self.size]
         order = np.r_[last.start : last.stop, shared]
-        prior = np.concatenate([scales.payloads, scales.eta, scales.drifts.ravel()])[shared]
-        A, b = found.A, found.b
-        root = np.sqrt(prior)
+        A, b, root = found.A, found.b, np.sqrt(scales.shared[shared])
         C = np.linalg.inv(root[:, None] * A[np.ix_(shared, shared)] * root + np.eye(len(root)))
         C = root[:, None] * (0.5 * (C + C.T)) * root
         slope, own = C @ A[shared][:, last], C @ b[shared]
@@ -198,7 +198,7 @@ class Problem:
                 seconds[k], shown[k] = run.usual
             elif run.noise is None:
                 seconds[k] = run.blocks.duration
-                shown[k] = noise[k] / (self.share[k] * max(1.0, seconds[k] / self.noise_model.novelty))
+                shown[k] = noise[k] / (self.share[k] * self._repeats[k])
         if not seconds.any():
             return self.expected[-1]
         return np.maximum(self.expected[-1], self.share[-1] * np.average(shown, axis=0, weights=seconds))
@@ -207,7 +207,7 @@ class Problem:
         """S of each run."""
         model, out = self.noise_model, []
         squares = found.squares(self.information) if model.white else None
-        for k, (run, E) in enumerate(zip(self.runs, self.selections, strict=True)):
+        for k, (run, E) in enumerate(self._each):
             if run.noise is not None:
                 out.append(run.noise)
                 continue
@@ -219,7 +219,7 @@ class Problem:
             if squares is not None:
                 power = run.residual_power(x, found.weights) + squares[k] / max(run.blocks.duration, 1e-9)
                 S = np.maximum(S, expected + 2.0 / run.gain * power)
-            out.append(S * max(1.0, run.blocks.duration / model.novelty))
+            out.append(S * self._repeats[k])
         return np.array(out)
 
     def _payloads(self, z: NDArray, variance: NDArray) -> NDArray:
@@ -251,17 +251,13 @@ class Problem:
             information=precision - before,
             vector=precision @ phi - pull,
             eta=eta,
+            eta_std=np.sqrt(np.diag(found.covariance[self.eta, self.eta])),
             drift=found.mean[drift],
             drift_covariance=found.covariance[drift, drift],
             tilt=eta[self.correction.tilt],
             tilt_covariance=found.covariance[self.eta, self.eta][self.correction.tilt, self.correction.tilt],
             residual=np.sqrt(scales.noise[-1]),
-            power=np.array(
-                [
-                    run.residual_power(E @ found.mean, found.weights)
-                    for run, E in zip(self.runs, self.selections, strict=True)
-                ]
-            ),
+            power=np.array([run.residual_power(E @ found.mean, found.weights) for run, E in self._each]),
             torque=torque,
             gears=gears,
             borne=self.runs[-1].rms_of(phi),
@@ -278,9 +274,8 @@ class Problem:
 
     def _ratios(self, scales: Scales, eta: NDArray) -> dict[str, NDArray[np.float64]]:
         stated = self.correction.prior_std**2
-        repeated = max(1.0, self.runs[-1].blocks.duration / self.noise_model.novelty)
         out = {
-            "noise": scales.noise[-1] / (repeated * self.expected[-1]),
+            "noise": scales.noise[-1] / (self._repeats[-1] * self.expected[-1]),
             "friction": self.correction.coulomb(scales.eta) / self.correction.coulomb(stated),
             "offset": self.correction.offset(eta**2) / self.correction.offset(stated),
         }

@@ -23,6 +23,11 @@ class Scales:
     payloads: NDArray[np.float64]
     drifts: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
 
+    @property
+    def shared(self) -> NDArray[np.float64]:
+        """Prior variance of z: of payloads, eta and drifts."""
+        return np.concatenate([self.payloads, self.eta, self.drifts.ravel()])
+
 
 @dataclass(frozen=True, eq=False)
 class AnotherArm:
@@ -76,7 +81,7 @@ class Posterior:
 
     phi, covariance: (10,), (10, 10) of the payload (relative to the tare, if there was one).
     information, vector: Λ (10, 10) and Λ·phi_ML (10,): what the logs alone say, all else integrated out.
-    eta: (p,) the arm's mismatch, in session 0.
+    eta, eta_std: (p,) the arm's mismatch, in session 0, and its standard deviation.
     drift, drift_covariance: (d,), (d, d) by which the run's session differs from session 0; (0,) where it does not.
     tilt, tilt_covariance: (2,), (2, 2) angles of gravity about `Arm.horizontal` [rad]; zero where gravity is believed.
     residual: √S (n,) of the run [N·m·√s].
@@ -97,6 +102,7 @@ class Posterior:
     information: NDArray[np.float64]
     vector: NDArray[np.float64]
     eta: NDArray[np.float64]
+    eta_std: NDArray[np.float64]
     drift: NDArray[np.float64]
     drift_covariance: NDArray[np.float64]
     tilt: NDArray[np.float64]
