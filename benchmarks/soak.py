@@ -119,7 +119,7 @@ def main():
             json.dumps(estimate.to_dict())
             spoken = estimate.t
         if estimate.t >= 60.0 * minute:
-            session.save(options.state)
+            session.identifier.save(options.state)
             saves += 1
             rows.append((estimate.t / 3600.0, resident()))
             if minute % 15 == 0:

@@ -546,7 +546,7 @@ def test_another_method_goes_on_from_nothing_and_an_unknown_one_changes_nothing(
     assert next(estimates).method == "map"
     session.use("rls")
     after = next(estimates)
-    assert (after.method, session.method) == ("rls", "rls")
+    assert (after.method, session.identifier.method) == ("rls", "rls")
     assert before.n_samples == 200
     assert after.n_samples == 1
     assert session.log[-1].text == "method rls"
@@ -563,7 +563,7 @@ def test_a_tare_is_as_old_as_it_was_said_to_be_until_another_is_taken(panda, ana
 
     def look(count):
         list(itertools.islice(estimates, count))
-        drifts.append(session._identifier.engine.session.drift)
+        drifts.append(session.identifier.engine.session.drift)
 
     look(100)
     session.use("map-gp")

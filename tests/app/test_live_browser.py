@@ -230,7 +230,7 @@ def test_whoever_comes_later_sees_the_present_state(served, holding, open_browse
 def test_the_method_can_be_switched_and_the_stream_tared(served, holding):
     session, *_ = served
     choose(holding, "Method", "map")
-    until(lambda: session.method == "map")
+    until(lambda: session.identifier.method == "map")
     until(lambda: "method map" in text(holding, "log"))
     until(lambda: (now := mass(holding)) is not None and abs(now[0] - HELD.mass) < 0.1)
     began = session.estimate.t

@@ -51,6 +51,7 @@ class ArmProcess:
 
     def __init__(self, settings: ArmSettings, every: float, readers: Sequence[Reader] = ()) -> None:
         self.settings, self.every, self._reader = settings, every, None
+        self._state = settings.state  # of the files as they are now: one written anew is not what the stream goes by
         self._told = self._saved = -float("inf")
         self._kept: float | None = None  # when the state was last saved or taken up, by the wall's clock
         self._continued = False  # whether it goes on from a state
@@ -116,11 +117,11 @@ class ArmProcess:
         source, estimate = self.source, session.estimate
         connections = source.connections + self._continued  # since it was saved the payload may have been exchanged
         link = Link(source.state, source.why, connections, source.resumed, source.heard)
-        why = why_unknown(estimate, link, now, session.trouble, session.doubt)
+        why = why_unknown(estimate, link, now, session.identifier.trouble, session.doubt)
         if estimate is None and _compiling.is_set() and source.state == "streaming":
             why = Why(Unknown.COMPILING, COMPILING)
         if self._feedback is not None and estimate is not None and session.sample is not None:
-            self._feedback.offer(estimate, session.sample.q, why is None, session.doubts)
+            self._feedback.offer(estimate, session.sample.q, why is None, session.identifier.doubts)
         self._say(estimate, why)
 
     def _say(self, estimate: OnlineEstimate | None, why: Why | None) -> None:
@@ -137,7 +138,7 @@ class ArmProcess:
             "connections": source.connections,
             "lost": source.lost,
             "saved": None if self._kept is None else max(0.0, time.time() - self._kept),
-            "arm_changed": None if self.session is None else self.session.arm_changed,
+            "arm_changed": None if self.session is None else self.session.identifier.arm_changed,
         }
         if self._feedback is not None:
             head["applied"] = {"mass": self._feedback.mass, "waits": self._feedback.waits}
@@ -189,7 +190,7 @@ class ArmProcess:
 
     def _restored(self, profile: Profile | None) -> OnlineIdentifier | None:
         """What goes on from the saved state, unless that is of a time when the arm may have been another."""
-        path = self.settings.state
+        path = self._state
         if path is None or not path.exists():
             return None
         try:
@@ -209,12 +210,12 @@ class ArmProcess:
         return identifier
 
     def _save(self, session: Session) -> None:
-        self._saved, path = time.monotonic(), self.settings.state
+        self._saved, path = time.monotonic(), self._state
         if path is None or session.sample is self._newest:  # what was not seen since is not of now
             return
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            session.save(path)
+            session.identifier.save(path)
             self._kept, self._failed, self._newest = time.time(), None, session.sample
         except (ArmloadError, OSError) as error:
             if str(error) != self._failed:

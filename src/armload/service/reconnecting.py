@@ -89,7 +89,7 @@ class Reconnecting(Source):
         def trial() -> None:
             try:
                 self._made = self._opens()
-            except (ArmloadError, OSError) as error:
+            except Exception as error:  # a client's own, too: it is told, and tried again
                 self._made = error
 
         self._trial = threading.Thread(target=trial, daemon=True)

@@ -122,25 +122,39 @@ class Service:
             began = time.monotonic()
             with self._state:
                 self._heard[name] = began
-            process = self._started(settings)
-            try:
-                error = self._listen(process, name)
-            finally:
-                code = process.wait()
-                _hang_up(process)
-                self.processes.pop(name, None)
-            if error is not None or code == 0 or self._gone.is_set():
-                if error is not None:
-                    self.error = f"{name}: {error}"
+            how = self._one_life(settings)
+            if how is None or self._gone.is_set():
                 break
-            how = f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
             wait = backoff.failed(time.monotonic() - began)
             self._note(f"{name}: its process {how}; it is started again in {wait:.1f} s")
             with self._state:
                 self._restarts[name] += 1
-                self._answers[name] = {**self._answers[name], **_unknown(f"its process {how}")}
+                # "t" says that it has answered, and compiling need not be waited for
+                self._answers[name] = {**self._answers[name], "t": None, **_unknown(f"its process {how}")}
             self._gone.wait(wait)
         self._ended.add(name)
+
+    def _one_life(self, settings: ArmSettings) -> str | None:
+        """One process, from its start to its end: how it ended, if it is to be started again."""
+        name = settings.name
+        try:
+            process = self._started(settings)
+        except OSError as error:  # too many processes at present, say
+            return f"cannot be started ({error.strerror})"
+        try:
+            error = self._listen(process, name)
+        finally:
+            _hang_up(process)
+            code = process.wait()
+            self.processes.pop(name, None)
+        if error is not None and self._restarts[name] == 0:  # later it may be a file that is being written anew
+            self.error = f"{name}: {error}"
+            return None
+        if error is not None:
+            return f"cannot begin: {error}"
+        if code == 0:
+            return None
+        return f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
 
     def _started(self, settings: ArmSettings) -> subprocess.Popen[bytes]:
         process = self.processes[settings.name] = self._spare.take()
@@ -157,6 +171,8 @@ class Service:
                 try:
                     said = json.loads(line)
                 except ValueError:  # cut off by a kill
+                    continue
+                if not isinstance(said, dict):  # something that a library prints
                     continue
                 if "error" in said:
                     return said["error"]

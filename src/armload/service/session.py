@@ -53,6 +53,7 @@ class Session:
         recorder: keeps every sample that was taken and what was said of it; closed with the session.
 
     Attributes:
+        identifier: at work; only the thread that runs the loop may save it or learn from it.
         sample: the newest that could be used. estimate: the newest. None before the first.
         history: rows (30,) of phi, half-widths of the 95 % intervals and the truth, NaN where it is not known.
         log: what happened, the last 200 entries.
@@ -81,7 +82,8 @@ class Session:
         self.tare = None if tare is None else Tare(tare, tare_age)
         self._known, self._every = known, every
         self._recorder, self._kept = recorder, -math.inf  # and when it last kept an estimate, on the stream's clock
-        self._identifier = self._made(self.tare, method) if identifier is None else identifier
+        self._ordered: tuple[Tare | None, str | Path | None] = self.tare, method  # last; perhaps not at work yet
+        self.identifier = self._made(self.tare, method) if identifier is None else identifier
         self.sample: Sample | None = None
         self.estimate: OnlineEstimate | None = None
         self._answered: OnlineEstimate | None = None  # the same when its sample had just arrived
@@ -96,42 +98,14 @@ class Session:
         self._stop = False
 
     @property
-    def method(self) -> str:
-        """The name of the method at work."""
-        return self._identifier.method
-
-    @property
     def doubt(self) -> str | None:
         """Why the samples cannot come from this arm; None: nothing says so."""
         return self._plausibility.doubt
 
     @property
-    def trouble(self) -> str | None:
-        """What keeps samples from being used at present."""
-        return self._identifier.trouble
-
-    @property
-    def arm_changed(self) -> str | None:
-        """That the arm is not as at its tare or profile; None: it is, as far as anybody can tell."""
-        return self._identifier.arm_changed
-
-    @property
-    def doubts(self) -> tuple[str, ...]:
-        """What speaks against the answer's error bars."""
-        return self._identifier.doubts
-
-    def save(self, path: str | Path) -> Path:
-        """Write the identifier's state (`OnlineIdentifier.save`); only from the thread that runs the loop."""
-        return self._identifier.save(path)
-
-    @property
     def lost(self) -> int:
         """Samples the source had to drop because the identifier was too slow."""
         return int(getattr(self.source, "lost", 0))
-
-    def learned(self) -> Profile | None:
-        """The profile with what the stream has shown of the empty arm; None: it showed nothing that can be learned."""
-        return self._identifier.learned(self.source.name)
 
     # ------------------------------------------------------------------ the loop
 
@@ -163,7 +137,7 @@ class Session:
             self._doubted()
         self._advise()
         if self.estimate is not None:
-            self.estimate = self._plausibility.qualified(self._identifier.conclude()).behind(self.source.lag())
+            self.estimate = self._plausibility.qualified(self.identifier.conclude()).behind(self.source.lag())
             self._keep(self.estimate, True)
         self._write("the source has ended")
         self.ended = True
@@ -192,7 +166,7 @@ class Session:
         self.source.close()
         if self._thread is not None:
             self._thread.join(5.0)
-        self._identifier.close()
+        self.identifier.close()
         if self._recorder is not None:
             self._recorder.close()
 
@@ -200,8 +174,8 @@ class Session:
         came = self.source.as_it_came(sample)
         if self._recorder is not None:
             self._recorder.append(came)
-        before, used = self.estimate, self._identifier.health.used
-        estimate = self._identifier.update(*sample)
+        before, used = self.estimate, self.identifier.health.used
+        estimate = self.identifier.update(*sample)
         event = estimate.event
         changed = event is not None and (before is None or event != before.event)
         if event is not None and changed and self.log.write_event(event):
@@ -217,7 +191,7 @@ class Session:
         estimate = self._answered.behind(self.source.lag())
         self.sample, self.estimate = sample if usable else self.sample, estimate
         self._keep(estimate, changed)
-        self.log.report_trouble(estimate.t, self._identifier.trouble)
+        self.log.report_trouble(estimate.t, self.identifier.trouble)
         if usable and self.history.due(estimate.t):
             truth = self.truth(estimate.t)
             known = np.full(10, np.nan) if truth is None else truth.phi
@@ -257,14 +231,14 @@ class Session:
         Raises:
             ArmloadError: the method cannot be used here; the present one goes on.
         """
-        self._exchange(self.tare, method, f"method {method}")
+        self._exchange(self._ordered[0], method, f"method {method}")
 
     def reset(self) -> None:
         """Forget the stream so far; the next sample is the first."""
         self._running()
 
         def order() -> None:
-            self._identifier.reset()
+            self.identifier.reset()
             self._recent.clear()
             self._plausibility.reset()
             self._write("started anew")
@@ -286,15 +260,16 @@ class Session:
                 "motion; wait and try again"
             )
         tare = Tare(log, held=self.source.truth(float(log.t[-1])), taken=True)
-        self._exchange(tare, self.method, f"tared with the last {seen:.0f} s")
+        self._exchange(tare, self._ordered[1], f"tared with the last {seen:.0f} s")
 
-    def _exchange(self, tare: Tare | None, method: str | Path, text: str) -> None:
+    def _exchange(self, tare: Tare | None, method: str | Path | None, text: str) -> None:
         self._running()
         identifier = self._made(tare, method)
+        self._ordered = tare, method
 
         def order() -> None:
-            self._identifier.close()
-            self._identifier, self.tare = identifier, tare
+            self.identifier.close()
+            self.identifier, self.tare = identifier, tare
             self._recent.clear()
             self._plausibility.forget()
             self._write(text)

@@ -223,7 +223,7 @@ def _learn(session, path: str) -> None:
     """Add what the stream has shown of the empty arm to a profile's file."""
     from armload.posterior import save_profile
 
-    profile = session.learned()
+    profile = session.identifier.learned(session.source.name)
     if profile is None:
         print_note(f"{path} is as it was: the stream showed no 20 s of the empty arm as the profile knows it")
         return

@@ -171,7 +171,7 @@ class Page:
         methods = methods_for(session)
         self._view = gui.add_dropdown("View", _VIEWS, hint="Payload: it stays in the middle while the arm moves")
         with gui.add_folder("Identification"):
-            self._method = gui.add_dropdown("Method", methods, initial_value=session.method)
+            self._method = gui.add_dropdown("Method", methods, initial_value=session.identifier.method)
             again = gui.add_button_group(" ", ("Start anew", "Tare"), hint="Tare: what is held now counts as nothing")
         if session.source.simulated:
             self._build_hand(gui)
@@ -186,10 +186,10 @@ class Page:
 
         @self._method.on_update
         def _(event: Any) -> None:
-            if event.client is None or event.target.value == session.method:
+            if event.client is None or event.target.value == session.identifier.method:
                 return  # we set it ourselves
             if not _done(event.client, "Method", lambda: session.use(event.target.value)):
-                self._method.value = session.method
+                self._method.value = session.identifier.method
 
         @self._view.on_update
         def _(_: Any) -> None:
@@ -219,7 +219,7 @@ def methods_for(session: Session) -> tuple[str, ...]:
         if (method.needs == "" or (method.needs == "tare" and session.tare is not None))
         and (name != "hybrid" or _has_hybrid(session.arm))
     ]
-    return tuple(names) if session.method in names else (session.method, *names)
+    return tuple(names) if session.identifier.method in names else (session.identifier.method, *names)
 
 
 def _has_hybrid(arm: Arm) -> bool:

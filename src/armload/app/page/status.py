@@ -71,10 +71,10 @@ class Watcher:
         estimate = session.estimate
         if estimate is not self._estimate:
             self._estimate, self._answered = estimate, now
-        why = why_unknown(estimate, _link(session, now), now, session.trouble, session.doubt)
+        why = why_unknown(estimate, _link(session, now), now, session.identifier.trouble, session.doubt)
         age = None if estimate is None else estimate.age + now - self._answered
         tare = None if session.tare is None else _tare_in_words(session.tare)
-        return Status(why, waits_for(estimate, why), session.doubt or session.arm_changed, age, tare)
+        return Status(why, waits_for(estimate, why), session.doubt or session.identifier.arm_changed, age, tare)
 
 
 def _tare_in_words(tare: Tare) -> str:
