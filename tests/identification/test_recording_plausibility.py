@@ -257,6 +257,44 @@ def test_a_torque_that_never_changes_while_its_joint_moves_is_refused_by_joint(r
         check_plausible(replace(log, tau=tau), robot)
 
 
+@pytest.mark.parametrize("name", ["panda", "ur10e"])
+def test_a_torque_that_stands_still_while_its_joint_moves_is_refused_by_joint(wrong, name):
+    robot, log = wrong[name]
+    first, last = np.array([1, 2]) * len(log) // 3
+    moving = np.flatnonzero(np.ptp(log.q[first:last], axis=0) > 0.3)
+    assert len(moving) >= 3
+    for joint in moving:
+        tau = log.tau.copy()
+        tau[first:last, joint] = tau[first, joint]
+        with pytest.raises(RecordingError, match=rf"tau{joint + 1} stays exactly the same from row {first} .* remove"):
+            check_plausible(replace(log, tau=tau), robot)
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e"])
+def test_a_torque_sensor_at_its_limit_is_told_by_the_joint(wrong, name):
+    robot, log = wrong[name]
+    tau = log.tau.copy()
+    tau[:, 1] = np.maximum(tau[:, 1], np.quantile(tau[:, 1], 0.3))
+    with pytest.raises(RecordingError, match=r"tau2 is exactly .*, its least value, .* at its limit"):
+        check_plausible(replace(log, tau=tau), robot)
+
+
+@pytest.mark.parametrize("digits", [1, 2, 3])
+def test_a_torque_that_is_rounded_is_not_taken_for_one_that_stands_still(sound, wrong, digits):
+    for robot, log in [*((robot, log) for robot, logs in sound.values() for log in logs), *wrong.values()]:
+        check_plausible(replace(log, tau=log.tau.round(digits)), robot)
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e"])
+def test_joints_in_the_order_of_the_alphabet_are_refused_by_name(sound, wrong, name):
+    robot, logs = sound[name]
+    order = [2, 1, 0, *range(3, robot.n)]  # elbow, shoulder lift, shoulder pan of a UR
+    for log in (*logs, wrong[name][1]):
+        other = replace(log, q=log.q[:, order], dq=log.dq[:, order], tau=log.tau[:, order], joint_names=None)
+        with pytest.raises(RecordingError, match=r"joints 1 and 3 seem to be exchanged|order of the joints"):
+            check_plausible(other, robot)
+
+
 @pytest.mark.parametrize(
     "name", ["panda", "ur10e", *(pytest.param(x, marks=pytest.mark.full) for x in ("ur10e loaded", "ur10"))]
 )

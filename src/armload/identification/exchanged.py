@@ -1,7 +1,8 @@
-"""Two torque columns in each other's place: found by the fit of the arm's own torque, before and after."""
+"""Torque columns, or joints, in each other's place: found by the fit of the arm's own torque, before and after."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import combinations, pairwise
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from armload.arms import Arm
 from armload.errors import RecordingError
-from armload.identification.thresholds import SWAPPED_MISFIT, SWAPPED_SHARE
+from armload.identification.thresholds import JOINTS_EXCHANGED, MODEL_MISFIT, SWAPPED_MISFIT, SWAPPED_SHARE
 from armload.identification.torque_scale import TorqueScale, torque_scale
 from armload.recording import Recording
 
@@ -27,13 +28,14 @@ def check_for_exchanged_torques(recording: Recording, arm: Arm, seen: TorqueScal
         return
     found = []
     for i, j in combinations(range(recording.n), 2):
-        fit = torque_scale(_exchanged(recording, i, j), arm)
+        fit = torque_scale(_torques_exchanged(recording, i, j), arm)
         if fit is not None and not fit.is_wrong:
             found.append((fit.misfit, i, j))
     if not found:
         return
     misfit, i, j = min(found)
-    if misfit < min(SWAPPED_MISFIT, SWAPPED_SHARE * seen.misfit) and _throughout(recording, arm, i, j):
+    enough = misfit < min(SWAPPED_MISFIT, SWAPPED_SHARE * seen.misfit)
+    if enough and all(b.misfit < a.misfit for a, b in _in_parts(recording, _torques_exchanged(recording, i, j), arm)):
         raise RecordingError(
             f"{recording.source}: tau{i + 1} and tau{j + 1} seem to be exchanged (misfit {seen.misfit:.1f} times a "
             f"sound robot's, {misfit:.1f} with these two columns the other way round): expected the torques in the "
@@ -41,21 +43,56 @@ def check_for_exchanged_torques(recording: Recording, arm: Arm, seen: TorqueScal
         )
 
 
-def _exchanged(recording: Recording, i: int, j: int) -> Recording:
-    order = list(range(recording.n))
+def check_for_exchanged_joints(recording: Recording, arm: Arm, seen: TorqueScale) -> None:
+    """Refuse a log of which the arm's own torque tells that two joints are in each other's place.
+
+    The order of ROS drivers may be that of the alphabet. Wrist joints, which bear little, tell nothing.
+
+    Args:
+        recording, arm: the log and what it should be of. seen: how its torque fits.
+
+    Raises:
+        RecordingError: so it is; the sentence names the two joints.
+    """
+    if seen.evidence > -JOINTS_EXCHANGED:  # no evidence is far above 0
+        return
+    found = []
+    for i, j in combinations(range(recording.n), 2):
+        fit = torque_scale(_joints_exchanged(recording, i, j), arm)
+        if fit is not None and not fit.is_wrong and fit.misfit <= MODEL_MISFIT:
+            found.append((fit.evidence, i, j))
+    evidence, i, j = max(found, default=(-np.inf, 0, 0))
+    if evidence < seen.evidence + JOINTS_EXCHANGED:
+        return
+    if all(b.evidence > a.evidence for a, b in _in_parts(recording, _joints_exchanged(recording, i, j), arm)):
+        raise RecordingError(
+            f"{recording.source}: joints {i + 1} and {j + 1} seem to be exchanged, in q, dq and tau: expected the "
+            f"order of {arm.name}'s joints ({', '.join(arm.joint_names)}); a ROS driver may give that of the alphabet; "
+            "name the columns, or exchange them"
+        )
+
+
+def _torques_exchanged(recording: Recording, i: int, j: int) -> Recording:
+    return replace(recording, tau=recording.tau[:, _order(recording.n, i, j)])
+
+
+def _joints_exchanged(recording: Recording, i: int, j: int) -> Recording:
+    q, dq, tau = (x[:, _order(recording.n, i, j)] for x in (recording.q, recording.dq, recording.tau))
+    return replace(recording, q=q, dq=dq, tau=tau)
+
+
+def _order(n: int, i: int, j: int) -> list[int]:
+    order = list(range(n))
     order[i], order[j] = j, i
-    return replace(recording, tau=recording.tau[:, order])
+    return order
 
 
-def _throughout(recording: Recording, arm: Arm, i: int, j: int) -> bool:
-    """Whether each third of a log fits better with two columns exchanged.
+def _in_parts(recording: Recording, other: Recording, arm: Arm) -> Iterator[tuple[TorqueScale, TorqueScale]]:
+    """How each third of a log fits, and of another of the same times, where both say anything.
 
     A payload that changes within a log leaves a misfit, too, but not in the parts before and after.
     """
-    edges = np.linspace(recording.t[0], recording.t[-1], 4)
-    for begin, end in pairwise(edges):
-        part = recording.between(begin, end)
-        fits = torque_scale(part, arm), torque_scale(_exchanged(part, i, j), arm)
-        if fits[0] is not None and fits[1] is not None and fits[1].misfit >= fits[0].misfit:
-            return False
-    return True
+    for begin, end in pairwise(np.linspace(recording.t[0], recording.t[-1], 4)):
+        fits = [torque_scale(log.between(begin, end), arm) for log in (recording, other)]
+        if fits[0] is not None and fits[1] is not None:
+            yield fits[0], fits[1]

@@ -15,7 +15,7 @@ from armload.identification.arm_health import ArmHealth
 from armload.identification.choice import Choice, choose
 from armload.identification.intervals import Before
 from armload.identification.known_payload import know
-from armload.identification.thresholds import LARGEST_OFFSET, LEAST_SEEN, MISFIT, MOVES
+from armload.identification.thresholds import BACKWARDS, KAPPA_UNKNOWN, LARGEST_OFFSET, LEAST_SEEN, MISFIT, MOVES
 from armload.inertia import distance_to_body, is_consistent
 from armload.posterior import HybridIdentifier, Known, PosteriorLeastSquares, Profile
 from armload.posterior.scales import AnotherArm, Drift, Tilt
@@ -52,6 +52,7 @@ class Found(NamedTuple):
     unprojected: mean (10,) and covariance (10, 10) of what the log says, before a body was made of it; None: the
         estimate's.
     offset_ratio: how many times the arm's torque offsets are what is expected of them, where that is too often.
+    backwards: joints, from 1, that friction surely drives where it must brake them, of such a method.
     frictionless: whether no joint that moves shows friction, of a method that knows the arm's.
     strange_links: by how much the arm's links differ from the model's (`ArmMismatch.links`), where that is too much.
     unknown_friction: whether the torques hold unknown gear friction; `friction_found`: that they did.
@@ -77,6 +78,7 @@ class Found(NamedTuple):
     weak_std: NDArray[np.float64] | None = None
     unprojected: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     offset_ratio: float = 0.0
+    backwards: tuple[int, ...] = ()
     frictionless: bool = False
     strange_links: float = 0.0
     unknown_friction: bool = False
@@ -157,6 +159,7 @@ def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Foun
     if not choice.error_known:
         estimate = replace(estimate, covariance=np.diag(std**2))
     mismatch = identifier.mismatch
+    kappa = identifier.kappa if isinstance(identifier, HybridIdentifier) else None
     # where the payload prior is learned, so are error bars that allow for friction
     unknown = identifier.payload_prior is None and not arm.motor_torque
     return Found(
@@ -168,6 +171,7 @@ def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Foun
         weak_std=identifier.weak_std,
         unprojected=identifier.unprojected,
         offset_ratio=0.0 if mismatch is None else _offset_ratio(mismatch, recording),
+        backwards=() if posterior is None else _backwards(posterior, recording, kappa),
         frictionless=posterior is not None and _frictionless(posterior, recording),
         strange_links=0.0 if mismatch is None or mismatch.torque == "motor" else _strange(mismatch.links),
         unknown_friction=unknown and mismatch is not None and mismatch.torque == "motor",
@@ -177,13 +181,23 @@ def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Foun
         tilt=None if posterior is None else posterior.stream.tilt,
         restlessness=0.0 if posterior is None else posterior.stream.restlessness,
         exchanged=posterior is not None and posterior.exchanged,
-        kappa=identifier.kappa if isinstance(identifier, HybridIdentifier) else None,
+        kappa=kappa,
         gain_std=None if posterior is None else posterior.posterior.gain_std,
         gain_known=asked.profile is not None and asked.profile.gain_std is not None,
         known=asked.known,
         log_only=None if posterior is None else posterior.log_only,
         health=None if posterior is None else ArmHealth.of(posterior),
     )
+
+
+def _backwards(found: PosteriorLeastSquares, recording: Recording, kappa: float | None) -> tuple[int, ...]:
+    """Joints, from 1, that move, and whose Coulomb friction surely has the sign of one that drives them.
+
+    kappa: by how much the physics overrates the log's evidence; None: not known.
+    """
+    coulomb, sure = found.stream.correction.coulomb, BACKWARDS * np.sqrt(kappa or KAPPA_UNKNOWN)
+    driven = coulomb(found.posterior.eta) < -sure * coulomb(found.posterior.eta_std)
+    return tuple((np.flatnonzero(driven & (span(recording.q) > MOVES)) + 1).tolist())
 
 
 def _frictionless(found: PosteriorLeastSquares, recording: Recording) -> bool:

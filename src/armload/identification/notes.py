@@ -178,6 +178,17 @@ def leaning(arm: Arm, tilt: Tilt | None, torque: str) -> str | None:
     return gravity_doubted(arm, tilt, torque)
 
 
+def driven_by_friction(joints: tuple[int, ...]) -> str:
+    """That friction drives joints, from 1, where it must brake them: a sign is turned."""
+    several = len(joints) > 1
+    which = ", ".join(str(j) for j in joints)
+    return (
+        f"friction drives joint{'s' if several else ''} {which} where it must brake {'them' if several else 'it'}: the "
+        f"sign of {'their' if several else 'its'} torque is turned, or that of position and velocity; turn it back in "
+        "the log and in its tare"
+    )
+
+
 def not_rigid(restlessness: float) -> str:
     """That what is held seems to move on its own."""
     return (

@@ -17,6 +17,7 @@ from armload.identification.notes import (
     COMPUTED,
     another_model,
     arm_changed,
+    driven_by_friction,
     gravity_turned,
     lacking,
     leaning,
@@ -124,7 +125,9 @@ def _doubts(found: Found, arm: Arm, mass_determined: bool, relative_to: str) -> 
         leans = gravity_turned(arm.gravity, found.gravity, True)
     else:
         leans = leaning(arm, found.tilt, "motor" if arm.motor_torque or found.friction_found else "link")
-    return [doubt for doubt in (leans, _doubt(found, arm, mass_determined, relative_to)) if doubt is not None]
+    driven = driven_by_friction(found.backwards) if found.backwards else None
+    doubts = driven, leans, _doubt(found, arm, mass_determined, relative_to)
+    return [doubt for doubt in doubts if doubt is not None]
 
 
 def _doubt(found: Found, arm: Arm, mass_determined: bool, relative_to: str) -> str | None:

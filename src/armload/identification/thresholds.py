@@ -26,6 +26,10 @@ LARGEST_OFFSET = 5.0
 # joints is 2.3e-3, of their wrists 2e-2; a model's torque leaves 2e-4
 # (test_a_torque_that_is_computed_and_not_measured_is_told_by_its_lack_of_friction)
 LEAST_SEEN = 1e-3
+# [standard deviations] by which Coulomb friction that is found lies on the side that drives its joint: friction brakes.
+# Of sound logs of a second and more, simulated and real, it is at most 2.6 (a KUKA's of unfiltered velocities), with a
+# wrist torque's sign turned 1 to 25 (test_friction_that_drives_a_joint_is_told_by_the_joint)
+BACKWARDS = 3.0
 # [rad] a joint that stays within so much stands: friction below stiction holds it
 MOVES = 0.05
 # times that a log tells a parameter worse under the weak prior: beyond, it leaves it to the learned one. The factor by
@@ -121,6 +125,10 @@ NO_TORQUE = 1e-3
 FROZEN_TIME = 0.25
 # [rad] that a joint moves meanwhile: a standing arm's torque may well repeat where it is rounded
 FROZEN_MOTION = 0.1
+# times as long as any other value of a joint's torque: a torque with noise repeats for a sample or two, so that one
+# that is held for `FROZEN_TIME` is not measured. Sound logs, simulated and real, rounded to 1 to 100 mN·m, too, pass
+# (test_a_torque_that_is_rounded_is_not_taken_for_one_that_stands_still)
+FROZEN_LONGER = 10.0
 
 # ---------------------------------------------------------------------- the arm's own torque, `torque_scale.py`
 
@@ -149,6 +157,10 @@ SWAPPED_MISFIT = 1.0
 # of the misfit, what may be left with two torque columns exchanged back: real logs leave at most 0.449
 # (test_exchanged_torque_columns_of_a_real_log_are_named)
 SWAPPED_SHARE = 0.45
+# [log odds] by which two joints exchanged back explain a log better, one window in four counting: 400 to 1. Of sound
+# logs no exchange explains more than they do, of the first and third joint exchanged 15 and more
+# (test_joints_in_the_order_of_the_alphabet_are_refused_by_name)
+JOINTS_EXCHANGED = 6.0
 # of the misfit, what is left in the parts of a log whose payload changed: 0.03 of a simulated one, where parts of logs
 # of another robot, unit, sign or base keep 0.3 and more (test_a_payload_that_is_put_down_is_not_taken_for_no_torque)
 PARTS_SHARE = 0.25

@@ -5,10 +5,11 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
-from armload.arms import ARMS, Arm
+from armload.arms import ARMS, Arm, rated_effort
 from armload.errors import RecordingError
-from armload.identification.exchanged import check_for_exchanged_torques
+from armload.identification.exchanged import check_for_exchanged_joints, check_for_exchanged_torques
 from armload.identification.thresholds import (
     CURRENT_HIGH,
     CURRENT_LOW,
@@ -16,8 +17,10 @@ from armload.identification.thresholds import (
     EFFORT,
     EFFORT_EVER,
     EFFORT_SHARE,
+    FROZEN_LONGER,
     FROZEN_MOTION,
     FROZEN_TIME,
+    MODEL_ERROR,
     MODEL_MISFIT,
     NO_TORQUE,
     OTHER_FORM,
@@ -40,6 +43,7 @@ def check_torque(recording: Recording, arm: Arm) -> None:
     if recording.channel == "measured":  # the others need not hold the arm's own weight
         _check_torque_goes_on(recording)
         _check_no_torque_is_dead(recording)
+        _check_no_torque_stands_still(recording, arm)
         _check_torque_is_the_arms(recording, arm)
 
 
@@ -66,19 +70,72 @@ def _check_effort(recording: Recording, arm: Arm) -> None:
 
 def _check_torque_goes_on(recording: Recording) -> None:
     """Refuse torque that repeats itself exactly in all joints while the arm moves: its sensor or logger stood still."""
-    same = np.zeros(len(recording) + 1, dtype=np.int8)
-    for part in blocks(len(recording)):
-        rows = slice(max(part.start - 1, 0), part.stop)
-        tau = recording.tau[rows]
-        same[rows.start + 1 : rows.stop] = np.all(tau[1:] == tau[:-1], axis=1)
-    edges = np.diff(same)
-    for first, last in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
+    for first, last in _repeats(recording, slice(None))[0]:
         time = recording.t[last] - recording.t[first]
         if time > FROZEN_TIME and np.any(span(recording.q, slice(first, last + 1)) > FROZEN_MOTION):
             raise RecordingError(
                 f"{recording.source}: tau stays exactly the same in all joints from {row_of(recording, first)} for "
                 f"{time:.2f} s although the arm moves: expected the torque of every moment; remove the rows"
             )
+
+
+def _repeats(recording: Recording, joints: slice) -> tuple[NDArray[np.intp], float]:
+    """First and last row (K, 2) of each stretch in which the torques of some joints are exactly the same.
+
+    And the smallest step between two rows of them [N·m]: what they are rounded to, or less.
+    """
+    same, least = np.zeros(len(recording) + 1, dtype=np.int8), np.inf
+    for part in blocks(len(recording)):
+        rows = slice(max(part.start - 1, 0), part.stop)
+        step = np.abs(np.diff(recording.tau[rows][:, joints], axis=0)).max(axis=1)
+        same[rows.start + 1 : rows.stop] = step == 0.0
+        least = min(least, step[step > 0.0].min(initial=np.inf))
+    edges = np.diff(same)
+    return np.column_stack([np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)]), float(least)
+
+
+def _check_no_torque_stands_still(recording: Recording, arm: Arm) -> None:
+    """Refuse a torque that is held at one value, as no measured one is, while its joint moves.
+
+    It is held for longer than `FROZEN_TIME` in all, while the joint moves by more than `FROZEN_MOTION`. And either what
+    the arm itself asks of it changes meanwhile by more than a model error, beyond what the torque is rounded to. Or, of
+    a torque that is rounded to less than a model error, no other value is held a tenth as long.
+    """
+    error = MODEL_ERROR * rated_effort(arm)
+    for j in range(recording.n):
+        stretches, least = _repeats(recording, slice(j, j + 1))
+        values, which = np.unique(recording.tau[stretches[:, 0]][:, j], return_inverse=True)
+        lasting = recording.t[stretches[:, 1]] - recording.t[stretches[:, 0]]
+        held = np.bincount(which, lasting, len(values))
+        for k in np.flatnonzero(held > FROZEN_TIME):
+            mine = stretches[which == k]
+            rows = np.linspace(mine[:, 0], mine[:, 1], 5).round().astype(int)  # (5, M)
+            moved = np.ptp(recording.q[rows.ravel()][:, j].reshape(rows.shape), axis=0)
+            if moved.sum() <= FROZEN_MOTION:
+                continue
+            own = np.ptp(arm.torque(recording.q[rows.ravel()])[:, j].reshape(rows.shape), axis=0)
+            alone = least < error[j] and held[k] > FROZEN_LONGER * np.delete(held, k).max(initial=0.0)
+            if alone or np.maximum(own - 2.0 * least, 0.0).sum() > error[j]:
+                raise _held_torque(recording, j, float(values[k]), mine, float(held[k]))
+
+
+def _held_torque(recording: Recording, j: int, value: float, rows: NDArray[np.intp], time: float) -> RecordingError:
+    """That the torque of joint j is held at a value in stretches of rows (M, 2), `time` [s] in all."""
+    low = min(float(tau[:, j].min()) for tau in parts_of(recording.tau))
+    high = max(float(tau[:, j].max()) for tau in parts_of(recording.tau))
+    if value in (low, high):
+        end = f"its {'largest' if value == high else 'least'} value, for {time:.2f} s in all"
+        return RecordingError(
+            f"{recording.source}: tau{j + 1} is exactly {value:.4g} N·m, {end}, first at "
+            f"{row_of(recording, rows[0, 0])}, although joint {j + 1} moves: its sensor or logger is at its limit; "
+            "expected the torque of every moment; record a slower motion, or a lighter payload"
+        )
+    first, last = rows[np.argmax(rows[:, 1] - rows[:, 0])]
+    return RecordingError(
+        f"{recording.source}: tau{j + 1} stays exactly the same from {row_of(recording, first)} for "
+        f"{recording.t[last] - recording.t[first]:.2f} s although joint {j + 1} moves: expected the torque of every "
+        "moment; remove the rows"
+    )
 
 
 def _check_no_torque_is_dead(recording: Recording) -> None:
@@ -98,6 +155,7 @@ def _check_torque_is_the_arms(recording: Recording, arm: Arm) -> None:
     if fit is None:
         return
     check_for_exchanged_torques(recording, arm, fit)
+    check_for_exchanged_joints(recording, arm, fit)
     if (fit.is_wrong or fit.misfit > MODEL_MISFIT) and _sound_in_parts(recording, arm, fit):
         return
     if arm.motor_torque:
