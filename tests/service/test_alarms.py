@@ -59,6 +59,16 @@ def test_an_unknown_answer_neither_raises_nor_clears_a_mass():
     assert alarms.raised == {"over_rating"}
 
 
+def test_what_lasted_before_an_unknown_time_does_not_count_after_it():
+    alarms, now = Alarms("a", rating=3.0), 0.0
+    for mass, lasts in ((3.5, RAISED_AFTER), (1.0, CLEARED_AFTER)):
+        for said, seconds in ((answer(mass), 0.9 * lasts), (UNKNOWN, 60.0), (answer(mass), 0.9 * lasts)):
+            found, now = told(alarms, said, seconds, now)
+            assert found == []
+        found, now = told(alarms, answer(mass), lasts, now)
+        assert len(found) == 1
+
+
 @pytest.mark.parametrize(
     ("said", "kind"),
     [
