@@ -11,7 +11,6 @@ RAISED_AFTER = (
     0.5  # [s] a condition holds before its alarm: longer than the worst estimates of a hand-over at once last
 )
 CLEARED_AFTER = 5.0  # [s] it does not hold before the alarm is over: a limit that is grazed gives one alarm
-KINDS = ("over_rating", "com_out_of_range", "arm_changed", "source_lost")
 STARTS = 30.0  # [s] a source may take to give its first sample: a process, a reader and a robot that connects
 # why an arm is not heard of; all others are of a source that works
 _LOST = ("starting", "source lost", "silent")
@@ -21,8 +20,8 @@ _LOST = ("starting", "source lost", "silent")
 class Alarm:
     """An alarm that begins or ends.
 
-    arm: its name. kind: one of `KINDS`. raised: whether it begins. value, limit: what was compared, None where nothing
-    was: masses [kg], or distances from the payload frame [m].
+    arm: its name. kind: one of `_CONDITIONS`. raised: whether it begins. value, limit: what was compared, None where
+    nothing was: masses [kg], or distances from the payload frame [m].
     """
 
     arm: str
@@ -69,7 +68,7 @@ class Alarms:
 
     def look(self, answer: Mapping[str, Any], now: float) -> list[Alarm]:
         """The alarms that begin or end with an answer told at `now` [s, monotonic]."""
-        return [alarm for kind in KINDS if (alarm := self._look(kind, answer, now)) is not None]
+        return [alarm for kind in _CONDITIONS if (alarm := self._look(kind, answer, now)) is not None]
 
     def _look(self, kind: str, answer: Mapping[str, Any], now: float) -> Alarm | None:
         holds, text, value, limit = _CONDITIONS[kind](self, answer)
