@@ -59,6 +59,16 @@ def test_an_unknown_answer_neither_raises_nor_clears_a_mass():
     assert alarms.raised == {"over_rating"}
 
 
+def test_what_lasted_before_an_unknown_time_does_not_count_after_it():
+    alarms, now = Alarms("a", rating=3.0), 0.0
+    for mass, lasts in ((3.5, RAISED_AFTER), (1.0, CLEARED_AFTER)):
+        for said, seconds in ((answer(mass), 0.9 * lasts), (UNKNOWN, 60.0), (answer(mass), 0.9 * lasts)):
+            found, now = told(alarms, said, seconds, now)
+            assert found == []
+        found, now = told(alarms, answer(mass), lasts, now)
+        assert len(found) == 1
+
+
 @pytest.mark.parametrize(
     ("said", "kind"),
     [
@@ -91,6 +101,9 @@ def receiver():
         def do_POST(self):
             body = self.rfile.read(int(self.headers["Content-Length"]))
             code = codes.pop(0) if codes else 200
+            if isinstance(code, bytes):
+                self.wfile.write(code)
+                return
             if code == 200:
                 taken.append((json.loads(body), self.headers.get("Authorization")))
             self.send_response(code)
@@ -136,6 +149,17 @@ def test_a_message_that_will_never_be_taken_holds_up_no_other(receiver):
     assert (webhook.sent, webhook.dropped) == (1, 1)
 
 
+def test_an_answer_that_is_no_http_is_said_and_alarms_go_on(receiver, caplog):
+    url, taken, codes = receiver
+    codes[:] = [b"garbage\r\n\r\n"]
+    webhook = Webhook(url)
+    webhook.post({"number": 0})
+    until(lambda: webhook.sent == 1)
+    webhook.close()
+    assert [message["number"] for message, _ in taken] == [0]
+    assert caplog.messages == ["the webhook did not answer: garbage", "the webhook takes alarms again"]
+
+
 def test_what_waits_for_a_dead_receiver_is_bounded():
     webhook = Webhook("http://127.0.0.1:9/nobody")
     for k in range(3000):
@@ -147,3 +171,8 @@ def test_what_waits_for_a_dead_receiver_is_bounded():
 def test_an_address_that_is_none_is_refused():
     with pytest.raises(UsageError, match="expected an address"):
         Webhook("ftp://host/x")
+
+
+def test_a_header_that_is_no_text_is_refused():
+    with pytest.raises(UsageError, match="header Authorization is a list: expected a text"):
+        Webhook("https://host/x", {"Authorization": ["x"]})

@@ -9,12 +9,13 @@ import threading
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from armload.arms import arm
-from armload.devices import Counted, Detached, check_writable, controller_of
+from armload.devices import Counted, Detached, Load, check_writable, controller_of
 from armload.errors import SinkError, SourceError, UsageError
 from armload.inertia import InertialParameters, is_consistent
 from armload.motion import FourierMotion, save_motion, taie2024
@@ -174,6 +175,61 @@ def test_a_controller_that_does_not_count_what_it_was_told_is_refused(answer):
     controller.deaf = True
     one, _ = feedback(controller)
     assert "was told" in told(one, answer)
+
+
+def test_whatever_a_controller_fails_with_is_said_once_and_it_is_tried_again(answer):
+    class Failing(Asked):
+        def __init__(self, what):
+            super().__init__()
+            self.fails = what
+
+        def counted(self):
+            self.fail("counted")
+            return super().counted()
+
+        def done(self):
+            self.fail("done")
+            super().done()
+
+        def fail(self, what):
+            if self.fails == what:
+                raise RuntimeError("lost\nat once")
+
+    for what in ("counted", "done"):
+        controller = Failing(what)
+        one, notes = feedback(controller)
+        for _ in range(3):
+            one.offer(answer, Q, what == "counted")
+            one.step()
+            assert one.waits == "lost at once"
+        assert notes == ["no load is told to the controller: lost at once"]
+        controller.fails = None
+        assert told(one, answer) is None
+
+
+def test_what_ur_rtde_raises_is_an_error_of_the_robot_and_the_next_look_connects_again(monkeypatch):
+    def lost(*_):
+        raise RuntimeError("lost")
+
+    still = {"isConnected": lambda: True, "getActualQd": lambda: [0.0] * 6, "disconnect": lambda: None}
+    nothing = {"getPayload": lambda: 0.0, "getPayloadCog": lambda: [0.0] * 3, "getPayloadInertia": lambda: [0.0] * 6}
+    receives = [SimpleNamespace(**still, **{key: lost for key in nothing}), SimpleNamespace(**still, **nothing)]
+    control = SimpleNamespace(setTargetPayload=lambda *_: True, stopScript=lost, disconnect=lambda: ended.append(None))
+    ended, robot = [], arm("ur10e")
+    for module, name, made in (
+        ("rtde_receive", "RTDEReceiveInterface", lambda *_: receives.pop(0)),
+        ("rtde_control", "RTDEControlInterface", lambda *_: control),
+    ):
+        monkeypatch.setitem(sys.modules, module, SimpleNamespace(**{name: made}))
+    controller = controller_of("ur://127.0.0.1", robot, lambda: None)
+    with pytest.raises(SourceError, match=r"127\.0\.0\.1 .*lost"):
+        controller.counted()
+    assert controller.counted().load.mass == 0.0
+    controller.put(Load(InertialParameters.zero("tool0"), (True,) * 10))
+    with pytest.raises(SinkError, match=r"127\.0\.0\.1 .*lost"):
+        controller.done()
+    controller.close()
+    assert len(ended) == 1
 
 
 @pytest.mark.parametrize(("end_effector", "mass"), [(0.0, 0.7), (0.7, 0.0)])

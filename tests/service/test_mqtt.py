@@ -8,6 +8,7 @@ import contextlib
 import json
 import os
 import queue
+import re
 import socket
 import subprocess
 import threading
@@ -125,3 +126,27 @@ def test_what_waits_for_a_broker_that_is_not_there_is_bounded(port):
         assert mqtt.dropped >= 100
     finally:
         mqtt.close()
+
+
+def test_a_broker_that_refuses_at_first_is_told_once_that_the_service_is_there():
+    pytest.importorskip("paho.mqtt.client", reason="paho-mqtt is not installed")
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(PATIENCE)
+        mqtt = Mqtt(f"mqtt://127.0.0.1:{server.getsockname()[1]}/cell")
+        try:
+            for refused in (5, 0):  # not authorized, accepted
+                connection, _ = server.accept()
+                connection.settimeout(PATIENCE)
+                with connection:
+                    connection.recv(4096)
+                    connection.sendall(bytes([0x20, 2, 0, refused]))
+                    heard = b""
+                    while not refused and b"true" not in heard:
+                        heard += connection.recv(4096)
+                    if not refused:
+                        mqtt.close()
+                        while more := connection.recv(4096):
+                            heard += more
+        finally:
+            mqtt.close()
+    assert len(re.findall(rb"cell/online..true", heard, re.DOTALL)) == 1

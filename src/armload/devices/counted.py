@@ -28,7 +28,7 @@ class Controller(Protocol):
         ...
 
     def done(self) -> None:
-        """Nothing more is written for a while."""
+        """Nothing more is written for a while; raises ArmloadError if the robot cannot be told."""
 
     def close(self) -> None:
-        """Let go of it."""
+        """Let go of it; raises ArmloadError as `done`."""

@@ -11,7 +11,6 @@ RAISED_AFTER = (
     0.5  # [s] a condition holds before its alarm: longer than the worst estimates of a hand-over at once last
 )
 CLEARED_AFTER = 5.0  # [s] it does not hold before the alarm is over: a limit that is grazed gives one alarm
-KINDS = ("over_rating", "com_out_of_range", "arm_changed", "source_lost")
 STARTS = 30.0  # [s] a source may take to give its first sample: a process, a reader and a robot that connects
 # why an arm is not heard of; all others are of a source that works
 _LOST = ("starting", "source lost", "silent")
@@ -21,8 +20,8 @@ _LOST = ("starting", "source lost", "silent")
 class Alarm:
     """An alarm that begins or ends.
 
-    arm: its name. kind: one of `KINDS`. raised: whether it begins. value, limit: what was compared, None where nothing
-    was: masses [kg], or distances from the payload frame [m].
+    arm: its name. kind: one of `_CONDITIONS`. raised: whether it begins. value, limit: what was compared, None where
+    nothing was: masses [kg], or distances from the payload frame [m].
     """
 
     arm: str
@@ -49,8 +48,8 @@ class Alarms:
     """What becomes an alarm of one arm's answers.
 
     A condition must hold for 0.5 s to raise its alarm, and must not hold for 5 s to clear it. While the answer is
-    unknown, nobody knows whether a mass is over the rating: then neither begins nor ends. A source counts as lost 0.5 s
-    after its last sample is half a second old, and where it never came, after 30 s.
+    unknown, nobody knows whether a mass is over the rating: then neither begins nor ends, and both times begin anew. A
+    source counts as lost 0.5 s after its last sample is half a second old, and where it never came, after 30 s.
 
     >>> alarms = Alarms("left", rating=3.0)
     >>> heavy = {"known": True, "mass": 3.4, "com": [0.0, 0.0, 0.1]}
@@ -65,18 +64,17 @@ class Alarms:
     def __init__(self, arm: str, rating: float = math.inf, com_range: float | None = None) -> None:
         self.arm, self.rating, self.com_range = arm, rating, com_range
         self.raised: set[str] = set()
-        self._since: dict[str, float] = {}  # since when each condition is other than its alarm says
+        self._since: dict[str, float] = {}  # since when each condition is known to be other than its alarm says
 
     def look(self, answer: Mapping[str, Any], now: float) -> list[Alarm]:
         """The alarms that begin or end with an answer told at `now` [s, monotonic]."""
-        return [alarm for kind in KINDS if (alarm := self._look(kind, answer, now)) is not None]
+        return [alarm for kind in _CONDITIONS if (alarm := self._look(kind, answer, now)) is not None]
 
     def _look(self, kind: str, answer: Mapping[str, Any], now: float) -> Alarm | None:
         holds, text, value, limit = _CONDITIONS[kind](self, answer)
         was = kind in self.raised
         if holds is None or holds == was:
-            if holds == was:
-                self._since.pop(kind, None)
+            self._since.pop(kind, None)
             return None
         lasts = CLEARED_AFTER if not holds else STARTS if answer.get("unknown") == "starting" else RAISED_AFTER
         if now - self._since.setdefault(kind, now) < lasts:

@@ -37,7 +37,7 @@ from armload.service.ready import ready
 from armload.service.reconnecting import Reconnecting
 from armload.service.session import TICK, Session
 from armload.service.settings import ArmSettings
-from armload.service.unknown import Link, Unknown, Why, why_unknown
+from armload.service.unknown import Unknown, Why, why_unknown
 
 SAVE_EVERY = 60.0  # [s] of what a kill may cost; saving takes the stream a tenth of a second
 
@@ -115,8 +115,7 @@ class ArmProcess:
     def _tell(self, session: Session, now: float) -> None:
         self._told = now
         source, estimate = self.source, session.estimate
-        connections = source.connections + self._continued  # since it was saved the payload may have been exchanged
-        link = Link(source.state, source.why, connections, source.resumed, source.heard)
+        link = source.link(before=self._continued)  # since it was saved the payload may have been exchanged
         why = why_unknown(estimate, link, now, session.identifier.trouble, session.doubt)
         if estimate is None and _compiling.is_set() and source.state == "streaming":
             why = Why(Unknown.COMPILING, COMPILING)

@@ -6,6 +6,7 @@ import contextlib
 import hmac
 import json
 import queue
+import select
 import sys
 import threading
 from collections.abc import Callable
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 _MOST = 32  # connections at once: a page and some scripts, not a crowd
 _PATIENCE = 10.0  # [s] a client may take to send its request, or to take a line
+_LOOK = 1.0  # [s] without a line after which a stream looks whether its client is still there
 
 
 class Endpoint:
@@ -93,9 +95,14 @@ class _Handler(BaseHTTPRequestHandler):
     timeout = _PATIENCE
 
     def do_GET(self) -> None:
-        if not self._allowed():
+        try:
+            path, host = urlsplit(self.path).path, urlsplit(f"//{self.headers.get('Host', '')}").hostname
+        except ValueError:
+            self._answer(400, {"error": "expected an address and a header Host that can be read"})
             return
-        parts = [unquote(part) for part in urlsplit(self.path).path.split("/") if part]
+        if not self._allowed(host):
+            return
+        parts = [unquote(part) for part in path.split("/") if part]
         names = self.service.names
         if len(parts) == 2 and parts[0] in ("arms", "stream") and parts[1] not in names:
             self._answer(404, {"error": f"there is no arm {parts[1]!r}: expected one of {', '.join(names)}"})
@@ -112,14 +119,13 @@ class _Handler(BaseHTTPRequestHandler):
         else:
             self._answer(404, {"error": "expected /arms, /arms/NAME, /health, /stream or /stream/NAME"})
 
-    def _allowed(self) -> bool:
+    def _allowed(self, host: str | None) -> bool:
         if self.token is not None:
             given = self.headers.get("Authorization", "")
             if hmac.compare_digest(given.encode(), f"Bearer {self.token}".encode()):
                 return True
             self._answer(401, {"error": "expected the header Authorization: Bearer TOKEN"})
             return False
-        host = urlsplit(f"//{self.headers.get('Host', '')}").hostname
         if host is not None and is_loopback(host):
             return True
         self._answer(403, {"error": "expected a request to 127.0.0.1 or localhost"})
@@ -140,21 +146,31 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_header("Cache-Control", "no-store")
         self.end_headers()
         lines: queue.Queue[dict[str, Any]] = queue.Queue(100)
-        with self.service.heard_by(_into(lines)):
+        with self.service.heard_by(_into(lines, name)):
             while True:
-                line = lines.get()
-                if name is None or line.get("arm") == name:
-                    self.wfile.write((json.dumps(line, allow_nan=False) + "\n").encode())
-                    self.wfile.flush()
+                try:
+                    line = lines.get(timeout=_LOOK)
+                except queue.Empty:
+                    if self._left():
+                        return
+                    continue
+                self.wfile.write((json.dumps(line, allow_nan=False) + "\n").encode())
+                self.wfile.flush()
+
+    def _left(self) -> bool:
+        """Whether the client has closed the connection; what else it has sent is dropped."""
+        return bool(select.select([self.connection], [], [], 0.0)[0]) and not self.connection.recv(4096)
 
     def log_message(self, format: str, *args: Any) -> None:
         """Requests are not logged."""
 
 
-def _into(lines: queue.Queue[dict[str, Any]]) -> Callable[[dict[str, Any]], None]:
-    """Puts a line into a queue; where its reader is too slow, the oldest gives way."""
+def _into(lines: queue.Queue[dict[str, Any]], name: str | None) -> Callable[[dict[str, Any]], None]:
+    """Puts an arm's lines, or all, into a queue; where its reader is too slow, the oldest gives way."""
 
     def put(line: dict[str, Any]) -> None:
+        if name is not None and line.get("arm") != name:
+            return None
         while True:
             try:
                 return lines.put_nowait(line)

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm, payload_regressor
 from armload.devices import Controller, Load, is_moving
-from armload.errors import ArmloadError, SinkError
+from armload.errors import SinkError, one_line
 from armload.inertia import InertialParameters
 from armload.online import OnlineEstimate
 
@@ -98,7 +98,10 @@ class Feedback:
         self._gone.set()
         if self._thread is not None:
             self._thread.join(2.0)
-        self._controller.close()
+        try:
+            self._controller.close()
+        except Exception as error:
+            self._note(one_line(error))
 
     def finish(self) -> str | None:
         """Steps until the controller counts what was identified (None), or no more can be told now: why."""
@@ -108,18 +111,19 @@ class Feedback:
                 return self.waits
 
     def step(self) -> None:
-        """One look, and one step if it is time for one."""
+        """One look, and one step if it is time for one; what it fails with is said once."""
         try:
-            self.waits = self._waits()
+            try:
+                self.waits = self._waits()
+            finally:
+                if not self._under_way:
+                    self._controller.done()
             self._refused = ""
-        except ArmloadError as error:
-            self.waits = str(error)
+        except Exception as error:  # of whatever kind: the thread goes on, and the next look may succeed
+            self.waits = one_line(error)
             if self.waits != self._refused:
-                self._note(f"no load is told to the controller: {error}")
+                self._note(f"no load is told to the controller: {self.waits}")
             self._refused = self.waits
-            self._under_way = False
-        if not self._under_way:
-            self._controller.done()
 
     def _waits(self) -> str | None:
         answer, under_way = self._answer, self._under_way

@@ -69,8 +69,9 @@ class Mqtt:
         self._client.disconnect()
         self._client.loop_stop()
 
-    def _connected(self, client: Any, *_: Any) -> None:
-        client.publish(f"{self._prefix}/online", "true", qos=1, retain=True)
+    def _connected(self, client: Any, _data: Any, _flags: Any, reason: Any, _properties: Any) -> None:
+        if not reason.is_failure:  # what a broker refuses comes here, too
+            client.publish(f"{self._prefix}/online", "true", qos=1, retain=True)
 
 
 def checked(url: str) -> Any:

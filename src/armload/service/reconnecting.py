@@ -12,6 +12,7 @@ from armload.inertia import InertialParameters
 from armload.recording import Sample
 from armload.service.backoff import Backoff
 from armload.service.transit import Transit
+from armload.service.unknown import Link
 
 STALLED = 3.0  # [s] without a sample after which the connection counts as lost: two lost TCP packets cost three
 BEHIND = 1.0  # [s] a sample may wait before the newest takes its place: saving a state takes a tenth
@@ -77,6 +78,10 @@ class Reconnecting(Source):
     def process(self):
         """The present reader's process; None while there is none."""
         return None if self._source is None else self._source.process
+
+    def link(self, before: int = 0) -> Link:
+        """What is known of the connection, where `before` others came before the first."""
+        return Link(self.state, self.why, self.connections + before, self.resumed, self.heard)
 
     def __iter__(self) -> Iterator[Sample]:
         return (sample for sample in self.ticking(1.0) if sample is not None)

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
+import logging
 import threading
 import urllib.error
 import urllib.request
 from collections import deque
 from collections.abc import Mapping
+from http.client import HTTPException
 from typing import Any
 from urllib.parse import urlsplit
 
-from armload.errors import UsageError
+from armload.errors import UsageError, one_line
 from armload.service.backoff import Backoff
 
 _ANSWERED = 5.0  # [s] a receiver may take
@@ -24,7 +26,8 @@ class Webhook:
     """Posts messages in their order from a thread of its own.
 
     What is not taken (an error, a status of 300 or more, no answer within 5 s) is posted again after 1, 2, 4, … 60 s.
-    A status of 400 to 499 but 408 and 429 means that this message will never be taken: it is dropped.
+    A status of 400 to 499 but 408 and 429 means that this message will never be taken: it is dropped. Why messages are
+    not taken is logged when it changes.
 
     Args:
         url: http:// or https://. headers: sent with each message, as `Authorization`.
@@ -33,13 +36,16 @@ class Webhook:
         sent, dropped: messages. failed: why the last trial failed; None: it did not.
 
     Raises:
-        UsageError: the address is none.
+        UsageError: the address is none, or a header is no text.
     """
 
     def __init__(self, url: str, headers: Mapping[str, str] | None = None) -> None:
         if urlsplit(url).scheme not in ("http", "https") or not urlsplit(url).hostname:
             raise UsageError(f"the webhook is {url!r}: expected an address such as https://HOST/PATH")
         self.url, self._headers = url, {"Content-Type": "application/json", **(headers or {})}
+        for name, value in self._headers.items():
+            if not isinstance(value, str):  # which is not shown: it may be a secret
+                raise UsageError(f"the webhook's header {name} is a {type(value).__name__}: expected a text")
         self.sent = self.dropped = 0
         self.failed: str | None = None
         self._waiting: deque[bytes] = deque()
@@ -87,12 +93,14 @@ class Webhook:
         request = urllib.request.Request(self.url, message, self._headers, method="POST")
         try:
             with urllib.request.urlopen(request, timeout=_ANSWERED):
-                self.failed = None
-                return True
+                taken, failed = True, None
         except urllib.error.HTTPError as error:
             error.close()
-            self.failed = f"{self.url} answered {error.code}"
-            return False if 400 <= error.code < 500 and error.code not in (408, 429) else None
-        except (OSError, ValueError) as error:
-            self.failed = f"{self.url} did not answer: {error}"
-            return None
+            taken = False if 400 <= error.code < 500 and error.code not in (408, 429) else None
+            failed = f"answered {error.code}"
+        except (OSError, ValueError, HTTPException) as error:
+            taken, failed = None, f"did not answer: {one_line(error)}"
+        if failed != self.failed:
+            self.failed = failed
+            logging.getLogger("armload").warning("the webhook %s", failed or "takes alarms again")
+        return taken

@@ -124,5 +124,5 @@ def _link(session: Session, now: float) -> Link:
     if session.error is not None:
         return Link("lost", str(session.error), 1, None, None)
     if isinstance(source, Reconnecting):
-        return Link(source.state, source.why, source.connections, source.resumed, source.heard)
+        return source.link()
     return Link("ended" if session.ended else "streaming", None, 1, None, now)

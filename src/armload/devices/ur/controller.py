@@ -46,13 +46,18 @@ class URController:
             SourceError: it does not answer.
         """
         receive = self._reading()
-        mass, cog, inertia = receive.getPayload(), receive.getPayloadCog(), receive.getPayloadInertia()
+        try:
+            mass, cog, inertia = receive.getPayload(), receive.getPayloadCog(), receive.getPayloadInertia()
+            dq = list(receive.getActualQd())
+        except Exception as error:
+            self._receive = None
+            raise SourceError(f"the UR arm at {self._address} was lost: {one_line(error)}") from None
         load = InertialParameters.zero(self._flange)
         if mass > 0.0:
             xx, yy, zz, xy, xz, yz = inertia
             about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
             load = InertialParameters.from_com(mass, cog, about, self._flange)
-        return Counted(list(receive.getActualQd()), 0.0, load)
+        return Counted(dq, 0.0, load)
 
     def put(self, load: Load) -> None:
         """Make it count a payload, guarded; one of zero is nothing.
@@ -73,18 +78,36 @@ class URController:
         )
 
     def done(self) -> None:
-        """End the script: nothing more is written for a while."""
+        """End the script: nothing more is written for a while.
+
+        Raises:
+            SinkError: nobody can say whether it has ended.
+        """
         control, self._control = self._control, None
-        if control is not None:
-            control.stopScript()
-            control.disconnect()
+        if control is None:
+            return
+        try:
+            try:
+                control.stopScript()
+            finally:
+                control.disconnect()
+        except Exception as error:
+            raise SinkError(
+                f"the script on the UR arm at {self._address} cannot be ended ({one_line(error)}): see whether it runs"
+            ) from None
 
     def close(self) -> None:
-        """Let go of the arm."""
-        self.done()
+        """Let go of the arm.
+
+        Raises:
+            SinkError: see `done`.
+        """
         receive, self._receive = self._receive, None
-        if receive is not None:
-            receive.disconnect()
+        try:
+            self.done()
+        finally:
+            if receive is not None:
+                receive.disconnect()
 
     def _reading(self) -> Any:
         if self._receive is not None and not self._receive.isConnected():

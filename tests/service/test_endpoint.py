@@ -1,0 +1,89 @@
+"""The endpoint: clients that go make room for others, and what no client should send is answered."""
+
+import contextlib
+import json
+import socket
+import threading
+import time
+import urllib.request
+
+import pytest
+
+from armload.service import Endpoint
+from armload.service.endpoint import _MOST
+
+
+class Cell:
+    """Two arms, of which "ended" says nothing any more and "right" all the time."""
+
+    names = ("ended", "right")
+
+    def __init__(self):
+        self.listeners, self.gone = [], threading.Event()
+
+    def answer(self, name):
+        return {"arm": name, "known": True, "why": None}
+
+    @contextlib.contextmanager
+    def heard_by(self, listener):
+        self.listeners.append(listener)
+        try:
+            yield
+        finally:
+            self.listeners.remove(listener)
+
+    def speak(self):
+        while not self.gone.wait(0.02):
+            for listener in list(self.listeners):
+                listener(self.answer("right"))
+
+
+@pytest.fixture
+def address():
+    """Where the endpoint listens."""
+    cell = Cell()
+    endpoint, thread = Endpoint(cell, "127.0.0.1", 0), threading.Thread(target=cell.speak)
+    thread.start()
+    yield "127.0.0.1", int(endpoint.url.rpartition(":")[2])
+    cell.gone.set()
+    thread.join()
+    endpoint.close()
+
+
+def asked(address, path, host="localhost"):
+    """A connection that has asked, and the first line of its answer."""
+    connection = socket.create_connection(address, timeout=10.0)
+    connection.sendall(f"GET {path} HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())
+    return connection, connection.recv(4096).partition(b"\r\n")[0]
+
+
+def test_clients_that_leave_the_stream_of_an_arm_that_ended_make_room_for_others(address):
+    for _ in range(_MOST):
+        connection, line = asked(address, "/stream/ended")
+        connection.close()
+        assert line.endswith(b"200 OK")
+    end = time.monotonic() + 20.0
+    while True:
+        try:
+            with urllib.request.urlopen(f"http://127.0.0.1:{address[1]}/health", timeout=10.0) as response:
+                assert json.loads(response.read())["well"]
+                break
+        except OSError:  # there is no room yet
+            assert time.monotonic() < end
+            time.sleep(0.05)
+
+
+def test_a_stream_of_one_arm_goes_on_though_it_is_silent_for_a_while(address):
+    with asked(address, "/stream/ended")[0] as ended, asked(address, "/stream/right")[0] as right:
+        ended.settimeout(2.5)
+        with pytest.raises(TimeoutError):
+            ended.recv(4096)  # neither a line of the other arm nor an end
+        assert b'"right"' in right.recv(4096)
+
+
+@pytest.mark.parametrize(("path", "host"), [("/health", "["), ("http://[/health", "localhost")])
+def test_an_address_that_cannot_be_read_is_a_bad_request(address, path, host, capfd):
+    connection, line = asked(address, path, host)
+    connection.close()
+    assert line.endswith(b"400 Bad Request")
+    assert capfd.readouterr().err == ""
