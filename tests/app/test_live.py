@@ -575,6 +575,21 @@ def test_a_tare_is_as_old_as_it_was_said_to_be_until_another_is_taken(panda, ana
     assert (session.tare.age, session.tare.taken) == (0.0, True)
 
 
+def test_an_order_that_follows_another_at_once_does_not_undo_it(panda, analytic_log):
+    session = Session(Replay(analytic_log(panda, HELD, duration=12.0), panda, speed=None), panda, method="map")
+    estimates = session.estimates()
+    for method, orders in (
+        ("map-gp", (lambda: session.use("map-gp"), session.take_tare)),
+        ("map", (session.take_tare, lambda: session.use("map"))),
+    ):
+        list(itertools.islice(estimates, 900))
+        for order in orders:
+            order()
+        after = next(estimates)
+        assert (after.method, after.relative_to) == (method, "tare")
+    session.close()
+
+
 @pytest.mark.parametrize("command", [["live", "sim", "--headless"], ["serve", "sim", "--robot", "panda"]])
 def test_the_age_of_no_tare_is_refused(capsys, command):
     assert main([*command, "--tare-age", "1d"]) == 2

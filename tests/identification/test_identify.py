@@ -1,5 +1,6 @@
 """One log in, one answer out: intervals, what is determined, tare, tool, frames, and bodies that can exist."""
 
+import contextlib
 import re
 from dataclasses import replace
 from functools import cache
@@ -239,6 +240,13 @@ def test_a_known_tool_that_is_not_mounted_is_missed_and_said_to_be(panda, simula
     assert "less is mounted" in answer.notes[0]
 
 
+def test_a_known_tool_that_is_on_neither_at_the_tare_nor_in_the_log_is_said_to_be_off(panda, simulated):
+    answer = identify(simulated("nothing", 3), panda, tare=simulated("nothing", 4, "tare"), tool=TOOL)
+    assert answer.mass == pytest.approx(-TOOL.mass, abs=0.03)
+    assert not answer.consistent
+    assert any("neither at the tare nor in the log" in note for note in answer.notes)
+
+
 @pytest.mark.full  # some seconds
 def test_where_the_tare_does_not_tell_of_the_tool_the_intervals_hold_both_cases():
     ur, light = arm("ur10e"), 0.25 * TOOL.phi
@@ -339,7 +347,7 @@ def real_answer(real_data):
 def test_real_logs_have_a_body_within_the_error_bars(real_answer, log, tare, robot):
     answer = real_answer(log, tare, robot)
     assert answer.method == "hybrid"
-    assert not any("no body fits" in note for note in answer.notes)
+    assert not any("no body fits" in note or "friction drives" in note for note in answer.notes)
     assert len(answer.segments) == 1  # the payload stays
 
 
@@ -423,3 +431,22 @@ def test_a_torque_that_is_computed_and_not_measured_is_told_by_its_lack_of_frict
     assert COMPUTED in identify(wanted, panda).notes
     rubs = np.tanh(dq / 0.05) * [0.25, 0.25, 0.2, 0.35, 0.35, 0.2, 0.26]
     assert COMPUTED not in identify(replace(wanted, tau=wanted.tau + rubs), panda).notes
+
+
+@pytest.mark.parametrize(("name", "turned"), [("panda", [5]), ("ur10e", [5]), ("ur10e", [3]), ("ur10e", range(6))])
+def test_friction_that_drives_a_joint_is_told_by_the_joint(name, turned):
+    """A torque with its sign turned; or all positions and velocities, which is the same for friction."""
+    robot = arm(name)
+    how = {"world": World.real_like(robot, 5), "sensors": Sensors.of(robot), "rate": 200.0}
+    log = simulate(robot, random_motion(robot, 6, duration=6.0), BOX, seed=7, **how)
+    sign = np.ones(robot.n)
+    sign[list(turned)] = -1.0
+    other = replace(log, tau=log.tau * sign) if len(turned) < robot.n else replace(log, q=-log.q, dq=-log.dq)
+    with contextlib.suppress(RecordingError):  # as the torque of no such arm: then no answer is wrong
+        answer = identify(other, robot)
+        assert answer.interval == "approximate"
+        (named,) = re.findall(r"friction drives joints? ([0-9, ]+) where", answer.notes[0])
+        told = {int(joint) - 1 for joint in named.split(",")}
+        assert told <= set(turned)
+        assert len(told) > 0.8 * len(turned)
+    assert not any("friction drives" in note for note in identify(log, robot).notes)

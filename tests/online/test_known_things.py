@@ -74,6 +74,22 @@ def test_what_is_known_now_counts_on_a_stream_that_is_taken_up_again(log, tmp_pa
     assert estimate.phi[0] == pytest.approx(MASS + 5e-3, abs=1e-3)
 
 
+def test_what_is_known_now_counts_for_the_run_that_begins_as_a_stream_is_taken_up_again(log, tmp_path):
+    first = OnlineIdentifier(arm("panda"), method="map-gp")
+    for sample in log.between(0.0, 5.9):
+        if first.update(*sample).settling:
+            break
+    first.save(tmp_path / "state.npz")
+    first.close()
+    known = Known.of((MASS, 1e-4), None, if_held=True)
+    again = OnlineIdentifier.restore(tmp_path / "state.npz", arm("panda"), method="map-gp", known=known)
+    estimates = [again.update(*x) for x in log.between(sample.t + 1e-6, 5.9)]
+    again.close()
+    assert estimates[0].settling
+    assert not estimates[-1].settling
+    assert estimates[-1].phi[0] == pytest.approx(MASS, abs=1e-3)
+
+
 def test_a_method_that_cannot_use_it_says_so():
     with pytest.raises(IdentificationError, match="cannot use a known mass or centre"):
         OnlineIdentifier(arm("panda"), method="rls-filter", known=Known.of((1.0, 0.1), None, if_held=True))

@@ -71,3 +71,23 @@ def test_a_state_is_gone_on_from_while_the_arm_is_that_of_the_same_session(
     else:
         assert found.conclude().phi[0] == pytest.approx(identifier.conclude().phi[0])
         found.close()
+
+
+def test_a_state_is_of_the_tare_that_the_stream_goes_by_whatever_its_file_says_since(panda, analytic_log, tmp_path):
+    run, tare = tmp_path / "run.csv", tmp_path / "tare.csv"
+    write_recording(run, analytic_log(panda, duration=2.0))
+    write_recording(tare, analytic_log(panda, duration=3.0))
+    named = {"name": "left", "source": str(run), "robot": "panda", "method": "map", "tare": str(tare)}
+    settings = ArmSettings(**named, save=str(tmp_path / "state"))
+    process, before = ArmProcess(settings, 0.1), settings.state
+    session = process._made_session()
+    for sample in analytic_log(panda, duration=1.0):
+        session._take(sample)
+    tare.unlink()
+    write_recording(tare, analytic_log(panda, test_payload().parameters, duration=3.0))
+    process._save(session)
+    session.close()
+    assert before is not None
+    assert before.exists()
+    assert settings.state != before
+    assert ArmProcess(settings, 0.1)._restored(None) is None  # its state is none of the new tare's

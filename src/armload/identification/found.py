@@ -18,6 +18,7 @@ from armload.identification.known_payload import know
 from armload.identification.thresholds import BACKWARDS, KAPPA_UNKNOWN, LARGEST_OFFSET, LEAST_SEEN, MISFIT, MOVES
 from armload.inertia import distance_to_body, is_consistent
 from armload.posterior import HybridIdentifier, Known, PosteriorLeastSquares, Profile
+from armload.posterior.restless import most_restless
 from armload.posterior.scales import AnotherArm, Drift, Tilt
 from armload.posterior.tilt import TURNED, TURNS
 from armload.recording import Recording, span
@@ -62,6 +63,7 @@ class Found(NamedTuple):
     tilt: by how much gravity is turned from that of the arm, of a method that asks. gravity: (3,) [m/s²] with which all
         this was found, where it is not what was given.
     restlessness: how restless the torques are, of what they were at the tare (`posterior.restless`).
+    restless_joint: the joint, from 1, that has most of it; 0 where it was not asked.
     exchanged: whether the estimate is rather the difference of two bodies, one put on for another.
     kappa: by how much the physics overrates the log's evidence, of a method that knows.
     gain_std: relative standard deviation of the torque's scale, of a method that allows for one. gain_known: whether a
@@ -89,6 +91,7 @@ class Found(NamedTuple):
     tilt: Tilt | None = None
     gravity: tuple[float, float, float] | None = None
     restlessness: float = 0.0
+    restless_joint: int = 0
     exchanged: bool = False
     known: Known | None = None
     log_only: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
@@ -180,6 +183,7 @@ def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Foun
         another=None if posterior is None else posterior.stream.another,
         tilt=None if posterior is None else posterior.stream.tilt,
         restlessness=0.0 if posterior is None else posterior.stream.restlessness,
+        restless_joint=0 if posterior is None else _restless_joint(posterior),
         exchanged=posterior is not None and posterior.exchanged,
         kappa=kappa,
         gain_std=None if posterior is None else posterior.posterior.gain_std,
@@ -188,6 +192,14 @@ def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Foun
         log_only=None if posterior is None else posterior.log_only,
         health=None if posterior is None else ArmHealth.of(posterior),
     )
+
+
+def _restless_joint(found: PosteriorLeastSquares) -> int:
+    """The joint, from 1, whose torque is the most restless; 0 where none is known."""
+    stream = found.stream
+    if not stream.restlessness:
+        return 0
+    return most_restless(found.posterior.power, stream.noise.residual * stream.correction.effort)
 
 
 def _backwards(found: PosteriorLeastSquares, recording: Recording, kappa: float | None) -> tuple[int, ...]:

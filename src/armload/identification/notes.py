@@ -189,12 +189,13 @@ def driven_by_friction(joints: tuple[int, ...]) -> str:
     )
 
 
-def not_rigid(restlessness: float) -> str:
-    """That what is held seems to move on its own."""
+def not_rigid(restlessness: float, joint: int = 0) -> str:
+    """That what is held seems to move on its own. joint: whose torque is the most restless, from 1; 0: not known."""
+    which = f", most of all that of joint {joint}" if joint else ""
     return (
-        f"the torques are {restlessness:.1f} times as restless with the payload as they should be: part of it seems to "
-        "swing, slosh or slip, or the arm touches something; the intervals are those of a rigid body: hold it tighter, "
-        "or move more slowly"
+        f"the torques are {restlessness:.1f} times as restless with the payload as they should be{which}: part of it "
+        "seems to swing, slosh or slip, the arm touches something, or a torque is wrong (its sensor, or late); the "
+        "intervals are those of a rigid body: hold it tighter, move more slowly, or look at that torque in another log"
     )
 
 
@@ -263,7 +264,8 @@ def changed_within(times: list[float], parts: int) -> str:
     when = ", ".join(f"{t:.2f}" for t in times)
     return (
         f"the payload changes within the log, {when} s after its start: the answer is of the last of {parts} parts, "
-        "what is held at the end; `segments` of the JSON has them all"
+        "what is held at the end; `segments` of the JSON has them all; if nothing was taken up or put down, something "
+        "pushed the arm, or a torque is wrong"
     )
 
 

@@ -18,7 +18,7 @@ from armload.identification.choice import choose
 from armload.identification.found import Asked, found_in
 from armload.identification.reporting import answered
 from armload.identification.thresholds import DECISIVE, HEAVIEST
-from armload.inertia import InertialParameters
+from armload.inertia import HELD, InertialParameters
 from armload.payloads import INERTIA_ASSUMED, Payload
 from armload.posterior import Profile
 from armload.recording import Recording
@@ -69,10 +69,12 @@ def answer_of_one_payload(recording: Recording, arm: Arm, question: Question) ->
         both = asked.known and asked.known.with_tool(known.phi)  # what was added since the tare
         found, relative_to = found_in(recording, arm, tare, replace(asked, known=both)).less(known.phi), "tool"
         found = found.with_error(error)
-        note, otherwise = (
-            f"the tool was mounted {since}: the answer is what was added since, less the tool",
-            known.phi,
-        )
+        note, otherwise = f"the tool was mounted {since}: the answer is what was added since, less the tool", known.phi
+        if found.estimate.phi[0] < -HELD * found.estimate.std[0]:
+            note = (
+                f"the tool seems to be mounted neither {before} nor in the log: the answer, less the tool, is too "
+                "small; leave the tool out"
+            )
     if sure:
         return answered(found, arm, recording, tared, relative_to, (*notes, note), unsure=unsure)
     who = "tare" if tare is not None else "profile"

@@ -143,7 +143,8 @@ def _doubt(found: Found, arm: Arm, mass_determined: bool, relative_to: str) -> s
             "sign is turned"
         )
     changed = arm_changed(found.drift, found.another, relative_to)
-    doubt = doubt_of(found.exchanged, found.exchanged or found.explained, changed, found.restlessness)
+    sound = found.exchanged or found.explained
+    doubt = doubt_of(found.exchanged, sound, changed, found.restlessness, found.restless_joint)
     if doubt is not None:
         return doubt
     if (denied := denied_by(found.known, found.log_only)) is not None:
@@ -155,12 +156,12 @@ def _doubt(found: Found, arm: Arm, mass_determined: bool, relative_to: str) -> s
     return None
 
 
-def doubt_of(exchanged: bool, explained: bool, changed: str | None, restlessness: float) -> str | None:
+def doubt_of(exchanged: bool, explained: bool, changed: str | None, restlessness: float, joint: int = 0) -> str | None:
     """What the answer of a log, or of a stream that has ended, shows against itself, most telling first.
 
     Args:
         exchanged: see `PosteriorLeastSquares`. explained: whether a body explains it. changed: that the arm has.
-        restlessness: of the torques (`posterior.restless`).
+        restlessness: of the torques (`posterior.restless`). joint: that has most of it, from 1; 0: not known.
     """
     if exchanged:
         return EXCHANGED
@@ -168,7 +169,7 @@ def doubt_of(exchanged: bool, explained: bool, changed: str | None, restlessness
         return NO_BODY
     if changed is not None:
         return changed
-    return not_rigid(restlessness) if restlessness > RESTLESS else None
+    return not_rigid(restlessness, joint) if restlessness > RESTLESS else None
 
 
 def _with_any_inertia(

@@ -27,4 +27,13 @@ def restlessness(power: NDArray[np.float64], expected: NDArray[np.float64]) -> f
         power: (K, n) mean square of each run's residual [N²·m²], the tares' first.
         expected: (n,) of it at least [N·m]: a tare may be of an arm that hardly moves.
     """
-    return float(np.sqrt(np.mean(power[-1] / np.maximum(power[:-1].max(axis=0), expected**2))))
+    return float(np.sqrt(np.mean(_ratios(power, expected))))
+
+
+def most_restless(power: NDArray[np.float64], expected: NDArray[np.float64]) -> int:
+    """The joint, from 1, that has most of it."""
+    return int(np.argmax(_ratios(power, expected))) + 1
+
+
+def _ratios(power: NDArray[np.float64], expected: NDArray[np.float64]) -> NDArray[np.float64]:
+    return power[-1] / np.maximum(power[:-1].max(axis=0), expected**2)

@@ -26,6 +26,14 @@ if TYPE_CHECKING:
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 _PATHS = ("tare", "profile", "tool", "save", "record", "mounted")
+# what numbers may be: the words, the least, the most, and whether the least itself may be
+_RANGES = {
+    "every": ("a time above 0 s", 0.0, math.inf, False),
+    "rating": ("a mass above 0 kg", 0.0, math.inf, False),
+    "com_range": ("a length above 0 m", 0.0, math.inf, False),
+    "rate": ("a rate above 0 Hz", 0.0, math.inf, False),
+    "port": ("a port from 0 to 65535", 0, 65536, True),
+}
 _KINDS = {"str": str, "float": (int, float), "bool": bool, "int": int, "tuple": list, "dict": dict}
 
 
@@ -217,6 +225,8 @@ def _arm(table: dict[str, Any], path: Path) -> ArmSettings:
     if "gravity" in settings:
         if len(settings["gravity"]) != 3:
             raise UsageError(f"{where}: gravity has {len(settings['gravity'])} numbers: expected three, in m/s²")
+        if not all(isinstance(x, (int, float)) and math.isfinite(x) for x in settings["gravity"]):
+            raise UsageError(f"{where}: gravity is {settings['gravity']}: expected three numbers, in m/s²")
         settings["gravity"] = tuple(float(x) for x in settings["gravity"])
     if not _NAME.fullmatch(settings["name"]):
         raise UsageError(f"{where}: the name is expected to be of letters, digits, '-', '_' and '.'")
@@ -242,6 +252,10 @@ def _checked(said: dict[str, Any], kind: type, where: str, without: tuple[str, .
         expected = _KINDS[fields[key]]
         if not isinstance(value, expected) or (isinstance(value, bool) and fields[key] != "bool"):
             raise UsageError(f"{where}: {key} is {value!r}: expected a {fields[key].replace('tuple', 'list')}")
+        if key in _RANGES:
+            words, least, most, itself = _RANGES[key]
+            if not (least < value < most or (itself and value == least)):
+                raise UsageError(f"{where}: {key} is {value}: expected {words}")
     if "webhook" in said and urlsplit(said["webhook"]).scheme not in ("http", "https"):
         raise UsageError(f"{where}: the webhook is {said['webhook']!r}: expected an address such as https://HOST/PATH")
     if "mqtt" in said:

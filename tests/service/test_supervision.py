@@ -1,0 +1,80 @@
+"""An arm's process is started again, whatever it says and whatever keeps it from starting."""
+
+import subprocess
+import sys
+import threading
+import time
+from itertools import pairwise
+
+import pytest
+
+from armload.service import ArmSettings, Service, ServiceSettings, service, spare
+
+PATIENCE = 30.0  # [s]
+LINE = """json.dumps({"t": 1.0, "told": time.monotonic(), "known": True, "unknown": None, "why": None, "mass": 0.0,
+    "com": None, "age": 0.0, "lag": 0.0})"""
+
+
+@pytest.fixture
+def running(monkeypatch):
+    """A factory of services whose one arm's process is a program of so many lines; its n-th start may fail."""
+    services = []
+
+    def start(program, fails=()):
+        starts = []
+
+        def started():
+            starts.append(time.monotonic())
+            if len(starts) in fails:
+                raise BlockingIOError(11, "Resource temporarily unavailable")
+            command = [sys.executable, "-c", f"import json, os, sys, time\nsys.stdin.readline()\n{program}"]
+            return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+
+        monkeypatch.setattr(spare, "_started", started)
+        arm = ArmSettings(name="left", source="sim", robot="panda")
+        services.append(Service(ServiceSettings((arm,), spare=False)))
+        threading.Thread(target=services[-1].run, args=(PATIENCE,), daemon=True).start()
+        return services[-1], starts
+
+    yield start
+    for each in services:
+        each.close()
+
+
+def until(condition):
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def test_a_line_that_is_no_answer_is_passed_over(running):
+    one, starts = running(f"print(1, flush=True)\nprint({LINE}, flush=True)\nsys.exit(3)")
+    until(lambda: len(starts) >= 3)
+    assert one.error is None
+
+
+def test_an_arm_whose_process_cannot_be_started_for_once_is_started_again(running):
+    one, starts = running("sys.exit(3)", fails=(2, 3))
+    until(lambda: len(starts) >= 5)
+    assert one.error is None
+
+
+def test_what_an_arm_cannot_begin_with_ends_the_service_at_first_and_is_tried_again_later(running):
+    refused = 'print(json.dumps({"error": "there is no tare"}), flush=True)'
+    one, starts = running(refused)
+    until(lambda: one.error is not None)
+    assert one.error == "left: there is no tare"
+    again, starts = running(f"print({LINE}, flush=True)\nsys.exit(3)")
+    until(lambda: len(starts) >= 2)
+    again, starts = running(refused, fails=(1,))
+    until(lambda: len(starts) >= 4)
+    assert again.error is None
+    assert "there is no tare" in again.answer("left")["why"]
+
+
+def test_a_process_that_is_started_again_may_take_as_long_as_the_first_until_its_first_line(running, monkeypatch):
+    monkeypatch.setattr(service, "HUNG", 0.3)
+    _, starts = running(f"time.sleep(1.0)\nprint({LINE}, flush=True)\nsys.exit(3)")
+    until(lambda: len(starts) >= 4)
+    assert all(b - a > 0.9 for a, b in pairwise(starts))  # none was ended before it spoke
