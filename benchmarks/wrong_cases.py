@@ -115,6 +115,54 @@ def tilted(degrees: float, tared: bool, robot: str, count: int, seed: int) -> It
     return simulated(leaning)
 
 
+# ---------------------------------------------------------------------- the logger
+
+
+def logged(
+    fault: Callable[[Recording, np.random.Generator], Recording], robot: str, count: int, seed: int
+) -> Iterator[Wrong]:
+    """A sensor, its cable or the logger's columns are at fault, at the tare and in the run alike."""
+    for k, log in enumerate(sound("reference", robot, count, seed)):
+        assert log.tare is not None
+        run, tare = (fault(each, np.random.default_rng([seed, k, 10])) for each in (log.run, log.tare))
+        yield Wrong(run, tare, log.truth)
+
+
+def stuck(log: Recording, rng: np.random.Generator) -> Recording:
+    """One of the torques stays what it is after a third of the log, for a third."""
+    tau, joint, first = log.tau.copy(), rng.integers(log.n), len(log) // 3
+    tau[first : 2 * first, joint] = tau[first, joint]
+    return replace(log, tau=tau)
+
+
+def limited(log: Recording, rng: np.random.Generator) -> Recording:
+    """One of the torques of the joints that bear most ends at three quarters of its largest."""
+    tau, joint = log.tau.copy(), (1, 3)[rng.integers(2)] if log.n == 7 else rng.integers(1, 3)
+    most = 0.75 * np.abs(tau[:, joint]).max()
+    tau[:, joint] = np.clip(tau[:, joint], -most, most)
+    return replace(log, tau=tau)
+
+
+def turned(log: Recording, rng: np.random.Generator) -> Recording:
+    """The torque of one of the last three joints has the opposite sign."""
+    sign = np.ones(log.n)
+    sign[-rng.integers(1, 4)] = -1.0
+    return replace(log, tau=log.tau * sign)
+
+
+def exchanged(i: int, j: int, log: Recording, _: np.random.Generator) -> Recording:
+    """Two joints are in each other's place, in q, dq and tau."""
+    order = np.arange(log.n)
+    order[[i, j]] = order[[j, i]]
+    return replace(log, q=log.q[:, order], dq=log.dq[:, order], tau=log.tau[:, order])
+
+
+def late(seconds: float, log: Recording, _: np.random.Generator) -> Recording:
+    """The torques are so much late."""
+    tau = np.column_stack([np.interp(log.t - seconds, log.t, one) for one in log.tau.T])
+    return replace(log, tau=tau)
+
+
 # ---------------------------------------------------------------------- the payload
 
 
@@ -296,6 +344,12 @@ CASES: dict[str, Callable[[str, int, int], Iterator[Wrong]]] = {
     "base tilted by 5°": partial(tilted, TILT, True),
     "base tilted by 5°, no tare": partial(tilted, TILT, False),
     "base tilted by 2°": partial(tilted, 2.0, True),
+    "a torque stands still": partial(logged, stuck),
+    "a torque at its sensor's limit": partial(logged, limited),
+    "a wrist torque's sign turned": partial(logged, turned),
+    "joints 1 and 3 exchanged": partial(logged, partial(exchanged, 0, 2)),
+    "the last two joints exchanged": partial(logged, partial(exchanged, -1, -2)),
+    "torques 60 ms late": partial(logged, partial(late, 0.06)),
     "30 % of the mass swings": partial(moving, liquid=False),
     "30 % of the mass sloshes": partial(moving, liquid=True),
 }

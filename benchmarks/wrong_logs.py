@@ -61,37 +61,46 @@ def answered(known: Arm, logs: Iterable[Wrong]) -> dict[str, Any]:
         silent.append(not calibrated[-1] and not answer.notes)
         first = answer.notes[0].split(":")[0][:60] if answer.notes and not calibrated[-1] else ""
         notes[first] = notes.get(first, 0) + 1
-    held, trusted = np.array(inside), np.array(calibrated)
+    held, trusted = np.array(inside, dtype=bool).reshape(-1, 10), np.array(calibrated, dtype=bool)
     fine = np.vstack([held | ~trusted[:, None], np.ones((refused, 10), bool)])
+    errors, halves = (np.array(x).reshape(-1, 10) for x in (error, half))
     return {
         "logs": len(fine),
         "refused": refused,
-        "mass error [g]": round(1e3 * float(np.mean(error, axis=0)[0]), 1),
-        "half-width [g]": round(1e3 * float(np.mean(half, axis=0)[0]), 1),
-        "first moments [g·m]": round(1e3 * float(np.mean(error, axis=0)[1:4].mean()), 2),
-        "inside": [round(float(held[:, part].mean()), 3) for part in GROUPS],
-        "calibrated": round(float(trusted.mean()), 3),
-        "covered or said": [round(float(fine[:, part].mean()), 3) for part in GROUPS],
-        "no word": round(float(np.mean(silent)), 3),
+        "mass error [g]": _mean(1e3 * errors[:, 0], 1),
+        "half-width [g]": _mean(1e3 * halves[:, 0], 1),
+        "first moments [g·m]": _mean(1e3 * errors[:, 1:4], 2),
+        "inside": [_mean(held[:, part], 3) for part in GROUPS],
+        "calibrated": _mean(trusted, 3),
+        "covered or said": [_mean(fine[:, part], 3) for part in GROUPS],
+        "no word": _mean(np.array(silent), 3),
         "first notes": notes,
     }
 
 
+def _mean(x: NDArray, digits: int) -> float | None:
+    """None: of logs that were all refused."""
+    return round(float(x.mean()), digits) if x.size else None
+
+
 def table(found: dict[str, Any]) -> str:
     """The cases as rows."""
-    rows = [
-        [
-            name,
-            str(case["logs"]),
-            f"{case['mass error [g]']:.1f} ± {case['half-width [g]']:.0f}",
-            " · ".join(f"{x:.2f}" for x in case["inside"]),
-            f"{100 * case['calibrated']:.0f} %",
-            " · ".join(f"{x:.2f}" for x in case["covered or said"]),
-        ]
-        for name, case in found.items()
-    ]
+    rows = []
+    for name, case in found.items():
+        answered = case["mass error [g]"] is not None
+        rows.append(
+            [
+                name,
+                str(case["logs"]),
+                str(case["refused"]),
+                f"{case['mass error [g]']:.1f} ± {case['half-width [g]']:.0f}" if answered else "",
+                " · ".join(f"{x:.2f}" for x in case["inside"]) if answered else "",
+                f"{100 * case['calibrated']:.0f} %" if answered else "",
+                " · ".join(f"{x:.2f}" for x in case["covered or said"]),
+            ]
+        )
     return markdown_table(
-        ["what is wrong", "logs", "mass [g]", "inside", "calibrated", "covered or said"], "lrrrrr", rows
+        ["what is wrong", "logs", "refused", "mass [g]", "inside", "calibrated", "covered or said"], "lrrrrrr", rows
     )
 
 
