@@ -289,7 +289,9 @@ def test_standard_output_can_be_named_as_the_file(export, tmp_path, into):
 def test_a_folder_that_is_missing_is_named_and_no_temporary_file(export, tmp_path):
     path = str(tmp_path / "no" / "p.urdf")
     _, err = export(result_of(HELD), "--to", "urdf", "--out", path, code=2)
-    assert err == f"armload: {path} cannot be written: No such file or directory\n"
+    folder = tmp_path / "no"
+    said = f"armload: --out {path} cannot be written: there is no folder {folder}; name a file where you can write\n"
+    assert err == said
 
 
 def test_an_arm_that_is_not_built_in_is_named_by_its_file(export, tmp_path):

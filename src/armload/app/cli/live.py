@@ -17,8 +17,10 @@ from armload.app.cli.arguments import (
     at_least,
     check_tare_age,
     file_name,
+    output_file,
 )
 from armload.app.cli.named import arm_of, columns_for, columns_of, payload_of, read_logs, robot_of
+from armload.app.cli.outputs import check_writable
 from armload.app.cli.printing import print_note
 from armload.errors import ArmloadError, UsageError
 from armload.runtime.interruption import held_back
@@ -94,7 +96,7 @@ def parser() -> Parser:
     )
     add(
         "--record",
-        type=file_name,
+        type=output_file,
         metavar="FILE.csv|.mcap",
         help="keep every sample in a log that does not exist yet; as MCAP with the estimates and events",
     )
@@ -140,8 +142,10 @@ def run(options: argparse.Namespace) -> int | None:
         raise UsageError(
             "--steady and --profile: a profile is learned from velocities as they come; leave one of the two out"
         )
-    if options.learn and options.profile is None:
-        raise UsageError("--learn adds to a profile, but there is no --profile; make one with `armload profile`")
+    if options.learn:
+        if options.profile is None:
+            raise UsageError("--learn adds to a profile, but there is no --profile; make one with `armload profile`")
+        check_writable("--profile", options.profile)
     profile = None if options.profile is None else load_profile(options.profile)
     of_log, columns = options.source != "sim" and "://" not in options.source, columns_of(options)
     if columns != ColumnSpec() and not of_log and options.tare is None:

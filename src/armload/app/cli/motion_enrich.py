@@ -8,7 +8,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
-from armload.app.cli.arguments import add_arm_arguments, at_least, file_name
+from armload.app.cli.arguments import add_arm_arguments, at_least, output_file
 from armload.app.cli.motion_arguments import add_constraint_arguments, add_knowledge_arguments
 from armload.app.cli.motion_design import constraints_of, criterion_of, print_widths
 from armload.app.cli.named import arm_of
@@ -42,7 +42,7 @@ def add_enrich_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out",
         required=True,
-        type=file_name,
+        type=output_file,
         metavar="FILE",
         help="file to write: .json (motion), .csv, .yaml (JointTrajectory) or .script (URScript)",
     )

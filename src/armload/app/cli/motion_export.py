@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from armload.app.cli.arguments import add_arm_arguments, at_least, file_name
+from armload.app.cli.arguments import add_arm_arguments, at_least, output_file
 from armload.app.cli.motion_arguments import box, floor, numbers
 from armload.app.cli.named import arm_of, motion_of
 from armload.app.cli.printing import print_note
@@ -25,7 +25,7 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
     add_arm_arguments(parser, default="panda")
     add("--format", required=True, choices=("csv", "ros2", "ur"))
     add("--rate", type=at_least(1e-3, float, 1e4), metavar="HZ", help="samples per second")
-    add("--out", type=file_name, metavar="FILE", help="file to write (default: standard output)")
+    add("--out", type=output_file, metavar="FILE", help="file to write (default: standard output)")
     add = parser.add_argument_group("from the present pose").add_argument
     add(
         "--from",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from armload.app.cli.arguments import add_arm_arguments, at_least, file_name
+from armload.app.cli.arguments import add_arm_arguments, at_least, output_file
 from armload.app.cli.motion_arguments import box, floor, held
 from armload.app.cli.named import arm_of, motion_of
 from armload.app.cli.printing import console, print_note, table
@@ -23,7 +23,7 @@ def add_show_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("motion", metavar="MOTION", help="taie2024, a JSON file, or random:SEED")
     add_arm_arguments(parser, default="panda")
-    add("--figure", type=file_name, metavar="F.png", help="draw the joints against their limits")
+    add("--figure", type=output_file, metavar="F.png", help="draw the joints against their limits")
     add("--page", action="store_true", help="a page in the browser on which the arm runs the motion, until Ctrl-C")
     add = parser.add_argument_group("with --page").add_argument
     add("--host", metavar="H", help="interface of the page (127.0.0.1)")
