@@ -96,9 +96,13 @@ def run(options: argparse.Namespace) -> int | None:
 
 
 def _motion(name: str, arm: Arm) -> Motion:
-    from armload.motion import PathMotion
+    from armload.motion import PathMotion, check_joints
 
-    return PathMotion.read(name) if name.lower().endswith(".csv") else motion_of(name, arm)
+    if not name.lower().endswith(".csv"):
+        return motion_of(name, arm)
+    motion = PathMotion.read(name)
+    check_joints(motion, arm)
+    return motion
 
 
 def _tool(options: argparse.Namespace, arm: Arm) -> InertialParameters:

@@ -110,7 +110,7 @@ def path_of(name: str, arm: Arm) -> Motion:
     Raises:
         MotionError: it cannot be read, or it is none of the forms that are known.
     """
-    from armload.motion import load_motion
+    from armload.motion import check_joints, load_motion
 
     file = Path(name)
     try:
@@ -122,7 +122,9 @@ def path_of(name: str, arm: Arm) -> Motion:
         return _table(text, name, arm)
     content = _content(text, name)
     if "format" in content:
-        return load_motion(file)
+        motion = load_motion(file)
+        check_joints(motion, arm)
+        return motion
     content = content.get("trajectory", content)  # of a FollowJointTrajectory goal
     if not isinstance(content, dict) or "points" not in content:
         raise MotionError(f"{name} is no path: expected a JointTrajectory with joint_names and points, or a motion")
