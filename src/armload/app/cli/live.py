@@ -130,6 +130,7 @@ def run(options: argparse.Namespace) -> int | None:
     """Identify until the source ends (--headless) or somebody interrupts; 2 after an error."""
     from armload.app.cli.headless import lines
     from armload.devices import Detached, Recorder, Steadied, open_source
+    from armload.identification import plausible_known
     from armload.identification.tare_age import age_of
     from armload.posterior import Known, load_profile
     from armload.recording import ColumnSpec, check_own_measurements
@@ -138,6 +139,7 @@ def run(options: argparse.Namespace) -> int | None:
     options.robot = options.robot or robot_of(options.source)
     check_tare_age(options)
     arm = _arm_of(options)
+    known = plausible_known(Known.of(options.mass, options.com, if_held=True), arm)
     if options.steady and options.profile is not None:
         raise UsageError(
             "--steady and --profile: a profile is learned from velocities as they come; leave one of the two out"
@@ -175,7 +177,6 @@ def run(options: argparse.Namespace) -> int | None:
         _warn(note)
     with Steadied(source) if options.steady else source as source:
         recorder = Recorder(mcap, arm.n, arm.joint_names) if mcap else None
-        known = Known.of(options.mass, options.com, if_held=True)
         more = {"known": known, "recorder": recorder, "tare_age": age}
         session = Session(source, arm, tare, options.method, _warn, profile, **more)
         try:
