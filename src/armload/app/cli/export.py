@@ -143,7 +143,7 @@ def write(
     if out is None:
         print(text, end="")
     else:
-        print_note(f"{out}: {'; '.join(body.description())}")
+        print_note(f"{out}: {body.description()[0]}")  # what else is said of it, the notes have said
 
 
 def _no_flange(load: Load) -> SinkError:
