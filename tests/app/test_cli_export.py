@@ -17,7 +17,7 @@ from armload.app.cli.export import _EXAMPLES
 from armload.app.cli.export import FORMS as NAMED
 from armload.arms import arm
 from armload.devices import FORMS
-from armload.inertia import InertialParameters
+from armload.inertia import NAMES, InertialParameters
 from armload.payloads import Payload, franka_hand, write_payload
 from armload.recording import write_recording
 
@@ -122,6 +122,17 @@ def test_a_file_is_written_and_stdout_stays_empty(export, tmp_path):
     assert out == ""
     assert "p.urdf" in err
     assert ET.parse(tmp_path / "p.urdf").find("./link").get("name") == "cup"
+
+
+def test_each_caution_is_said_once_whether_the_load_is_written_or_printed(export, tmp_path):
+    known = [name not in ("Ixx", "Iyz") for name in NAMES]
+    resting = [name == "Iyy" for name in NAMES]
+    doubted = result_of(HELD, determined=known, rests_on_prior=resting)
+    printed = export(doubted, "--to", "mjcf").err.splitlines()
+    written = export(doubted, "--to", "mjcf", "--out", str(tmp_path / "p.xml")).err.splitlines()
+    assert written[:-1] == printed
+    assert len(printed) == 2
+    assert written[-1] == f"armload: {tmp_path / 'p.xml'}: payload of panda about panda_link8, relative to the arm"
 
 
 def test_minus_the_hand_in_the_hand_s_own_frame_or_the_flange_s(export, tmp_path):
@@ -289,7 +300,9 @@ def test_standard_output_can_be_named_as_the_file(export, tmp_path, into):
 def test_a_folder_that_is_missing_is_named_and_no_temporary_file(export, tmp_path):
     path = str(tmp_path / "no" / "p.urdf")
     _, err = export(result_of(HELD), "--to", "urdf", "--out", path, code=2)
-    assert err == f"armload: {path} cannot be written: No such file or directory\n"
+    folder = tmp_path / "no"
+    said = f"armload: --out {path} cannot be written: there is no folder {folder}; name a file where you can write\n"
+    assert err == said
 
 
 def test_an_arm_that_is_not_built_in_is_named_by_its_file(export, tmp_path):

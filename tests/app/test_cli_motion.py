@@ -213,3 +213,43 @@ def test_the_help_says_the_limits_of_a_design_and_of_a_path_when_none_is_asked_f
             assert found is not None
             said = found[1]
             assert value >= 1e3 if said == "any" else float(said) == value
+
+
+@pytest.fixture(scope="module")
+def of_six(tmp_path_factory):
+    """The file of a motion of six joints."""
+    path = tmp_path_factory.mktemp("six") / "six.json"
+    assert main(["motion", "random", "--robot", "ur10e", "--seed", "3", "--duration", "2", "--out", str(path)]) == 0
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "motion show {} --robot panda",
+        "motion show {} --figure f.png",
+        "motion check {} --robot panda",
+        "motion check random:1 --robot panda --tare {}",
+        "motion export {} --format csv --robot panda",
+        "motion export {} --format ur --robot panda",
+        "motion export {} --format ros2",
+        "motion export {} --format csv --from 0,0,0,0,0,0,0",
+        "motion enrich {} --robot panda --out o.json",
+        "motion design --robot panda --from 0,-0.5,0,-2,0,1.6,0.8 --tare {} --out o.json",
+        "measure sim --robot panda --motion {} --dry-run",
+        "dataset --robot panda --motion {} --out data",
+    ],
+)
+def test_every_command_refuses_a_motion_of_another_arm_alike(of_six, words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(words.format(of_six).split()) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert "moves 6 joints: panda has 7; name the arm that it is of" in printed.err
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("words", ["motion show {}", "motion export {} --format csv", "motion export {} --format ur"])
+def test_what_needs_no_arm_takes_any_motion_where_none_is_named(of_six, words, capsys):
+    assert main(words.format(of_six).split()) == 0
+    assert capsys.readouterr().out

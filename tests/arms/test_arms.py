@@ -704,6 +704,8 @@ ONE_LINK = robot(link("base"), joint("j", "revolute", "base", "a"), link("a", 1.
         (lambda: arm("panda", gravity=(0, 0)), r"gravity is \(0, 0\): expected 3 finite numbers"),
         (lambda: arm("panda", gravity=("a", 0, 0)), r"gravity is .*expected 3 finite numbers"),
         (lambda: arm("panda", gravity=(0, 0, -981)), "magnitude 981 m/s²: expected about 9.81"),
+        (lambda: arm("panda", gravity=(0, 0, -1)), r"magnitude 1 m/s²: expected .*give it in m/s², not in g"),
+        (lambda: arm("panda", gravity=(0, 0, -32.2)), r"magnitude 32.2 m/s²: expected .*1.5 to 20 anywhere"),
         (lambda: arm("panda", gravity=(0, 0, 0)), "magnitude 0 m/s²: expected about 9.81"),
         (lambda: arm("panda", frame="panda_link0"), "no joint of panda moves the frame 'panda_link0'"),
         (lambda: Arm("x", "joints: 7"), "x is not a URDF"),

@@ -294,7 +294,7 @@ def test_accuracy_counts_half_widths_and_a_mass_that_was_weighed():
     assert Accuracy(mass=0.04, moment=0.002, inertia=0.001).reached(estimate)
     for tight in ({"mass": 0.039}, {"moment": 0.0019}, {"inertia": 9.7e-4}):
         assert not Accuracy(**tight).reached(estimate)
-    assert Accuracy(mass=0.01).reached(estimate, KnownMass(0.0, 0.002))
+    assert Accuracy(mass=0.01).reached(estimate, KnownMass(0.1, 0.002))
 
 
 def test_thresholds_reach_the_arm(panda, simulated, tmp_path):

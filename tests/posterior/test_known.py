@@ -138,7 +138,9 @@ def test_a_known_centre_makes_the_moments_better_and_their_intervals_narrower_an
     assert np.mean(inside) > 0.85
 
 
-@pytest.mark.parametrize(("mass", "std"), [(np.nan, 0.1), (1.0, 0.0), (1.0, -1.0), (np.inf, 1.0)])
+@pytest.mark.parametrize(
+    ("mass", "std"), [(np.nan, 0.1), (1.0, 0.0), (1.0, -1.0), (np.inf, 1.0), (0.0, 0.1), (-1.0, 0.1)]
+)
 def test_a_mass_that_is_none_is_refused(mass, std):
     with pytest.raises(IdentificationError, match="expected a number and a standard deviation above zero"):
         KnownMass(mass, std)

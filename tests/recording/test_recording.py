@@ -1,7 +1,11 @@
 """CSV, Parquet and NPZ logs: what is written is read back to the bit, and every fault is named by its place."""
 
+import bz2
+import gzip
 import io
+import lzma
 import os
+import zipfile
 
 import numpy as np
 import pyarrow as pa
@@ -275,7 +279,7 @@ def stacks(**changed):
         (stacks(t=log().t[:, None]), r"t has shape \(5, 1\)"),
         (stacks(tau=np.array([["a", "b"]] * 5)), r"array tau holds <U1: expected real numbers"),
         (stacks(tau=log().tau * 1j), r"array tau holds complex128"),
-        (stacks(tau=np.array([[None, {}]] * 5)), r"not a NumPy archive that can be read: .*pickle"),
+        (stacks(tau=np.array([[None, {}]] * 5)), r"not a NumPy archive that can be read: it holds Python objects"),
         (stacks(channel="guessed"), r"channel is 'guessed': expected one of measured, desired, external"),
         ({"t": log().t, "q": log().q}, r"lacks columns of velocity"),
     ],
@@ -305,6 +309,69 @@ def test_what_is_no_log_file_is_refused(tmp_path):
     write_recording(tmp_path / "b.csv", log())
     with pytest.raises(RecordingError, match=r"only ROS bags have topics"):
         read_recording(tmp_path / "b.csv", topic="/joint_states")
+
+
+@pytest.mark.parametrize("suffix", [".parquet", ".npz", ".h5", ".bag", ".db3", ".mcap"])
+def test_text_under_the_name_of_another_form_is_called_text(tmp_path, suffix):
+    (tmp_path / f"a{suffix}").write_text("\ufeff" + text(log()))
+    with pytest.raises(RecordingError, match=rf"is not a \{suffix} file: it is text; .* its name should end in \.csv"):
+        read_recording(tmp_path / f"a{suffix}")
+
+
+def _zipped(table):
+    kept = io.BytesIO()
+    with zipfile.ZipFile(kept, "w") as archive:
+        archive.writestr("run.csv", table)
+    return kept.getvalue()
+
+
+def _sheet(table):
+    kept = io.BytesIO()
+    with zipfile.ZipFile(kept, "w") as archive:
+        archive.writestr("xl/workbook.xml", table)
+    return kept.getvalue()
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".npz", ".parquet"])
+@pytest.mark.parametrize(
+    ("pack", "says"),
+    [
+        (gzip.compress, "it is packed with gzip; unpack it first"),
+        (bz2.compress, "it is packed with bzip2; unpack it first"),
+        (lzma.compress, "it is packed with xz; unpack it first"),
+        (_zipped, "it is packed with zip; unpack it first"),
+        (_sheet, "it is a spreadsheet; save it as CSV"),
+    ],
+)
+def test_a_packed_log_is_called_packed_whatever_its_name(tmp_path, suffix, pack, says):
+    (tmp_path / f"a{suffix}").write_bytes(pack(text(log()).encode()))
+    with pytest.raises(RecordingError, match=rf"is not a \{suffix} file: {says}"):
+        read_recording(tmp_path / f"a{suffix}")
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".parquet"])
+@pytest.mark.parametrize("make", ["cut", "junk", "objects"])
+def test_a_damaged_log_is_told_in_own_words(tmp_path, suffix, make):
+    path = tmp_path / f"a{suffix}"
+    write_recording(path, log())
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2] if make == "cut" else b"\x00\x01\x02\xff" * 300)
+    if make == "objects" and suffix == ".npz":
+        np.savez(path, t=np.array([{}], dtype=object))
+    with pytest.raises(RecordingError, match=r"damaged or was cut off; copy it|Python objects, or is none") as refused:
+        read_recording(path)
+    assert not any(word in str(refused.value) for word in ("pickle", "corrupted", "footer", "File is not a zip"))
+
+
+def test_an_hdf5_log_behind_a_block_of_text_is_no_text(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    one = log()
+    with h5py.File(tmp_path / "a.h5", "w", userblock_size=512) as file:
+        for name in ("t", "q", "dq", "tau"):
+            file[name] = getattr(one, name)
+    with (tmp_path / "a.h5").open("rb+") as file:
+        file.write(b"made by hand\n" + b" " * 499)
+    np.testing.assert_array_equal(read_recording(tmp_path / "a.h5").q, one.q)
 
 
 def test_a_file_without_permission_is_refused(tmp_path, monkeypatch):

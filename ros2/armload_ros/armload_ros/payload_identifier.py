@@ -33,7 +33,7 @@ from armload.arms import Arm
 from armload.devices.ros2 import announced, parameters_of
 from armload.devices.ros2.joint_states import JointStates
 from armload.errors import ArmloadError, UsageError
-from armload.identification import check_usable, plausible_tool
+from armload.identification import check_usable, plausible_known, plausible_tool
 from armload.online import OnlineEstimate
 from armload.posterior import Known
 from armload.recording import GAP
@@ -277,7 +277,7 @@ class PayloadIdentifier(LifecycleNode):
         forgotten = request.mass == 0.0 and request.std == 0.0
         try:
             known = None if forgotten else Known.of((request.mass, request.std), None, if_held=True)
-            self._identify(self._stream.arm, self._stream.tare, known)
+            self._identify(self._stream.arm, self._stream.tare, plausible_known(known, self._bare))
         except ArmloadError as error:
             return self._told(response, False, str(error))
         text = "no mass is known" if forgotten else f"the mass is {request.mass:.3f} ± {request.std:.3f} kg"

@@ -17,6 +17,9 @@ from armload.errors import ArmError
 from armload.inertia import InertialParameters, from_order
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
+# [m/s²] least and most at a base that an arm works on: the Moon has 1.62, and a base on the Earth that brakes or turns
+# at one g beside it has 14. A stated guard: 1, which is gravity in g, is below it, 32 in ft/s² and 981 in cm/s² above
+GRAVITIES = (1.5, 20.0)
 
 
 # one `link_spread`: standard deviation of a link's mass [1], centre of mass [m] and inertia [1]
@@ -89,10 +92,12 @@ class Arm:
             gravity = np.full(3, np.nan)
         if gravity.shape != (3,) or not np.all(np.isfinite(gravity)):
             raise ArmError(f"gravity is {self.gravity!r}: expected 3 finite numbers x,y,z in m/s², such as 0,0,-9.81")
-        if not 1.0 <= np.linalg.norm(gravity) <= 30.0:
+        least, most = GRAVITIES
+        if not least <= np.linalg.norm(gravity) <= most:
             raise ArmError(
                 f"gravity {tuple(gravity.tolist())} has magnitude {np.linalg.norm(gravity):.3g} m/s²: expected about "
-                "9.81; give it in the axes of the robot's base, pointing down"
+                f"9.81 on Earth (1.62 on the Moon, {least:g} to {most:g} anywhere); give it in m/s², not in g, in the "
+                "axes of the robot's base, pointing down"
             )
         object.__setattr__(self, "gravity", tuple(gravity.tolist()))
         chain = read_chain(self.urdf, self.frame, self.name)

@@ -25,7 +25,7 @@ from armload.identification.notes import (
     paused,
     rested,
 )
-from armload.identification.one_payload import Question, answer_of_one_payload
+from armload.identification.one_payload import Question, answer_of_one_payload, plausible_known
 from armload.identification.plausibility import check_plausible
 from armload.identification.segments import changes_of_payload
 from armload.identification.tare_age import drift_since
@@ -77,6 +77,7 @@ def identify(
     """
     say = progress or (lambda _: None)
     arm = arm if isinstance(arm, Arm) else arm_named(arm)
+    known = plausible_known(Known.of(mass, com), arm)
     recording = recording if isinstance(recording, Recording) else read_recording(recording, arm)
     tare = tare if tare is None or isinstance(tare, Recording) else read_recording(tare, arm)
     read = recording.notes if tare is None else of_both(recording, tare)
@@ -88,7 +89,7 @@ def identify(
         check_own_measurements(recording, tare)
     drift, aged = (0.0, ()) if tare is None else drift_since(tare, recording, tare_age)
     profile = load_profile(profile) if isinstance(profile, str | Path) else profile
-    asked, notes = Asked(method, drift, Known.of(mass, com), profile), (*notes, *aged)
+    asked, notes = Asked(method, drift, known, profile), (*notes, *aged)
     if tare is not None and profile is not None:
         _check_same_mounted(tare, arm, profile, asked)
     mounted = read_payload(tool) if isinstance(tool, str | Path) else tool

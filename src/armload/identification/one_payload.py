@@ -20,7 +20,7 @@ from armload.identification.reporting import answered
 from armload.identification.thresholds import DECISIVE, HEAVIEST
 from armload.inertia import HELD, InertialParameters
 from armload.payloads import INERTIA_ASSUMED, Payload
-from armload.posterior import Profile
+from armload.posterior import Known, Profile
 from armload.recording import Recording
 
 
@@ -94,13 +94,33 @@ def plausible_tool(tool: InertialParameters, arm: Arm) -> InertialParameters:
     Raises:
         IdentificationError: it weighs more than three times the rated payload: in grams, say.
     """
-    most = HEAVIEST * rated_mass(arm)
-    if not abs(tool.mass) <= most:
-        raise IdentificationError(
-            f"the tool weighs {tool.mass:.4g} kg: expected at most {most:.3g} kg, {HEAVIEST:g} times what "
-            f"{arm.name} is rated for; give kilograms and metres"
-        )
+    plausible_mass(tool.mass, "the tool weighs", arm)
     return tool
+
+
+def plausible_known(known: Known | None, arm: Arm) -> Known | None:
+    """What is known of a payload, if an arm can hold so much.
+
+    Raises:
+        IdentificationError: it weighs more than three times the rated payload: in grams, say.
+    """
+    if known is not None and known.mass is not None:
+        plausible_mass(known.mass.mass, "the known mass is", arm)
+    return known
+
+
+def plausible_mass(mass: float, said: str, arm: Arm) -> None:
+    """See that an arm can hold a mass [kg]. said: what it is, as the message begins.
+
+    Raises:
+        IdentificationError: it is more than three times the rated payload.
+    """
+    most = HEAVIEST * rated_mass(arm)
+    if not abs(mass) <= most:
+        raise IdentificationError(
+            f"{said} {mass:.4g} kg: expected at most {most:.3g} kg, {HEAVIEST:g} times what {arm.name} is rated for; "
+            "give kilograms and metres"
+        )
 
 
 def _carries(arm: Arm, tool: InertialParameters, tare: Recording | None, profile: Profile | None) -> tuple[bool, bool]:

@@ -18,7 +18,7 @@ from armload.devices.recorder import Recorder
 from armload.devices.supervision import Thresholds
 from armload.errors import RecordingError, SafetyError, SourceError
 from armload.excitation import Accuracy, Obstacle
-from armload.identification import Identification, identify
+from armload.identification import Identification, identify, plausible_known
 from armload.identification.tare_age import age_of
 from armload.inertia import Z95
 from armload.measuring.plan import APPROACH, BACK, EMPTY, LOADED, TO_START, Plan, plan_of
@@ -107,7 +107,7 @@ class Procedure:
         self.mover, self.arm, self.motion, self.empty_motion = mover, arm, motion, empty_motion
         self.folder, self.tare, self.tare_age, self.method = Path(folder), tare, tare_age, method
         self.mass, self.com = mass, com
-        self._known = Known.of(mass, com)
+        self._known = plausible_known(Known.of(mass, com), arm)
         self.accuracy, self.thresholds, self._say = accuracy, thresholds or Thresholds(), say
         self.profile = profile
         heaviest = None if mass is None else mass.mass + 3.0 * mass.std

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from armload.runtime.lazy import on_first_use
 
 if TYPE_CHECKING:
-    from armload.motion.check import MotionCheck, check_motion, rated_load
+    from armload.motion.check import MotionCheck, check_joints, check_motion, rated_load
     from armload.motion.course import Course
     from armload.motion.endless import EndlessMotion
     from armload.motion.export import export_motion
@@ -32,6 +32,7 @@ __all__ = [
     "PathMotion",
     "SplineMotion",
     "StraightMotion",
+    "check_joints",
     "check_motion",
     "excitation",
     "export_motion",

@@ -97,8 +97,7 @@ def check_motion(
     Raises:
         MotionError: the motion has another number of joints than the arm.
     """
-    if motion.n != arm.n:
-        raise MotionError(f"the motion {motion.name!r} moves {motion.n} joints: {arm.name} has {arm.n}")
+    check_joints(motion, arm)
     t = np.linspace(0.0, motion.duration, max(2, round(motion.duration * rate) + 1))
     q, dq, ddq = motion(t)
     jerk = motion.jerk(t)
@@ -154,6 +153,19 @@ def check_motion(
         self_nearest,
         problems,
     )
+
+
+def check_joints(motion: Motion, arm: Arm) -> None:
+    """See that a motion is one of the arm's joints.
+
+    Raises:
+        MotionError: it moves another number of joints.
+    """
+    if motion.n != arm.n:
+        raise MotionError(
+            f"the motion {motion.name!r} moves {motion.n} joints: {arm.name} has {arm.n}; name the arm that it is of, "
+            "or another motion"
+        )
 
 
 def rated_load(arm: Arm) -> InertialParameters | None:

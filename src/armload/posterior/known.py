@@ -39,17 +39,17 @@ class KnownMass:
         mass: [kg]. std: its standard deviation [kg].
 
     Raises:
-        IdentificationError: not finite, or a standard deviation that is not above zero.
+        IdentificationError: not finite, or one of both that is not above zero: no body weighs nothing.
     """
 
     mass: float
     std: float
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.mass) and np.isfinite(self.std) and self.std > 0.0):
+        if not (0.0 < self.mass < np.inf and 0.0 < self.std < np.inf):
             raise IdentificationError(
                 f"a known mass of {self.mass:g} ± {self.std:g} kg: expected a number and a standard deviation above "
-                "zero"
+                "zero, both in kg; leave it out where nothing was weighed"
             )
 
     def given(self, mean: NDArray[np.float64], covariance: NDArray[np.float64]) -> Gaussian:

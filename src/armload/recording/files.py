@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -18,8 +19,9 @@ from armload.recording.recording import Recording
 from armload.recording.ros_bag import BAG_SUFFIXES, read_bag
 from armload.runtime.atomic import replacing
 
+_TABLES = (".csv", ".tsv", ".txt")
 _READERS = {
-    **dict.fromkeys((".csv", ".tsv", ".txt"), read_csv),
+    **dict.fromkeys(_TABLES, read_csv),
     ".parquet": read_parquet,
     ".npz": read_npz,
     **dict.fromkeys((".hdf5", ".h5"), read_hdf5),
@@ -28,9 +30,17 @@ LOG_SUFFIXES = (*_READERS, *BAG_SUFFIXES)
 PACKED_SUFFIXES = (".gz", ".bz2", ".xz", ".zst", ".zip")
 _FORMS = "CSV, Parquet, NPZ, HDF5, ROS bag or LeRobot folder"
 _WRITERS = {".csv": write_csv, ".parquet": write_parquet, ".npz": write_npz}
+_PACKED = {  # how a file begins that a program has packed
+    b"\x1f\x8b": "gzip",
+    b"BZh91AY&SY": "bzip2",
+    b"\xfd7zXZ\x00": "xz",
+    b"\x28\xb5\x2f\xfd": "Zstandard",
+}
+_HEAD = 2048  # bytes by which a file is known; HDF5 may leave up to so many to others before it begins
+_ZIP = b"PK\x03\x04"
 _SIGNATURES = {
     b"PAR1": (".parquet",),
-    b"PK\x03\x04": (".npz",),
+    _ZIP: (".npz",),
     b"\x89HDF\r\n\x1a\n": (".hdf5", ".h5"),
     b"SQLite format 3\x00": (".db3",),
     b"\x89MCAP0\r\n": (".mcap",),
@@ -135,10 +145,34 @@ def write_recording(path: str | Path, recording: Recording) -> None:
 
 
 def _looks_like(path: Path, suffix: str) -> str:
-    """A hint, if the file starts like one of another suffix."""
+    """A hint, if the file starts like one of another suffix, or was packed."""
     with path.open("rb") as file:
-        head = file.read(16)
+        head = file.read(_HEAD)
+    for signature, packer in _PACKED.items():
+        if head.startswith(signature):
+            return f": it is packed with {packer}; unpack it first"
+    if head.startswith(_ZIP) and (inside := _in_zip(path)):
+        return inside
     for signature, suffixes in _SIGNATURES.items():
-        if head.startswith(signature) and suffix not in suffixes:
-            return f": it starts like a {suffixes[0]} file; rename it"
+        if head.startswith(signature):
+            return "" if suffix in suffixes else f": it starts like a {suffixes[0]} file; rename it"
+    if suffix not in _TABLES and _is_text(head) and not any(signature in head for signature in _SIGNATURES):
+        return ": it is text; if it is a table, its name should end in .csv"
     return ""
+
+
+def _in_zip(path: Path) -> str:
+    """A hint, if an archive is none of NumPy's; a damaged one is left to who reads it."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = archive.namelist()
+    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
+        return ""
+    if any(name.startswith("xl/") for name in names):
+        return ": it is a spreadsheet; save it as CSV"
+    return "" if any(name.endswith(".npy") for name in names) else ": it is packed with zip; unpack it first"
+
+
+def _is_text(head: bytes) -> bool:
+    text = head.decode("utf-8", errors="ignore")
+    return len(text.encode()) > len(head) - 4 and all(x.isprintable() or x in "\r\n\t\ufeff" for x in text)

@@ -36,7 +36,7 @@ def read_npz(path: Path, where: str, arm: Arm | None = None, spec: ColumnSpec | 
     except RecordingError:
         raise
     except Exception as error:  # a damaged archive can fail anywhere between zip, zlib and the array header
-        raise RecordingError(f"{where} is not a NumPy archive that can be read: {one_line(error)[:160]}") from None
+        raise RecordingError(f"{where} is not a NumPy archive that can be read: {_reason(error)}") from None
     if arrays.keys() >= set(_ARRAYS) and spec in (None, ColumnSpec()):
         _check_shapes(arrays, where)
     channel = str(arrays.get("channel", "measured"))
@@ -50,6 +50,15 @@ def read_npz(path: Path, where: str, arm: Arm | None = None, spec: ColumnSpec | 
     }
     log = read_table(ArrayTable(columns, where), where, arm, spec or ColumnSpec(), channel=channel)
     return log if joints is None or len(joints) != log.n else replace(log, joint_names=joints)
+
+
+def _reason(error: Exception) -> str:
+    """What is wrong with an archive; NumPy's own advice, to allow pickled objects, runs whatever code is in them."""
+    if "pickle" in str(error):
+        return "it holds Python objects, or is none at all; expected arrays of numbers, as numpy.savez writes them"
+    if isinstance(error, zipfile.BadZipFile | EOFError):
+        return "it is damaged or was cut off; copy it again, or write it anew"
+    return one_line(error)[:160]
 
 
 def npz_chunks(path: Path, where: str, arm: Arm | None, spec: ColumnSpec, size: int) -> Iterator[Recording]:

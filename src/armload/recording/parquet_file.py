@@ -58,7 +58,9 @@ def read_parquet(
     except RecordingError:
         raise
     except Exception as error:  # a damaged file can fail anywhere in the decoder
-        raise RecordingError(f"{where} is not a Parquet file that can be read: {one_line(error)[:160]}") from None
+        cut = "magic bytes" in str(error)  # those at its end
+        reason = "it is damaged or was cut off; copy it again, or write it anew" if cut else one_line(error)[:160]
+        raise RecordingError(f"{where} is not a Parquet file that can be read: {reason}") from None
     return log if joints is None or len(joints) != log.n else replace(log, joint_names=joints)
 
 

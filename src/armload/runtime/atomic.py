@@ -27,7 +27,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
         OSError: the folder does not exist or cannot be written; it names `path`, not the temporary file.
     """
     path = Path(path)
-    stream = _is_stream(path)
+    stream = is_stream(path)
     target = path if stream else Path(os.path.realpath(path))
     beside = {} if stream else {"prefix": f".{target.name}.", "dir": target.parent}
     try:
@@ -54,7 +54,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def _is_stream(path: Path) -> bool:
+def is_stream(path: Path) -> bool:
     """Whether there is something to write into that must not be replaced by a file."""
     try:
         if path.is_dir():

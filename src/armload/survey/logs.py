@@ -224,18 +224,18 @@ def _units(path: str, hidden: set[Path]) -> Iterator[tuple[str, int | None, tupl
     elif (real := here.resolve()) not in hidden:
         hidden.add(real)
         for inner in sorted(here.iterdir()):
-            known = inner.is_dir() or _is_log(inner)
-            if known and not inner.name.startswith(".") and inner.resolve() not in hidden and not _of_survey(inner):
+            known = inner.is_dir() or is_log(inner)
+            if known and not inner.name.startswith(".") and inner.resolve() not in hidden and not of_survey(inner):
                 yield from _units(str(inner), hidden)
 
 
-def _is_log(file: Path) -> bool:
+def is_log(file: Path) -> bool:
     """Whether a file is a log by its name; a packed one is, too: its row says that it has to be unpacked."""
     name = file.with_suffix("") if file.suffix.lower() in PACKED_SUFFIXES else file
     return name.suffix.lower() in LOG_SUFFIXES
 
 
-def _of_survey(path: Path) -> bool:
+def of_survey(path: Path) -> bool:
     """Whether this is the table of a survey, or its folder of cells (`cells_of`)."""
     table = path.with_suffix("") if path.suffix == ".cells" else path
     return table.is_file() and cells_of(table).is_dir()

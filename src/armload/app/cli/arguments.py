@@ -10,7 +10,7 @@ from typing import NoReturn
 from armload.errors import IdentificationError, UsageError
 
 # options whose value may begin with a minus sign: argparse would take "-1,0,-9.7" for an option
-_SIGNED = ("--gravity", "--from", "--box", "--floor", "--centre", "--com")
+_SIGNED = ("--gravity", "--mass", "--from", "--box", "--floor", "--centre", "--com")
 COLUMNS = 'names and units of columns, such as "t=time,q=joint_pos_{i},t_unit=ms", or a TOML file'
 AS_NAMED = "none"  # as SPEC: nothing is said of the columns
 
@@ -72,6 +72,24 @@ def file_name(text: str) -> str:
     return text
 
 
+class OutputFile(str):
+    """The name of a file that a command writes; `outputs.check_outputs` looks at all of them before it begins."""
+
+
+class OutputFolder(str):
+    """The name of a folder that a command writes into, likewise; it is made where there is none."""
+
+
+def output_file(text: str) -> OutputFile:
+    """The name of a file to write."""
+    return OutputFile(file_name(text))
+
+
+def output_folder(text: str) -> OutputFolder:
+    """The name of a folder to write into."""
+    return OutputFolder(file_name(text))
+
+
 def at_least(least: float, kind: type = int, most: float = float("inf")):
     """An argument type: a number of at least `least`, and at most `most` where memory or time would run out."""
 
@@ -96,7 +114,8 @@ def add_arm_arguments(parser: argparse.ArgumentParser, default: str | None = Non
         required=required and default is None,
         default=default,
         metavar="NAME|FILE.urdf",
-        help=f"{', '.join(_arms())}, or the path of a URDF file" + (f" (default: {default})" if default else ""),
+        help=f"{', '.join(built_in_arms())}, or the path of a URDF file"
+        + (f" (default: {default})" if default else ""),
     )
     parser.add_argument(
         "--frame", metavar="F", help="link whose frame the payload is about (default: the flange; a URDF's last link)"
@@ -109,8 +128,8 @@ def add_arm_arguments(parser: argparse.ArgumentParser, default: str | None = Non
     )
 
 
-def _arms() -> list[str]:
-    """The built-in arms, by their sheets: --help must not wait for what `armload.arms` imports."""
+def built_in_arms() -> list[str]:
+    """The arms that need no file, by their sheets: --help must not wait for what `armload.arms` imports."""
     sheets = resources.files("armload").joinpath("arms", "descriptions").iterdir()
     return sorted(sheet.name.removesuffix(".toml") for sheet in sheets if sheet.name.endswith(".toml"))
 

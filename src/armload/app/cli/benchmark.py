@@ -6,7 +6,7 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from armload.app.cli.arguments import Parser, add_cluster_argument, at_least
+from armload.app.cli.arguments import Parser, add_cluster_argument, at_least, output_file, output_folder
 from armload.app.cli.printing import print_note, print_table
 
 _EXAMPLES = """\
@@ -40,9 +40,9 @@ def parser() -> Parser:
     add("--jobs", type=at_least(1), default=1, metavar="N", help="processes (default: 1); same numbers")
     add_cluster_argument(parser)
     add("--hours", type=at_least(0.0, float), metavar="H", help="begin nothing after so many hours")
-    add("--out", metavar="DIR", help="cells and report (default: out/benchmark)")
-    add("--summary", metavar="FILE", help="the JSON (default: benchmarks/results/benchmark.json)")
-    add("--page", metavar="FILE", help="the page (default: docs/benchmark.md)")
+    add("--out", type=output_folder, metavar="DIR", help="cells and report (default: out/benchmark)")
+    add("--summary", type=output_file, metavar="FILE", help="the JSON (default: benchmarks/results/benchmark.json)")
+    add("--page", type=output_file, metavar="FILE", help="the page (default: docs/benchmark.md)")
     return parser
 
 

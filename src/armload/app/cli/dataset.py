@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from armload.app.cli.arguments import Parser, add_arm_arguments, add_cluster_argument, at_least, file_name
+from armload.app.cli.arguments import Parser, add_arm_arguments, add_cluster_argument, at_least, output_folder
 from armload.app.cli.named import arm_of, motion_of, whole_number, world_of
 
 _EXAMPLES = """\
@@ -27,7 +27,7 @@ def parser() -> Parser:
         epilog=_EXAMPLES,
     )
     add = parser.add_argument
-    add("--out", required=True, type=file_name, metavar="DIR", help="folder of the data set")
+    add("--out", required=True, type=output_folder, metavar="DIR", help="folder of the data set")
     add_arm_arguments(parser, default="panda")
     add(
         "--motion",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from armload.app.cli.arguments import Parser, at_least
+from armload.app.cli.arguments import Parser, at_least, output_folder
 from armload.app.cli.printing import print_note, print_table
 
 _EXAMPLES = """\
@@ -25,7 +25,13 @@ def parser() -> Parser:
         "Under three minutes on two cores.",
         epilog=_EXAMPLES,
     )
-    parser.add_argument("--out", default="out/demo", metavar="DIR", help="folder to write to (default: out/demo)")
+    parser.add_argument(
+        "--out",
+        type=output_folder,
+        default="out/demo",
+        metavar="DIR",
+        help="folder to write to (default: out/demo)",
+    )
     parser.add_argument(
         "--quick", action="store_true", help="seconds instead of minutes, with ensembles too small to judge"
     )

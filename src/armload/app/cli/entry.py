@@ -27,6 +27,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from armload.app.cli.arguments import Parser, attach_values
+from armload.app.cli.outputs import check_outputs
 from armload.errors import ArmloadError, UsageError
 from armload.runtime.extras import missing
 from armload.runtime.version import __version__
@@ -192,7 +193,9 @@ def _run(arguments: list[str]) -> int:
             + (f"; did you mean {near[0]!r}?" if near else "; see 'armload --help'")
         )
     module = importlib.import_module(f"armload.app.cli.{command}")
-    return module.run(module.parser().parse_args(attach_values(arguments[1:]))) or 0
+    options = module.parser().parse_args(attach_values(arguments[1:]))
+    check_outputs(options)
+    return module.run(options) or 0
 
 
 def _overview() -> Parser:

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from armload.app.cli.arguments import Parser, file_name
+from armload.app.cli.arguments import Parser, file_name, output_file
 from armload.app.cli.named import payload_of
 from armload.app.cli.printing import print_note
 
@@ -53,7 +53,7 @@ def parser() -> Parser:
         help="what `armload identify --json` printed, a payload file, or franka-hand",
     )
     add("--to", required=True, choices=FORMS, metavar="FORM", help=", ".join(FORMS))
-    add("--out", type=file_name, metavar="FILE", help="write a file instead of printing")
+    add("--out", type=output_file, metavar="FILE", help="write a file instead of printing")
     add(
         "--minus",
         type=file_name,
@@ -143,7 +143,7 @@ def write(
     if out is None:
         print(text, end="")
     else:
-        print_note(f"{out}: {'; '.join(body.description())}")
+        print_note(f"{out}: {body.description()[0]}")  # what else is said of it, the notes have said
 
 
 def _no_flange(load: Load) -> SinkError:

@@ -14,6 +14,7 @@ from armload.app.cli.arguments import (
     add_tool_and_topic_arguments,
     check_tare_age,
     file_name,
+    output_file,
 )
 from armload.app.cli.export import FORMS, write
 from armload.app.cli.named import arm_of, payload_named, read_logs, uncompensated
@@ -72,7 +73,7 @@ def parser() -> Parser:
         help=f"print it as a controller or simulator reads it, as `armload export` does: {', '.join(FORMS)}",
     )
     parser.add_argument(
-        "--out", type=file_name, metavar="FILE", help="write a file, whole or not at all: JSON, or the form of --to"
+        "--out", type=output_file, metavar="FILE", help="write a file, whole or not at all: JSON, or the form of --to"
     )
     return parser
 

@@ -17,8 +17,10 @@ from armload.app.cli.arguments import (
     at_least,
     check_tare_age,
     file_name,
+    output_file,
 )
 from armload.app.cli.named import arm_of, columns_for, columns_of, payload_of, read_logs, robot_of
+from armload.app.cli.outputs import check_writable
 from armload.app.cli.printing import print_note
 from armload.errors import ArmloadError, UsageError
 from armload.runtime.interruption import held_back
@@ -94,7 +96,7 @@ def parser() -> Parser:
     )
     add(
         "--record",
-        type=file_name,
+        type=output_file,
         metavar="FILE.csv|.mcap",
         help="keep every sample in a log that does not exist yet; as MCAP with the estimates and events",
     )
@@ -128,6 +130,7 @@ def run(options: argparse.Namespace) -> int | None:
     """Identify until the source ends (--headless) or somebody interrupts; 2 after an error."""
     from armload.app.cli.headless import lines
     from armload.devices import Detached, Recorder, Steadied, open_source
+    from armload.identification import plausible_known
     from armload.identification.tare_age import age_of
     from armload.posterior import Known, load_profile
     from armload.recording import ColumnSpec, check_own_measurements
@@ -136,12 +139,15 @@ def run(options: argparse.Namespace) -> int | None:
     options.robot = options.robot or robot_of(options.source)
     check_tare_age(options)
     arm = _arm_of(options)
+    known = plausible_known(Known.of(options.mass, options.com, if_held=True), arm)
     if options.steady and options.profile is not None:
         raise UsageError(
             "--steady and --profile: a profile is learned from velocities as they come; leave one of the two out"
         )
-    if options.learn and options.profile is None:
-        raise UsageError("--learn adds to a profile, but there is no --profile; make one with `armload profile`")
+    if options.learn:
+        if options.profile is None:
+            raise UsageError("--learn adds to a profile, but there is no --profile; make one with `armload profile`")
+        check_writable("--profile", options.profile)
     profile = None if options.profile is None else load_profile(options.profile)
     of_log, columns = options.source != "sim" and "://" not in options.source, columns_of(options)
     if columns != ColumnSpec() and not of_log and options.tare is None:
@@ -171,7 +177,6 @@ def run(options: argparse.Namespace) -> int | None:
         _warn(note)
     with Steadied(source) if options.steady else source as source:
         recorder = Recorder(mcap, arm.n, arm.joint_names) if mcap else None
-        known = Known.of(options.mass, options.com, if_held=True)
         more = {"known": known, "recorder": recorder, "tare_age": age}
         session = Session(source, arm, tare, options.method, _warn, profile, **more)
         try:

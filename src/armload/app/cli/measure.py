@@ -35,9 +35,10 @@ def run(options: argparse.Namespace) -> int | None:
 
     from armload.devices import Thresholds, open_mover
     from armload.excitation import Accuracy
+    from armload.identification import plausible_known
     from armload.measuring import Procedure
     from armload.measuring.plan import APPROACH
-    from armload.posterior import KnownCentre, KnownMass, load_profile
+    from armload.posterior import Known, KnownCentre, KnownMass, load_profile
 
     options.robot = options.robot or robot_of(options.source)
     bare = arm_of(options)
@@ -50,6 +51,7 @@ def run(options: argparse.Namespace) -> int | None:
     accuracy = None if options.until is None else Accuracy.read(options.until)
     mass = None if options.mass is None else KnownMass(*options.mass)
     com = None if options.com is None else KnownCentre(*options.com)
+    plausible_known(Known.of(mass, com), arm)  # before a motion is designed for it
     mounted = tool if options.mounted in (None, "nothing") else payload_of(options.mounted, arm)
     if tool is not None and options.mounted is not None:
         raise UsageError("--tool is what is on at the empty run, and so is --mounted: give one of them")
@@ -96,9 +98,13 @@ def run(options: argparse.Namespace) -> int | None:
 
 
 def _motion(name: str, arm: Arm) -> Motion:
-    from armload.motion import PathMotion
+    from armload.motion import PathMotion, check_joints
 
-    return PathMotion.read(name) if name.lower().endswith(".csv") else motion_of(name, arm)
+    if not name.lower().endswith(".csv"):
+        return motion_of(name, arm)
+    motion = PathMotion.read(name)
+    check_joints(motion, arm)
+    return motion
 
 
 def _tool(options: argparse.Namespace, arm: Arm) -> InertialParameters:

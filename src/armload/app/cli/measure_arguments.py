@@ -12,6 +12,8 @@ from armload.app.cli.arguments import (
     add_tare_age_argument,
     at_least,
     file_name,
+    output_file,
+    output_folder,
 )
 from armload.app.cli.motion_arguments import box
 
@@ -61,7 +63,7 @@ def parser() -> Parser:
     add("--dry-run", action="store_true", help="connect, say what would move and check it; move nothing")
     add("--move", action="store_true", help="move without asking: for who has seen the dry run")
     add("--until", metavar="WIDTHS", help="stop when 95%% half-widths are mass=10g,moment=1.5g.m,inertia=1e-3")
-    add("--dir", type=file_name, metavar="DIR", help="folder of the logs (default: measurement-DATE-TIME)")
+    add("--dir", type=output_folder, metavar="DIR", help="folder of the logs (default: measurement-DATE-TIME)")
     add(
         "--tare", type=file_name, metavar="LOG0", help="a log of the empty arm: no empty run, the payload is on already"
     )
@@ -99,7 +101,7 @@ def parser() -> Parser:
     )
     answer = parser.add_argument_group("the answer").add_argument
     answer("--json", action="store_true", help="print one JSON object and nothing else")
-    answer("--out", type=file_name, metavar="FILE", help="write the answer as JSON, whole or not at all")
+    answer("--out", type=output_file, metavar="FILE", help="write the answer as JSON, whole or not at all")
     answer("--apply", action="store_true", help="write it to the controller, too (UR, Franka)")
     answer("--mounted", metavar="FILE", help="what was on at the empty run: JSON, franka-hand, or nothing; for --apply")
     answer(

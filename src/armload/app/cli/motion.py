@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from armload.app.cli import motion_arguments, motion_design, motion_enrich, motion_export, motion_show
-from armload.app.cli.arguments import Parser, add_arm_arguments, add_column_arguments, at_least, file_name
+from armload.app.cli.arguments import Parser, add_arm_arguments, add_column_arguments, at_least, output_file
 from armload.app.cli.named import arm_of, payload_of
 from armload.app.cli.printing import print_json, print_note, working
 from armload.errors import UsageError
@@ -109,7 +109,7 @@ def parser() -> Parser:
         "--duration", type=at_least(0.1, float, 3600), default=6.0, metavar="S", help="in seconds (default: 6)"
     )
     random.add_argument("--harmonics", type=at_least(2), default=5, metavar="K", help="(default: 5)")
-    random.add_argument("--out", required=True, type=file_name, metavar="FILE", help="JSON file to write")
+    random.add_argument("--out", required=True, type=output_file, metavar="FILE", help="JSON file to write")
     return parser
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 
-from armload.app.cli.arguments import add_arm_arguments, add_column_arguments, at_least, file_name
+from armload.app.cli.arguments import add_arm_arguments, add_column_arguments, at_least, file_name, output_file
 
 _UNITS = {
     "mass": {"g": 1e-3, "kg": 1.0, "": 1.0},
@@ -143,5 +143,5 @@ def add_design_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_constraint_arguments(parser)
     parser.add_argument("--seed", type=at_least(0), default=0, metavar="N", help="same seed, same motion (default: 0)")
-    parser.add_argument("--out", required=True, type=file_name, metavar="FILE", help="JSON file to write")
+    parser.add_argument("--out", required=True, type=output_file, metavar="FILE", help="JSON file to write")
     parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")

@@ -6,7 +6,9 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from armload.app.cli.arguments import OutputFile
 from armload.app.cli.named import arm_of
+from armload.app.cli.outputs import check_outputs
 from armload.app.cli.printing import console, print_json, print_note, table, working
 from armload.errors import UsageError
 
@@ -77,10 +79,13 @@ def run_design(options: argparse.Namespace) -> int:
 
     if options.until is not None and options.time is not None:
         raise UsageError("--time and --until exclude each other: give one of them")
+    out = Path(options.out)
+    empty = out.with_name(f"{out.stem}-empty{out.suffix}")
+    if options.tare_time is not None:
+        check_outputs(options, ("--tare-time", OutputFile(empty)))
     arm = arm_of(options)
     constraints = constraints_of(options, arm, options.start, options.joints)
     criterion, words = criterion_of(options, arm, options.tare_time is not None)
-    out = Path(options.out)
     settings: dict[str, Any] = {"tare_time": options.tare_time, "seed": options.seed, "name": out.stem or "designed"}
     with working("designing a motion"):
         if options.until is None:
@@ -90,7 +95,7 @@ def run_design(options: argparse.Namespace) -> int:
     save_motion(out, found.motion)
     written = [str(out)]
     if found.empty is not None:
-        written.append(str(out.with_name(f"{out.stem}-empty{out.suffix}")))
+        written.append(str(empty))
         save_motion(written[1], found.empty)
     if options.json:
         print_json(_fields(found, constraints, criterion, written, words))

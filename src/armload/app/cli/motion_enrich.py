@@ -8,7 +8,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
-from armload.app.cli.arguments import add_arm_arguments, at_least, file_name
+from armload.app.cli.arguments import add_arm_arguments, at_least, output_file
 from armload.app.cli.motion_arguments import add_constraint_arguments, add_knowledge_arguments
 from armload.app.cli.motion_design import constraints_of, criterion_of, print_widths
 from armload.app.cli.named import arm_of
@@ -42,7 +42,7 @@ def add_enrich_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out",
         required=True,
-        type=file_name,
+        type=output_file,
         metavar="FILE",
         help="file to write: .json (motion), .csv, .yaml (JointTrajectory) or .script (URScript)",
     )
@@ -110,7 +110,7 @@ def path_of(name: str, arm: Arm) -> Motion:
     Raises:
         MotionError: it cannot be read, or it is none of the forms that are known.
     """
-    from armload.motion import load_motion
+    from armload.motion import check_joints, load_motion
 
     file = Path(name)
     try:
@@ -122,7 +122,9 @@ def path_of(name: str, arm: Arm) -> Motion:
         return _table(text, name, arm)
     content = _content(text, name)
     if "format" in content:
-        return load_motion(file)
+        motion = load_motion(file)
+        check_joints(motion, arm)
+        return motion
     content = content.get("trajectory", content)  # of a FollowJointTrajectory goal
     if not isinstance(content, dict) or "points" not in content:
         raise MotionError(f"{name} is no path: expected a JointTrajectory with joint_names and points, or a motion")

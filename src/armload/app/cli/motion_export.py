@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from armload.app.cli.arguments import add_arm_arguments, at_least, file_name
+from armload.app.cli.arguments import add_arm_arguments, at_least, output_file
 from armload.app.cli.motion_arguments import box, floor, numbers
 from armload.app.cli.named import arm_of, motion_of
 from armload.app.cli.printing import print_note
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from armload.arms import Arm
     from armload.motion import Motion
 
+_DEFAULT = "panda"
 _LEAD = 0.5  # [s] until the first point of a ros2 trajectory from the present pose, where the arm is already
 
 
@@ -22,10 +23,11 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
     """All of `armload motion export`."""
     add = parser.add_argument
     add("motion", metavar="MOTION", help="taie2024, a JSON file, or random:SEED")
-    add_arm_arguments(parser, default="panda")
+    add_arm_arguments(parser, default=_DEFAULT)
+    parser.set_defaults(robot=None)  # a table names no joints: only an arm that is named must fit
     add("--format", required=True, choices=("csv", "ros2", "ur"))
     add("--rate", type=at_least(1e-3, float, 1e4), metavar="HZ", help="samples per second")
-    add("--out", type=file_name, metavar="FILE", help="file to write (default: standard output)")
+    add("--out", type=output_file, metavar="FILE", help="file to write (default: standard output)")
     add = parser.add_argument_group("from the present pose").add_argument
     add(
         "--from",
@@ -48,8 +50,10 @@ def run_export(options: argparse.Namespace) -> int:
     from armload.motion import export_motion
     from armload.motion.export import motion_text
 
+    named, options.robot = options.robot is not None, options.robot or _DEFAULT
     arm = arm_of(options)
-    motion, lead = motion_of(options.motion, arm), {}
+    needed = named or options.format == "ros2" or options.start is not None
+    motion, lead = motion_of(options.motion, arm, needed), {}
     if options.start is not None:
         motion, lead = _led(motion, arm, options), {"lead": _LEAD}
     elif options.approach is not None or options.payload is not None or options.box:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from armload.app.cli.arguments import add_arm_arguments, at_least, file_name
+from armload.app.cli.arguments import add_arm_arguments, at_least, output_file
 from armload.app.cli.motion_arguments import box, floor, held
 from armload.app.cli.named import arm_of, motion_of
 from armload.app.cli.printing import console, print_note, table
@@ -17,13 +17,16 @@ if TYPE_CHECKING:
     from armload.arms import Arm
     from armload.motion import Motion
 
+_DEFAULT = "panda"
+
 
 def add_show_arguments(parser: argparse.ArgumentParser) -> None:
     """All of `armload motion show`."""
     add = parser.add_argument
     add("motion", metavar="MOTION", help="taie2024, a JSON file, or random:SEED")
-    add_arm_arguments(parser, default="panda")
-    add("--figure", type=file_name, metavar="F.png", help="draw the joints against their limits")
+    add_arm_arguments(parser, default=_DEFAULT)
+    parser.set_defaults(robot=None)  # a table needs no arm: only one that is named must fit
+    add("--figure", type=output_file, metavar="F.png", help="draw the joints against their limits")
     add("--page", action="store_true", help="a page in the browser on which the arm runs the motion, until Ctrl-C")
     add = parser.add_argument_group("with --page").add_argument
     add("--host", metavar="H", help="interface of the page (127.0.0.1)")
@@ -39,8 +42,9 @@ def run_show(options: argparse.Namespace) -> int:
 
     if not options.page and (options.host is not None or options.port is not None or options.box):
         raise UsageError("--host, --port and --box are of the page, but there is no --page")
+    named, options.robot = options.robot is not None, options.robot or _DEFAULT
     arm = arm_of(options)
-    motion = motion_of(options.motion, arm)
+    motion = motion_of(options.motion, arm, named or options.page or options.figure is not None)
     page = _page(motion, arm, options) if options.page else None  # what refuses the motion, before anything is printed
     if options.figure is not None:
         from armload.lab.report.motion_figure import write_motion_figure

@@ -169,15 +169,22 @@ def robot_of(source: str) -> str:
     return known[0]
 
 
-def motion_of(name: str, arm: Arm) -> Motion:
-    """A motion by name (`taie2024`), from a JSON file, or drawn for the arm (`random:SEED`)."""
-    from armload.motion import load_motion, random_motion, taie2024
+def motion_of(name: str, arm: Arm, of_arm: bool = True) -> Motion:
+    """A motion by name (`taie2024`), from a JSON file, or drawn for the arm (`random:SEED`).
 
-    if name == "taie2024":
-        return taie2024()
+    of_arm: whether it must be one of the arm's; else the arm is what a random one is drawn for.
+
+    Raises:
+        MotionError: it cannot be read, or moves another number of joints than the arm has.
+    """
+    from armload.motion import check_joints, load_motion, random_motion, taie2024
+
     if name.startswith("random:"):
         return random_motion(arm, whole_number(name, "motion"))
-    return load_motion(name)
+    motion = taie2024() if name == "taie2024" else load_motion(name)
+    if of_arm:
+        check_joints(motion, arm)
+    return motion
 
 
 def world_of(name: str, arm: Arm) -> World:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from armload.app.cli.arguments import Parser, add_arm_arguments, add_column_arguments, file_name, weighed
+from armload.app.cli.arguments import Parser, add_arm_arguments, add_column_arguments, file_name, output_file, weighed
 from armload.app.cli.named import arm_of, payload_of, read_logs
 from armload.app.cli.printing import console, print_json, print_note, table, working
 from armload.errors import UsageError
@@ -41,7 +41,7 @@ def parser() -> Parser:
     )
     parser.add_argument("logs", nargs="+", type=file_name, metavar="LOG", help="logs of the arm, or: show PROFILE")
     add_arm_arguments(parser, required=False)
-    parser.add_argument("--out", type=file_name, metavar="P", help="the profile's file")
+    parser.add_argument("--out", type=output_file, metavar="P", help="the profile's file")
     parser.add_argument("--update", action="store_true", help="add the logs to the profile that --out names")
     parser.add_argument(
         "--one-session", action="store_true", help="all logs are of one session, without a switching-off between them"
@@ -54,7 +54,7 @@ def parser() -> Parser:
     )
     parser.add_argument("--topic", metavar="T", help="JointState topic of a bag, where it has several")
     add_column_arguments(parser)
-    parser.add_argument("--figure", type=file_name, metavar="F.png", help="with show: draw where the arm is known")
+    parser.add_argument("--figure", type=output_file, metavar="F.png", help="with show: draw where the arm is known")
     parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     return parser
 

@@ -8,8 +8,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armload.app.cli.arguments import Parser, add_arm_arguments, add_column_arguments, at_least, file_name
+from armload.app.cli.arguments import Parser, add_arm_arguments, add_column_arguments, at_least, file_name, output_file
 from armload.app.cli.named import arm_of, arm_of_dataset, payload_of, read_logs
+from armload.app.cli.outputs import check_page
 from armload.app.cli.printing import print_note, print_table, working
 from armload.errors import UsageError
 
@@ -52,7 +53,7 @@ def parser() -> Parser:
     add("--model", nargs="+", default=[], metavar="FILE", help="trained models to show too")
     add("--topic", metavar="T", help="JointState topic of a bag, where it has several")
     add_column_arguments(parser)
-    add("--out", required=True, type=file_name, metavar="FILE.html", help="file to write")
+    add("--out", required=True, type=output_file, metavar="FILE.html", help="file to write")
     return parser
 
 
@@ -60,6 +61,7 @@ def run(options: argparse.Namespace) -> None:
     """Run every method, write the report, print its first tables."""
     from armload.lab.report import write_report
 
+    check_page(options.out)
     if (options.log is None) == (options.dataset is None):
         raise UsageError("expected either a LOG or --dataset DIR; see 'armload report --help'")
     if options.log is not None and options.robot is None:

@@ -7,7 +7,7 @@ import os
 import sys
 from pathlib import Path
 
-from armload.app.cli.arguments import Parser, add_cluster_argument, at_least
+from armload.app.cli.arguments import Parser, add_cluster_argument, at_least, output_file, output_folder
 from armload.app.cli.printing import print_note
 from armload.errors import UsageError
 
@@ -34,9 +34,9 @@ def parser() -> Parser:
     add = parser.add_argument
     add("study", choices=("taie2024",), help="the study")
     add("--quick", action="store_true", help="reduced size; everything goes to --out")
-    add("--out", metavar="DIR", help="data sets, models, report (default: out/taie2024)")
-    add("--results", metavar="DIR", help="finished cells (default: benchmarks/results/taie2024)")
-    add("--page", metavar="FILE", help="the page to write (default: docs/paper.md)")
+    add("--out", type=output_folder, metavar="DIR", help="data sets, models, report (default: out/taie2024)")
+    add("--results", type=output_folder, metavar="DIR", help="finished cells (default: benchmarks/results/taie2024)")
+    add("--page", type=output_file, metavar="FILE", help="the page to write (default: docs/paper.md)")
     add("--jobs", type=at_least(1), default=1, metavar="N", help="cells at once (default: 1); same numbers")
     add_cluster_argument(parser)
     add("--hours", type=at_least(0.0, float), metavar="H", help="begin nothing after so many hours")

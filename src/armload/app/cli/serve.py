@@ -21,6 +21,7 @@ from armload.app.cli.arguments import (
     at_least,
     check_tare_age,
     file_name,
+    output_folder,
 )
 from armload.app.cli.named import robot_of
 from armload.app.cli.printing import print_note
@@ -59,7 +60,7 @@ def parser() -> Parser:
     add_identifier_arguments(parser)
     add_tare_age_argument(parser)
     add_tool_argument(parser)
-    add("--save", type=file_name, metavar="DIR", help="keep the state in this folder, every minute")
+    add("--save", type=output_folder, metavar="DIR", help="keep the state in this folder, every minute")
     add("--loop", action="store_true", help="replay a log again and again")
     add("--every", type=at_least(0.02, float), metavar="S", help="seconds between lines of an arm (0.1)")
     add(

@@ -9,7 +9,17 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from armload.app.cli.arguments import COLUMNS, Parser, add_arm_arguments, add_cluster_argument, at_least, file_name
+from armload.app.cli.arguments import (
+    COLUMNS,
+    Parser,
+    add_arm_arguments,
+    add_cluster_argument,
+    at_least,
+    file_name,
+    output_file,
+    output_folder,
+)
+from armload.app.cli.outputs import check_page
 from armload.app.cli.printing import print_json, print_note, working
 from armload.errors import UsageError
 
@@ -46,7 +56,7 @@ def parser() -> Parser:
     add = parser.add_argument
     add("paths", nargs="+", type=file_name, metavar="PATH", help="logs, folders, globs, URLs, @lists; or: report TABLE")
     add_arm_arguments(parser, required=False)
-    add("--out", type=file_name, metavar="FILE", help="the table (.parquet, .csv, .json), or the report (.html)")
+    add("--out", type=output_file, metavar="FILE", help="the table (.parquet, .csv, .json), or the report (.html)")
     add(
         "--arm-of",
         metavar="REGEX",
@@ -60,7 +70,7 @@ def parser() -> Parser:
     add("--topic", metavar="T", help="JointState topic of bags that have several")
     add("--jobs", type=at_least(1), metavar="N", help="processes (default: all cores); same rows")
     add_cluster_argument(parser)
-    add("--learn-profiles", type=file_name, metavar="DIR", help="then learn each arm from its empty stretches")
+    add("--learn-profiles", type=output_folder, metavar="DIR", help="then learn each arm from its empty stretches")
     add("--json", action="store_true", help="print one JSON object and nothing else")
     return parser
 
@@ -128,6 +138,7 @@ def _report(options: argparse.Namespace) -> None:
         raise UsageError(
             "armload survey report takes one table: armload survey report survey.parquet --out report.html"
         )
+    check_page(options.out)
     with working("drawing and writing"):
         findings = write_survey_report(options.paths[1], options.out)
     for line in findings:

@@ -6,7 +6,7 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
-from armload.app.cli.arguments import Parser, add_cluster_argument, at_least, file_name
+from armload.app.cli.arguments import Parser, add_cluster_argument, at_least, output_file, output_folder
 from armload.app.cli.named import arm_of_dataset, motion_of
 from armload.app.cli.printing import print_note, print_table
 from armload.errors import UsageError
@@ -68,7 +68,7 @@ def parser() -> Parser:
     )
     add(
         "--out",
-        type=file_name,
+        type=output_file,
         metavar="FILE",
         help="model to write, .safetensors (hybrid, default: out/hybrid-ROBOT.safetensors)",
     )
@@ -91,9 +91,11 @@ def parser() -> Parser:
     )
     add_cluster_argument(hybrid)
     hybrid.add_argument(
-        "--work", type=file_name, metavar="DIR", help="finished episodes are kept here (default: out/hybrid-ROBOT)"
+        "--work", type=output_folder, metavar="DIR", help="finished episodes are kept here (default: out/hybrid-ROBOT)"
     )
-    hybrid.add_argument("--report", type=file_name, metavar="FILE", help="JSON: the intervals' coverage, cell by cell")
+    hybrid.add_argument(
+        "--report", type=output_file, metavar="FILE", help="JSON: the intervals' coverage, cell by cell"
+    )
     hybrid.add_argument("--json", action="store_true", default=None, help="print that report and nothing else")
     ensemble = parser.add_argument_group("ensemble")
     ensemble.add_argument("--dataset", metavar="DIR", help="folder written by armload dataset")

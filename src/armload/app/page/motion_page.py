@@ -15,9 +15,8 @@ import numpy as np
 from armload.app.page.scene import HELD, REGION, TRUTH, DrawnArm
 from armload.app.page.server import PageServer, look_at_arm
 from armload.arms import PAYLOAD_REACH, Arm
-from armload.errors import MotionError
 from armload.excitation import Surroundings
-from armload.motion import Motion
+from armload.motion import Motion, check_joints
 
 SPEEDS = {"real time": 1.0, "half": 0.5, "a quarter": 0.25, "a tenth": 0.1}
 _REST = 0.7  # [s] at the end, before the motion begins again
@@ -52,8 +51,7 @@ class MotionPage:
         port: int = 8080,
         period: float = 1 / 30,
     ) -> None:
-        if motion.n != arm.n:
-            raise MotionError(f"the motion {motion.name} moves {motion.n} joints: {arm.name} has {arm.n}")
+        check_joints(motion, arm)
         self._motion, self._arm, self.period = motion, arm, period
         self._around = Surroundings(arm) if around is None else around
         self._page = PageServer(host, port, f"armload · {motion.name}", otherwise="draw it with --figure")

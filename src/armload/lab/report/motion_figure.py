@@ -10,7 +10,7 @@ import numpy as np
 from armload.arms import Arm
 from armload.errors import ReportError
 from armload.lab.report.style import COLOURS, look, new_figure
-from armload.motion import Motion, rated_load
+from armload.motion import Motion, check_joints, rated_load
 from armload.runtime.atomic import replacing
 
 if TYPE_CHECKING:
@@ -26,10 +26,9 @@ def motion_figure(motion: Motion, arm: Arm) -> Figure:
     A limit far beyond what the motion uses is written at the edge instead of drawn.
 
     Raises:
-        ReportError: the motion has another number of joints than the arm.
+        MotionError: the motion has another number of joints than the arm.
     """
-    if motion.n != arm.n:
-        raise ReportError(f"the motion {motion.name!r} moves {motion.n} joints: {arm.name} has {arm.n}")
+    check_joints(motion, arm)
     t = np.linspace(0.0, motion.duration, _INSTANTS)
     q, dq, ddq = motion(t)
     limits, load = arm.limits, rated_load(arm)
