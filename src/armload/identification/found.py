@@ -205,9 +205,11 @@ def _restless_joint(found: PosteriorLeastSquares) -> int:
 def _backwards(found: PosteriorLeastSquares, recording: Recording, kappa: float | None) -> tuple[int, ...]:
     """Joints, from 1, that move, and whose Coulomb friction surely has the sign of one that drives them.
 
-    kappa: by how much the physics overrates the log's evidence; None: not known.
+    kappa: by how much the physics overrates the log's evidence; None: not known. Of motor currents, which are mostly
+        friction, it says nothing of that.
     """
-    coulomb, sure = found.stream.correction.coulomb, BACKWARDS * np.sqrt(kappa or KAPPA_UNKNOWN)
+    motor = found.posterior.torque == "motor"
+    coulomb, sure = found.stream.correction.coulomb, BACKWARDS * (1.0 if motor else np.sqrt(kappa or KAPPA_UNKNOWN))
     driven = coulomb(found.posterior.eta) < -sure * coulomb(found.posterior.eta_std)
     return tuple((np.flatnonzero(driven & (span(recording.q) > MOVES)) + 1).tolist())
 
