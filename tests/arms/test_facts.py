@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import armload
-from armload.app.cli.arguments import _arms
+from armload.app.cli.arguments import built_in_arms
 from armload.arms import ARMS, arm, facts_of, rated_effort, rated_mass
 from armload.arms.facts import description_of, read_sheet
 from armload.devices import Simulator, open_source
@@ -70,7 +70,7 @@ def test_a_sheet_and_its_description_are_of_one_arm(name):
 
 
 def test_the_command_line_names_the_same_arms():
-    assert _arms() == list(ARMS)
+    assert built_in_arms() == list(ARMS)
 
 
 def test_an_arm_cut_short_by_its_frame_has_no_figures_per_joint():

@@ -86,7 +86,7 @@ class Recording:
             if len(bad):
                 row, column = bad[0][0], name + (str(bad[0][1] + 1) if name != "t" else "")
                 raise RecordingError(f"{self.source}: {column} at row {row} is not a finite number")
-        late = np.flatnonzero(np.diff(self.t) <= 0)
+        late = np.flatnonzero(self.t[1:] <= self.t[:-1])
         if len(late):
             k = int(late[0])
             raise RecordingError(
