@@ -126,9 +126,10 @@ NO_TORQUE = 1e-3
 FROZEN_TIME = 0.25
 # [rad] that a joint moves meanwhile: a standing arm's torque may well repeat where it is rounded
 FROZEN_MOTION = 0.1
-# times as long as any other value of a joint's torque: a torque with noise repeats for a sample or two, so that one
-# that is held for `FROZEN_TIME` is not measured. Sound logs, simulated and real, rounded to 1 to 100 mN·m, too, pass
-# (test_a_torque_that_is_rounded_is_not_taken_for_one_that_stands_still)
+# times as long as any other value of a joint's torque, of one that is rounded to as much less than a model error: with
+# noise it repeats for a sample or two, so that one that is held for `FROZEN_TIME` is not measured. Also the steps of a
+# rounded torque that its own weight must change by meanwhile. Sound logs, simulated and real, rounded to 1 to 100 mN·m,
+# too, pass (test_a_torque_that_is_rounded_is_not_taken_for_one_that_stands_still)
 FROZEN_LONGER = 10.0
 
 # ---------------------------------------------------------------------- the arm's own torque, `torque_scale.py`

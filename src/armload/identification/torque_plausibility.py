@@ -31,6 +31,8 @@ from armload.recording import Recording, blocks, largest, parts_of, span, with_g
 
 # of the arm's own torque: of what holds less the percentage is said
 _NEARLY_NONE = 0.25
+# values of a torque that are held longest, and the longest stretches of each: what is looked at, however long a log is
+_MOST_HELD, _MOST_STRETCHES = 20, 200
 
 
 def check_torque(recording: Recording, arm: Arm) -> None:
@@ -98,8 +100,8 @@ def _check_no_torque_stands_still(recording: Recording, arm: Arm) -> None:
     """Refuse a torque that is held at one value, as no measured one is, while its joint moves.
 
     It is held for longer than `FROZEN_TIME` in all, while the joint moves by more than `FROZEN_MOTION`. And either what
-    the arm itself asks of it changes meanwhile by more than a model error, beyond what the torque is rounded to. Or, of
-    a torque that is rounded to less than a model error, no other value is held a tenth as long.
+    the arm itself asks of it changes in a stretch by more than a model error and ten times what the torque is rounded
+    to. Or, of a torque that is rounded to less than a tenth of a model error, no other value is held a tenth as long.
     """
     error = MODEL_ERROR * rated_effort(arm)
     for j in range(recording.n):
@@ -107,15 +109,18 @@ def _check_no_torque_stands_still(recording: Recording, arm: Arm) -> None:
         values, which = np.unique(recording.tau[stretches[:, 0]][:, j], return_inverse=True)
         lasting = recording.t[stretches[:, 1]] - recording.t[stretches[:, 0]]
         held = np.bincount(which, lasting, len(values))
-        for k in np.flatnonzero(held > FROZEN_TIME):
-            mine = stretches[which == k]
+        for k in np.argsort(-held)[:_MOST_HELD]:
+            if held[k] <= FROZEN_TIME:
+                break
+            mine = np.flatnonzero(which == k)
+            mine = stretches[np.sort(mine[np.argsort(-lasting[mine])[:_MOST_STRETCHES]])]
             rows = np.linspace(mine[:, 0], mine[:, 1], 5).round().astype(int)  # (5, M)
             moved = np.ptp(recording.q[rows.ravel()][:, j].reshape(rows.shape), axis=0)
             if moved.sum() <= FROZEN_MOTION:
                 continue
             own = np.ptp(arm.torque(recording.q[rows.ravel()])[:, j].reshape(rows.shape), axis=0)
-            alone = least < error[j] and held[k] > FROZEN_LONGER * np.delete(held, k).max(initial=0.0)
-            if alone or np.maximum(own - 2.0 * least, 0.0).sum() > error[j]:
+            alone = FROZEN_LONGER * least < error[j] and held[k] > FROZEN_LONGER * np.delete(held, k).max(initial=0.0)
+            if alone or own.max() > error[j] + FROZEN_LONGER * least:
                 raise _held_torque(recording, j, float(values[k]), mine, float(held[k]))
 
 
