@@ -151,10 +151,11 @@ def turned(log: Recording, rng: np.random.Generator) -> Recording:
 
 
 def exchanged(i: int, j: int, log: Recording, _: np.random.Generator) -> Recording:
-    """Two joints are in each other's place, in q, dq and tau."""
+    """Two joints are in each other's place, in q, dq and tau, and nothing names them."""
     order = np.arange(log.n)
     order[[i, j]] = order[[j, i]]
-    return replace(log, q=log.q[:, order], dq=log.dq[:, order], tau=log.tau[:, order])
+    q, dq, tau = (x[:, order] for x in (log.q, log.dq, log.tau))
+    return replace(log, q=q, dq=dq, tau=tau, joint_names=None)
 
 
 def late(seconds: float, log: Recording, _: np.random.Generator) -> Recording:

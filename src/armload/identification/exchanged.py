@@ -14,6 +14,8 @@ from armload.identification.thresholds import JOINTS_EXCHANGED, MODEL_MISFIT, SW
 from armload.identification.torque_scale import TorqueScale, torque_scale
 from armload.recording import Recording
 
+_WINDOWS = 24  # as many as a log of six seconds has: they tell joints that bear the arm, and all pairs are tried
+
 
 def check_for_exchanged_torques(recording: Recording, arm: Arm, seen: TorqueScale) -> None:
     """Refuse a log that is a sound one with two torque columns exchanged back, and fits far worse as it is.
@@ -43,22 +45,24 @@ def check_for_exchanged_torques(recording: Recording, arm: Arm, seen: TorqueScal
         )
 
 
-def check_for_exchanged_joints(recording: Recording, arm: Arm, seen: TorqueScale) -> None:
+def check_for_exchanged_joints(recording: Recording, arm: Arm) -> None:
     """Refuse a log of which the arm's own torque tells that two joints are in each other's place.
 
-    The order of ROS drivers may be that of the alphabet. Wrist joints, which bear little, tell nothing.
+    The order of ROS drivers may be that of the alphabet. Wrist joints, which bear little, tell nothing. A log that
+    names its joints is not asked.
 
     Args:
-        recording, arm: the log and what it should be of. seen: how its torque fits.
+        recording, arm: the log and what it should be of.
 
     Raises:
         RecordingError: so it is; the sentence names the two joints.
     """
-    if seen.evidence > -JOINTS_EXCHANGED:  # no evidence is far above 0
+    seen = None if recording.joint_names is not None else torque_scale(recording, arm, most=_WINDOWS)
+    if seen is None or seen.evidence > -JOINTS_EXCHANGED:  # no evidence is far above 0
         return
     found = []
     for i, j in combinations(range(recording.n), 2):
-        fit = torque_scale(_joints_exchanged(recording, i, j), arm)
+        fit = torque_scale(_joints_exchanged(recording, i, j), arm, most=_WINDOWS)
         if fit is not None and not fit.is_wrong and fit.misfit <= MODEL_MISFIT:
             found.append((fit.evidence, i, j))
     evidence, i, j = max(found, default=(-np.inf, 0, 0))

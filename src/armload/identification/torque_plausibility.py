@@ -160,7 +160,7 @@ def _check_torque_is_the_arms(recording: Recording, arm: Arm) -> None:
     if fit is None:
         return
     check_for_exchanged_torques(recording, arm, fit)
-    check_for_exchanged_joints(recording, arm, fit)
+    check_for_exchanged_joints(recording, arm)
     if (fit.is_wrong or fit.misfit > MODEL_MISFIT) and _sound_in_parts(recording, arm, fit):
         return
     if arm.motor_torque:

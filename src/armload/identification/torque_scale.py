@@ -88,14 +88,16 @@ class TorqueScale(NamedTuple):
         )
 
 
-def torque_scale(recording: Recording, arm: Arm, constants: NDArray[np.float64] | None = None) -> TorqueScale | None:
+def torque_scale(
+    recording: Recording, arm: Arm, constants: NDArray[np.float64] | None = None, most: int = _MOST_WINDOWS
+) -> TorqueScale | None:
     """Fit the model above to a log; None if the log is too short to say anything.
 
-    constants: (n,) [N·m/A] if tau is current.
+    constants: (n,) [N·m/A] if tau is current. most: windows, spread over the log.
     """
     if constants is not None:
         recording = replace(recording, tau=recording.tau * constants)
-    system = _System.of(recording, arm)
+    system = _System.of(recording, arm, most)
     if system is None:
         return None
     A, b, y, inner = system.A, system.b, system.y, system.inner
@@ -152,9 +154,9 @@ class _System(NamedTuple):
     y: NDArray[np.float64]
 
     @classmethod
-    def of(cls, recording: Recording, arm: Arm) -> _System | None:
+    def of(cls, recording: Recording, arm: Arm, most: int = _MOST_WINDOWS) -> _System | None:
         """The model above of a log; None: it is too short to say anything."""
-        parts = _some(windows(recording))
+        parts = _some(windows(recording), most)
         if len(parts.first) < 2:
             return None
         own, payload, tau, friction, moving = _averages(recording, arm, parts)
@@ -195,9 +197,9 @@ def _averages(recording: Recording, arm: Arm, parts: Windows) -> tuple[NDArray, 
     return own, payload, tau, friction, moving
 
 
-def _some(parts: Windows) -> Windows:
-    """At most `_MOST_WINDOWS`, spread over the log."""
-    if len(parts.first) <= _MOST_WINDOWS:
+def _some(parts: Windows, most: int) -> Windows:
+    """At most so many, spread over the log."""
+    if len(parts.first) <= most:
         return parts
-    chosen = np.linspace(0, len(parts.first) - 1, _MOST_WINDOWS).round().astype(int)
+    chosen = np.linspace(0, len(parts.first) - 1, most).round().astype(int)
     return Windows(parts.first[chosen], parts.last[chosen])

@@ -117,7 +117,8 @@ class Plausibility:
         if log is None:
             return False
         try:
-            check_plausible(replace(log, source=self._name), self._arm)
+            # a source puts its joints in order, and to look for another order would keep the stream waiting
+            check_plausible(replace(log, source=self._name, joint_names=self._arm.joint_names), self._arm)
         except ArmloadError as error:
             self.doubt = f"{_IMPLAUSIBLE}: {error}"
             self._doubted, self._rests_on = self._moved, min(self._since, _LOOKED_AT)
