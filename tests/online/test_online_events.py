@@ -538,7 +538,7 @@ def test_a_stream_that_is_begun_anew_amid_a_change_leaves_no_thread():
     until = time.monotonic() + 10.0  # they end by themselves
     while threads() > before and time.monotonic() < until:
         time.sleep(0.05)
-    assert threads() == before
+    assert threads() <= before  # others may have ended, too
 
 
 @pytest.mark.full
