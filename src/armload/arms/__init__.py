@@ -11,8 +11,9 @@ if TYPE_CHECKING:
     from armload.arms.catalogue import arm, facts_of
     from armload.arms.facts import ARMS, ArmFacts, Capsule
     from armload.arms.forward import ForwardDerivatives, ForwardDynamics
+    from armload.arms.limits import Limits
     from armload.arms.matching import link_fingerprint, names_among, prefixed_frame
-    from armload.arms.model import LINK_SPREAD, Arm, Limits
+    from armload.arms.model import LINK_SPREAD, Arm
     from armload.arms.regressors import (
         MomentumRegressor,
         full_arm_regressor,

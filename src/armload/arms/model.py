@@ -12,6 +12,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from armload.arms.description import read_chain
+from armload.arms.limits import Limits
 from armload.arms.rigid_body import Body, BodyMotion, body_motions, built, placement_of
 from armload.errors import ArmError
 from armload.inertia import InertialParameters, from_order
@@ -20,22 +21,8 @@ STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 # [m/s²] least and most at a base that an arm works on: the Moon has 1.62, and a base on the Earth that brakes or turns
 # at one g beside it has 14. A stated guard: 1, which is gravity in g, is below it, 32 in ft/s² and 981 in cm/s² above
 GRAVITIES = (1.5, 20.0)
-
-
 # one `link_spread`: standard deviation of a link's mass [1], centre of mass [m] and inertia [1]
 LINK_SPREAD = (0.02, 0.002, 0.05)
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What the joints may do; each an array (n,). Acceleration and jerk are infinite where the maker gives none."""
-
-    position_low: NDArray[np.float64]  # [rad]
-    position_high: NDArray[np.float64]  # [rad]
-    velocity: NDArray[np.float64]  # [rad/s]
-    effort: NDArray[np.float64]  # [N·m]
-    acceleration: NDArray[np.float64]  # [rad/s²]
-    jerk: NDArray[np.float64]  # [rad/s³]
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,16 +134,7 @@ class Arm:
     @cached_property
     def limits(self) -> Limits:
         """Joint limits, from the URDF and, for acceleration and jerk, from the arm's sheet."""
-        model, endless = self._model, np.full(self.n, np.inf)
-        wide = model.upperPositionLimit >= 1e3
-        return Limits(
-            np.where(wide, -np.inf, model.lowerPositionLimit),
-            np.where(wide, np.inf, model.upperPositionLimit),
-            np.where(model.upperVelocityLimit > 0, model.upperVelocityLimit, np.inf),
-            np.where(model.upperEffortLimit > 0, model.upperEffortLimit, np.inf),
-            endless if self.acceleration is None else np.array(self.acceleration[: self.n]),
-            endless if self.jerk is None else np.array(self.jerk[: self.n]),
-        )
+        return Limits.of(self._model, self.acceleration, self.jerk)
 
     @property
     def link_parameters(self) -> NDArray[np.float64]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from itertools import combinations, pairwise
 
 import numpy as np
@@ -28,14 +29,10 @@ def check_for_exchanged_torques(recording: Recording, arm: Arm, seen: TorqueScal
     """
     if seen.misfit < SWAPPED_MISFIT:
         return
-    found = []
-    for i, j in combinations(range(recording.n), 2):
-        fit = torque_scale(_torques_exchanged(recording, i, j), arm)
-        if fit is not None and not fit.is_wrong:
-            found.append((fit.misfit, i, j))
-    if not found:
+    fits = _fits(recording, arm, _torques_exchanged)
+    if not fits:
         return
-    misfit, i, j = min(found)
+    misfit, i, j = min((fit.misfit, i, j) for fit, i, j in fits)
     enough = misfit < min(SWAPPED_MISFIT, SWAPPED_SHARE * seen.misfit)
     if enough and all(b.misfit < a.misfit for a, b in _in_parts(recording, _torques_exchanged(recording, i, j), arm)):
         raise RecordingError(
@@ -60,11 +57,8 @@ def check_for_exchanged_joints(recording: Recording, arm: Arm) -> None:
     seen = None if recording.joint_names is not None else torque_scale(recording, arm, most=_WINDOWS)
     if seen is None or seen.evidence > -JOINTS_EXCHANGED:  # no evidence is far above 0
         return
-    found = []
-    for i, j in combinations(range(recording.n), 2):
-        fit = torque_scale(_joints_exchanged(recording, i, j), arm, most=_WINDOWS)
-        if fit is not None and not fit.is_wrong and fit.misfit <= MODEL_MISFIT:
-            found.append((fit.evidence, i, j))
+    fits = _fits(recording, arm, _joints_exchanged, partial(torque_scale, most=_WINDOWS))
+    found = [(fit.evidence, i, j) for fit, i, j in fits if fit.misfit <= MODEL_MISFIT]
     evidence, i, j = max(found, default=(-np.inf, 0, 0))
     if evidence < seen.evidence + JOINTS_EXCHANGED:
         return
@@ -74,6 +68,18 @@ def check_for_exchanged_joints(recording: Recording, arm: Arm) -> None:
             f"order of {arm.name}'s joints ({', '.join(arm.joint_names)}); a ROS driver may give that of the alphabet; "
             "name the columns, or exchange them"
         )
+
+
+def _fits(
+    recording: Recording,
+    arm: Arm,
+    exchanged: Callable[[Recording, int, int], Recording],
+    fitted: Callable[[Recording, Arm], TorqueScale | None] = torque_scale,
+) -> list[tuple[TorqueScale, int, int]]:
+    """How the log fits with each pair exchanged, where that is not surely wrong."""
+    pairs = combinations(range(recording.n), 2)
+    fits = [(fitted(exchanged(recording, i, j), arm), i, j) for i, j in pairs]
+    return [(fit, i, j) for fit, i, j in fits if fit is not None and not fit.is_wrong]
 
 
 def _torques_exchanged(recording: Recording, i: int, j: int) -> Recording:

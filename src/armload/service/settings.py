@@ -26,13 +26,12 @@ if TYPE_CHECKING:
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 _PATHS = ("tare", "profile", "tool", "save", "record", "mounted")
-# what numbers may be: the words, the least, the most, and whether the least itself may be
-_RANGES = {
-    "every": ("a time above 0 s", 0.0, math.inf, False),
-    "rating": ("a mass above 0 kg", 0.0, math.inf, False),
-    "com_range": ("a length above 0 m", 0.0, math.inf, False),
-    "rate": ("a rate above 0 Hz", 0.0, math.inf, False),
-    "port": ("a port from 0 to 65535", 0, 65536, True),
+_RANGES = {  # what numbers may be: in words, and between which two
+    "every": ("a time above 0 s", 0.0, math.inf),
+    "rating": ("a mass above 0 kg", 0.0, math.inf),
+    "com_range": ("a length above 0 m", 0.0, math.inf),
+    "rate": ("a rate above 0 Hz", 0.0, math.inf),
+    "port": ("a port from 0 to 65535", -1, 65536),
 }
 _KINDS = {"str": str, "float": (int, float), "bool": bool, "int": int, "tuple": list, "dict": dict}
 
@@ -253,8 +252,8 @@ def _checked(said: dict[str, Any], kind: type, where: str, without: tuple[str, .
         if not isinstance(value, expected) or (isinstance(value, bool) and fields[key] != "bool"):
             raise UsageError(f"{where}: {key} is {value!r}: expected a {fields[key].replace('tuple', 'list')}")
         if key in _RANGES:
-            words, least, most, itself = _RANGES[key]
-            if not (least < value < most or (itself and value == least)):
+            words, below, above = _RANGES[key]
+            if not below < value < above:
                 raise UsageError(f"{where}: {key} is {value}: expected {words}")
     if "webhook" in said and urlsplit(said["webhook"]).scheme not in ("http", "https"):
         raise UsageError(f"{where}: the webhook is {said['webhook']!r}: expected an address such as https://HOST/PATH")

@@ -20,7 +20,7 @@ from armload.app.cli.arguments import (
     output_file,
 )
 from armload.app.cli.named import arm_of, columns_for, columns_of, payload_of, read_logs, robot_of
-from armload.app.cli.outputs import check_writable
+from armload.app.cli.outputs import check_output
 from armload.app.cli.printing import print_note
 from armload.errors import ArmloadError, UsageError
 from armload.runtime.interruption import held_back
@@ -147,7 +147,7 @@ def run(options: argparse.Namespace) -> int | None:
     if options.learn:
         if options.profile is None:
             raise UsageError("--learn adds to a profile, but there is no --profile; make one with `armload profile`")
-        check_writable("--profile", options.profile)
+        check_output("--profile", options.profile)
     profile = None if options.profile is None else load_profile(options.profile)
     of_log, columns = options.source != "sim" and "://" not in options.source, columns_of(options)
     if columns != ColumnSpec() and not of_log and options.tare is None:

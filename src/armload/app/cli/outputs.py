@@ -52,10 +52,10 @@ def check_outputs(options: argparse.Namespace, *more: tuple[str, OutputFile]) ->
                 which = f"it is part of {found.said}" if found.path.is_dir() else found.said
                 raise UsageError(f"{option} {out} would replace what this command reads ({which}): name another file")
     for option, out in outputs:
-        check_writable(option, out)
+        check_output(option, out)
     for key, value in vars(options).items():
         if isinstance(value, OutputFolder):
-            check_writable(_option(key), value)
+            check_output(_option(key), value)
 
 
 def check_page(out: str) -> None:
@@ -68,7 +68,7 @@ def check_page(out: str) -> None:
         raise UsageError(f"--out {out} is to be a page of HTML: expected a name that ends in .html")
 
 
-def check_writable(option: str, path: str) -> None:
+def check_output(option: str, path: str) -> None:
     """See that a file, or a folder with what is to come into it, can be written.
 
     Raises:

@@ -1,0 +1,37 @@
+"""What an arm's joints may do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the joints may do; each an array (n,). Acceleration and jerk are infinite where the maker gives none."""
+
+    position_low: NDArray[np.float64]  # [rad]
+    position_high: NDArray[np.float64]  # [rad]
+    velocity: NDArray[np.float64]  # [rad/s]
+    effort: NDArray[np.float64]  # [N·m]
+    acceleration: NDArray[np.float64]  # [rad/s²]
+    jerk: NDArray[np.float64]  # [rad/s³]
+
+    @classmethod
+    def of(cls, model: pin.Model, acceleration: Sequence[float] | None, jerk: Sequence[float] | None) -> Limits:
+        """Those of a URDF's model, and of the arm's sheet what a URDF cannot hold; its further joints are left."""
+        n = model.nv
+        endless = np.full(n, np.inf)
+        wide = model.upperPositionLimit >= 1e3
+        return cls(
+            np.where(wide, -np.inf, model.lowerPositionLimit),
+            np.where(wide, np.inf, model.upperPositionLimit),
+            np.where(model.upperVelocityLimit > 0, model.upperVelocityLimit, np.inf),
+            np.where(model.upperEffortLimit > 0, model.upperEffortLimit, np.inf),
+            endless if acceleration is None else np.array(acceleration[:n]),
+            endless if jerk is None else np.array(jerk[:n]),
+        )
