@@ -289,6 +289,16 @@ class Play(NamedTuple):
         return extra[np.clip(np.searchsorted(clock, t), 0, len(clock) - 1)]
 
 
+def drifting(share: float, robot: str, count: int, seed: int) -> Iterator[Wrong]:
+    """Within the run each torque drifts by a share of its effort limit, evenly, one way or the other."""
+    effort = arm(robot).limits.effort
+    for k, log in enumerate(sound("reference", robot, count, seed)):
+        way = np.random.default_rng([seed, k, 13]).choice([-1.0, 1.0], len(effort))
+        t = log.run.t
+        drift = np.outer((t - t[0]) / (t[-1] - t[0]), share * way * effort)
+        yield log._replace(run=replace(log.run, tau=log.run.tau + drift))
+
+
 # ---------------------------------------------------------------------- another simulator
 
 
@@ -351,6 +361,8 @@ CASES: dict[str, Callable[[str, int, int], Iterator[Wrong]]] = {
     "joints 1 and 3 exchanged": partial(logged, partial(exchanged, 0, 2)),
     "the last two joints exchanged": partial(logged, partial(exchanged, -1, -2)),
     "torques 60 ms late": partial(logged, partial(late, 0.06)),
+    "torques drift by 1 %": partial(drifting, 0.01),
+    "torques drift by 2 %": partial(drifting, 0.02),
     "30 % of the mass swings": partial(moving, liquid=False),
     "30 % of the mass sloshes": partial(moving, liquid=True),
 }

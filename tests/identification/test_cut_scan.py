@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
-from armload.identification.cut_scan import added_at_cuts, of_the_log
+from armload.identification.cut_scan import Unchanged, log_evidence, of_the_log
 from armload.identification.cut_statistics import Cuts
 from armload.motion import random_motion
 from armload.payloads import draw_payload
@@ -34,12 +35,10 @@ def test_a_cut_says_what_a_solution_of_its_own_with_the_same_scales_does(panda, 
     search = Cuts(physics, RowsOfLog(physics.stream.regression(), log), 1.0)
     known, features = search.rough.known, search.few
     stretches = search._stretches(0, len(search.rows.t), np.array(CUTS))
-    for stretch in stretches:
-        stretch.session = search.session
     whole = RegressionData.joined(stretches).of_features(features)
     scales = Problem([*known, whole], search.weak, None, SMOOTH, same=True).scales(search.rough.start)
     twice = replace(scales, noise=np.vstack([scales.noise, scales.noise[-1:]]))
-    found = added_at_cuts(known, stretches, features, search.weak, scales)
+    found = Unchanged(known, stretches, features, search.weak, scales).at_cuts()
     assert len(found) == len(CUTS)
     for k, (information, vector) in enumerate(found, start=1):
         parts = [RegressionData.joined(part).of_features(features) for part in (stretches[:k], stretches[k:])]
@@ -48,3 +47,33 @@ def test_a_cut_says_what_a_solution_of_its_own_with_the_same_scales_does(panda, 
         np.testing.assert_allclose(information / scale, own.information / scale, atol=1e-6)
         np.testing.assert_allclose(vector, own.vector, atol=1e-6 * np.abs(own.vector).max())
     np.testing.assert_allclose(of_the_log(twice, (2.0, 3.0)).noise, scales.noise)
+
+
+def test_what_torques_drift_by_is_told_as_by_a_solution_with_each_joint_s_drift_added(panda):
+    """Oracle: h is linear in the drift that is added, with Λ as its slope; and Λ is symmetric, no less than zero."""
+    log = log_of(panda, 1)
+    physics = SmoothPosteriorLeastSquares(panda)
+    by = np.linspace(-1.0, 1.0, panda.n)
+
+    def told(drift):
+        torque = log.tau + np.outer(log.t / log.t[-1] - 0.5, drift)
+        search = Cuts(physics, RowsOfLog(physics.stream.regression(), replace(log, tau=torque)), 1.0)
+        rows = np.linspace(0, len(search.rows.t), 41)[1:-1].astype(int)
+        stretches, t = search._stretches(0, len(search.rows.t), rows), search.rows.t
+        edges = t[[0, *rows, len(t) - 1]]
+        height = (0.5 * (edges[1:] + edges[:-1]) - t[0]) / (t[-1] - t[0]) - 0.5
+        return Unchanged([], stretches, search.few, search.weak, None).ramp(height)
+
+    (Λ, without), (_, with_it) = told(np.zeros(panda.n)), told(by)
+    assert np.linalg.eigvalsh(Λ)[0] >= -1e-9 * np.linalg.eigvalsh(Λ)[-1]
+    np.testing.assert_allclose(with_it - without, Λ @ by, atol=0.03 * np.abs(Λ @ by).max())
+
+
+def test_the_evidence_of_unknowns_is_that_of_the_marginal_likelihood():
+    """Oracle: SciPy's multivariate normal, of data with the unknowns integrated out and of data without them."""
+    rng = np.random.default_rng(0)
+    X, root = rng.normal(size=(12, 3)), rng.normal(size=(3, 3))
+    r = rng.normal(size=12)
+    whole = multivariate_normal(np.zeros(12), np.eye(12) + X @ root @ root.T @ X.T).logpdf(r)
+    none = multivariate_normal(np.zeros(12), np.eye(12)).logpdf(r)
+    assert log_evidence((X.T @ X, X.T @ r), root) == pytest.approx(whole - none)

@@ -119,6 +119,47 @@ def test_a_change_in_a_log_of_motor_currents_does_not_hide_itself(tared):
         assert MAY_CHANGE not in found.notes
 
 
+def drifting(log, robot, share, seed):
+    """The same with torques that drift, each by a share of its effort limit, one way or the other."""
+    way = np.random.default_rng(seed).choice([-1.0, 1.0], robot.n)
+    return replace(log, tau=log.tau + np.outer(log.t / log.t[-1] - 0.5, share * way * robot.limits.effort))
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e"])
+@pytest.mark.parametrize("tared", [True, pytest.param(False, marks=pytest.mark.full)], ids=["tared", "untared"])
+def test_torques_that_drift_are_no_change_of_payload(name, tared):
+    """And the joint that drifts most, of its effort limit, is named with what it drifts by."""
+    robot, payload = arm(name), draw_payload("boxes", 4, 1.5)
+    how = {"world": World.real_like(robot, 504), "sensors": Sensors.of(robot), "rate": 200.0}
+    motion, about = random_motion(robot, 44, duration=6.0), random_motion(robot, 45, duration=20.0)
+    tare = simulate(robot, about, seed=9, **how) if tared else None
+    sound = simulate(robot, motion, payload, seed=4, **how)
+    assert changes_of_payload(sound, robot, tare).drift is None
+    found = changes_of_payload(drifting(sound, robot, 0.02, 4), robot, tare)
+    assert found.times == []
+    assert found.drift is not None
+    way = np.random.default_rng(4).choice([-1.0, 1.0], robot.n)
+    joint = found.drift.joint - 1
+    assert found.drift.torque == pytest.approx(0.02 * way[joint] * robot.limits.effort[joint], rel=0.5)
+    answer = identify(drifting(sound, robot, 0.02, 4), robot, tare=tare)
+    assert answer.interval == "approximate"
+    assert len(answer.segments) == 1
+    assert "drift within the log" in answer.notes[0]
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e"])
+def test_a_payload_that_is_taken_up_while_torques_drift_a_little_is_a_change(name):
+    robot, payload = arm(name), draw_payload("boxes", 4, 1.5)
+    how = {"world": World.real_like(robot, 504), "sensors": Sensors.of(robot), "rate": 200.0}
+    source = Simulator(
+        robot, random_motion(robot, 44), [(0.0, None), (3.3, payload)], speed=None, duration=6.0, seed=4, **how
+    )
+    log = Recording(*map(np.array, zip(*source, strict=True)))  # type: ignore[arg-type]
+    found = changes_of_payload(drifting(log, robot, 0.002, 4), robot)
+    assert found.times == [pytest.approx(3.3, abs=0.15)]
+    assert found.drift is None
+
+
 def test_no_change_is_found_in_windows_of_a_real_pair_of_motor_currents(real_data):
     robot = arm("ur10e")
     log, tare = (read_recording(real_data / f"ur10e_{name}.csv", robot) for name in ("loaded_2805g", "unloaded"))

@@ -1,12 +1,13 @@
-"""What is added at each of many cuts of a log, of one solution for all of them.
+"""What a log says of more unknowns, of one solution for all of them: what is added at many cuts, a drift of the arm.
 
 The log is solved as if nothing changed in it, with the scales of the model given. With x = [z, g_1 … g_n] all that is
-unknown then, x̂ and C its mean and covariance, the rows after a cut with the residual r − X·x̂ say of what was added
+unknown then, x̂ and C its mean and covariance, further unknowns y with rows Y_j are told by the residual r − X·x̂ as
 
-    h = Σ_j ∫ W_jᵀ·(r_j − X_j·x̂)/S_j dt,      Λ = Σ_j ∫ W_jᵀ·W_j/S_j dt − U·C·Uᵀ,      U = Σ_j ∫ W_jᵀ·X_j/S_j dt
+    h = Σ_j ∫ Y_jᵀ·(r_j − X_j·x̂)/S_j dt,      Λ = Σ_j ∫ Y_jᵀ·Y_j/S_j dt − U·C·Uᵀ,      U = Σ_j ∫ Y_jᵀ·X_j/S_j dt
 
-the same information as a solution of its own for each cut, whose scales are these (a Gaussian's score and its
-information, Bishop 2006, section 2.3): the unknowns are eliminated once for all cuts.
+the same information as a solution of its own, whose scales are these (a Gaussian's score and its information, Bishop
+2006, section 2.3): the unknowns are eliminated once for all. Of what is added at a cut Y is W after the cut, and 0
+before it; of torques that drift it is ramp(t), from −½ at the log's start to ½ at its end, in the place of an offset.
 """
 
 from __future__ import annotations
@@ -24,15 +25,11 @@ from armload.regression import JointFeatures
 from armload.regression.information import RegressionData
 from armload.regression.noise import SMOOTH
 
+Told = tuple[NDArray[np.float64], NDArray[np.float64]]  # Λ and h
 
-def added_at_cuts(
-    known: list[RegressionData],
-    stretches: Sequence[RegressionData],
-    features: JointFeatures,
-    prior_std: NDArray[np.float64],
-    scales: Scales | None,
-) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Λ (10, 10) and h (10,) of what is added between one stretch of a log and the next, for each such cut.
+
+class Unchanged:
+    """A log solved as if nothing changed in it.
 
     Args:
         known: what is known of the arm, of `features`.
@@ -41,24 +38,62 @@ def added_at_cuts(
         prior_std: (10,) of what is held throughout.
         scales: of the known runs, and of the log as one; None: as stated.
     """
-    whole = RegressionData.joined(stretches).of_features(features)
-    with threads().limit(limits=1):
-        problem = Problem([*known, whole], prior_std, None, SMOOTH, same=True)
-        scales = problem.scales(scales)
-        found = problem.posterior(scales)
-        E, S, c = problem.selections[-1], scales.noise[-1], len(problem.selections[-1])
-        at = np.concatenate([np.broadcast_to(E @ found.mean, (len(S), c)), found.weights], axis=1)  # (n, size)
-        U, b = np.zeros((len(S), 10, at.shape[1])), np.zeros((len(S), 10))
-        out = []
-        for stretch in reversed(stretches[1:]):
-            rows, right = stretch.of_payload(features)
-            U, b = U + rows / S[:, None, None], b + right / S[:, None]
-            h = b.sum(axis=0) - np.einsum("jpk,jk->p", U, at)
-            shared = U[:, :, :c].sum(axis=0) @ E - np.einsum("jpr,jrz->pz", U[:, :, c:], found.slope)
-            own = np.einsum("jpr,jrs,jqs->pq", U[:, :, c:], found.rest, U[:, :, c:], optimize=True)
-            information = U[:, :, :10].sum(axis=0) - shared @ found.covariance @ shared.T - own
-            out.append((0.5 * (information + information.T), h))
-    return out[::-1]
+
+    def __init__(
+        self,
+        known: list[RegressionData],
+        stretches: Sequence[RegressionData],
+        features: JointFeatures,
+        prior_std: NDArray[np.float64],
+        scales: Scales | None,
+    ) -> None:
+        self._stretches = [stretch.of_features(features) for stretch in stretches]
+        whole = RegressionData.joined(self._stretches)
+        with threads().limit(limits=1):
+            problem = Problem([*known, whole], prior_std, None, SMOOTH, same=True)
+            scales = problem.scales(scales)
+            self._found = problem.posterior(scales)
+        self._E, self._S = problem.selections[-1], scales.noise[-1]
+        shared = np.broadcast_to(self._E @ self._found.mean, (len(self._S), len(self._E)))
+        self._at = np.concatenate([shared, self._found.weights], axis=1)  # x̂ (n, size)
+
+    def at_cuts(self) -> list[Told]:
+        """Λ (10, 10) and h (10,) of what is added between one stretch and the next, for each such cut."""
+        U, b, out = np.zeros((10, *self._at.shape)), np.zeros((10, len(self._S))), []
+        for stretch in reversed(self._stretches[1:]):
+            U += stretch.A[:, :10].swapaxes(0, 1) / self._S[:, None]
+            b += stretch.b[:, :10].T / self._S
+            out.append(self._told(U, b, U[:, :, :10].sum(axis=1)))
+        return out[::-1]
+
+    def ramp(self, height: NDArray[np.float64]) -> Told:
+        """Λ (n, n) and h (n,) of what each joint's torque drifts by [N·m]; `height`: of each stretch."""
+        n, correction = len(self._S), self._stretches[0].correction
+        joints, offsets = np.arange(n), 10 + correction.offset(np.arange(correction.size)).astype(int)
+        U, b, squares = np.zeros((n, *self._at.shape)), np.zeros((n, n)), np.zeros(n)
+        for s, stretch in zip(height, self._stretches, strict=True):
+            U[joints, joints] += s * stretch.A[joints, offsets] / self._S[:, None]
+            b[joints, joints] += s * stretch.b[joints, offsets] / self._S
+            squares += s**2 * stretch.A[joints, offsets, offsets] / self._S
+        return self._told(U, b, np.diag(squares))
+
+    def _told(self, U: NDArray[np.float64], b: NDArray[np.float64], squares: NDArray[np.float64]) -> Told:
+        """Of further unknowns (m): ∫ Yᵀ·X/S dt (m, n, size), ∫ Yᵀ·r/S dt (m, n) and ∫ Yᵀ·Y/S dt (m, m)."""
+        c, found = len(self._E), self._found
+        own = U[:, :, c:]
+        shared = U[:, :, :c].sum(axis=1) @ self._E - np.einsum("mjr,jrz->mz", own, found.slope)
+        rest = np.einsum("mjr,jrs,kjs->mk", own, found.rest, own, optimize=True)
+        information = squares - shared @ found.covariance @ shared.T - rest
+        return 0.5 * (information + information.T), b.sum(axis=1) - np.einsum("mjk,jk->m", U, self._at)
+
+
+def log_evidence(told: Told, root: NDArray[np.float64]) -> float:
+    """ln of how much likelier unknowns of covariance R·Rᵀ make a log than none, R being `root`.
+
+    ½·(Rᵀh)ᵀ·(1 + RᵀΛR)⁻¹·Rᵀh − ½·ln|1 + RᵀΛR| (Bishop 2006, section 3.5).
+    """
+    h, M = root.T @ told[1], np.eye(root.shape[1]) + root.T @ told[0] @ root
+    return float(0.5 * h @ np.linalg.solve(M, h) - 0.5 * np.linalg.slogdet(M)[1])
 
 
 def of_the_log(scales: Scales, durations: tuple[float, float]) -> Scales:

@@ -30,8 +30,8 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.identification.added_mass import MASS_MAY_CHANGE, of_mass
-from armload.identification.cut_scan import added_at_cuts, of_the_log
-from armload.identification.thresholds import LOSS_DIFFERS, PAYLOAD_MAY_CHANGE
+from armload.identification.cut_scan import Told, Unchanged, log_evidence, of_the_log
+from armload.identification.thresholds import DRIFT_SAID, DRIFTS, LOSS_DIFFERS, PAYLOAD_MAY_CHANGE
 from armload.posterior import SmoothPosteriorLeastSquares
 from armload.posterior.drift import TESTED
 from armload.posterior.scales import Scales
@@ -39,6 +39,7 @@ from armload.posterior.solve import solve
 from armload.regression import JointFeatures, payload_prior_std, solution_prior_std
 from armload.regression.information import RegressionData, Session
 from armload.regression.noise import SMOOTH, NoiseModel
+from armload.regression.prior import BODY_SIZES, body_root
 from armload.regression.rows_of_log import RowsOfLog
 
 # of joint torque sensors: what is left of vibration looks like a change where it is taken to be less. What motor
@@ -47,6 +48,7 @@ from armload.regression.rows_of_log import RowsOfLog
 _NOISE = replace(SMOOTH, white=True)
 _ITERATIONS = 3  # of expectation–maximisation: the scales change little after
 _FEW = 32  # smooth functions of the pose with which cuts are compared: T at the likeliest is of all of them
+_STEPS = 16  # of a ramp, which a drift is
 _LIKELIEST = 2  # cuts of which T is found with the whole model
 
 
@@ -75,6 +77,29 @@ class Likeliest(NamedTuple):
     left: float
 
 
+class Drifts(NamedTuple):
+    """Whether the torques drift within a log.
+
+    odds: log odds of a drift against an arm that stays as it is, both as likely beforehand. change: the same of another
+    payload from the cut on. joint: the one that drifts most, of its effort limit, from 1. torque: by how much [N·m].
+    """
+
+    odds: float
+    change: float
+    joint: int
+    torque: float
+
+    @property
+    def explains(self) -> bool:
+        """Whether a drift explains the log rather than another payload."""
+        return self.odds > self.change
+
+    @property
+    def said(self) -> bool:
+        """Whether the torques surely drift."""
+        return self.explains and self.odds > DRIFT_SAID
+
+
 class _Model(NamedTuple):
     """What is known of the arm before the log: by a tare or a profile, and the scales that a solution begins with."""
 
@@ -98,7 +123,7 @@ class Cuts:
 
     def __init__(self, physics: SmoothPosteriorLeastSquares, rows: RowsOfLog, kappa: float, held: float = 0.0) -> None:
         self.physics, self.rows, self.kappa = physics, rows, kappa
-        self.weak = solution_prior_std(physics.arm)
+        self.weak, self.body = solution_prior_std(physics.arm), payload_prior_std(physics.arm)[0] * body_root()
         loss = LOSS_DIFFERS * max(held, 0.0) if physics.arm.motor_torque else 0.0  # [kg]
         self.lost = np.diag((loss * self.weak / self.weak[0]) ** 2)
         known = [_without_payload(tare, physics.arm, physics.start) for tare in physics.stream.tares]
@@ -139,18 +164,44 @@ class Cuts:
 
     def _roughly(self, stretches: list[RegressionData]) -> NDArray[np.float64]:
         """Both statistics of every cut (K, 2), with fewer smooth functions, and scales of the likeliest cut."""
-        for stretch in stretches:
-            stretch.session = self.session
-        cuts = added_at_cuts(self.rough.known, stretches, self.few, self.weak, self.rough.start)
+        cuts = self._unchanged(stretches, self.rough.start).at_cuts()
         best = int(np.argmax([self._tests(*cut).T for cut in cuts])) + 1
-        parts = [RegressionData.joined(part).of_features(self.few) for part in (stretches[:best], stretches[best:])]
-        solution = solve([*self.rough.known, *parts], self.weak, None, self.noise, _ITERATIONS, self.rough.start)
-        scales = of_the_log(solution.scales, (parts[0].blocks.duration, parts[1].blocks.duration))
-        cuts = added_at_cuts(self.rough.known, stretches, self.few, self.weak, scales)
+        cuts = self._unchanged(stretches, self._scales(stretches, best)).at_cuts()
         return np.array([self._tests(*cut) for cut in cuts])
 
+    def _unchanged(self, stretches: list[RegressionData], scales: Scales | None) -> Unchanged:
+        return Unchanged(self.rough.known, stretches, self.few, self.weak, scales)
+
+    def _scales(self, stretches: list[RegressionData], cut: int) -> Scales:
+        """Scales of stretches between the cut-th and the one before of which something may be added."""
+        parts = [RegressionData.joined(part).of_features(self.few) for part in (stretches[:cut], stretches[cut:])]
+        solution = solve([*self.rough.known, *parts], self.weak, None, self.noise, _ITERATIONS, self.rough.start)
+        return of_the_log(solution.scales, (parts[0].blocks.duration, parts[1].blocks.duration))
+
+    def drift(self, start: int, stop: int, cut: int) -> Drifts:
+        """Of torques that drift between two rows, where the payload would change at a cut."""
+        cuts = np.unique([*np.linspace(start, stop, _STEPS + 1)[1:-1].astype(int), cut])
+        stretches, at = self._stretches(start, stop, cuts), int(np.searchsorted(cuts, cut)) + 1
+        log = self._unchanged(stretches, self._scales(stretches, at))
+        t = self.rows.t[[start, *cuts, stop - 1]]
+        middle = 0.5 * (t[1:] + t[:-1])
+        ramp, added = log.ramp((middle - t[0]) / (t[-1] - t[0]) - 0.5), log.at_cuts()[at - 1]
+        effort = self.physics.stream.correction.effort
+        odds = log_evidence(self._believed(ramp), np.diag(DRIFTS * effort))
+        bodies = [log_evidence(self._believed(added), size * self.body) for size in BODY_SIZES]
+        mean = np.linalg.solve(ramp[0] + self.kappa * np.diag((DRIFTS * effort) ** -2.0), ramp[1])
+        joint = int(np.argmax(np.abs(mean) / effort))
+        change = float(np.logaddexp.reduce(bodies) - np.log(len(bodies)))
+        return Drifts(odds, change, joint + 1, float(mean[joint]))
+
+    def _believed(self, told: Told) -> Told:
+        return told[0] / self.kappa, told[1] / self.kappa
+
     def _stretches(self, start: int, stop: int, cuts: np.ndarray) -> list[RegressionData]:
-        return [self._data(slice(a, b)) for a, b in pairwise([start, *cuts.tolist(), stop])]
+        stretches = [self._data(slice(a, b)) for a, b in pairwise([start, *cuts.tolist(), stop])]
+        for stretch in stretches:
+            stretch.session = self.session
+        return stretches
 
     def _data(self, part: slice) -> RegressionData:
         data = self.physics.empty_data()
@@ -162,8 +213,6 @@ class Cuts:
         self, before: list[RegressionData], after: list[RegressionData], noise: NoiseModel | None = None
     ) -> Statistics:
         parts = [RegressionData.joined(before), RegressionData.joined(after)]
-        for part in parts:
-            part.session = self.session
         solution = solve(
             [*self.whole.known, *parts], self.weak, None, noise or self.noise, _ITERATIONS, self.whole.start
         )

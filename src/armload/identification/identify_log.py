@@ -24,6 +24,7 @@ from armload.identification.notes import (
     of_both,
     paused,
     rested,
+    torques_drift,
 )
 from armload.identification.one_payload import Question, answer_of_one_payload, plausible_known
 from armload.identification.plausibility import check_plausible
@@ -141,8 +142,10 @@ def _account(recording: Recording, arm: Arm, question: Question) -> _Account:
         answers.append(answer_of_one_payload(parts[-1], arm, last))
         if whole.moves and 2 * sum(answer.moves for answer in answers) > len(answers):
             edges, answers = [edges[0], edges[-1]], [whole]  # there is no rigid body in the parts either: it swings
-    elif changes.doubted:
-        answers = [replace(whole, interval="approximate", notes=(MAY_CHANGE, *whole.notes))]
+    if changes.drift is not None:
+        answers = [_doubted(answer, torques_drift(*changes.drift[2:])) for answer in answers]
+    elif changes.doubted and not times:
+        answers = [_doubted(whole, MAY_CHANGE)]
     segments = tuple(
         Segment(float(a - recording.t[0]), float(b - recording.t[0]), answer)
         for (a, b), answer in zip(pairwise(edges), answers, strict=True)
@@ -151,6 +154,11 @@ def _account(recording: Recording, arm: Arm, question: Question) -> _Account:
     misfit = 0.0 if whole.health is None else whole.health.misfit or 0.0
     doubts = len(times) + changes.doubted + sum(answer.doubts for answer in answers)
     return _Account(answer, doubts, max(changes.left, misfit / CHANGED))
+
+
+def _doubted(answer: Identification, note: str) -> Identification:
+    """An answer that something speaks against."""
+    return replace(answer, interval="approximate", notes=(note, *answer.notes))
 
 
 def _check_same_mounted(tare: Recording, arm: Arm, profile: Profile, asked: Asked) -> None:

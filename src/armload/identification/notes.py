@@ -34,6 +34,15 @@ MAY_CHANGE = (
 )
 
 
+def torques_drift(joint: int, torque: float) -> str:
+    """That the torques drift within the log, most of all that of a joint, from 1, by so much [N·m]."""
+    return (
+        f"the torques drift within the log, most of all that of joint {joint}, by {torque:+.2g} N·m from its start to "
+        "its end: an arm that warms up, a sensor that fails, or a payload that is filled or poured out; the answer "
+        "takes both for the same throughout: record it once more"
+    )
+
+
 ALLOWED = (
     "this log fits better with the noise of its velocities taken out and friction that grows with the load allowed "
     "for: the answer is made so"

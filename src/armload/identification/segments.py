@@ -1,7 +1,8 @@
 """Where the payload changes within a log.
 
 The log is cut in two at several places, and both sides are asked whether they hold the same (`cut_statistics.py`).
-The cut with the largest T is sought more finely, and both parts are cut again. What the mass of something light says by
+The cut with the largest T is sought more finely, and both parts are cut again, unless torques that drift would explain
+the log rather. What the mass of something light says by
 itself raises a doubt, but makes no cut: what an arm does wrong in half a second looks like a weight, too (a real
 Panda's).
 
@@ -11,6 +12,7 @@ between those changes.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
@@ -19,11 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
-from armload.identification.cut_statistics import Cuts, Statistics
+from armload.identification.cut_statistics import Cuts, Drifts, Statistics
 from armload.identification.standing_changes import changes_at_rest
 from armload.identification.thresholds import (
     CUT_FARTHER,
     CUT_SHARE,
+    DRIFT_SAID,
     KAPPA_UNKNOWN,
     PART_LEAST,
     PAYLOAD_CHANGED,
@@ -44,13 +47,15 @@ class Changes(NamedTuple):
     """times: [s, on the log's clock] at which the payload changes. statistic: the largest T of the whole log.
 
     of_mass: the largest chi-squared of the mass alone; 0 where not tested. left: as `doubt`, but with noise that is no
-    more than its blocks show: below 1 nothing is left to be explained.
+    more than its blocks show: below 1 nothing is left to be explained. drift: of the torques, the surest of any part;
+    None where there is none.
     """
 
     times: list[float]
     statistic: float
     of_mass: float = 0.0
     left: float = 0.0
+    drift: Drifts | None = None
 
     @property
     def doubt(self) -> float:
@@ -59,8 +64,8 @@ class Changes(NamedTuple):
 
     @property
     def doubted(self) -> bool:
-        """Whether the payload may change, by one of the two."""
-        return self.doubt > 1.0
+        """Whether the payload may change, by one of the two, or the torques drift."""
+        return self.doubt > 1.0 or self.drift is not None
 
 
 def changes_of_payload(
@@ -98,6 +103,11 @@ def _rubs(recording: Recording, times: list[float], arm: Arm) -> bool:
     return physics.posterior.gears
 
 
+def _surest(parts: Iterable[Changes]) -> Drifts | None:
+    """The surest drift of some parts of a log."""
+    return max((part.drift for part in parts if part.drift), key=lambda drift: drift.odds, default=None)
+
+
 class _Search:
     """Changes in the rows of a log."""
 
@@ -130,7 +140,7 @@ class _Search:
         statistic = max(PAYLOAD_CHANGED if seen else 0.0, *(part.statistic for part in parts))
         times = sorted([*times, *(time for part in parts for time in part.times)])
         of_mass, left = max(part.of_mass for part in parts), max(part.left for part in parts)
-        return Changes(times, statistic, of_mass, max(left, Statistics(statistic, of_mass).doubt))
+        return Changes(times, statistic, of_mass, max(left, Statistics(statistic, of_mass).doubt), _surest(parts))
 
     def at_rest(self) -> list[float]:
         """When the payload changes while the arm stands."""
@@ -148,16 +158,20 @@ class _Search:
         if not candidates.size:
             return Changes([], 0.0)
         best, most, of_mass, left = self.cuts.likeliest(start, stop, candidates)
-        if most <= _NOWHERE_NEAR:
-            return Changes([], most, of_mass, left)
-        best = self._finer(start, stop, candidates, best)
-        most = max(most, self.cuts.at(start, stop, best).T)
-        if most <= PAYLOAD_CHANGED:
-            return Changes([], most, of_mass, max(left, self.cuts.at(start, stop, best, SMOOTH).doubt))
+        near = most > _NOWHERE_NEAR
+        if near:
+            best = self._finer(start, stop, candidates, best)
+            most = max(most, self.cuts.at(start, stop, best).T)
+        drift = self.cuts.drift(start, stop, best)
+        if most <= PAYLOAD_CHANGED or drift.explains:
+            left = max(left, self.cuts.at(start, stop, best, SMOOTH).doubt) if near else left
+            said = max(left, drift.odds / DRIFT_SAID) if drift.said else left
+            return Changes([], most, of_mass, said, drift if drift.said else None)
         # the rows' lag still holds what was there before, and the cut is off by some rows
         until, after = (int(np.searchsorted(t, t[best] + aside)) for aside in (-SETTLED, SETTLED))
-        earlier, later = self.within(start, until).times, self.within(after, stop).times
-        return Changes([*earlier, float(t[best]) - 1.0 / GAIN, *later], most, of_mass, left)
+        parts = earlier, later = self.within(start, until), self.within(after, stop)
+        times = [*earlier.times, float(t[best]) - 1.0 / GAIN, *later.times]
+        return Changes(times, most, of_mass, left, _surest(parts))
 
     def _finer(self, start: int, stop: int, cuts: NDArray[np.int64], best: int) -> int:
         """The likeliest cut near the best of some."""

@@ -79,6 +79,12 @@ KAPPA_UNKNOWN = 4.5
 # motor current. A stated prior; without it sound logs of heavy payloads are called changed
 # (`benchmarks/changed_logs.py`)
 LOSS_DIFFERS = 0.03
+# [effort limits] by how much the torques may drift from a log's start to its end, 1 sigma: 1.7 N·m of a Panda's large
+# joints, a cell that warms up or a sensor that fails. A stated prior
+# (test_torques_that_drift_are_no_change_of_payload)
+DRIFTS = 0.02
+# log odds from which a drift is said that no change of payload would explain as well: one log in a thousand drifts
+DRIFT_SAID = 6.9
 # [s] the shortest part that is distinguished from its neighbours: with less no inertia and hardly a mass is known
 PART_LEAST = 0.5
 # [s] left out after a change: four lags of the regression, 2 % of the old torque is left

@@ -28,9 +28,6 @@ from numpy.typing import NDArray
 
 from armload.online.mode_kernels import take_row
 from armload.online.thresholds import (
-    BODY_COM,
-    BODY_GYRATION,
-    BODY_SIZES,
     CONTACT_LASTS,
     CONTACT_TIME,
     DRIFT_RARE,
@@ -54,20 +51,11 @@ from armload.online.thresholds import (
     SAME_ERROR,
     STARTS,
 )
+from armload.regression.prior import BODY_SIZES, body_root
 
 _CONTACT = 2  # where each kind begins among the probabilities; 0: steady, 1: drifting
 _HANDING, _BODIES = _CONTACT + len(PUSH_SIZES) + len(HAND_SIZES), len(BODY_SIZES)
 _OTHER = _HANDING + _BODIES
-
-
-def body_root() -> NDArray[np.float64]:
-    """R (10, 10) with R·Rᵀ = E[phi·phiᵀ] of a body of 1 kg somewhere about the flange, turned any way."""
-    c, k = BODY_COM**2, 2.0 * BODY_COM**2 + BODY_GYRATION**2
-    mean = np.array([1.0, 0.0, 0.0, 0.0, k, 0.0, 0.0, k, 0.0, k])
-    P = np.outer(mean, mean) + np.diag([0.0, c, c, c, *(c * c * np.array([4.0, 1.0, 1.0, 4.0, 1.0, 4.0]))])
-    moments = [4, 7, 9]
-    P[np.ix_(moments, moments)] += 2.0 * c * c * (1.0 - np.eye(3))
-    return np.linalg.cholesky(P)
 
 
 class Modes:

@@ -15,11 +15,7 @@ from armload.regression.noise import SMOOTH
 
 # ---------------------------------------------------------------------- the hypotheses, `modes.py`
 
-# [payloads] sizes of another body, in half of what the arm is rated for: 75 g to 2 kg of a Panda. With 0.3 kg as the
-# smallest, intervals after 30 to 200 g left the mass out (seeds 95000 to 95005), and with 1.25 kg those of a UR10e half
-# a kilogram (test_half_a_kilogram_more_on_a_real_arm_is_never_denied)
-BODY_SIZES = np.array([0.05, 0.2, 0.53, 1.33])
-# [s] correlation times of bodies of these sizes that are handed over: a heavy one is seen at once, whatever its pace.
+# [s] correlation times of bodies of `BODY_SIZES` that are handed over: a heavy one is seen at once, whatever its pace.
 # Without the slow one of 0.2, what is handed over within 1 to 2 s is told as two (seeds 95000 to 95003); if the
 # lightest were as slow, a drift would be taken for it
 HANDING_TIMES = np.array([1.5, 5.0, 1.5, 0.5])
@@ -62,11 +58,6 @@ LETS_GO = 0.03
 STARTS = np.array([0.05, 0.1, 0.2, 0.4, 0.8, 1.6])
 # [s] for which what a run foresees is wrong by about the same, when it is not told: a pose does not stay longer
 SAME_ERROR = 0.1
-# [m] standard deviation of a body's centre of mass along each axis: √3 times that is the weak prior's reach, twice that
-# of the simulated families (0.075 m rms)
-BODY_COM = 0.085
-# [m] a body's radius of gyration: the simulated families' median is 0.057 m
-BODY_GYRATION = 0.06
 # [of the expected noise] where the level begins: rows of a short run fit worse than they will
 LEVEL = 2.0
 # [of the expected noise] the least level: the posterior expects no more than it has reason to

@@ -138,11 +138,6 @@ class RegressionData:
         out.blocks = self.blocks.mapped(lambda sums: sums[..., np.append(rows, -1)] * np.append(by, 1.0))
         return out
 
-    def of_payload(self, features: JointFeatures) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """∫ W_jᵀ·X_j dt (n, 10, size) and ∫ W_jᵀ·r_j dt (n, 10), X_j with the first waves of the pose only."""
-        rows, by = self._of(features)
-        return self.A[:, :10, rows] * by, self.b[:, :10]
-
     def _of(self, features: JointFeatures) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Which unknowns are those with fewer features, and the factors that make them so."""
         keep, scale = self.features.first(features)

@@ -24,6 +24,15 @@ _LOAD, REACH = 0.5, 0.15
 # times that, with which solutions are computed: a parameter that counts as determined (`inertia.SHRINK`) is then
 # drawn by 1 / (3 · 4)² of its value at most, 0.7 %
 _WIDE = 4.0
+# [payloads] sizes of another body, in half of what the arm is rated for: 75 g to 2 kg of a Panda. With 0.3 kg as the
+# smallest, intervals after 30 to 200 g left the mass out (seeds 95000 to 95005), and with 1.25 kg those of a UR10e half
+# a kilogram (test_half_a_kilogram_more_on_a_real_arm_is_never_denied)
+BODY_SIZES = np.array([0.05, 0.2, 0.53, 1.33])
+# [m] standard deviation of a body's centre of mass along each axis: √3 times that is the weak prior's reach, twice that
+# of the simulated families (0.075 m rms)
+BODY_COM = 0.085
+# [m] a body's radius of gyration: the simulated families' median is 0.057 m
+BODY_GYRATION = 0.06
 
 
 def payload_prior_std(arm: Arm) -> NDArray[np.float64]:
@@ -37,6 +46,16 @@ def solution_prior_std(arm: Arm) -> NDArray[np.float64]:
     Four times that of `payload_prior_std`, which is the one that what a log cannot tell is reported with.
     """
     return _WIDE * payload_prior_std(arm)
+
+
+def body_root() -> NDArray[np.float64]:
+    """R (10, 10) with R·Rᵀ = E[phi·phiᵀ] of a body of 1 kg somewhere about the flange, turned any way."""
+    c, k = BODY_COM**2, 2.0 * BODY_COM**2 + BODY_GYRATION**2
+    mean = np.array([1.0, 0.0, 0.0, 0.0, k, 0.0, 0.0, k, 0.0, k])
+    P = np.outer(mean, mean) + np.diag([0.0, c, c, c, *(c * c * np.array([4.0, 1.0, 1.0, 4.0, 1.0, 4.0]))])
+    moments = [4, 7, 9]
+    P[np.ix_(moments, moments)] += 2.0 * c * c * (1.0 - np.eye(3))
+    return np.linalg.cholesky(P)
 
 
 @dataclass(frozen=True, eq=False)
