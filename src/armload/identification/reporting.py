@@ -32,7 +32,7 @@ from armload.recording import Recording
 from armload.regression import payload_prior_std
 from armload.regression.prior import REACH
 
-_CHECK = "check the robot, the base (--gravity), what is mounted and the torques' signs"
+_CHECK = "check the robot, the base (--gravity), what is mounted, the torques' signs, and that gravity is in them"
 NO_BODY = f"no body fits within the error bars: {_CHECK}"
 EXCHANGED = (
     "something seems to have been taken off since the tare, and something else put on: the answer is the difference of "
