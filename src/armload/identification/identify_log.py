@@ -92,7 +92,7 @@ def identify(
     profile = load_profile(profile) if isinstance(profile, str | Path) else profile
     asked, notes = Asked(method, drift, known, profile), (*notes, *aged)
     if tare is not None and profile is not None:
-        _check_same_mounted(tare, arm, profile, asked)
+        _check_same_mounted(tare, arm, asked)
     mounted = read_payload(tool) if isinstance(tool, str | Path) else tool
     say("identifying")
     question = Question(tare, mounted, asked, notes)
@@ -161,13 +161,13 @@ def _doubted(answer: Identification, note: str) -> Identification:
     return replace(answer, interval="approximate", notes=(note, *answer.notes))
 
 
-def _check_same_mounted(tare: Recording, arm: Arm, profile: Profile, asked: Asked) -> None:
+def _check_same_mounted(tare: Recording, arm: Arm, asked: Asked) -> None:
     """See that a tare carries what the profile's logs do.
 
     Raises:
         IdentificationError: it carries something else.
     """
-    seen = found_in(tare, arm, None, replace(asked, known=None, drift=0.0, profile=profile)).estimate
+    seen = found_in(tare, arm, None, replace(asked, known=None, drift=0.0)).estimate
     mass, std = float(seen.phi[0]), float(seen.std[0])
     if abs(mass) > HELD * std:
         raise IdentificationError(
