@@ -143,7 +143,10 @@ def _account(recording: Recording, arm: Arm, question: Question) -> _Account:
         if whole.moves and 2 * sum(answer.moves for answer in answers) > len(answers):
             edges, answers = [edges[0], edges[-1]], [whole]  # there is no rigid body in the parts either: it swings
     if changes.drift is not None:
-        answers = [_doubted(answer, torques_drift(*changes.drift[2:])) for answer in answers]
+        answers = [
+            _doubted(answer, torques_drift(changes.drift.joint, changes.drift.torque, len(answers)))
+            for answer in answers
+        ]
     elif changes.doubted and not times:
         answers = [_doubted(whole, MAY_CHANGE)]
     segments = tuple(
