@@ -49,8 +49,8 @@ def test_a_cut_says_what_a_solution_of_its_own_with_the_same_scales_does(panda, 
     np.testing.assert_allclose(of_the_log(twice, (2.0, 3.0)).noise, scales.noise)
 
 
-def test_what_torques_drift_by_is_told_as_by_a_solution_with_each_joint_s_drift_added(panda):
-    """Oracle: h is linear in the drift that is added, with Λ as its slope; and Λ is symmetric, no less than zero."""
+def test_what_torques_drift_by_is_told_by_the_information_of_the_drift(panda):
+    """Oracle: h is linear in the drift that is added, with Λ as its slope; of a cut it is what is told of cuts."""
     log = log_of(panda, 1)
     physics = SmoothPosteriorLeastSquares(panda)
     by = np.linspace(-1.0, 1.0, panda.n)
@@ -62,11 +62,29 @@ def test_what_torques_drift_by_is_told_as_by_a_solution_with_each_joint_s_drift_
         stretches, t = search._stretches(0, len(search.rows.t), rows), search.rows.t
         edges = t[[0, *rows, len(t) - 1]]
         height = (0.5 * (edges[1:] + edges[:-1]) - t[0]) / (t[-1] - t[0]) - 0.5
-        return Unchanged([], stretches, search.few, search.weak, None).ramp(height)
+        unchanged = Unchanged([], stretches, search.few, search.weak, None)
+        return unchanged.cut_and_drift(20, height), unchanged.at_cuts()[19]
 
-    (Λ, without), (_, with_it) = told(np.zeros(panda.n)), told(by)
-    assert np.linalg.eigvalsh(Λ)[0] >= -1e-9 * np.linalg.eigvalsh(Λ)[-1]
-    np.testing.assert_allclose(with_it - without, Λ @ by, atol=0.03 * np.abs(Λ @ by).max())
+    ((Λ, without), cut), ((_, with_it), _) = told(np.zeros(panda.n)), told(by)
+    unit = np.sqrt(np.diag(Λ))
+    assert np.linalg.eigvalsh(Λ / np.outer(unit, unit))[0] >= -1e-9
+    expected = Λ[:, 10:] @ by  # of what seems to be added at the cut, too
+    np.testing.assert_allclose((with_it - without) / unit, expected / unit, atol=0.03 * np.abs(expected / unit).max())
+    np.testing.assert_allclose(Λ[:10, :10], cut[0], rtol=1e-9, atol=1e-9 * np.abs(cut[0]).max())
+    np.testing.assert_allclose(without[:10], cut[1], rtol=1e-9, atol=1e-9 * np.abs(cut[1]).max())
+
+
+@pytest.mark.parametrize("joint", [2, 6])
+def test_the_joint_that_drifts_most_of_its_effort_limit_is_named(panda, joint):
+    log, share = log_of(panda, 1), np.full(panda.n, 0.005)
+    share[joint - 1] = -0.03
+    torque = log.tau + np.outer(log.t / log.t[-1] - 0.5, share * panda.limits.effort)
+    physics = SmoothPosteriorLeastSquares(panda)
+    search = Cuts(physics, RowsOfLog(physics.stream.regression(), replace(log, tau=torque)), 1.0)
+    found = search.drift(0, len(search.rows.t), 250)
+    assert found.said
+    assert found.joint == joint
+    assert found.torque == pytest.approx(-0.03 * panda.limits.effort[joint - 1], rel=0.3)
 
 
 def test_the_evidence_of_unknowns_is_that_of_the_marginal_likelihood():

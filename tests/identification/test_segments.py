@@ -24,7 +24,7 @@ from armload.lab.episodes import draw_episodes, simulate_episodes
 from armload.motion import random_motion, taie2024
 from armload.payloads import draw_payload, franka_hand
 from armload.posterior.drift import ALLOWED
-from armload.simulation import Sensors, World, simulate
+from armload.simulation import Sensors, World, simulate, simulate_inverse
 
 MASS = 1.5  # [kg]
 
@@ -158,6 +158,23 @@ def test_a_payload_that_is_taken_up_while_torques_drift_a_little_is_a_change(nam
     found = changes_of_payload(drifting(log, robot, 0.002, 4), robot)
     assert found.times == [pytest.approx(3.3, abs=0.15)]
     assert found.drift is None
+
+
+@pytest.mark.parametrize(
+    ("seed", "size", "held", "share"),
+    [(1, 0.3, (0.5, 1.0), 0.0), (3, 0.2, (1.0,), 0.02), (1, 1.0, (0.3,), 0.02)],
+    ids=["in two steps", "beside a drift", "beside a drift that is larger"],
+)
+def test_a_change_that_no_drift_alone_explains_is_found(panda, seed, size, held, share):
+    """In a small motion a payload's torque is much like an offset, and one taken up in steps like a ramp."""
+    body, motion = draw_payload("boxes", seed, 1.0).parameters, random_motion(panda, 40 + seed)
+    motion = replace(motion, sine=size * motion.sine, cosine=size * motion.cosine)
+    when = np.linspace(0.0, 6.0, len(held) + 2)[1:-1]
+    steps = [(t, InertialParameters(part * body.phi, body.frame)) for t, part in zip(when, held, strict=True)]
+    how = {"world": World.real_like(panda, 500 + seed), "sensors": Sensors.panda(panda), "rate": 100.0}
+    log = simulate_inverse(panda, motion, [(0.0, None), *steps], seed=seed, **how)
+    found = changes_of_payload(drifting(log, panda, share, seed), panda, kappa=1.5)
+    assert found.times == [pytest.approx(t, abs=0.1) for t in when]
 
 
 def test_no_change_is_found_in_windows_of_a_real_pair_of_motor_currents(real_data):

@@ -27,6 +27,24 @@ def test_joined_stretches_have_the_sums_of_groups_of_blocks_that_follow_each_oth
     assert group == 1 or 2 * len(signal) / group > len(joined.sums)  # no coarser than it must be
 
 
+def test_joined_stretches_of_blocks_that_are_longer_and_shorter_lose_none():
+    """Of a long one pairs were joined; a short one beside it, ten times as loud, counts for its time all the same."""
+    rng, parts, total = np.random.default_rng(5), [], 0.0
+    for seconds, loud in ((10.0, 10.0), (200.0, 1.0), (2.0, 10.0)):
+        part = BlockMeans(1, 0.25)
+        values = loud * rng.choice([-1.0, 1.0], round(seconds / 0.05))
+        part.extend(np.full(len(values), 0.05), values[:, None])
+        parts.append(part)
+        total += values.sum() * 0.05
+    assert [part.block for part in parts] == [0.25, 1.0, 0.25]
+    joined = BlockMeans.joined(parts)
+    means, times, _ = joined.means()
+    assert times.sum() == pytest.approx(212.0)
+    assert joined.duration == pytest.approx(212.0)
+    assert (means[:, 0] * times).sum() == pytest.approx(total)
+    assert joined.long_run_variance()[0] == pytest.approx(0.05 * (200.0 + 100.0 * 12.0) / 212.0, rel=0.35)
+
+
 def test_what_is_discounted_counts_for_its_share_of_a_variance_and_of_the_time():
     rng = np.random.default_rng(2)
     old, new = 2.0 * rng.normal(size=40), rng.normal(size=60)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -31,3 +33,13 @@ def test_any_part_of_the_rows_is_that_of_all_rows(panda, log, kept, monkeypatch)
         for k, expected in enumerate(whole):
             found = np.concatenate([part[k] for part in parts]) if parts else expected[:0]
             np.testing.assert_array_equal(found, expected[start:stop])
+
+
+def test_parts_that_follow_each_other_make_the_rows_of_each_block_once(panda, log, monkeypatch):
+    monkeypatch.setattr(rows_of_log, "_KEPT", 0.0)
+    rows, made, make = RowsOfLog(SmoothPosteriorLeastSquares(panda).stream.regression(), log), [], RowsOfLog._made
+    monkeypatch.setattr(RowsOfLog, "_made", lambda self, samples: made.append(samples.start) or make(self, samples))
+    edges = np.linspace(0, len(rows.t), 31).astype(int)
+    for start, stop in pairwise(edges):
+        list(rows.between(start, stop))
+    assert made == list(range(0, len(log), BLOCK))

@@ -66,16 +66,26 @@ class Unchanged:
             out.append(self._told(U, b, U[:, :, :10].sum(axis=1)))
         return out[::-1]
 
-    def ramp(self, height: NDArray[np.float64]) -> Told:
-        """Λ (n, n) and h (n,) of what each joint's torque drifts by [N·m]; `height`: of each stretch."""
+    def cut_and_drift(self, cut: int, height: NDArray[np.float64]) -> Told:
+        """Λ (10 + n, 10 + n) and h (10 + n,): what is added before the cut-th stretch, and each joint's drift [N·m].
+
+        height: of the ramp in each stretch.
+        """
         n, correction = len(self._S), self._stretches[0].correction
         joints, offsets = np.arange(n), 10 + correction.offset(np.arange(correction.size)).astype(int)
-        U, b, squares = np.zeros((n, *self._at.shape)), np.zeros((n, n)), np.zeros(n)
-        for s, stretch in zip(height, self._stretches, strict=True):
-            U[joints, joints] += s * stretch.A[joints, offsets] / self._S[:, None]
-            b[joints, joints] += s * stretch.b[joints, offsets] / self._S
-            squares += s**2 * stretch.A[joints, offsets, offsets] / self._S
-        return self._told(U, b, np.diag(squares))
+        drifts, m = 10 + joints, 10 + n
+        U, b, squares = np.zeros((m, *self._at.shape)), np.zeros((m, n)), np.zeros((m, m))
+        for k, (s, stretch) in enumerate(zip(height, self._stretches, strict=True)):
+            rows = stretch.A[joints, offsets] / self._S[:, None]  # ∫ X_j dt of each joint
+            U[drifts, joints] += s * rows
+            b[drifts, joints] += s * stretch.b[joints, offsets] / self._S
+            squares[drifts, drifts] += s**2 * rows[joints, offsets]
+            if k >= cut:
+                U[:10] += stretch.A[:, :10].swapaxes(0, 1) / self._S[:, None]
+                b[:10] += stretch.b[:, :10].T / self._S
+                squares[10:, :10] += s * rows[:, :10]
+        squares[:10, :10], squares[:10, 10:] = U[:10, :, :10].sum(axis=1), squares[10:, :10].T
+        return self._told(U, b, squares)
 
     def _told(self, U: NDArray[np.float64], b: NDArray[np.float64], squares: NDArray[np.float64]) -> Told:
         """Of further unknowns (m): ∫ Yᵀ·X/S dt (m, n, size), ∫ Yᵀ·r/S dt (m, n) and ∫ Yᵀ·Y/S dt (m, m)."""

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.identification.added_mass import MASS_MAY_CHANGE, of_mass
-from armload.identification.cut_scan import Told, Unchanged, log_evidence, of_the_log
+from armload.identification.cut_scan import Unchanged, log_evidence, of_the_log
 from armload.identification.thresholds import DRIFT_SAID, DRIFTS, LOSS_DIFFERS, PAYLOAD_MAY_CHANGE
 from armload.posterior import SmoothPosteriorLeastSquares
 from armload.posterior.drift import TESTED
@@ -81,18 +81,23 @@ class Drifts(NamedTuple):
     """Whether the torques drift within a log.
 
     odds: log odds of a drift against an arm that stays as it is, both as likely beforehand. change: the same of another
-    payload from the cut on. joint: the one that drifts most, of its effort limit, from 1. torque: by how much [N·m].
+    payload from the cut on; both: of a drift and another payload. joint: the one that drifts most, of its effort limit,
+    from 1. torque: by how much [N·m].
     """
 
     odds: float
     change: float
+    both: float
     joint: int
     torque: float
 
     @property
     def explains(self) -> bool:
-        """Whether a drift explains the log rather than another payload."""
-        return self.odds > self.change
+        """Whether a drift explains the log rather than another payload, and leaves none to be explained.
+
+        A payload that is taken up in several steps is more like a drift than like one step.
+        """
+        return self.odds > self.change and self.both <= self.odds + DRIFT_SAID
 
     @property
     def said(self) -> bool:
@@ -185,17 +190,19 @@ class Cuts:
         log = self._unchanged(stretches, self._scales(stretches, at))
         t = self.rows.t[[start, *cuts, stop - 1]]
         middle = 0.5 * (t[1:] + t[:-1])
-        ramp, added = log.ramp((middle - t[0]) / (t[-1] - t[0]) - 0.5), log.at_cuts()[at - 1]
+        Λ, h = (x / self.kappa for x in log.cut_and_drift(at, (middle - t[0]) / (t[-1] - t[0]) - 0.5))
         effort = self.physics.stream.correction.effort
-        odds = log_evidence(self._believed(ramp), np.diag(DRIFTS * effort))
-        bodies = [log_evidence(self._believed(added), size * self.body) for size in BODY_SIZES]
-        mean = np.linalg.solve(ramp[0] + self.kappa * np.diag((DRIFTS * effort) ** -2.0), ramp[1])
-        joint = int(np.argmax(np.abs(mean) / effort))
-        change = float(np.logaddexp.reduce(bodies) - np.log(len(bodies)))
-        return Drifts(odds, change, joint + 1, float(mean[joint]))
+        body, drift = np.zeros((len(h), 10)), np.zeros((len(h), len(effort)))
+        body[:10], drift[10:] = self.body, np.diag(DRIFTS * effort)
 
-    def _believed(self, told: Told) -> Told:
-        return told[0] / self.kappa, told[1] / self.kappa
+        def of_a_body(beside: NDArray[np.float64]) -> float:
+            sizes = [log_evidence((Λ, h), np.hstack([size * body, beside])) for size in BODY_SIZES]
+            return float(np.logaddexp.reduce(sizes) - np.log(len(sizes)))
+
+        mean = np.linalg.solve(Λ[10:, 10:] + np.diag((DRIFTS * effort) ** -2.0), h[10:])
+        joint = int(np.argmax(np.abs(mean) / effort))
+        odds, change, both = log_evidence((Λ, h), drift), of_a_body(drift[:, :0]), of_a_body(drift)
+        return Drifts(odds, change, both, joint + 1, float(mean[joint]))
 
     def _stretches(self, start: int, stop: int, cuts: np.ndarray) -> list[RegressionData]:
         stretches = [self._data(slice(a, b)) for a, b in pairwise([start, *cuts.tolist(), stop])]

@@ -92,7 +92,7 @@ def identify(
     profile = load_profile(profile) if isinstance(profile, str | Path) else profile
     asked, notes = Asked(method, drift, known, profile), (*notes, *aged)
     if tare is not None and profile is not None:
-        _check_same_mounted(tare, arm, profile, asked)
+        _check_same_mounted(tare, arm, asked)
     mounted = read_payload(tool) if isinstance(tool, str | Path) else tool
     say("identifying")
     question = Question(tare, mounted, asked, notes)
@@ -143,7 +143,10 @@ def _account(recording: Recording, arm: Arm, question: Question) -> _Account:
         if whole.moves and 2 * sum(answer.moves for answer in answers) > len(answers):
             edges, answers = [edges[0], edges[-1]], [whole]  # there is no rigid body in the parts either: it swings
     if changes.drift is not None:
-        answers = [_doubted(answer, torques_drift(*changes.drift[2:])) for answer in answers]
+        answers = [
+            _doubted(answer, torques_drift(changes.drift.joint, changes.drift.torque, len(answers)))
+            for answer in answers
+        ]
     elif changes.doubted and not times:
         answers = [_doubted(whole, MAY_CHANGE)]
     segments = tuple(
@@ -161,13 +164,13 @@ def _doubted(answer: Identification, note: str) -> Identification:
     return replace(answer, interval="approximate", notes=(note, *answer.notes))
 
 
-def _check_same_mounted(tare: Recording, arm: Arm, profile: Profile, asked: Asked) -> None:
+def _check_same_mounted(tare: Recording, arm: Arm, asked: Asked) -> None:
     """See that a tare carries what the profile's logs do.
 
     Raises:
         IdentificationError: it carries something else.
     """
-    seen = found_in(tare, arm, None, replace(asked, known=None, drift=0.0, profile=profile)).estimate
+    seen = found_in(tare, arm, None, replace(asked, known=None, drift=0.0)).estimate
     mass, std = float(seen.phi[0]), float(seen.std[0])
     if abs(mass) > HELD * std:
         raise IdentificationError(

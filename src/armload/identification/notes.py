@@ -34,12 +34,13 @@ MAY_CHANGE = (
 )
 
 
-def torques_drift(joint: int, torque: float) -> str:
-    """That the torques drift within the log, most of all that of a joint, from 1, by so much [N·m]."""
+def torques_drift(joint: int, torque: float, parts: int) -> str:
+    """That the torques drift within a log of so many parts, most of all that of a joint, from 1, by so much [N·m]."""
+    where = "the log" if parts == 1 else "a part of the log"
     return (
-        f"the torques drift within the log, most of all that of joint {joint}, by {torque:+.2g} N·m from its start to "
+        f"the torques drift within {where}, most of all that of joint {joint}, by {torque:+.2g} N·m from its start to "
         "its end: an arm that warms up, a sensor that fails, or a payload that is filled or poured out; the answer "
-        "takes both for the same throughout: record it once more"
+        f"takes both for the same {'throughout' if parts == 1 else 'throughout each part'}: record it once more"
     )
 
 

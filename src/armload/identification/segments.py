@@ -2,9 +2,8 @@
 
 The log is cut in two at several places, and both sides are asked whether they hold the same (`cut_statistics.py`).
 The cut with the largest T is sought more finely, and both parts are cut again, unless torques that drift would explain
-the log rather. What the mass of something light says by
-itself raises a doubt, but makes no cut: what an arm does wrong in half a second looks like a weight, too (a real
-Panda's).
+the log rather, and leave no change beside. What the mass of something light says by itself raises a doubt, but makes no
+cut: what an arm does wrong in half a second looks like a weight, too (a real Panda's).
 
 While the arm stands, what it takes up is found by the torque of that pose (`standing_changes.py`); cuts are sought
 between those changes.

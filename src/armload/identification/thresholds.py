@@ -84,7 +84,8 @@ LOSS_DIFFERS = 0.03
 # (test_torques_that_drift_are_no_change_of_payload)
 DRIFTS = 0.02
 # log odds from which a drift is said that no change of payload would explain as well: one log in a thousand drifts, a
-# stated prior (test_torques_that_drift_are_no_change_of_payload; sound logs: `benchmarks/wrong_logs.py`)
+# stated prior (sound logs: `benchmarks/wrong_logs.py`). And from which another payload beside a drift is a change: one
+# drifting log in a thousand has both (test_a_change_that_no_drift_alone_explains_is_found)
 DRIFT_SAID = 6.9
 # [s] the shortest part that is distinguished from its neighbours: with less no inertia and hardly a mass is known
 PART_LEAST = 0.5

@@ -73,8 +73,6 @@ def another_arm(
     with threads().limit(limits=1):
         same = Problem([first, *own], prior_std, prior, noise)
         before = Problem([first], prior_std, None, noise)
-        for run in own[:-1]:
-            run.session = own[-1].session
         other = Problem([_of_session_0(run) for run in own], prior_std, prior, noise)
         others = other.scales(None)
         for _ in range(_STEPS):

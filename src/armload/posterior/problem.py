@@ -1,8 +1,8 @@
 """One solution of the MAP problem: unknowns eliminated joint by joint, scales improved step by step.
 
 z = [payloads, eta, drifts] is what all joints share, g_j are the weights of joint j's own features. A drift is what
-offsets and friction of a session differ by from those of session 0. Given the scales, all is
-linear and Gaussian; `posterior` says what `posterior.solve` does with it.
+offsets and friction of a session differ by from those of session 0. Given the scales, all is linear and Gaussian;
+`posterior.solve` says what is made of it.
 """
 
 from __future__ import annotations

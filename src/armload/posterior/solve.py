@@ -2,8 +2,9 @@
 
     r = W·phi + Z·eta + G·g + e,   phi ~ N(0, P_phi), eta ~ N(0, P_eta), g_j ~ N(0, P_g), e_j of long-run variance S_j
 
-r, W, Z, G come from the acceleration-free filtered regression (`regression.py`); eta is what the arm's rigid-body model
-gets wrong (`correction.py`), g_j are the weights of joint j's smooth functions of pose and velocity (`features.py`).
+r, W, Z, G come from the acceleration-free filtered regression (`regression.rows`); eta is what the arm's rigid-body
+model gets wrong (`regression.mismatch`), g_j are the weights of joint j's smooth functions of pose and velocity
+(`regression.features`).
 The information A = Σ_j ∫ X_jᵀ·X_j dt / S_j with X = [W Z G] accumulates in constant memory; the posterior is
 x = (A + P⁻¹)⁻¹·b, joint by joint with g_j eliminated first. S_j (batch means of the residual) and the scales of the
 priors of offsets, friction and features (expectation–maximisation) are found from the data in a few iterations.

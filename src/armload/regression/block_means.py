@@ -116,14 +116,19 @@ class BlockMeans:
 
     @classmethod
     def joined(cls, parts: Sequence[BlockMeans]) -> BlockMeans:
-        """The blocks of several stretches of one signal, one after another, to be read and not to be added to."""
+        """The blocks of several stretches of one signal, one after another, to be read and not to be added to.
+
+        Stretches whose blocks are shorter, as they lasted less, have theirs put together first.
+        """
         out = cls(parts[0].sums.shape[1:], max(part.block for part in parts))
-        counts = [part._filled + 1 for part in parts]
+        shorter = [round(np.log2(out.block / part.block)) for part in parts]
+        counts = [(part._filled >> by) + 1 for part, by in zip(parts, shorter, strict=True)]
         total, halvings, weighted = sum(counts), 0, np.zeros(_MOST_BLOCKS)
         while total > _MOST_BLOCKS << halvings:
             halvings += 1
-        for part, first, count in zip(parts, np.cumsum([0, *counts]), counts, strict=False):
-            into = (first + np.arange(count)) >> halvings
+        for part, first, by in zip(parts, np.cumsum([0, *counts[:-1]]), shorter, strict=True):
+            count = part._filled + 1
+            into = (first + (np.arange(count) >> by)) >> halvings
             starts = np.flatnonzero(np.diff(into, prepend=-1))
             out.sums[into[starts]] += np.add.reduceat(part.sums[:count], starts, axis=0)
             out._times[into[starts]] += np.add.reduceat(part._times[:count], starts)

@@ -23,8 +23,8 @@ tare missed the mass (`benchmarks/motor_side.py`).
 
 Prior standard deviations are fractions of the joint's effort limit, the same for every arm (two Pandas and a UR10e lie
 within a factor of 3 of each other so, but for friction, which is five times as large where torque is motor current);
-`problem.py` rescales all blocks but `load`, `tilt` and `links` from the data. Gravity is believed: the prior of `tilt`
-is zero, unless somebody asks (`armload.posterior.tilt`).
+`posterior.problem` rescales all blocks but `load`, `tilt` and `links` from the data. Gravity is believed: the prior of
+`tilt` is zero, unless somebody asks (`armload.posterior.tilt`).
 """
 
 from __future__ import annotations

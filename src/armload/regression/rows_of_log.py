@@ -43,6 +43,7 @@ class RowsOfLog:
         self._regression, self._recording = regression, recording
         self._blocks: list[_Block] = []
         self._kept: dict[int, Rows] = {}
+        self._last: tuple[int, Rows] | None = None  # parts that follow each other are of one block mostly
         made, first, size = [], 0, 0.0
         for samples in blocks(len(recording)):
             state = regression.state
@@ -62,12 +63,17 @@ class RowsOfLog:
         for block in self._blocks:
             if block.stop <= start or block.first >= stop:
                 continue
-            rows = self._kept.get(block.first)
-            if rows is None:
-                self._regression.state = block.state
-                rows = self._made(block.samples)
+            rows = self._of(block)
             part = slice(max(start - block.first, 0), min(stop, block.stop) - block.first)
             yield Rows(*(value[part] for value in rows))
+
+    def _of(self, block: _Block) -> Rows:
+        if (rows := self._kept.get(block.first)) is not None:
+            return rows
+        if self._last is None or self._last[0] != block.first:
+            self._regression.state = block.state
+            self._last = block.first, self._made(block.samples)
+        return self._last[1]
 
     def _made(self, samples: slice) -> Rows:
         log = self._recording
