@@ -341,6 +341,34 @@ def test_what_the_controller_counts_itself_is_said(export, to, relative_to, says
     assert (err == "") == (says == "")
 
 
+def part_of(tmp_path, mass, name):
+    body = InertialParameters.from_com(mass, (0, 0, 0.05), mass * 2e-3 * np.eye(3), "panda_link8")
+    write_payload(file := tmp_path / f"{name}.json", Payload(name, body))
+    return str(file)
+
+
+def test_parts_are_added_before_others_are_taken_off(export, tmp_path):
+    """What is left at last is a body, what would be left in between has no mass."""
+    held = result_of(InertialParameters.from_com(1.0, (0, 0, 0.05), 4e-3 * np.eye(3), "panda_link8"))
+    plus, minus = part_of(tmp_path, 0.9, "small"), part_of(tmp_path, 1.3, "large")
+    for words in (["--plus", plus, "--minus", minus], ["--minus", minus, "--plus", plus]):
+        text, _ = export(held, "--to", "urdf", *words)
+        assert float(re.search(r'mass value="([^"]+)"', text)[1]) == pytest.approx(0.6)
+
+
+def test_what_is_added_to_a_load_since_a_tare_is_not_said_to_contain_what_was_mounted_then(export, tmp_path):
+    err = export(of_arm("panda", relative_to="tare"), "--to", "franka", "--plus", part_of(tmp_path, 0.2, "camera"))[1]
+    assert "contains any hand" not in err
+    assert "what was mounted at the tare is in it as far as it was added" in err
+
+
+def test_what_is_taken_off_a_load_since_a_tare_names_no_tool_that_nobody_gave(export, tmp_path):
+    part = part_of(tmp_path, 0.2, "camera")
+    _, err = export(of_arm("panda", relative_to="tare"), "--to", "urdf", "--minus", part)
+    assert "relative to the tare" in err
+    assert "relative to the tool" not in err
+
+
 def test_the_rest_of_a_subtraction_is_made_a_body_and_that_is_said(export, tmp_path):
     # a part whose inertia is larger than what was measured of the whole
     part = InertialParameters.from_com(0.5, (0.02, -0.03, 0.08), np.diag([9e-3, 9e-3, 9e-3]), "panda_link8")

@@ -11,6 +11,7 @@ from armload.app.cli import main, motion_enrich
 from armload.app.cli.motion_arguments import joints
 from armload.arms import arm
 from armload.errors import MotionError
+from armload.excitation import Surroundings
 from armload.excitation.constraints import SHARE, TOOL_SPEED, TRAVEL
 from armload.motion import export_motion, load_motion
 from armload.motion.point_to_point import PointToPoint
@@ -107,6 +108,24 @@ def test_a_box_in_the_way_of_the_start_is_refused_by_its_number(tmp_path, capsys
     words = ["motion", "design", "--robot", "panda", "--from", READY, "--box", "2,2,2,0.1,0.1,0.1", "--box", box]
     assert main([*words, "--out", str(tmp_path / "m.json")]) == 2
     assert "box 2" in capsys.readouterr().err
+
+
+def test_a_design_keeps_off_a_floor_at_the_base_where_nothing_is_said_of_one(tmp_path, capsys):
+    lying, out = "0,1.7,0,-0.1,0,1.8,0.8", str(tmp_path / "m.json")  # the hand is below the base
+    assert main([*f"motion design --robot panda --from {lying} --time 0.5 --share 1 --out".split(), out]) == 2
+    assert "is at the floor" in capsys.readouterr().err
+
+
+def test_a_path_that_runs_into_the_floor_itself_is_said_to(tmp_path, capsys):
+    robot, start = arm("panda"), np.array([float(x) for x in READY.split(",")])
+    lower = start + np.array([0, 0.5, 0, 0, 0, 0, 0])
+    path = PointToPoint(np.array([start, lower]), np.array([0.1]), np.array([1.5]), name="move")
+    export_motion(path, tmp_path / "move.csv", "csv", rate=50.0, joint_names=robot.joint_names)
+    words = ["motion", "enrich", str(tmp_path / "move.csv"), "--robot", "panda", "--payload", "1"]
+    high = float(Surroundings(robot, 0.0).clearance(np.array([start, lower]))[:, 0].mean())
+    for floor, said in ((0.0, False), (high, True)):
+        assert main([*words, "--floor", str(floor), "--out", str(tmp_path / "e.json")]) == 0
+        assert ("is at the floor" in capsys.readouterr().err) == said
 
 
 @pytest.mark.parametrize("form", ["csv", "ros2"])

@@ -9,7 +9,10 @@ import pytest
 
 from armload import arm
 from armload.arms import rated_effort
+from armload.identification import identify
+from armload.identification.notes import MOTOR_PROFILE
 from armload.motion import random_motion
+from armload.payloads import draw_payload
 from armload.posterior import SmoothPosteriorLeastSquares, learn_profile
 from armload.posterior.problem import Problem
 from armload.posterior.solve import solve
@@ -94,3 +97,14 @@ def test_a_run_with_a_profile_is_foreseen_as_noisy_as_the_profile_s_logs_were():
         identifier.update(next(samples))
     state = identifier.stream.state or identifier.stream._current
     np.testing.assert_allclose(state.noise, share_of_noise(identifier.stream.seconds) * expected, rtol=1e-3)
+
+
+def test_an_answer_with_a_profile_of_motor_currents_is_not_called_calibrated_and_says_so():
+    robot = arm("ur5e")
+    more = {"world": World.real_like(robot, 3), "sensors": Sensors.of(robot), "rate": 100.0}
+    profile = learn_profile(robot, [simulate(robot, random_motion(robot, 1, duration=20.0), seed=1, **more)])
+    run = simulate(robot, random_motion(robot, 2, duration=4.0), draw_payload("boxes", 3, 2.0), seed=2, **more)
+    answer = identify(run, robot, profile=profile)
+    assert answer.method == "hybrid"
+    assert answer.interval == "approximate"
+    assert MOTOR_PROFILE in answer.notes

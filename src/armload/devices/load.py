@@ -107,7 +107,8 @@ class Load:
         return f"relative to the {_RELATIVE.get(self.relative_to, self.relative_to)}: {what} is not in it"
 
     def __sub__(self, other: InertialParameters) -> Load:
-        left = self._changed(self.parameters - other, "tool")
+        since = self.relative_to in ("tare", "profile", "before")  # what was mounted then is not in it, as before
+        left = self._changed(self.parameters - other, self.relative_to if since else "tool")
         if self.lacks is not None and left._is_no_body():
             raise SinkError(
                 f"what is left has a mass of {left.parameters.mass:.4g} kg and is no body: {self.lacks}; do not take "
@@ -165,7 +166,7 @@ class Load:
         away = (self._nearest() - self.parameters.phi) / np.maximum(self.std, 1e-9)
         return float(np.linalg.norm(away)) > _MISFIT
 
-    def _changed(self, parameters: InertialParameters, relative_to: str) -> Load:
+    def _changed(self, parameters: InertialParameters, relative_to: str | None) -> Load:
         return replace(self, parameters=parameters, relative_to=relative_to if self.relative_to else None)
 
 

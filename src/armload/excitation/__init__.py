@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from armload.excitation.accuracy import Accuracy
     from armload.excitation.constraints import Constraints
     from armload.excitation.criterion import Criterion
-    from armload.excitation.enrichment import Enriched, enrich
+    from armload.excitation.enrichment import Enriched, enrich, touched_by
     from armload.excitation.optimisation import Design, design_motion
     from armload.excitation.payload_range import PayloadRange
     from armload.excitation.surroundings import Obstacle, Surroundings
@@ -30,6 +30,7 @@ __all__ = [
     "design_until",
     "enrich",
     "problems",
+    "touched_by",
     "used",
 ]
 

@@ -20,6 +20,7 @@ from armload.errors import MotionError
 from armload.excitation.constraints import Constraints
 from armload.excitation.criterion import Criterion
 from armload.excitation.optimisation import Climb
+from armload.excitation.surroundings import Surroundings
 from armload.excitation.track import Track
 from armload.excitation.tube import Tube, away, poses
 from armload.excitation.verification import RATE, Used, used
@@ -102,6 +103,23 @@ def enrich(
     return Enriched(motion, before, after, far, turned, found)
 
 
+def touched_by(path: Motion, around: Surroundings) -> str | None:
+    """What the path itself comes to, in words, and by how much; None: it stays clear.
+
+    A task may mean to: what it holds stands on a table at last.
+    """
+    q = _poses(path)
+    clearance = around.clearance(q)
+    row, kind = np.unravel_index(int(np.argmin(clearance)), clearance.shape)
+    if clearance[row, kind] > 0.0:
+        return None
+    return f"{around.nearest(q[row : row + 1], int(kind))} ({clearance[row, kind]:.3f} m between their capsules)"
+
+
+def _poses(path: Motion) -> NDArray[np.float64]:
+    return path(np.linspace(0.0, path.duration, round(path.duration * 100.0) + 2))[0]
+
+
 def moving_stretches(path: Motion) -> list[tuple[float, float, int]]:
     """From, to [s] and control points of the stretches between stops that are long enough to be changed."""
     t = np.linspace(0.0, path.duration, max(2, round(path.duration * 200.0) + 1))
@@ -117,8 +135,7 @@ def moving_stretches(path: Motion) -> list[tuple[float, float, int]]:
 
 def _as_the_path(constraints: Constraints, path: Motion) -> Constraints:
     """The constraints, with clearances no larger than the path's own."""
-    q = path(np.linspace(0.0, path.duration, round(path.duration * 100.0) + 2))[0]
-    own = constraints.around.clearance(q).min(axis=0)
+    own = constraints.around.clearance(_poses(path)).min(axis=0)
     keep = np.minimum(constraints.around.keep, np.where(np.isfinite(own), own - 1e-3, np.inf))
     return replace(constraints, surroundings=replace(constraints.around, keep=tuple(keep.tolist())))
 

@@ -18,6 +18,7 @@ from armload.identification.found import Asked, found_in
 from armload.identification.notes import (
     ALLOWED,
     MAY_CHANGE,
+    MOTOR_PROFILE,
     UNCHECKED,
     changed_within,
     learned_from,
@@ -91,6 +92,8 @@ def identify(
     drift, aged = (0.0, ()) if tare is None else drift_since(tare, recording, tare_age)
     profile = load_profile(profile) if isinstance(profile, str | Path) else profile
     asked, notes = Asked(method, drift, known, profile), (*notes, *aged)
+    if profile is not None and arm.motor_torque:
+        notes = (*notes, MOTOR_PROFILE)
     if tare is not None and profile is not None:
         _check_same_mounted(tare, arm, asked)
     mounted = read_payload(tool) if isinstance(tool, str | Path) else tool

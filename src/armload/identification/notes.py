@@ -269,6 +269,12 @@ def learned_from(session: str) -> str:
     )
 
 
+MOTOR_PROFILE = (
+    "the intervals of answers with a profile were checked for arms whose torque is measured behind the gears only: of "
+    "motor currents they may be too narrow; record a tare of today and leave the profile out"
+)
+
+
 def changed_within(times: list[float], parts: int) -> str:
     """That the payload changes within a log, when, and which part the answer is of."""
     when = ", ".join(f"{t:.2f}" for t in times)

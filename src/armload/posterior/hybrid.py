@@ -68,7 +68,8 @@ class HybridIdentifier(PosteriorLeastSquares):
         self.model = shipped_model(arm) if model is None else model
         self._payloads = self.model.prior_for(arm)
         self._traits_frame = self.model.into_frame(arm)
-        self.calibrated = self.model.calibrated
+        # what gears lose of a load no empty log tells, and a profile's many features of the pose take it for the arm's
+        self.calibrated = self.model.calibrated and not (profile is not None and arm.motor_torque)
         self.payload_prior = (self._payloads.mean, self._payloads.std)
         super().__init__(arm, tare, features=features, same_motion=True, profile=profile)
 

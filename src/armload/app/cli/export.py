@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from armload.errors import SinkError
     from armload.inertia import InertialParameters
 
+# when what is not in a load was mounted, by what it is relative to
+_SINCE = {"tare": "at the tare", "before": "at the tare", "profile": "in the profile's logs"}
 # the names of armload.devices.FORMS, so that --help need not import them; a test compares
 FORMS = ("franka", "franka-desk", "ur", "ur-payload", "urdf", "mjcf", "sdf", "ros2")
 _EXAMPLES = """\
@@ -88,11 +90,17 @@ def run(options: argparse.Namespace) -> None:
     if arm is None and facts is not None and _moves(options, load.frame, facts.flange):
         arm = _arm(facts.name)
     doubts = _doubts(options.minus, load)
+    added = bool(options.plus) and load.relative_to in _SINCE
+    if added:
+        doubts.append(
+            f"what was mounted {_SINCE[str(load.relative_to)]} is in it as far as it was added: see that nothing is "
+            "counted twice, or not at all"
+        )
+    for part in options.plus:  # first: what is taken off may be in it
+        load = load + _part(part, load, arm)
     for part in options.minus:
         load = load - _part(part, load, arm)
-    for part in options.plus:
-        load = load + _part(part, load, arm)
-    write(load, options.to, options.out, arm, options.frame, options.name, doubts)
+    write(load, options.to, options.out, arm, options.frame, options.name, doubts, added=added)
 
 
 def write(
@@ -104,11 +112,12 @@ def write(
     name: str = "payload",
     doubts: Sequence[str] = (),
     earlier: Sequence[str] = (),
+    added: bool = False,
 ) -> None:
     """Write a load in a form, to a file or to stdout, about the frame asked for, else the one the form wants.
 
     doubts: notes to print with those on the load. earlier: notes of its identification, which say already what was
-    not determined and what rests on the prior.
+    not determined and what rests on the prior. added: whether parts were added to what is relative to a tare.
 
     Raises:
         SinkError: the form's frame is not known, or no body has the load's parameters and a mass above 0.
@@ -138,7 +147,7 @@ def write(
         print_note("nothing seems to be held: the mass is within three standard deviations of zero")
     if elsewhere:
         print_note(f"a controller counts from its flange; these numbers are about {load.frame}, as was asked for")
-    for note in (*earlier, *doubts, *([] if earlier else _on_numbers(body)), *_on_use(body, to)):
+    for note in (*earlier, *doubts, *([] if earlier else _on_numbers(body)), *_on_use(body, to, added)):
         print_note(note)
     if out is None:
         print(text, end="")
@@ -203,21 +212,25 @@ def _on_numbers(load: Load) -> list[str]:
     return [*([f"not determined by the log: {missing}; written as known beforehand"] if missing else []), *load.remarks]
 
 
-def _on_use(load: Load, to: str) -> list[str]:
+def _on_use(load: Load, to: str, added: bool) -> list[str]:
     """What to see to where they are used."""
     from armload.arms import ARMS
     from armload.devices import CONTROLLERS
 
     notes = []
     facts = ARMS.get(load.robot or "")
+    if facts is None and to in CONTROLLERS and load.frame in {each.flange for each in ARMS.values()}:
+        makers = {each.controller for each in ARMS.values() if each.flange == load.frame}
+        if not any(maker and to.startswith(maker) for maker in makers):
+            notes.append(f"it is about {load.frame}: another maker's flange may have other axes")
     if facts is not None and to in CONTROLLERS and not (facts.controller and to.startswith(facts.controller)):
         notes.append(f"it was identified on a {load.robot}: another maker's flange may have other axes")
-    if to == "franka" and load.relative_to == "arm":
+    if to == "franka" and load.relative_to == "arm" and not added:
         notes.append("this contains any hand that is mounted: take off what Desk counts already with --minus")
     if to in ("ur", "ur-payload") and load.relative_to == "tool":
         notes.append("a UR's payload is everything on the flange: add the tool with --plus")
-    if to in ("ur", "ur-payload") and load.relative_to in ("tare", "profile", "before"):
-        then = "in the profile's logs" if load.relative_to == "profile" else "at the tare"
+    if to in ("ur", "ur-payload") and load.relative_to in _SINCE:
+        then = _SINCE[load.relative_to]
         notes.append(f"a UR's payload is everything on the flange: add what was mounted {then}, if any, with --plus")
     if to in CONTROLLERS and load.frame is None:
         notes.append("the payload names no frame: it is taken to be about the flange")

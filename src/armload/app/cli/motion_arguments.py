@@ -98,7 +98,13 @@ def add_constraint_arguments(
         metavar="X,Y,Z",
         help="of payloads in the payload frame, to 5 cm along each axis [m] (default: 0,0,0.1)",
     )
-    add("--floor", type=floor, metavar="Z", help="height of the floor in the base's frame [m], or none (default: 0)")
+    add(
+        "--floor",
+        type=floor,
+        default=0.0,
+        metavar="Z",
+        help="height of the floor in the base's frame [m], or none (default: 0)",
+    )
     add("--box", type=box, action="append", default=[], metavar="X,Y,Z,SX,SY,SZ", help="an obstacle; repeat for more")
     add(
         "--held",

@@ -53,7 +53,7 @@ def run_enrich(options: argparse.Namespace) -> int:
     """Enrich, write, and say what that is worth."""
     import numpy as np
 
-    from armload.excitation import enrich
+    from armload.excitation import enrich, touched_by
     from armload.inertia import NAMES, UNITS
     from armload.motion import export_motion, save_motion
 
@@ -71,6 +71,12 @@ def run_enrich(options: argparse.Namespace) -> int:
     with working("enriching the path"):
         found = enrich(
             path, constraints, criterion, distance=1e-3 * options.mm, angle=np.deg2rad(options.deg), seed=options.seed
+        )
+    touched = touched_by(path, constraints.around)
+    if touched is not None:
+        print_note(
+            f"on the path itself {touched}, and the enriched one comes no nearer: if that is not meant, say what is "
+            "there (--floor, --box, --held)"
         )
     form = _FORMATS[out.suffix.lower()]
     if form is None:
