@@ -64,6 +64,7 @@ GROUPS = {  # home → constants, None: all; what they are tried on
     "identification.thresholds": (r"(?s).*", ("logs",)),
     "posterior.problem": (r"(?m)(^#.*\n)*^(_MOTOR_SIDE|GAIN_STD) = .*\n", ("streams", "logs")),
     "posterior.joint_gains": (r"(?m)(^#.*\n)*^LOAD_LOSS = .*\n", ("streams", "logs")),
+    "posterior.calibration": (r"(?m)(^#.*\n)*^KAPPA_UNKNOWN = .*\n", ("logs",)),
     "posterior.hybrid": (r"(?m)(^#.*\n)*^_REMOVED = .*\n", ("streams", "logs")),
     "regression.prior": (r"(?m)(^#.*\n)*^BODY_\w+ = .*\n", ("streams", "logs")),
     "regression.mismatch": (r"(?m)(^#.*\n)*^(DAILY|LINK_LOSS) = .*\n", ("logs", "tares")),

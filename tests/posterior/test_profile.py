@@ -271,3 +271,15 @@ def test_a_base_that_leans_since_the_profile_is_said(panda, life, profile):
     answer = identify(log, panda, profile=profile)
     assert answer.interval == "approximate"
     assert any("not as its profile says" in note or "leans by" in note for note in answer.notes)
+
+
+@pytest.mark.full
+def test_sound_logs_of_motor_currents_agree_on_what_is_mounted():
+    """One of these seems to carry −0.74 kg, which the physics alone is far too sure of."""
+    robot, source = arm("ur10e"), MotionSource(arm("ur10e"), 0.0)
+    episode = draw_episodes(robot, "reference", 24, 300, motions=6)[21]
+    rng, around = np.random.default_rng([0, 21, 7]), source.centre(episode.motion)
+    motions = [source.draw("long", rng, 20.0, f"21-{i}", around, 0.3) for i in range(5)][:4]
+    runs = [Run(motion, None, episode.world, episode.sensors, episode.seed + i) for i, motion in enumerate(motions)]
+    logs = simulate_many(robot, runs, rate=200.0, duration=20.0, workers=1, resolution=COARSE)
+    assert len(learn_profile(robot, logs, sessions=[0] * 4).sessions) == 1

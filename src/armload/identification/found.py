@@ -15,9 +15,10 @@ from armload.identification.arm_health import ArmHealth
 from armload.identification.choice import Choice, choose
 from armload.identification.intervals import Before
 from armload.identification.known_payload import know
-from armload.identification.thresholds import BACKWARDS, KAPPA_UNKNOWN, LARGEST_OFFSET, LEAST_SEEN, MISFIT, MOVES
+from armload.identification.thresholds import BACKWARDS, LARGEST_OFFSET, LEAST_SEEN, MISFIT, MOVES
 from armload.inertia import distance_to_body, is_consistent
 from armload.posterior import HybridIdentifier, Known, PosteriorLeastSquares, Profile
+from armload.posterior.calibration import KAPPA_UNKNOWN
 from armload.posterior.restless import most_restless
 from armload.posterior.scales import AnotherArm, Drift, Tilt
 from armload.posterior.tilt import TURNED, TURNS

@@ -26,13 +26,13 @@ from armload.identification.thresholds import (
     CUT_FARTHER,
     CUT_SHARE,
     DRIFT_SAID,
-    KAPPA_UNKNOWN,
     PART_LEAST,
     PAYLOAD_CHANGED,
     PAYLOAD_MAY_CHANGE,
     SETTLED,
 )
 from armload.posterior import Profile, SmoothPosteriorLeastSquares
+from armload.posterior.calibration import KAPPA_UNKNOWN
 from armload.recording import Recording
 from armload.regression.lag import GAIN
 from armload.regression.noise import SMOOTH

@@ -71,10 +71,6 @@ PAUSE_SAID = 1.0
 PAYLOAD_CHANGED = 29.588298445074422
 # T where it may have: the 99 % quantile
 PAYLOAD_MAY_CHANGE = 23.209251158954356
-# by how much the physics overrates a log's evidence, where it is not known, and where torque is motor current: as of
-# arms that are least like their models, with motor currents and beyond the measured ones (`Calibration.kappa`). One
-# of 96 sound simulated logs of UR arms is called changed with it (`benchmarks/changed_logs.py`)
-KAPPA_UNKNOWN = 4.5
 # of what is held: standard deviation of what gears lose of it in one part of a log and not in another, where torque is
 # motor current. A stated prior; without it sound logs of heavy payloads are called changed
 # (`benchmarks/changed_logs.py`)

@@ -38,6 +38,10 @@ LIGHT_MASS = 0.35
 _LEAST = 0.4  # of c: the least that 95 % of what was hardly more than nothing needed (`benchmarks/wide_and_light.py`)
 # range of the factor: a guard, where the bag is asked about traits unlike all it has seen
 _KAPPA = (0.1, 1e3)
+# by how much the physics overrates a log's evidence, where it is not known, and where torque is motor current: as of
+# arms that are least like their models, with motor currents and beyond the measured ones (`Calibration.kappa`). One
+# of 96 sound simulated logs of UR arms is called changed with it (`benchmarks/changed_logs.py`)
+KAPPA_UNKNOWN = 4.5
 
 
 @dataclass(frozen=True, eq=False)

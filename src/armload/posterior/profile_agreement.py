@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from armload.errors import IdentificationError
 from armload.inertia import HELD, Z95
+from armload.posterior.calibration import KAPPA_UNKNOWN
 from armload.posterior.profile_session import without_drift
 from armload.posterior.scales import Scales
 from armload.posterior.solve import solve
@@ -44,6 +45,8 @@ def carried(
 ) -> NDArray[np.float64]:
     """Mass and its standard deviation (K, 2) [kg] of what each log carries beside what is mounted in the others.
 
+    Where torque is motor current, variances are `KAPPA_UNKNOWN` times what the physics says.
+
     Args:
         data: of each log. scales: of the logs solved together, with the noise of each (K, n). drift: (d,) variance of a
             session's own. repeated: by how much the noise counts for more.
@@ -54,6 +57,7 @@ def carried(
     ]
     A, b = sum(A for A, _ in own), sum(b for _, b in own)
     noise, out = np.ones((1, correction.arm.n)), np.zeros((len(data), 2))
+    overrated = KAPPA_UNKNOWN if correction.arm.motor_torque else 1.0
     session = Session(1, 1.0, tuple(np.sqrt(drift) / correction.daily_std))
     for k, (part, (A_k, b_k)) in enumerate(zip(data, own, strict=True)):
         others = RegressionData(correction, GAIN, part.features, SMOOTH.block)
@@ -62,7 +66,7 @@ def carried(
         run.session = session
         start = Scales(noise, scales.eta, scales.features, scales.payloads)
         found = solve([others, run], payload_prior_std(correction.arm), None, SMOOTH, 3, start)
-        out[k] = found.phi[0], np.sqrt(found.covariance[0, 0])
+        out[k] = found.phi[0], np.sqrt(overrated * found.covariance[0, 0])
     return out
 
 

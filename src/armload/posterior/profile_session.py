@@ -17,6 +17,7 @@ from armload.arms import Arm, rated_effort
 from armload.errors import IdentificationError
 from armload.inertia import HELD, Z95
 from armload.posterior.another_arm import another_arm
+from armload.posterior.calibration import KAPPA_UNKNOWN
 from armload.posterior.drift import drift_of
 from armload.posterior.problem import Problem
 from armload.posterior.profile import Profile, SessionRecord, remembered
@@ -140,7 +141,8 @@ def check_fits(known: Profile, arm: Arm, log: Recording, tool: NDArray[np.float6
     correction = Correction(arm, rated_effort(arm))
     data = log_data(correction, log, known.features, known.session(correction), tool)
     found, drift, another = compared(known, correction, data)
-    mass, std = float(found.phi[0]), float(np.sqrt(found.covariance[0, 0]))
+    overrated = KAPPA_UNKNOWN if arm.motor_torque else 1.0
+    mass, std = float(found.phi[0]), float(np.sqrt(overrated * found.covariance[0, 0]))
     if abs(mass) > HELD * std:
         raise IdentificationError(
             f"{log.source} carries {mass:+.3g} ± {Z95 * std:.2g} kg beside what was mounted in the profile's logs: a "
