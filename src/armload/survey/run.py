@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from armload.errors import UsageError
-from armload.identification.choice import METHODS, choose
+from armload.identification.choice import choose
+from armload.identification.methods import METHODS
 from armload.lab.cells import load_cells
 from armload.lab.experiment import Task, run_tasks
 from armload.survey.answering import answer_log, lost_log
