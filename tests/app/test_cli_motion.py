@@ -86,6 +86,11 @@ def test_the_json_says_what_is_told_and_what_is_used(designed):
         (f"--from {READY} --box 0,0,1", "is not a box"),
         (f"--from {READY} --joints 9", "joints 1 to 7"),
         (f"--from {READY} --joints a", "names no joints"),
+        (f"--from {READY} --joints 0-3", "names joint 0"),
+        ("--from 0,-0.5,0,-2,0,1.6,nan", "has nan at panda_joint7"),
+        ("--from 0,-28,0,-114,0,91,45", "are these degrees?"),
+        (f"--from {READY} --joints 7-5", "'7-5' names no joints"),
+        (f"--from {READY} --joints 1-99999999999", "names no joints"),
         (f"--from {READY} --until mass=3apples", "is no accuracy"),
         (f"--from {READY} --until mass=10g --time 2", "exclude each other"),
         (f"--from {READY} --tare none --tare-time 2", "leave --tare out"),
@@ -126,6 +131,35 @@ def test_a_path_that_runs_into_the_floor_itself_is_said_to(tmp_path, capsys):
     for floor, said in ((0.0, False), (high, True)):
         assert main([*words, "--floor", str(floor), "--out", str(tmp_path / "e.json")]) == 0
         assert ("is at the floor" in capsys.readouterr().err) == said
+
+
+@pytest.mark.parametrize("action", [f"design --from {READY}", "random"])
+@pytest.mark.parametrize("name", ["m.csv", "m"])
+def test_a_motion_is_written_under_no_other_ending_than_its_own(action, name, tmp_path, capsys):
+    words = ["motion", *action.split(), "--robot", "panda", "--out", str(tmp_path / name)]
+    assert main(words) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert "a name that ends in .json" in printed.err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("start", "asked"),
+    [("0,-28,0,-114,0,91,45", True), ("0,-0.5,0,-2,0,1.6,3", False), ("0,-0.5,0,-2,0,1.6,nan", False)],
+)
+def test_a_pose_beyond_the_limits_that_would_be_within_them_in_degrees_is_asked_about(start, asked, tmp_path, capsys):
+    words = ["motion", "export", "taie2024", "--format", "csv", "--robot", "panda", "--from", start]
+    assert main([*words, "--out", str(tmp_path / "m.csv")]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert "expected a position from" in printed.err
+    assert ("are these degrees?" in printed.err) == asked
+
+
+def test_a_motion_that_is_not_there_is_asked_for_by_the_command_that_writes_one(capsys):
+    assert main(["motion", "check", "nosuch.json", "--robot", "panda"]) == 2
+    assert "`armload motion design`" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("form", ["csv", "ros2"])

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from armload.app.cli import main
+from armload.app.cli.profile import _next
 from armload.arms import arm
 from armload.motion import random_motion, save_motion, taie2024
 from armload.payloads import test_payload as make_payload
@@ -72,6 +74,49 @@ def test_show_says_what_is_known_and_how_the_arm_drifted(profile, capsys, tmp_pa
     fields = json.loads(capsys.readouterr().out)
     assert len(fields["sessions"]) == 3
     assert np.isfinite(fields["drift_offset"]).all()
+
+
+def test_a_figure_is_of_the_profile_s_own_arm_in_the_form_that_its_name_says(profile, capsys, tmp_path):
+    show = ["profile", "show", str(profile), "--figure"]
+    for robot in ("fr3", "ur5e"):
+        assert main([*show, str(tmp_path / "arm.png"), "--robot", robot]) == 2
+        assert "the profile is of panda" in capsys.readouterr().err
+    assert main([*show, str(tmp_path / "arm.txt")]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert "'txt' is not supported" in said.err
+    assert list(tmp_path.iterdir()) == []
+    assert main([*show, str(tmp_path / "arm.svg"), "--robot", "panda"]) == 0
+    assert f"wrote {tmp_path / 'arm.svg'}" in capsys.readouterr().err
+    assert b"<svg" in (tmp_path / "arm.svg").read_bytes()
+
+
+def test_logs_are_added_about_the_profile_s_own_frame(folder, profile, capsys, tmp_path):
+    path = tmp_path / "more.profile"
+    path.write_bytes(profile.read_bytes())
+    update = ["profile", str(folder / "day3.csv"), "--robot", "panda", "--out", str(path), "--update", "--frame"]
+    assert main([*update, "panda_link7"]) == 2
+    assert "--frame panda_link7 is not the profile's" in capsys.readouterr().err
+    assert path.read_bytes() == profile.read_bytes()
+    assert main([*update, "panda_link8"]) == 0
+
+
+def test_a_session_of_several_logs_is_shown_with_all_their_names(folder, capsys, tmp_path):
+    logs = [str(folder / f"day{k}.csv") for k in range(2)]
+    words = ["profile", *logs, "--robot", "panda", "--out", str(tmp_path / "one.profile"), "--one-session"]
+    assert main(words) == 0
+    said = capsys.readouterr()
+    assert "day0.csv, day1.csv" in said.out
+    assert "one session does not tell how the arm drifts" in said.err
+
+
+def test_a_log_that_fits_less_well_than_an_arm_s_own_is_named(profile):
+    known = load_profile(profile)
+    assert not any("was it made by this arm?" in line for line in _next(known))
+    odd = replace(known.sessions[1], statistic=30.0)
+    said = [line for line in _next(replace(known, sessions=(known.sessions[0], odd))) if "misfit" in line]
+    assert len(said) == 1
+    assert said[0].startswith("day1.csv fits less well")
 
 
 def test_update_adds_a_session_and_refuses_a_payload(folder, profile, capsys, tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from armload.errors import ArmloadError, UsageError
 from armload.lab.cells import load_cells, save_cell
 from armload.motion import random_motion
 from armload.recording import write_recording
@@ -184,3 +186,63 @@ def test_a_share_that_vanishes_costs_no_row_once_it_is_back(share, whole, tmp_pa
     assert answers(back.rows) == answers(whole)
     assert out.read_bytes() == before
     assert read_rows(out)[0] == back.rows
+
+
+def test_a_name_that_is_no_utf8_has_its_row_in_every_form(share, tmp_path):
+    odd = os.fsencode(share) + b"/k\xe4lte.csv"
+    try:
+        os.rename(share / "1.csv", odd)
+    except OSError:
+        pytest.skip("this file system takes names of UTF-8 only")
+    for suffix in ("csv", "parquet", "json"):
+        out = tmp_path / f"survey.{suffix}"
+        found = survey([str(share)], SETTINGS, out, jobs=1)
+        assert (found.anew, found.unusable) == (3, 0)
+        assert {row["log"] for row in read_rows(out)[0]} == {
+            f"{share}/0.csv",
+            f"{share}/2.csv",
+            f"{share}/k\\xe4lte.csv",
+        }
+        assert survey([str(share)], SETTINGS, out, jobs=1).anew == 0
+
+
+def test_a_name_that_is_no_utf8_can_be_printed(logs, tmp_path):
+    words = [sys.executable, "-m", "armload", "survey", str(logs / "0.csv"), "--robot", "panda", "--method", "map"]
+    utf8 = os.environ | {"PYTHONIOENCODING": "utf-8:strict"}
+    done = subprocess.run([*words, "--out", b"k\xe4lte.csv"], cwd=tmp_path, capture_output=True, env=utf8)
+    assert (done.returncode, b"wrote k\\udce4lte.csv" in done.stdout) == (0, True), done.stderr
+
+
+def test_a_pipe_is_no_log_and_one_that_is_named_has_a_row(share, tmp_path):
+    pipe = share / "pipe.csv"
+    os.mkfifo(pipe)
+    assert len(find_logs([str(share)])) == 3
+    found = survey([str(pipe), str(share / "0.csv")], SETTINGS, tmp_path / "survey.json", jobs=1)
+    assert [(row["log"], row["status"]) for row in found.rows if row["status"] == "unusable"] == [
+        (str(pipe), "unusable")
+    ]
+    assert "it is a pipe" in next(row["reason"] for row in found.rows if row["log"] == str(pipe))
+
+
+@pytest.mark.parametrize(
+    ("method", "said"), [("nosuch", "unknown method 'nosuch'"), ("joint", "needs a tare"), ("tree", "name its file")]
+)
+def test_a_method_that_no_log_can_be_asked_with_is_refused_before_any_is(logs, tmp_path, method, said):
+    with pytest.raises(ArmloadError, match=said):
+        survey([str(logs)], Settings("panda", method=method), tmp_path / "survey.json", jobs=1)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_method_that_needs_a_tare_is_asked_with_one(logs, tmp_path):
+    asked = Settings("panda", method="difference", tare=str(logs / "0.csv"))
+    found = survey([str(logs / "1.csv")], asked, tmp_path / "survey.json", jobs=1)
+    assert (found.logs, len(found.rows)) == (1, 1)
+
+
+def test_paths_of_which_none_is_there_are_refused_and_one_among_others_has_a_row(logs, tmp_path):
+    out, typo = tmp_path / "survey.json", str(logs.parent / "amr")
+    with pytest.raises(UsageError, match="no such file or folder"):
+        survey([typo], SETTINGS, out, jobs=1)
+    assert not out.exists()
+    found = survey([typo, str(logs / "0.csv")], SETTINGS, out, jobs=1)
+    assert [row["status"] for row in found.rows if row["log"] == typo] == ["unusable"]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 
 @dataclass(frozen=True)
@@ -20,6 +20,18 @@ class Limits:
     effort: NDArray[np.float64]  # [N·m]
     acceleration: NDArray[np.float64]  # [rad/s²]
     jerk: NDArray[np.float64]  # [rad/s³]
+
+    def as_degrees(self, q: ArrayLike) -> str:
+        """A question to whoever named a pose (n,) [rad] that is beyond the limits, and would be within them in degrees.
+
+        Empty where there is nothing to ask.
+        """
+
+        def within(pose: NDArray[np.float64]) -> bool:
+            return bool(np.all((self.position_low <= pose) & (pose <= self.position_high)))
+
+        pose = np.asarray(q, dtype=float)
+        return "; positions are in rad: are these degrees?" if not within(pose) and within(np.deg2rad(pose)) else ""
 
     @classmethod
     def of(cls, model: pin.Model, acceleration: Sequence[float] | None, jerk: Sequence[float] | None) -> Limits:

@@ -50,7 +50,10 @@ class Constraints:
     def __post_init__(self) -> None:
         arm, n = self.arm, self.arm.n
         start = np.array(self.start, dtype=float)
-        if start.shape != (n,) or not np.all(np.isfinite(start)):
+        if start.shape == (n,) and not np.all(np.isfinite(start)):
+            j = int(np.argmin(np.isfinite(start)))
+            raise MotionError(f"the start has {start[j]} at {arm.joint_names[j]}: expected a finite position in rad")
+        if start.shape != (n,):
             raise MotionError(
                 f"the start has {start.size} joint positions: {arm.name} has {n} joints; give {n} finite numbers in rad"
             )
@@ -131,6 +134,7 @@ class Constraints:
                 f"{arm.joint_names[j]} starts at {self.start[j]:.4g} rad, outside {self.share:g} of its range about "
                 f"the middle, {low[j]:.4g} to {high[j]:.4g} rad (its limits are {limits.position_low[j]:.4g} and "
                 f"{limits.position_high[j]:.4g}): start elsewhere{_or_share(needed)}"
+                f"{limits.as_degrees(self.start)}"
             )
         bare, each = arm.torque(self.start), self._static()
         held = bare + each

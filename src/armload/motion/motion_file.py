@@ -54,7 +54,9 @@ def load_motion(path: str | Path) -> FourierMotion | SplineMotion | PathMotion:
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
-        raise MotionError(f"motion file {path} does not exist: give a JSON file written by save_motion") from None
+        raise MotionError(
+            f"motion file {path} does not exist: give one that `armload motion design` or `random` wrote"
+        ) from None
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
         raise MotionError(f"motion file {path} cannot be read: {reason}") from None

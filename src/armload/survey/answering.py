@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from armload.errors import ArmloadError, EpisodesError, RecordingError, one_line
 from armload.identification import identify
 from armload.runtime.version import __version__
-from armload.survey.logs import Log, filesystem
+from armload.survey.logs import NO_FILE, Log, filesystem, is_special
 from armload.survey.rows import UNUSABLE, answered, unusable
 from armload.survey.settings import Settings
 from armload.survey.sliding import slides_of_parts
@@ -115,6 +115,8 @@ def _reason(error: Exception) -> str:
 def _here(log: Log) -> Iterator[Path]:
     """The log as a path on this machine; an object is fetched, and removed afterwards."""
     if not log.remote:
+        if special := next((file for file in log.files if is_special(file)), None):
+            raise RecordingError(f"{special} cannot be read: {NO_FILE}")
         yield Path(log.name)
         return
     fs, path = filesystem(log.name)

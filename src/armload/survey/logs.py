@@ -6,9 +6,11 @@ episode of a LeRobot data set.
 
 from __future__ import annotations
 
+import errno
 import glob
 import hashlib
 import re
+import stat
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -22,6 +24,7 @@ from armload.recording import LOG_SUFFIXES, PACKED_SUFFIXES, data_set_episodes, 
 _URL = re.compile(r"[a-z][a-z0-9+.-]*://")
 _WILD = re.compile(r"[*?\[]")
 _VALIDATORS = ("ETag", "Content-MD5", "Digest", "Last-Modified")  # of a file behind HTTP: all that fsspec keeps
+NO_FILE = "it is a pipe, a socket or a device: expected a regular file; copy what it gives into one"
 _BLOCK = 1 << 20  # bytes that are hashed at a time
 
 
@@ -43,6 +46,11 @@ class Log:
     def remote(self) -> bool:
         """Whether it is in an object store."""
         return is_url(self.name)
+
+    @property
+    def there(self) -> bool:
+        """Whether any of its files is there; of an object nobody knows before it is fetched."""
+        return self.remote or any(file.exists() for file in self.files)
 
     def stamp(self) -> str:
         """What changes with the content and is known without reading it: sizes and times, or the store's own key.
@@ -121,8 +129,14 @@ def _digest(stream: IO[bytes]) -> str:
 
 
 def file_hash(file: Path) -> str:
-    """SHA-256 of a file, which is not hashed again while its size and time stay."""
+    """SHA-256 of a file, which is not hashed again while its size and time stay.
+
+    Raises:
+        OSError: it cannot be read, or is no regular file.
+    """
     about = file.stat()
+    if _special(about.st_mode):
+        raise OSError(errno.EINVAL, NO_FILE, str(file))
     return _hash(file, about.st_size, about.st_mtime_ns)
 
 
@@ -224,9 +238,21 @@ def _units(path: str, hidden: set[Path]) -> Iterator[tuple[str, int | None, tupl
     elif (real := here.resolve()) not in hidden:
         hidden.add(real)
         for inner in sorted(here.iterdir()):
-            known = inner.is_dir() or is_log(inner)
+            known = inner.is_dir() or (is_log(inner) and not is_special(inner))
             if known and not inner.name.startswith(".") and inner.resolve() not in hidden and not of_survey(inner):
                 yield from _units(str(inner), hidden)
+
+
+def is_special(path: Path) -> bool:
+    """Whether this is a pipe, a socket or a device, through links, too: to open one may wait for ever."""
+    try:
+        return _special(path.stat().st_mode)
+    except OSError:  # a link to nothing: its row will say so
+        return False
+
+
+def _special(mode: int) -> bool:
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
 
 
 def is_log(file: Path) -> bool:

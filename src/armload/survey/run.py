@@ -15,6 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from armload.errors import UsageError
+from armload.identification.choice import choose
+from armload.identification.methods import METHODS
 from armload.lab.cells import load_cells
 from armload.lab.experiment import Task, run_tasks
 from armload.survey.answering import answer_log, lost_log
@@ -62,7 +65,7 @@ def survey(
 
     Raises:
         UsageError: no log was found, or something that is named for all logs is not there.
-        ArmloadError: the arm is unknown, or a profile, a tool or a model cannot be read.
+        ArmloadError: the arm or the method is unknown, or a profile, a tool or a model cannot be read.
         OSError: the table or a cell cannot be written.
     """
     out, jobs = check_suffix(out), jobs or os.cpu_count() or 1
@@ -74,8 +77,12 @@ def survey(
     for arm in sorted({log.arm for log in logs} - {""}):
         settings.profile_of(arm)
     settings.mounted()
+    _check_method(settings)
     say(f"{len(logs)} logs: asking which have changed")
     before = load_cells(folder)
+    # what was answered once may be away for a while: its row says so
+    if not any(log.there or _name(log) in before for log in logs):
+        raise UsageError(f"{', '.join(paths)}: no such file or folder: expected logs, folders, globs or URLs")
     with ThreadPoolExecutor(jobs) as pool:
         tasks = list(pool.map(lambda log: _task(log, settings, before.get(_name(log))), logs))
     fresh = {t.name for t in tasks if before.get(t.name, {}).get("key") != t.keys[t.name]}
@@ -94,9 +101,17 @@ def survey(
     return Survey(rows, len(logs), len(fresh))
 
 
+def _check_method(settings: Settings) -> None:
+    """See that the method is one that logs can be asked with: whether it fits an arm's tare, each row will say."""
+    known = METHODS.get(settings.method or "")
+    if settings.method is not None and not (known is not None and known.needs == "tare" and settings.tare is not None):
+        choose(settings.arm(), method=settings.method)
+
+
 def _name(log: Log) -> str:
     """Of a log's cell: what kind of file systems allow, and what tells logs of one name apart."""
-    return hashlib.sha256(f"{log.name}\n{log.episode}".encode()).hexdigest()[:24]
+    text = f"{log.name}\n{log.episode}"
+    return hashlib.sha256(text.encode(errors="surrogateescape")).hexdigest()[:24]  # a name on disk may be no UTF-8
 
 
 def _task(log: Log, settings: Settings, before: dict[str, Any] | None) -> Task:

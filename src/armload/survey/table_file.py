@@ -35,6 +35,7 @@ def write_rows(path: str | Path, rows: Sequence[dict[str, Any]], n: int) -> None
         UsageError: unknown suffix. OSError: it cannot be written. ModuleNotFoundError: pyarrow is not installed.
     """
     path, kinds = check_suffix(path), columns(n)
+    rows = [{name: _whole(row.get(name)) for name in kinds} for row in rows]
     suffix = path.suffix.lower()
     with replacing(path) as temporary:
         if suffix == ".parquet":
@@ -43,10 +44,9 @@ def write_rows(path: str | Path, rows: Sequence[dict[str, Any]], n: int) -> None
             with temporary.open("w", encoding="utf-8", newline="") as file:
                 writer = csv.writer(file, lineterminator="\n")
                 writer.writerow(kinds)
-                writer.writerows([_cell(row.get(name)) for name in kinds] for row in rows)
+                writer.writerows([_cell(row[name]) for name in kinds] for row in rows)
         else:
-            whole = [{name: row.get(name) for name in kinds} for row in rows]
-            temporary.write_text(json.dumps(whole, indent=0, allow_nan=False) + "\n", encoding="utf-8")
+            temporary.write_text(json.dumps(rows, indent=0, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def read_rows(path: str | Path) -> tuple[list[dict[str, Any]], int]:
@@ -89,8 +89,15 @@ def _write_parquet(path: Path, rows: Sequence[dict[str, Any]], kinds: dict[str, 
 
     types = {TEXT: pa.string(), WHOLE: pa.int64(), FLAG: pa.bool_(), NUMBER: pa.float64()}
     schema = pa.schema([(name, types[kind]) for name, kind in kinds.items()])
-    made = [pa.array([row.get(name) for row in rows], types[kind]) for name, kind in kinds.items()]
+    made = [pa.array([row[name] for row in rows], types[kind]) for name, kind in kinds.items()]
     parquet.write_table(pa.Table.from_arrays(made, schema=schema), path, compression="zstd")
+
+
+def _whole(value: Any) -> Any:
+    """A value that every form can hold: a path whose bytes are no UTF-8 has them written out, as \\xff."""
+    if isinstance(value, str):
+        return value.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
+    return value
 
 
 def _cell(value: Any) -> Any:

@@ -76,8 +76,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         if getattr(sys, name) is None:  # closed by the parent process: the output is dropped
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure") and (stream.encoding or "").lower().replace("-", "") != "utf8":
+        if not hasattr(stream, "reconfigure"):
+            continue
+        if (stream.encoding or "").lower().replace("-", "") != "utf8":
             stream.reconfigure(errors="replace")  # a terminal that cannot show "m²" still gets the answer
+        elif stream.errors == "strict":
+            stream.reconfigure(errors="backslashreplace")  # nor does a file's name that is no UTF-8 stop it
     with warnings.catch_warnings(), _notes_on_stderr(), _no_interruption_lost():
         warnings.showwarning = _show_warning
         code = _guarded(arguments, show_traceback)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from armload.app.cli import motion_arguments, motion_design, motion_enrich, motion_export, motion_show
 from armload.app.cli.arguments import Parser, add_arm_arguments, add_column_arguments, at_least, output_file
 from armload.app.cli.named import arm_of, payload_of
+from armload.app.cli.outputs import check_motion
 from armload.app.cli.printing import print_json, print_note, working
 from armload.errors import UsageError
 
@@ -187,6 +188,7 @@ def _limits(payload_name: str, arm: Arm, motion: Motion) -> tuple[MotionCheck, s
 def _random(options: argparse.Namespace) -> int:
     from armload.motion import random_motion, save_motion
 
+    check_motion(options.out)
     arm = arm_of(options)
     with working("looking for a motion"):
         motion = random_motion(arm, options.seed, duration=options.duration, harmonics=options.harmonics)

@@ -57,10 +57,13 @@ def joints(text: str) -> tuple[int, ...]:
     """
     out: list[int] = []
     for part in text.split(","):
-        found = re.fullmatch(r"(\d+)(?:-(\d+))?", part.strip())
-        if found is None:
-            raise argparse.ArgumentTypeError(f"{text!r} names no joints: expected numbers from 1, such as 5-7 or 1,3")
-        out += range(int(found[1]), int(found[2] or found[1]) + 1)
+        found = re.fullmatch(r"(\d{1,3})(?:-(\d{1,3}))?", part.strip())
+        named = range(0) if found is None else range(int(found[1]), int(found[2] or found[1]) + 1)
+        if not named:
+            raise argparse.ArgumentTypeError(
+                f"{text!r} names no joints: expected numbers from 1, such as 5-7 (the lower one first) or 1,3"
+            )
+        out += named
     return tuple(sorted(set(out)))
 
 

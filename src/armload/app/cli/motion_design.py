@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from armload.app.cli.arguments import OutputFile
 from armload.app.cli.named import arm_of
-from armload.app.cli.outputs import check_outputs
+from armload.app.cli.outputs import check_motion, check_outputs
 from armload.app.cli.printing import console, print_json, print_note, table, working
 from armload.errors import UsageError
 
@@ -33,8 +33,8 @@ def constraints_of(options: argparse.Namespace, arm: Arm, start: Any, moving: tu
         raise UsageError(f"--centre has {len(centre)} numbers: expected x,y,z in m")
     allowed = None
     if moving is not None:
-        if max(moving) > arm.n or min(moving) < 1:
-            raise UsageError(f"--joints names joint {max(moving)}: {arm.name} has joints 1 to {arm.n}")
+        if unknown := [joint for joint in moving if not 1 <= joint <= arm.n]:
+            raise UsageError(f"--joints names joint {unknown[-1]}: {arm.name} has joints 1 to {arm.n}")
         allowed = np.isin(np.arange(1, arm.n + 1), moving)
     return Constraints(
         arm,
@@ -79,6 +79,7 @@ def run_design(options: argparse.Namespace) -> int:
 
     if options.until is not None and options.time is not None:
         raise UsageError("--time and --until exclude each other: give one of them")
+    check_motion(options.out)
     out = Path(options.out)
     empty = out.with_name(f"{out.stem}-empty{out.suffix}")
     if options.tare_time is not None:

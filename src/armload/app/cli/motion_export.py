@@ -79,6 +79,13 @@ def _led(motion: Motion, arm: Arm, options: argparse.Namespace) -> Motion:
 
     if len(options.start) != arm.n:
         raise MotionError(f"--from has {len(options.start)} joint positions: {arm.name} has {arm.n}")
+    for j, at in enumerate(options.start):
+        low, high = arm.limits.position_low[j], arm.limits.position_high[j]
+        if not low <= at <= high:
+            raise MotionError(
+                f"--from has {arm.joint_names[j]} at {at:.4g} rad: expected a position from {low:.4g} to {high:.4g} rad"
+                f"{arm.limits.as_degrees(options.start)}"
+            )
     boxes = tuple(Obstacle((b[0], b[1], b[2]), (b[3], b[4], b[5])) for b in options.box)
     approach = APPROACH if options.approach is None else options.approach
     about = {"floor": options.floor, "boxes": boxes, "heaviest": options.payload, "approach": approach}

@@ -68,6 +68,18 @@ def check_page(out: str) -> None:
         raise UsageError(f"--out {out} is to be a page of HTML: expected a name that ends in .html")
 
 
+def check_motion(out: str) -> None:
+    """See that a motion's file is named as one; what is no plain file, such as /dev/stdout, has any name.
+
+    Raises:
+        UsageError: it has another ending.
+    """
+    if Path(out).suffix.lower() != ".json" and not _is_stream(out):
+        raise UsageError(
+            f"--out {out} is to be a motion: expected a name that ends in .json; `motion export` makes others of it"
+        )
+
+
 def check_output(option: str, path: str) -> None:
     """See that a file, or a folder with what is to come into it, can be written.
 

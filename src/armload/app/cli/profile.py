@@ -13,6 +13,7 @@ from armload.errors import UsageError
 
 if TYPE_CHECKING:
     from armload.posterior import Profile
+    from armload.posterior.profile import SessionRecord
 
 _USAGE = """armload profile LOG… --robot R --out P [--update] …
        armload profile show P [--figure F.png] [--json]"""
@@ -79,6 +80,8 @@ def run(options: argparse.Namespace) -> None:
     with working("reading") as say:
         arm = arm_of(options)
         known = load_profile(options.out) if options.update else None
+        if known is not None:
+            _check_frame(known, arm, options.frame)
         tool = None if options.tool is None else arm.in_frame(payload_of(options.tool, arm)).phi
         read = [read_logs(options, arm, path)[0] for path in options.logs]
         logs = [log for log in read if log is not None]
@@ -109,21 +112,43 @@ def run(options: argparse.Namespace) -> None:
     print(f"wrote {options.out} ({size:.1f} MB); use it with: {use}")
 
 
+def _check_frame(known: Profile, arm: Any, frame: str | None) -> None:
+    """See that a frame that is named is the profile's own, which its logs are added about.
+
+    Raises:
+        ModelError: the profile is of another arm. UsageError: it is another frame.
+    """
+    from armload.arms.matching import prefixed_frame
+
+    known.check(arm)
+    if frame is not None and str(arm.frame) != prefixed_frame(arm, known.frame):
+        raise UsageError(
+            f"--frame {frame} is not the profile's, which is about {known.frame}: leave --frame out, or learn a new "
+            "profile about it"
+        )
+
+
 def _show(options: argparse.Namespace) -> None:
     from armload.posterior import load_profile
 
     if len(options.logs) != 2:
         raise UsageError("armload profile show takes one profile: armload profile show arm.profile")
     profile = load_profile(options.logs[1])
+    arm = None
+    if options.robot is not None:
+        options.gravity = profile.gravity if options.gravity is None else options.gravity
+        arm = arm_of(options)
+        profile.check(arm)
     if options.figure is not None:
         from armload.lab.report.profile_figure import write_profile_figure
 
-        arm = arm_of(options) if options.robot is not None else _arm_of(profile)
-        write_profile_figure(profile, arm, options.figure)
+        write_profile_figure(profile, _arm_of(profile) if arm is None else arm, options.figure)
     if options.json:
         print_json(_fields(profile))
         return
     _print(profile)
+    if options.figure is not None:
+        print_note(f"wrote {options.figure}")
 
 
 def _arm_of(profile: Profile) -> Any:
@@ -178,7 +203,7 @@ def _print(profile: Profile) -> None:
     rows = table("sessions", "log", "time [s]", "offsets [N·m]", "misfit", "noise")
     for session in profile.sessions:
         offsets = " ".join(f"{x:+.2f}" for x in session.offset)
-        name, time = Path(session.name).name, f"{session.duration:.0f}"
+        name, time = _name(session), f"{session.duration:.0f}"
         rows.add_row(name, time, offsets, f"{session.statistic:.0f}", f"{max(session.noise):.1f}")
     console().print(rows)
     print_note(
@@ -189,16 +214,24 @@ def _print(profile: Profile) -> None:
         print_note(line)
 
 
+def _name(session: SessionRecord) -> str:
+    """The names of a session's logs, without their folders."""
+    return ", ".join(Path(log).name for log in session.name.split(", "))
+
+
 def _next(profile: Profile) -> tuple[str, ...]:
     """What to record next, and what does not fit."""
     from armload.posterior.drift import CHANGED
     from armload.posterior.torque_gain import common_gain
 
     advice = [
-        f"{Path(session.name).name} does not fit the other sessions (misfit {session.statistic:.0f}): another arm, "
+        f"{_name(session)} does not fit the other sessions (misfit {session.statistic:.0f}): another arm, "
         "another base, or something was mounted; learn the profile without it"
-        for session in profile.sessions
         if session.statistic > CHANGED
+        else f"{_name(session)} fits less well than an arm's own logs do (misfit {session.statistic:.0f}): was it made "
+        "by this arm?"
+        for session in profile.sessions
+        if session.statistic > 3 * profile.n
     ]
     common = common_gain(profile)
     if common is not None:
@@ -207,8 +240,9 @@ def _next(profile: Profile) -> tuple[str, ...]:
             "weigh it again; every answer by this profile rests on it"
         )
     if len(profile.sessions) < 4:
-        days = f"{len(profile.sessions)} sessions do not tell how the arm drifts: record it on four days or more"
-        advice.append(days)
+        count = len(profile.sessions)
+        few = "one session does not tell" if count == 1 else f"{count} sessions do not tell"
+        advice.append(f"{few} how the arm drifts: record it on four days or more")
     moved = profile.poses.max(axis=0) - profile.poses.min(axis=0)
     still = [str(j + 1) for j in range(profile.n) if moved[j] < 0.5]
     if still:

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     from armload.posterior import Profile
 
+# what a file would say of its making: the same profile makes the same bytes
+_UNDATED: dict[str, dict[str, None]] = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
 _RANDOM = 1500  # poses of the whole joint space that are shown
 
 
@@ -61,13 +63,16 @@ def profile_figure(profile: Profile, arm: Arm) -> Figure:
 
 
 def write_profile_figure(profile: Profile, arm: Arm, path: str | Path) -> None:
-    """Write the figure as PNG; it appears whole or not at all.
+    """The figure as PNG, PDF or SVG, by the ending of the file; it appears whole or not at all.
 
     Raises:
-        ReportError: it cannot be written.
+        ReportError: it cannot be written, or has another ending.
     """
+    form = Path(path).suffix.lstrip(".").lower() or "png"
+    figure = profile_figure(profile, arm)
     try:
-        with replacing(Path(path)) as part:
-            profile_figure(profile, arm).savefig(part, format="png", dpi=110, metadata={"Software": None})
-    except OSError as error:
-        raise ReportError(f"the figure cannot be written to {path}: {error.strerror}; name a file elsewhere") from None
+        with look(), replacing(Path(path)) as part:
+            figure.savefig(part, format=form, dpi=110, metadata=_UNDATED.get(form))
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or " ".join(str(error).split())
+        raise ReportError(f"{path} cannot be written: {reason}") from None
