@@ -301,7 +301,7 @@ def test_an_old_tare_widens_the_interval(files, capsys):
         (["--mass", "heavy"], "is not a weighed mass"),
         (["--mass", "1.2"], "is not a weighed mass"),
         (["--mass", "1.2±0"], "above zero"),
-        (["--mass", "-1±0.1"], "above zero"),
+        (["--mass", "-1±0.1"], "is a mass of -1 kg: expected one above zero"),
         (["--mass", "0±0.01"], "above zero"),
         (["--mass", "1e9±1"], "the known mass is 1e+09 kg: expected at most 9 kg, 3 times what panda is rated for"),
         (["--mass", "1200±2"], "give kilograms"),

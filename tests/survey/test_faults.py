@@ -211,6 +211,8 @@ def test_a_name_that_is_no_utf8_can_be_printed(logs, tmp_path):
     utf8 = os.environ | {"PYTHONIOENCODING": "utf-8:strict"}
     done = subprocess.run([*words, "--out", b"k\xe4lte.csv"], cwd=tmp_path, capture_output=True, env=utf8)
     assert (done.returncode, b"wrote k\\udce4lte.csv" in done.stdout) == (0, True), done.stderr
+    assert b"1 log (1 answered anew): 1 row, " in done.stdout
+    assert b"1 log: asking" in done.stderr
 
 
 def test_a_pipe_is_no_log_and_one_that_is_named_has_a_row(share, tmp_path):

@@ -109,6 +109,15 @@ def test_the_page_says_what_to_do_and_lists_what_is_in_doubt(rows, tmp_path, cap
     assert "cut off" in html
 
 
+def test_arms_named_in_a_script_that_the_font_lacks_are_drawn_without_a_warning(rows, tmp_path, capsys):
+    for one in rows:
+        one["arm"] = one["arm"].replace("exchanged", "日本")
+    write_rows(tmp_path / "survey.json", rows, 7)
+    assert main(["survey", "report", str(tmp_path / "survey.json"), "--out", str(tmp_path / "r.html")]) == 0
+    assert "Glyph" not in capsys.readouterr().err
+    assert "日本" in (tmp_path / "r.html").read_text(encoding="utf-8")
+
+
 def test_a_survey_without_dates_has_its_page_too(rows, tmp_path):
     for one in rows:
         one["date"] = None
@@ -133,7 +142,7 @@ def test_a_survey_without_dates_has_its_page_too(rows, tmp_path):
         ),
         (["survey", "report", "--out", "r.html"], "takes one table"),
         (["survey", "report", "none.parquet", "--out", "r.html"], "none.parquet is not there"),
-        (["survey", "report", "x.csv", "--out", "r.html"], "is no survey"),
+        (["survey", "report", "x.csv", "--out", "r.html"], "is no table of a survey, but a log"),
     ],
 )
 def test_what_cannot_be_is_refused_in_a_sentence(tmp_path, monkeypatch, capsys, argv, said):

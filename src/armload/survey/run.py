@@ -78,7 +78,8 @@ def survey(
         settings.profile_of(arm)
     settings.mounted()
     _check_method(settings)
-    say(f"{len(logs)} logs: asking which have changed")
+    count = "1 log" if len(logs) == 1 else f"{len(logs)} logs"
+    say(f"{count}: asking which have changed")
     before = load_cells(folder)
     # what was answered once may be away for a while: its row says so
     if not any(log.there or _name(log) in before for log in logs):
@@ -86,7 +87,7 @@ def survey(
     with ThreadPoolExecutor(jobs) as pool:
         tasks = list(pool.map(lambda log: _task(log, settings, before.get(_name(log))), logs))
     fresh = {t.name for t in tasks if before.get(t.name, {}).get("key") != t.keys[t.name]}
-    say(f"{len(logs)} logs, {len(fresh)} of them new or changed")
+    say(f"{count}, {len(fresh)} of them new or changed")
     cells = run_tasks(
         [task for task in tasks if task.name in fresh],
         folder,

@@ -70,12 +70,16 @@ def read_rows(path: str | Path) -> tuple[list[dict[str, Any]], int]:
             rows = json.loads(path.read_text(encoding="utf-8"))
         n = sum(name.startswith(_JOINTS) for name in rows[0])
         kinds = columns(n)
+        if not {"log", "status", "reason"} <= set(rows[0]):
+            raise UsageError(
+                f"{path} is no table of a survey, but a log or another table: expected what `armload survey` wrote"
+            )
         if set(kinds) != set(rows[0]):
             raise ValueError("its columns are those of another version: run the survey again")
         if path.suffix.lower() == ".csv":
             rows = [{name: _read(row[name], kind) for name, kind in kinds.items()} for row in rows]
         return rows, n
-    except ModuleNotFoundError:
+    except (ModuleNotFoundError, UsageError):
         raise
     except Exception as error:  # a damaged file can fail anywhere in the decoder
         raise UsageError(

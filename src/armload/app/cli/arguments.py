@@ -162,6 +162,10 @@ def weighed(text: str) -> tuple[float, float]:
             f"{text!r} is not a weighed mass: expected kilograms and their standard deviation, such as 1.200±0.002 "
             "(or 1.200+-0.002)"
         ) from None
+    if mass <= 0.0:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is a mass of {mass:g} kg: expected one above zero; leave it out where nothing was weighed"
+        )
     return mass, std
 
 

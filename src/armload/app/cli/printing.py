@@ -35,6 +35,15 @@ def write_json(path: str, value: dict[str, Any]) -> None:
         ) from None
 
 
+def counted(number: int, what: str) -> str:
+    """A number of things.
+
+    >>> counted(1, "log"), counted(2, "log")
+    ('1 log', '2 logs')
+    """
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
+
+
 def print_note(text: str) -> None:
     """One line on stderr, so that stdout holds the answer only."""
     print(f"armload: {' '.join(text.split())}", file=sys.stderr)

@@ -20,7 +20,7 @@ from armload.app.cli.arguments import (
     output_folder,
 )
 from armload.app.cli.outputs import check_page
-from armload.app.cli.printing import print_json, print_note, working
+from armload.app.cli.printing import counted, print_json, print_note, working
 from armload.errors import UsageError
 
 if TYPE_CHECKING:
@@ -116,10 +116,8 @@ def run(options: argparse.Namespace) -> None:
     if options.json:
         print_json(about | {"out": options.out, "profiles": learned})
         return
-    print(
-        f"{found.logs} logs ({found.anew} answered anew): {len(found.rows)} rows, {found.unusable} of them of logs "
-        "that cannot be answered"
-    )
+    logs, rows = counted(found.logs, "log"), counted(len(found.rows), "row")
+    print(f"{logs} ({found.anew} answered anew): {rows}, {found.unusable} of them of logs that cannot be answered")
     for arm, outcome in learned.items():
         print(f"profile of {arm}: {outcome}")
     print(f"wrote {options.out}; look at it with: armload survey report {options.out} --out report.html")

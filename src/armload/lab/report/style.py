@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -59,7 +60,9 @@ def look() -> Iterator[None]:
     """The style sheet, for the time of drawing and of saving; nothing global remains."""
     import matplotlib as mpl
 
-    with mpl.rc_context(_LOOK):
+    with mpl.rc_context(_LOOK), warnings.catch_warnings():
+        # a name in a script that the one font lacks is drawn as boxes: whoever reads can do nothing about it
+        warnings.filterwarnings("ignore", message=r"Glyph .* missing from")
         yield
 
 
