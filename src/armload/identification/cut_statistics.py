@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from armload.arms import Arm
 from armload.identification.added_mass import MASS_MAY_CHANGE, of_mass
 from armload.identification.cut_scan import Unchanged, log_evidence, of_the_log
-from armload.identification.thresholds import DRIFT_SAID, DRIFTS, LOSS_DIFFERS, PAYLOAD_MAY_CHANGE
+from armload.identification.thresholds import DRIFT_SAID, LOSS_DIFFERS, PAYLOAD_MAY_CHANGE, TORQUE_DRIFT
 from armload.posterior import SmoothPosteriorLeastSquares
 from armload.posterior.drift import TESTED
 from armload.posterior.scales import Scales
@@ -77,7 +77,7 @@ class Likeliest(NamedTuple):
     left: float
 
 
-class Drifts(NamedTuple):
+class TorqueDrift(NamedTuple):
     """Whether the torques drift within a log.
 
     odds: log odds of a drift against an arm that stays as it is, both as likely beforehand. change: the same of another
@@ -183,7 +183,7 @@ class Cuts:
         solution = solve([*self.rough.known, *parts], self.weak, None, self.noise, _ITERATIONS, self.rough.start)
         return of_the_log(solution.scales, (parts[0].blocks.duration, parts[1].blocks.duration))
 
-    def drift(self, start: int, stop: int, cut: int) -> Drifts:
+    def drift(self, start: int, stop: int, cut: int) -> TorqueDrift:
         """Of torques that drift between two rows, where the payload would change at a cut."""
         cuts = np.unique([*np.linspace(start, stop, _STEPS + 1)[1:-1].astype(int), cut])
         stretches, at = self._stretches(start, stop, cuts), int(np.searchsorted(cuts, cut)) + 1
@@ -193,16 +193,16 @@ class Cuts:
         Λ, h = (x / self.kappa for x in log.cut_and_drift(at, (middle - t[0]) / (t[-1] - t[0]) - 0.5))
         effort = self.physics.stream.correction.effort
         body, drift = np.zeros((len(h), 10)), np.zeros((len(h), len(effort)))
-        body[:10], drift[10:] = self.body, np.diag(DRIFTS * effort)
+        body[:10], drift[10:] = self.body, np.diag(TORQUE_DRIFT * effort)
 
         def of_a_body(beside: NDArray[np.float64]) -> float:
             sizes = [log_evidence((Λ, h), np.hstack([size * body, beside])) for size in BODY_SIZES]
             return float(np.logaddexp.reduce(sizes) - np.log(len(sizes)))
 
-        mean = np.linalg.solve(Λ[10:, 10:] + np.diag((DRIFTS * effort) ** -2.0), h[10:])
+        mean = np.linalg.solve(Λ[10:, 10:] + np.diag((TORQUE_DRIFT * effort) ** -2.0), h[10:])
         joint = int(np.argmax(np.abs(mean) / effort))
         odds, change, both = log_evidence((Λ, h), drift), of_a_body(drift[:, :0]), of_a_body(drift)
-        return Drifts(odds, change, both, joint + 1, float(mean[joint]))
+        return TorqueDrift(odds, change, both, joint + 1, float(mean[joint]))
 
     def _stretches(self, start: int, stop: int, cuts: np.ndarray) -> list[RegressionData]:
         stretches = [self._data(slice(a, b)) for a, b in pairwise([start, *cuts.tolist(), stop])]

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
-from armload.identification.cut_statistics import Cuts, Drifts, Statistics
+from armload.identification.cut_statistics import Cuts, Statistics, TorqueDrift
 from armload.identification.standing_changes import changes_at_rest
 from armload.identification.thresholds import (
     CUT_FARTHER,
@@ -54,7 +54,7 @@ class Changes(NamedTuple):
     statistic: float
     of_mass: float = 0.0
     left: float = 0.0
-    drift: Drifts | None = None
+    drift: TorqueDrift | None = None
 
     @property
     def doubt(self) -> float:
@@ -102,7 +102,7 @@ def _rubs(recording: Recording, times: list[float], arm: Arm) -> bool:
     return physics.posterior.gears
 
 
-def _surest(parts: Iterable[Changes]) -> Drifts | None:
+def _surest(parts: Iterable[Changes]) -> TorqueDrift | None:
     """The surest drift of some parts of a log."""
     return max((part.drift for part in parts if part.drift), key=lambda drift: drift.odds, default=None)
 

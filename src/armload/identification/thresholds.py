@@ -76,9 +76,9 @@ PAYLOAD_MAY_CHANGE = 23.209251158954356
 # (`benchmarks/changed_logs.py`)
 LOSS_DIFFERS = 0.03
 # [effort limits] by how much the torques may drift from a log's start to its end, 1 sigma: 1.7 N·m of a Panda's large
-# joints, a cell that warms up or a sensor that fails. A stated prior
-# (test_torques_that_drift_are_no_change_of_payload)
-DRIFTS = 0.02
+# joints, a cell that warms up or a sensor that fails; twice `DRIFT_SIZE` of a stream, whose drift is a sound arm's. A
+# stated prior (test_torques_that_drift_are_no_change_of_payload)
+TORQUE_DRIFT = 0.02
 # log odds from which a drift is said that no change of payload would explain as well: one log in a thousand drifts, a
 # stated prior (sound logs: `benchmarks/wrong_logs.py`). And from which another payload beside a drift is a change: one
 # drifting log in a thousand has both (test_a_change_that_no_drift_alone_explains_is_found)
