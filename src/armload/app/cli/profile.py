@@ -31,6 +31,9 @@ same in all of them. With --mass, the log is of a known weight, which tells how 
 Use it with: armload identify LOG --profile arm.profile
 """
 
+# T of a session per joint up to which it is like the others: offset and two friction terms have a mean of 1 each
+_USUAL = 3
+
 
 def parser() -> Parser:
     """The arguments of `armload profile`."""
@@ -207,7 +210,7 @@ def _print(profile: Profile) -> None:
         rows.add_row(name, time, offsets, f"{session.statistic:.0f}", f"{max(session.noise):.1f}")
     console().print(rows)
     print_note(
-        f"misfit is T of how the session's offsets and friction differ from the others': about {3 * n} or less, above "
+        f"misfit is T of how the session's offsets and friction differ from the others': about {_USUAL * n} or less, above "
         f"{CHANGED:.0f} it is another arm's; noise is over what is expected, the largest joint's"
     )
     for line in _next(profile):
@@ -231,7 +234,7 @@ def _next(profile: Profile) -> tuple[str, ...]:
         else f"{_name(session)} fits less well than an arm's own logs do (misfit {session.statistic:.0f}): was it made "
         "by this arm?"
         for session in profile.sessions
-        if session.statistic > 3 * profile.n
+        if session.statistic > _USUAL * profile.n
     ]
     common = common_gain(profile)
     if common is not None:
