@@ -210,8 +210,8 @@ def _print(profile: Profile) -> None:
         rows.add_row(name, time, offsets, f"{session.statistic:.0f}", f"{max(session.noise):.1f}")
     console().print(rows)
     print_note(
-        f"misfit is T of how the session's offsets and friction differ from the others': about {_USUAL * n} or less, above "
-        f"{CHANGED:.0f} it is another arm's; noise is over what is expected, the largest joint's"
+        f"misfit is T of how the session's offsets and friction differ from the others': about {_USUAL * n} or less, "
+        f"above {CHANGED:.0f} it is another arm's; noise is over what is expected, the largest joint's"
     )
     for line in _next(profile):
         print_note(line)
