@@ -56,7 +56,7 @@ def choose(
     """
     choice = _chosen(arm, tare, default_for(arm) if method is None else str(method), live, profile)
     if live and isinstance(choice.identifier, PosteriorLeastSquares):
-        choice.identifier.read_once = True
+        choice.identifier.live = True
     return choice
 
 

@@ -55,21 +55,22 @@ class Accumulation:
         self.run, self._waiting = empty, []
 
     def take(
-        self, row: Row, count: int, covariance: NDArray, solve: Callable[[RegressionData], Solution]
+        self, rows: list[Row], as_one: Row, count: int, covariance: NDArray, solve: Callable[[RegressionData], Solution]
     ) -> Result | None:
-        """Take the next row; at fixed numbers of rows some are handed over, a solution is begun, or a result counts.
+        """Take the next rows; at fixed numbers of rows some are handed over, a solution is begun, or a result counts.
 
         Args:
-            count: rows of the run, this one among them. covariance: of the posterior (10, 10), to compare with.
+            as_one: what the rows say together (`pooled`). count: rows of the run, these among them.
+            covariance: of the posterior (10, 10), to compare with.
             solve: makes a solution of a run, on the second thread.
 
         Returns:
             The result that counts from this row on; None: there is none.
         """
         work, result = self._handover, None
-        self._waiting.append(row)
-        work.follow(row)
-        due = count in _REFITS or count % _REFIT_EVERY == 0
+        self._waiting += rows
+        work.follow(as_one)
+        due = any(k in _REFITS or k % _REFIT_EVERY == 0 for k in range(count - len(rows) + 1, count + 1))
         if work.pending:
             if count < work.adopt_at and not due:
                 return None
@@ -77,12 +78,16 @@ class Accumulation:
             if result[0] is not None:
                 return result
         if due or len(self._waiting) >= self._chunk + _LATE:
-            rows, self._waiting = self._waiting[:-_LATE], self._waiting[-_LATE:]
+            early, self._waiting = self._waiting[:-_LATE], self._waiting[-_LATE:]
             if due:
-                work.begin_solution(count, self._solved, rows, self._waiting.copy(), covariance, solve)
+                work.begin_solution(count, self._solved, early, self._waiting.copy(), covariance, solve)
             else:
-                work.begin(count, self._handed_over, rows, covariance)
+                work.begin(count, self._handed_over, early, covariance)
         return result
+
+    def add_late(self, row: Row) -> None:
+        """Take a row for which nothing is begun; it can be taken back."""
+        self._waiting.append(row)
 
     def take_many(self, rows: Rows) -> None:
         """Take many rows at once, which are not taken back."""

@@ -65,7 +65,9 @@ class PosteriorLeastSquares(Identifier):
     _smooth = False  # whether the arm's smooth mismatch is an unknown, too
     _same_motion: SameMotion | None = None
     test_tare = True  # whether an answer tests that arm and gravity are as stated; episodes of a training do not
-    read_once = False  # whether it follows a stream, of which nobody reads what looks wrong once more
+    # whether it follows a stream: nobody reads what looks wrong once more, and no row is taken alone of which no answer
+    # is asked for
+    live = False
     publish = PUBLISH  # [s] between two live answers; a service that speaks ten times a second asks for fewer
     louder = 1.0  # how large the noise is seen to be, in units of what the scales say; whoever watches the rows tells
     known: Known | None = None  # of the payload, apart from the log
@@ -210,9 +212,10 @@ class PosteriorLeastSquares(Identifier):
                 tares, start = (*earlier.tares, earlier.finish()), earlier.posterior.scales
             asks, given = self.test_tare, len(self._tares)
             solver = CheckedSolver(
-                solution_prior_std(self.arm), self.prior, self._noise, self.session, asks, given, self.read_once
+                solution_prior_std(self.arm), self.prior, self._noise, self.session, asks, given, self.live
             )
-            about = (self.gain, self._iterations, self._same_motion)
+            together = PUBLISH if self.live else 0.0
+            about = (self.gain, self._iterations, self._same_motion, together)
             self._stream = StreamingPosterior(self._correction, self.features, solver, tares, start, *about)
         return self._stream
 

@@ -21,10 +21,12 @@ from armload.posterior.scales import AnotherArm, Drift, Posterior, Scales, Tilt
 from armload.posterior.sequential import SequentialPosterior
 from armload.posterior.solve import Solution
 from armload.posterior.under_prior import under_prior
+from armload.recording import GAP
 from armload.regression import Correction, JointFeatures
 from armload.regression.information import RegressionData
 from armload.regression.lag import GAIN
 from armload.regression.noise import MOMENT, share_of_noise, whole_noise
+from armload.regression.pooling import Pooling, pooled
 from armload.regression.rows import REGRESSOR_RATE, FilteredRegression, Row
 
 
@@ -37,6 +39,7 @@ class StreamingPosterior:
         tares: what earlier runs said, all with the same mounted; `start`: the scales found from them.
         gain: λ of the lag [1/s]. iterations: of expectation–maximisation in the last solution.
         same_motion: asks whether the tare shows the run's motion; None: not tested.
+        together: rows that come within so long [s] count once they are complete, as one.
 
     Attributes:
         posterior: the last full solution; its scales, ratios and torque side hold until the next.
@@ -46,7 +49,7 @@ class StreamingPosterior:
         without_tare: whether the last solution does without what the tare says of the arm.
         tilt: by how much gravity is turned from what was given; None: not asked yet.
         restlessness: how restless the torques are in the run, of what they were at the tare; 0 where that is not known.
-        solutions: full solutions so far. rows: how many. row: the last one; seconds: what all rows stand for [s].
+        solutions: full solutions so far. rows: how many. row: the last that counted. seconds: what all stand for [s].
     """
 
     def __init__(
@@ -59,6 +62,7 @@ class StreamingPosterior:
         gain: float = GAIN,
         iterations: int = 5,
         same_motion: SameMotion | None = None,
+        together: float = 0.0,
     ) -> None:
         self.correction, self.features, self.noise = correction, features, solver.noise
         self._solver, self._iterations = solver, iterations
@@ -70,12 +74,15 @@ class StreamingPosterior:
         self._whole = whole_noise(correction, self.noise)
         self._base: SequentialPosterior | None = None
         self._accumulation = Accumulation(self._empty(), same_motion)
+        self._pooling, self._looked = Pooling(together), Pooling(together)
         self.reset()
 
     def reset(self) -> None:
         """Forget the run (not the tare); the next sample is the first."""
         self._accumulation.reset(self._empty())
         self._regression.reset()
+        self._pooling.reset()
+        self._looked.reset()
         self._state: SequentialPosterior | None = None  # made when the first row asks for it
         self._early: list[Row] | None = []
         self._early_is_old = True
@@ -109,14 +116,16 @@ class StreamingPosterior:
         return RegressionData(self.correction, self.gain, self.features, self.noise.block, self._solver.session)
 
     def take(self, t: float, q: NDArray, dq: NDArray, tau: NDArray) -> bool:
-        """Take one sample (n,); times rise. True if it completed a row, that is, if there is something new."""
+        """Take one sample (n,); times rise. True if it completed rows that count now, that is, if something is new."""
         self.prepare()
         row = self._regression.row(t, q, dq, tau)
-        if row is None:
+        if row is not None and row.t - self._pooling.last > GAP:  # what waits is of the time before the pause
+            self._take_waiting()
+        if row is None or not (rows := self._pooling.take(row)):
             return False
-        self.rows += 1
+        self.rows += len(rows)
+        self.row = row = pooled(rows)
         self.seconds += row.h
-        self.row = row
         if self._early is not None:
             self._early.append(row)
             self._early_is_old = True
@@ -126,7 +135,7 @@ class StreamingPosterior:
         else:
             assert self._state is not None
             self._state.take(row)
-        result = self._accumulation.take(row, self.rows, self.posterior.covariance, self._step)
+        result = self._accumulation.take(rows, row, self.rows, self.posterior.covariance, self._step)
         if result is not None:
             solution, self.difference = result
             if solution is not None:
@@ -136,6 +145,7 @@ class StreamingPosterior:
     def take_many(self, t: NDArray, q: NDArray, dq: NDArray, tau: NDArray) -> None:
         """Take samples (N,), (N, n) of a log: their rows are accumulated, and count once the stream is concluded."""
         rows = self._regression.rows(t, q, dq, tau)
+        self._take_waiting()
         if len(rows.t):
             self._accumulation.take_many(rows)
             self.rows += len(rows.t)
@@ -147,8 +157,14 @@ class StreamingPosterior:
         return FilteredRegression(arm, self.gain, self.correction, self.features, REGRESSOR_RATE, settling)
 
     def look(self, t: float, q: NDArray, dq: NDArray, tau: NDArray) -> Row | None:
-        """Pass a sample over: the row it completes, if it does, counts for nothing here."""
-        return self._regression.row(t, q, dq, tau)
+        """Pass a sample over: the rows it completes, if it does, as one; they count for nothing here."""
+        row = self._regression.row(t, q, dq, tau)
+        if row is None:
+            return None
+        if row.t - self._looked.last > GAP:  # none has been looked at for long: what waits is of another time
+            self._looked.reset()
+        rows = self._looked.take(row)
+        return pooled(rows) if rows else None
 
     @property
     def state(self) -> SequentialPosterior | None:
@@ -201,6 +217,7 @@ class StreamingPosterior:
 
     def conclude(self) -> None:
         """A last solution from all rows so far, as no more will come; it begins with the scales found from the tare."""
+        self._take_waiting()
         runs = [*self.tares, self._accumulation.conclude()]
         self.drift = self.another = None
         self._adopt(self._solver.conclude(runs, self.start, self._iterations))
@@ -225,6 +242,13 @@ class StreamingPosterior:
             assert self._base is not None
             self._state = self._base.copy()
 
+    def _take_waiting(self) -> None:
+        """Accumulate rows that wait for others, as none will come soon: the next solution knows them."""
+        for row in self._pooling.release():
+            self.rows += 1
+            self.seconds += row.h
+            self._accumulation.add_late(row)
+
     def hold(self) -> None:
         """Wait for what the second thread does; nothing is done from then on, until the next rows."""
         self._accumulation.hold()
@@ -235,6 +259,7 @@ class StreamingPosterior:
         Args:
             until: rows from this time on [s], as far as they are still to be had, never were.
         """
+        self._take_waiting()
         taken_back = self._accumulation.finish(until)
         if taken_back:
             self.rows -= len(taken_back)
