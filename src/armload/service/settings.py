@@ -26,6 +26,10 @@ if TYPE_CHECKING:
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 _PATHS = ("tare", "profile", "tool", "save", "record", "mounted")
+TOOL_OR_TARE = (  # but for a tare that is taken on the stream itself
+    "whether the tool was mounted at the tare, or in the profile's logs, cannot be found out on a stream: give the "
+    "tool, or the tare or profile"
+)
 _RANGES = {  # what numbers may be: in words, and between which two
     "every": ("a time above 0 s", 0.0, math.inf),
     "rating": ("a mass above 0 kg", 0.0, math.inf),
@@ -69,10 +73,7 @@ class ArmSettings(ArmOptions):
         if self.tare_age is not None and not 0.0 <= self.tare_age < math.inf:
             raise UsageError(f"{self.name}: tare_age is {self.tare_age:g} s: expected a time of 0 or more")
         if self.tool is not None and (self.tare is not None or self.profile is not None):
-            raise UsageError(
-                f"{self.name}: whether the tool was mounted at the tare, or in the profile's logs, cannot be found out "
-                "on a stream: give the tool, or the tare or profile"
-            )
+            raise UsageError(f"{self.name}: {TOOL_OR_TARE}")
         if self.record is not None and Path(self.record).suffix.lower() not in RECORDS:
             raise UsageError(f"{self.name}: record is {self.record}: expected a name that ends in .csv or .mcap")
         if self.steady and self.profile is not None:
