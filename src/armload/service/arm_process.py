@@ -46,11 +46,13 @@ class ArmProcess:
     """The run of one process.
 
     Args:
-        settings: of the arm. every: [s] between two lines. readers: that were started ahead.
+        settings: of the arm. every: [s] between two lines of the service, which leaves out some above `TICK`.
+        readers: that were started ahead.
     """
 
     def __init__(self, settings: ArmSettings, every: float, readers: Sequence[Reader] = ()) -> None:
-        self.settings, self.every, self._reader = settings, every, None
+        # alarms, and whoever asks the endpoint, need to know at any moment
+        self.settings, self.every, self._reader = settings, min(every, TICK), None
         self._state = settings.state  # of the files as they are now: one written anew is not what the stream goes by
         self._told = self._saved = -float("inf")
         self._kept: float | None = None  # when the state was last saved or taken up, by the wall's clock
@@ -100,7 +102,7 @@ class ArmProcess:
         waiting = threading.Event()
 
         def speak() -> None:  # until the first sample nothing of the session comes: compiling and connecting take long
-            while not waiting.wait(self.every if self.every > TICK else TICK):
+            while not waiting.wait(TICK):
                 if session.estimate is None:
                     self._tell(session, time.monotonic())
 

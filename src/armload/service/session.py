@@ -250,8 +250,8 @@ class Session:
         """What is held now counts as nothing: the last half minute becomes the tare.
 
         Raises:
-            ArmloadError: the payload is changing, something touches the arm, too little was seen since it last changed, or
-                the method can use no tare.
+            ArmloadError: the payload is changing, something touches the arm, too little was seen since the payload last
+                changed, or the method can use no tare.
         """
         self._running()
         why = None if self.estimate is None else passing_by(self.estimate)
