@@ -118,6 +118,8 @@ class ArmProcess:
         self._told = now
         source, estimate = self.source, session.estimate
         link = source.link(before=self._continued)  # since it was saved the payload may have been exchanged
+        if source.answering:  # how long that took is in its lag
+            link = link._replace(heard=now)
         why = why_unknown(estimate, link, now, session.identifier.trouble, session.doubt)
         if estimate is None and _compiling.is_set() and source.state == "streaming":
             why = Why(Unknown.COMPILING, COMPILING)
