@@ -199,6 +199,11 @@ class ArmProcess:
         try:
             saved = saved_at(path)
             ago = time.time() - saved
+            if ago < -SESSION:
+                self.note(
+                    f"{path} was saved at a time that is still to come, nobody knows how old it is: begun anew"
+                )
+                return None
             if ago > SESSION:
                 self.note(
                     f"{path} was saved {in_words(ago)} ago, and offsets and friction change within hours: begun anew"
@@ -209,7 +214,7 @@ class ArmProcess:
             self.note(f"{error}: begun anew")
             return None
         self._kept, self._continued = saved, True
-        self.note(f"continued from {path}, saved {ago:.0f} s ago")
+        self.note(f"continued from {path}, saved {max(ago, 0.0):.0f} s ago")
         return identifier
 
     def _save(self, session: Session) -> None:
