@@ -200,9 +200,7 @@ class ArmProcess:
             saved = saved_at(path)
             ago = time.time() - saved
             if ago < -SESSION:
-                self.note(
-                    f"{path} was saved at a time that is still to come, nobody knows how old it is: begun anew"
-                )
+                self.note(f"{path} was saved at a time that is still to come, nobody knows how old it is: begun anew")
                 return None
             if ago > SESSION:
                 self.note(
