@@ -187,10 +187,12 @@ def read_settings(path: str | Path, **over: Any) -> ServiceSettings:
     tables = said.pop("arm", [])
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
         raise UsageError(f"{path}: arm is no list of tables: expected [[arm]] before each")
-    if (file := said.pop("token_file", None)) is not None:
-        said["token"] = read_token(path.parent / str(file))
+    file = said.pop("token_file", None)
     arms = tuple(_arm(table, path) for table in tables)
-    service = _checked(said, ServiceSettings, f"{path}", ("arms", "duration"))
+    # a token has a file of its own, which is checked
+    service = _checked(said, ServiceSettings, f"{path}", ("arms", "duration", "token"), ("token_file",))
+    if file is not None:
+        service["token"] = read_token(path.parent / str(file))
     return ServiceSettings(arms, **{**service, **over})
 
 
@@ -242,12 +244,14 @@ def _seconds(text: str, where: str) -> float:
         raise UsageError(f"{where}: tare_age: {error}") from None
 
 
-def _checked(said: dict[str, Any], kind: type, where: str, without: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Known keys with values of their types."""
+def _checked(
+    said: dict[str, Any], kind: type, where: str, without: tuple[str, ...] = (), also: tuple[str, ...] = ()
+) -> dict[str, Any]:
+    """Known keys with values of their types; `also` are read elsewhere."""
     fields = {f.name: str(f.type).split(" | ")[0].split("[")[0] for f in dataclasses.fields(kind)}
     for key, value in said.items():
         if key not in fields or key in without:
-            known = ", ".join(name for name in fields if name not in without)
+            known = ", ".join([*(name for name in fields if name not in without), *also])
             raise UsageError(f"{where}: unknown setting {key!r}: expected some of {known}")
         expected = _KINDS[fields[key]]
         if not isinstance(value, expected) or (isinstance(value, bool) and fields[key] != "bool"):
