@@ -615,6 +615,21 @@ def test_what_is_held_counts_as_nothing_after_a_tare(panda, analytic_log):
     session.close()
 
 
+def test_no_tare_is_taken_while_a_payload_is_handed_over(panda, analytic_log):
+    empty, loaded = (analytic_log(panda, what, duration=20.0) for what in (None, HELD))
+    share = np.clip((empty.t - 8.0) / 8.0, 0.0, 1.0)[:, np.newaxis]
+    run = Recording(empty.t, empty.q, empty.dq, empty.tau + share * (loaded.tau - empty.tau))
+    session = Session(Replay(run, panda, speed=None), panda)
+    refused = set()
+    for estimate in session.estimates():
+        if 8.0 < estimate.t < 15.9 and (estimate.settling or estimate.p_change > 0.5):
+            with pytest.raises(ArmloadError, match="the payload is changing"):
+                session.take_tare()
+            refused.add(round(estimate.t))
+    assert len(refused) > 4  # seconds
+    session.close()
+
+
 def test_recent_samples_are_the_last_ones_in_bounded_memory():
     recent = Recent(2, rows=50)
     assert recent.recording(1.0) is None

@@ -10,6 +10,7 @@ import json
 import re
 import subprocess
 import sys
+import time
 from contextlib import contextmanager
 from pathlib import Path
 from xml.etree import ElementTree
@@ -18,9 +19,12 @@ import numpy as np
 import pytest
 import yaml
 
+from armload.errors import UsageError
 from armload.inertia import InertialParameters
 from armload.motion import taie2024
 from armload.payloads import test_payload as example_payload
+from armload.recording import Sample
+from armload.service.tare import Tare
 from armload.simulation import simulate
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -138,6 +142,7 @@ def scene(request, ros, wait_until, moved_and_at_rest):
 
             order.said = said
             order.wait = lambda true: wait_until(true, 90.0, client, node, driver)
+            order.silence = driver.terminate
             order.offered = lambda: [json.loads(line) for line in offered.printed_lines()]
             yield order
 
@@ -191,6 +196,10 @@ def test_the_payload_has_covariance_probabilities_and_a_frame_at_its_centre_of_m
         assert (late["measure"], late["success"], late["status"]) == ("the time is over", False, 6)
         cancelled = order("cancel", inertia=1e-9, timeout=60.0)
         assert (cancelled["measure"], cancelled["status"]) == ("cancelled", 5)
+        order.silence()
+        time.sleep(0.5)
+        forgotten = order("measure", mass=0.1, forget=True, timeout=0.5)
+        assert (forgotten["measure"], forgotten["payload"]["known"]) == ("the time is over", False)
 
 
 @pytest.mark.full
@@ -266,6 +275,79 @@ def test_moveit_gets_an_object_attached_to_the_link_with_its_weight(scene):
         volume = 4.0 / 3.0 * np.pi * ball["dimensions"][0] ** 3
         assert volume * 1000.0 == pytest.approx(attached["weight"], rel=1e-6)
         np.testing.assert_allclose([pose["position"][k] for k in "xyz"], HELD.com, atol=0.02)
+        assert order("step", transition=4)["success"]
+        time.sleep(1.0)
+        told = order("apply")  # of a node that does not listen
+        assert (told["apply"], told["message"]) == (False, "the answer is unknown")
+        assert len(order.offered()) == 1
+
+
+@pytest.mark.full
+def test_a_controller_is_told_nothing_that_is_in_doubt(scene):
+    with scene("apply:=franka_ros2", "gravity:=[1.3,0.0,-9.7]", offers=("franka_ros2",)) as order:
+        at_rest(order)
+        told = order("apply")
+        assert not told["apply"]
+        assert told["message"].startswith("the answer is in doubt: "), told["message"]
+        assert not order.offered()
+
+
+@pytest.mark.full
+def test_two_requests_at_once_tell_a_controller_one_load(scene):
+    with scene("apply:=franka_ros2", offers=("franka_ros2",)) as order:
+        at_rest(order)
+        told = dict(order("apply_twice")["apply_twice"])
+        assert told.pop("it is being told already") is False
+        assert list(told.values()) == [True], told
+
+
+@pytest.fixture
+def package(monkeypatch):
+    """Imports a module of armload_ros that needs no ROS."""
+    monkeypatch.syspath_prepend(str(ROOT / "ros2" / "armload_ros"))
+    return lambda name: importlib.import_module(f"armload_ros.{name}")
+
+
+def test_a_ros_stream_that_was_interrupted_is_confirmed_first(package, panda, monkeypatch):
+    log, now = simulate(panda, taie2024(), HELD, rate=100.0), [1000.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    stream = package("stream").Stream(panda)
+
+    def take(k):
+        now[0] += 0.01
+        stream.update(Sample(0.01 * k, log.q[k], log.dq[k], log.tau[k]))
+
+    for k in range(300):
+        take(k)
+    assert stream.why_unknown() is None
+    now[0] += 3600.0
+    assert stream.why_unknown() == "no sample for 3600.0 s"
+    take(300)
+    assert "since the interruption" in stream.why_unknown()
+    for k in range(301, 420):
+        take(k)
+    assert stream.why_unknown() is None
+    stream.close()
+
+
+def test_a_tare_on_ros_is_of_the_samples_that_can_be_used_and_ends_whatever_the_clock_does(package, panda):
+    log = simulate(panda, taie2024(), HELD, rate=100.0)
+    taring, seconds = package("taring").Taring(panda), 0.0
+    for k, sample in enumerate(log):
+        t = sample.t - 1000.0 * (k >= 200)  # set back, as where a simulation begins anew
+        tau = np.full(7, np.nan) if k % 50 == 0 else sample.tau
+        seconds = taring.take(sample._replace(t=t, tau=tau))
+    tare = taring.recording(panda.joint_names)
+    assert seconds == tare.duration == pytest.approx(log.duration, abs=0.5)
+    assert len(tare) == len(log) - len(range(0, len(log), 50))
+
+
+def test_a_tool_on_ros_goes_with_a_tare_of_the_stream_alone(package, panda):
+    log = simulate(panda, taie2024(), rate=100.0)
+    robot, stream = panda.with_payload(HELD), package("stream").Stream
+    with pytest.raises(UsageError, match="cannot be found out on a stream"):
+        stream(robot, Tare(log))
+    stream(robot, Tare(log, taken=True)).close()
 
 
 @pytest.mark.full

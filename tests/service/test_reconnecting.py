@@ -11,11 +11,12 @@ import pytest
 from armload.devices import Detached
 from armload.online import OnlineIdentifier
 from armload.recording import write_recording
-from armload.service import Reconnecting, Session, Unknown
+from armload.service import ArmSettings, Reconnecting, Session, Unknown
+from armload.service.arm_process import ArmProcess
 from armload.service.backoff import Backoff
 from armload.service.reconnecting import STALLED
 from armload.service.transit import Transit
-from armload.service.unknown import Link, why_unknown
+from armload.service.unknown import SILENT, Link, why_unknown
 
 
 @pytest.fixture
@@ -67,6 +68,22 @@ def test_whoever_was_away_goes_on_with_the_newest_sample(source):
     assert source.lag() < 1.0
     assert after.t - before > 1.0
     assert source.lost > 100
+
+
+def test_a_source_is_not_silent_while_its_sample_is_answered(source, panda, path, monkeypatch):
+    settings = ArmSettings(name="left", source=str(path), robot="panda", method="map")
+    process, said = ArmProcess(settings, 0.1), []
+    monkeypatch.setattr(process, "_write", said.append)
+    process.source = source
+    session = Session(source, panda, method="map")
+    for estimate in itertools.islice(session.estimates(), 400):
+        if estimate.n_samples == 300:
+            time.sleep(1.0)  # as the first answers of a process take
+            session.estimate = estimate.behind(source.lag())
+            process._tell(session, time.monotonic())
+    assert time.monotonic() - source.link().heard < SILENT
+    assert [line["unknown"] for line in said] == ["behind"]
+    session.close()
 
 
 def test_what_cannot_be_opened_is_tried_again_and_ends_when_told(panda, tmp_path, path):

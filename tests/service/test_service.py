@@ -204,6 +204,27 @@ def test_two_arms_answer_over_http_and_a_kill_of_one_leaves_the_other(serve, cel
 
 
 @pytest.mark.full
+def test_lines_that_come_seldom_delay_neither_the_endpoint_nor_alarms(serve, cell):
+    running = serve(cell("heavy", port=0, every=6.0))
+    url = running.url()
+    said, end = [], time.monotonic() + 120.0
+    while not said or not said[-1]["known"]:
+        said.append(get(f"{url}/arms/heavy")[1])
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    began = time.monotonic()
+    running.until(lambda line: line.get("alarm") == "over_rating")
+    assert time.monotonic() - began < 3.0
+    while time.monotonic() - began < 7.0:
+        answer = get(f"{url}/arms/heavy")[1]
+        assert answer["known"], answer["why"]
+        assert answer["age"] < 1.0
+        time.sleep(0.2)
+    first, second = (running.until(lambda line: "age" in line)["t"] for _ in range(2))
+    assert second - first > 5.5
+
+
+@pytest.mark.full
 def test_kill_9_of_the_service_ends_all_its_processes_and_the_next_goes_on_from_their_state(serve, cell):
     path = cell("light")
     first = serve(path)

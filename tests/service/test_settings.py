@@ -65,6 +65,7 @@ def test_a_file_says_what_it_says_with_paths_from_its_own_folder(tmp_path):
         (("every = 0.5", 'every = 0.5\nhost = "0.0.0.0"'), "give it a token"),
         (("steady = true", 'steady = true\nprofile = "arm.profile"'), "leave one out"),
         (("every = 0.5", 'token_file = "short"'), "expected 16 or more"),
+        (("every = 0.5", 'token = ""'), "unknown setting 'token': .*token_file"),  # whose length nobody would look at
         (('tare = "empty.csv"', 'tare = "empty.csv"\ntool = "franka-hand"'), "give the tool, or the tare"),
         (('"3d"', "-3.0"), "expected a time of 0 or more"),
         (('"3d"', '"old"'), "tare_age: 'old' is not a time"),

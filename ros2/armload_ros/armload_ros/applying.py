@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import threading
+import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 from armload.arms import Arm
 from armload.devices.ros2 import announced
@@ -11,12 +13,18 @@ from armload.errors import ArmloadError, UsageError
 from armload.inertia import InertialParameters
 from armload.online import OnlineEstimate
 from armload.recording import Sample
-from armload.service.feedback import Feedback
+from armload.service.feedback import FRESH, Feedback
 
 from .controllers import KINDS, PlanningScene, ServiceController
 from .parameters import Parameters
 
 MOVEIT = "moveit"
+
+
+class _Answer(NamedTuple):
+    estimate: OnlineEstimate
+    known: bool
+    at: float
 
 
 class Applying:
@@ -49,7 +57,8 @@ class Applying:
             raise UsageError(f"apply is {to!r}: expected one of {', '.join((*KINDS, MOVEIT))}")
         if auto and to == MOVEIT:
             raise UsageError("apply_auto is for a robot's controller: MoveIt is told on request")
-        self._auto, self._newest = auto, None
+        self._auto, self._telling = auto, threading.Lock()
+        self._newest: _Answer | None = None
         self._scene: PlanningScene | None = None
         self._feedback: Feedback | None = None
         self._sample: Sample | None = None
@@ -61,20 +70,24 @@ class Applying:
         if auto:
             self._feedback.start()
 
-    def offer(self, estimate: OnlineEstimate, sample: Sample, known: bool) -> None:
-        """The newest answer, its sample, and whether it can be used."""
-        self._newest, self._sample = (estimate, known), sample
+    def offer(self, estimate: OnlineEstimate, sample: Sample, known: bool, doubts: tuple[str, ...] = ()) -> None:
+        """The newest answer, its sample, whether it can be used, and what speaks against it."""
+        self._newest, self._sample = _Answer(estimate, known, time.monotonic()), sample
         if self._feedback is not None:
-            self._feedback.offer(estimate, sample.q, known)
+            self._feedback.offer(estimate, sample.q, known, doubts)
 
     def tell(self) -> tuple[bool, str]:
         """Tell it now; whether it was, and what to say."""
         if self._auto:
             return False, "apply_auto is set: it is told by itself"
+        if not self._telling.acquire(blocking=False):
+            return False, "it is being told already"
         try:
             return self._tell_scene() if self._feedback is None else self._tell_controller(self._feedback)
         except ArmloadError as error:
             return False, str(error)
+        finally:
+            self._telling.release()
 
     def close(self) -> None:
         """No more calls."""
@@ -88,8 +101,9 @@ class Applying:
 
     def _tell_scene(self) -> tuple[bool, str]:
         assert self._scene is not None
-        estimate, known = self._newest or (None, False)
-        body = announced(estimate) if known and estimate is not None else None
+        answer, body = self._newest, None
+        if answer is not None and answer.known and time.monotonic() - answer.at <= FRESH:
+            body = announced(answer.estimate)
         if body is None:
             return False, "the answer is unknown"
         self._scene.put(body)

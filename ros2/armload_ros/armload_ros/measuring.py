@@ -55,6 +55,10 @@ class Measuring:
             if payload.known and not payload.settling and max(ratios) <= 1.0 and not future.done():
                 future.set_result(_REACHED)
 
+    def forget(self) -> None:
+        """The stream begins anew: what was known is of before."""
+        self._newest = Payload()
+
     def end(self, why: str) -> None:
         """No goal goes on: the node is not active any more."""
         for _, future, _ in self._goals:

@@ -12,7 +12,6 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections import deque
 from typing import Any
 
 import numpy as np
@@ -28,11 +27,10 @@ from rclpy.task import Future
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
-from armload import Recording
 from armload.arms import Arm
 from armload.devices.ros2 import announced, parameters_of
 from armload.devices.ros2.joint_states import JointStates
-from armload.errors import ArmloadError, UsageError
+from armload.errors import ArmloadError
 from armload.identification import check_usable, plausible_known, plausible_tool
 from armload.online import OnlineEstimate
 from armload.posterior import Known
@@ -46,6 +44,7 @@ from .messages import payload_message
 from .outputs import Outputs
 from .parameters import DEFAULTS, Parameters
 from .stream import Stream
+from .taring import Taring
 
 _KEPT = 1000  # messages that wait while an answer is computed: one second at 1 kHz
 _DONE, _FAILED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
@@ -67,7 +66,7 @@ class PayloadIdentifier(LifecycleNode):
         self._outputs: Outputs | None = None
         self._offered: list[Any] = []
         self._subscription: Any = None
-        self._taring: deque[Any] | None = None
+        self._taring: Taring | None = None
         self._heard, self._last = 0.0, -np.inf
         self._said, self._trouble = "", ""
 
@@ -158,8 +157,6 @@ class PayloadIdentifier(LifecycleNode):
     def _identify(self, robot: Arm, tare: Tare | None, known: Known | None = None) -> None:
         """A new stream in the place of the present one, which stays if it cannot be made."""
         given = self.parameters
-        if given.value("steady") and given.value("profile"):
-            raise UsageError("steady and profile: a profile is learned from velocities as they come; leave one out")
         method = given.value("method") or None
         stream = Stream(robot, tare, method, given.profile(), known, given.value("steady"))
         if self._stream is not None:
@@ -179,8 +176,7 @@ class PayloadIdentifier(LifecycleNode):
             return
         self._heard, self._trouble = time.monotonic(), ""
         if self._taring is not None:
-            self._taring.append(sample)
-            if sample.t - self._taring[0].t >= self.parameters.value("tare_duration"):
+            if self._taring.take(sample) >= self.parameters.value("tare_duration"):
                 self._end_tare()
             return
         estimate = self._stream.update(sample)
@@ -193,13 +189,13 @@ class PayloadIdentifier(LifecycleNode):
             self._publish(self._stream, estimate)
 
     def _publish(self, stream: Stream, estimate: OnlineEstimate) -> None:
-        known = stream.why_unknown(self._heard) is None
+        known = stream.why_unknown() is None
         body = announced(estimate) if known else None
         said = payload_message(estimate, stream.arm.name, self._states, body)
         if self._measuring is not None:
             self._measuring.take(said)
         if self._applying is not None and stream.sample is not None:
-            self._applying.offer(estimate, stream.sample, known)
+            self._applying.offer(estimate, stream.sample, known, stream.doubts)
         if self._outputs is not None:
             self._outputs.say(said, body, self.parameters.value("com_frame"))
 
@@ -209,7 +205,7 @@ class PayloadIdentifier(LifecycleNode):
             return
         if time.monotonic() - self._heard > GAP:
             stream.flush()
-        why = None if stream.estimate is None else stream.why_unknown(self._heard)
+        why = None if stream.estimate is None else stream.why_unknown()
         status = status_of(self._in_the_way(), stream.estimate, why)
         tared = "yes" if stream.tare is not None else "no"
         status.values = values_of(stream.estimate, robot=self._bare.name, tare=tared, last_service=self._said)
@@ -234,6 +230,8 @@ class PayloadIdentifier(LifecycleNode):
         assert self._stream is not None
         self._stream.reset()
         self._last, self._taring = -np.inf, None
+        if self._measuring is not None:
+            self._measuring.forget()
 
     def _reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:  # noqa: ARG002
         self.reset_stream()
@@ -242,16 +240,15 @@ class PayloadIdentifier(LifecycleNode):
     def _tare(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:  # noqa: ARG002
         if not self.active:
             return self._told(response, False, "the node is not active: activate it first")
-        self._taring = deque()
+        self._taring = Taring(self._bare)
         return self._told(response, True, f"listening for {self.parameters.value('tare_duration'):g} s")
 
     def _end_tare(self) -> None:
         assert self._taring is not None
         assert self._stream is not None
-        samples, self._taring = list(self._taring), None
-        t, q, dq, tau = map(np.array, zip(*samples, strict=True))
+        taring, self._taring = self._taring, None
         try:
-            log = Recording(t, q, dq, tau, joint_names=self._bare.joint_names)
+            log = taring.recording(self._bare.joint_names)
             check_usable(log, self._stream.arm)
             self._identify(self._stream.arm, Tare(log, taken=True), self._stream.known)
         except ArmloadError as error:
@@ -270,6 +267,7 @@ class PayloadIdentifier(LifecycleNode):
             self._identify(robot, None, None if self._stream is None else self._stream.known)
         except ArmloadError as error:
             return self._told(response, False, str(error))
+        self._taring = None  # of the tool before
         return self._told(response, True, f"{text}; the stream begins anew, without a tare")
 
     def _set_mass(self, request: SetMass.Request, response: SetMass.Response) -> SetMass.Response:

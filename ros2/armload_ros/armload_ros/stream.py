@@ -5,11 +5,14 @@ from __future__ import annotations
 import time
 
 from armload.arms import Arm
+from armload.errors import UsageError
 from armload.online import OnlineEstimate, OnlineIdentifier
 from armload.posterior import Known, Profile
 from armload.recording import Sample, Steadying, steadied
 from armload.service.plausible import Plausibility
 from armload.service.recent import Recent
+from armload.service.reconnecting import STALLED
+from armload.service.settings import TOOL_OR_TARE
 from armload.service.tare import Tare
 from armload.service.unknown import Link, why_unknown
 
@@ -20,6 +23,9 @@ class Stream:
     Args:
         arm: with its tool. tare: what answers are relative to. method, profile, known: see `OnlineIdentifier`.
         steady: whether velocities are told by the positions, too, 75 ms late (`armload.devices.Steadied`).
+
+    Raises:
+        UsageError: things that cannot be given together.
     """
 
     def __init__(
@@ -31,6 +37,10 @@ class Stream:
         known: Known | None = None,
         steady: bool = False,
     ) -> None:
+        if steady and profile is not None:
+            raise UsageError("steady and profile: a profile is learned from velocities as they come; leave one out")
+        if arm.attached is not None and (profile is not None or (tare is not None and not tare.taken)):
+            raise UsageError(TOOL_OR_TARE)
         self.arm, self.tare, self.known, self._steady = arm, tare, known, steady
         log, age = (None, 0.0) if tare is None else (tare.recording, tare.age_now)
         told = steadied(log) if steady and log is not None else log
@@ -40,9 +50,19 @@ class Stream:
         self.estimate: OnlineEstimate | None = None
         self.sample: Sample | None = None
         self._left_out = 0
+        self._link = Link("streaming", None, 1, None, None)  # to those who publish joint states
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What speaks against the answer."""
+        return self._identifier.doubts
 
     def update(self, sample: Sample) -> OnlineEstimate | None:
         """The answer after one more sample; None where the first ones are held back."""
+        now, link = time.monotonic(), self._link
+        if link.heard is not None and now - link.heard > STALLED:  # since then the payload may have been exchanged
+            link = link._replace(connections=link.connections + 1, resumed=now)
+        self._link = link._replace(heard=now)
         if self._steady:
             self._take_late(self._steadying.take(sample, (sample, time.monotonic())))
         else:
@@ -72,10 +92,10 @@ class Stream:
         self._left_out = estimate.health.bad
         self.sample, self.estimate = sample, self._plausibility.qualified(estimate)
 
-    def why_unknown(self, heard: float) -> str | None:
-        """Why the answer cannot be used, given when the last sample came [s, monotonic]; None: it can."""
-        link = Link("streaming", None, 1, None, heard)
-        why = why_unknown(self.estimate, link, time.monotonic(), self._identifier.trouble, self._plausibility.doubt)
+    def why_unknown(self) -> str | None:
+        """Why the answer cannot be used; None: it can."""
+        now, trouble, doubt = time.monotonic(), self._identifier.trouble, self._plausibility.doubt
+        why = why_unknown(self.estimate, self._link, now, trouble, doubt)
         return None if why is None else why.text
 
     def reset(self) -> None:
@@ -85,6 +105,7 @@ class Stream:
         self._plausibility.reset()
         self._steadying = Steadying(self.arm.n)
         self.estimate, self.sample, self._left_out = None, None, 0
+        self._link = self._link._replace(connections=1, resumed=None)
 
     def close(self) -> None:
         """End its threads."""

@@ -46,11 +46,13 @@ class ArmProcess:
     """The run of one process.
 
     Args:
-        settings: of the arm. every: [s] between two lines. readers: that were started ahead.
+        settings: of the arm. every: [s] between two lines of the service, which leaves out some above `TICK`.
+        readers: that were started ahead.
     """
 
     def __init__(self, settings: ArmSettings, every: float, readers: Sequence[Reader] = ()) -> None:
-        self.settings, self.every, self._reader = settings, every, None
+        # alarms, and whoever asks the endpoint, need to know at any moment
+        self.settings, self.every, self._reader = settings, min(every, TICK), None
         self._state = settings.state  # of the files as they are now: one written anew is not what the stream goes by
         self._told = self._saved = -float("inf")
         self._kept: float | None = None  # when the state was last saved or taken up, by the wall's clock
@@ -100,7 +102,7 @@ class ArmProcess:
         waiting = threading.Event()
 
         def speak() -> None:  # until the first sample nothing of the session comes: compiling and connecting take long
-            while not waiting.wait(self.every if self.every > TICK else TICK):
+            while not waiting.wait(TICK):
                 if session.estimate is None:
                     self._tell(session, time.monotonic())
 
@@ -116,6 +118,8 @@ class ArmProcess:
         self._told = now
         source, estimate = self.source, session.estimate
         link = source.link(before=self._continued)  # since it was saved the payload may have been exchanged
+        if source.answering:  # how long that took is in its lag
+            link = link._replace(heard=now)
         why = why_unknown(estimate, link, now, session.identifier.trouble, session.doubt)
         if estimate is None and _compiling.is_set() and source.state == "streaming":
             why = Why(Unknown.COMPILING, COMPILING)
@@ -195,6 +199,9 @@ class ArmProcess:
         try:
             saved = saved_at(path)
             ago = time.time() - saved
+            if ago < -SESSION:
+                self.note(f"{path} was saved at a time that is still to come, nobody knows how old it is: begun anew")
+                return None
             if ago > SESSION:
                 self.note(
                     f"{path} was saved {in_words(ago)} ago, and offsets and friction change within hours: begun anew"
@@ -205,7 +212,7 @@ class ArmProcess:
             self.note(f"{error}: begun anew")
             return None
         self._kept, self._continued = saved, True
-        self.note(f"continued from {path}, saved {ago:.0f} s ago")
+        self.note(f"continued from {path}, saved {max(ago, 0.0):.0f} s ago")
         return identifier
 
     def _save(self, session: Session) -> None:

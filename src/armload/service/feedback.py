@@ -34,7 +34,7 @@ PAUSE = 0.2  # [s] between two steps: such a joint has come to rest by then
 _ENOUGH = 0.1  # of STEP: what is left is not worth a step
 LIGHT = 0.05  # [kg] what differs by more is told, too, where it does not show in the joints of this pose
 _OLDEST = 10.0  # [s] an answer may be: an arm that has stood for longer moves first
-_FRESH = 0.5  # [s] since the answer was made
+FRESH = 0.5  # [s] since the answer was made
 _TAKEN, _LOOK = 1.0, 0.01  # [s] until what was sent is read back, between two looks
 _SAME = 1e-3  # [kg, kg·m, kg·m²] between what was sent and what is read back
 
@@ -128,7 +128,7 @@ class Feedback:
     def _waits(self) -> str | None:
         answer, under_way = self._answer, self._under_way
         self._under_way = False
-        if answer is None or not answer.known or time.monotonic() - answer.at > _FRESH:
+        if answer is None or not answer.known or time.monotonic() - answer.at > FRESH:
             return "the answer is unknown"
         if answer.estimate.age > _OLDEST:
             return "the arm has stood for long: it moves first"

@@ -35,7 +35,8 @@ class Reconnecting(Source):
     Attributes:
         state: "connecting", "streaming", "lost" or "ended". why: it was lost, one sentence; None while it streams.
         connections: how many there were. resumed: when the present one gave its first sample [s, monotonic].
-        heard: when the last sample was handed on [s, monotonic].
+        heard: since when a sample is waited for: the last was handed on, and answered [s, monotonic].
+        answering: whether the last is not answered yet, so that nobody waits for another.
     """
 
     def __init__(
@@ -53,6 +54,7 @@ class Reconnecting(Source):
         self.why: str | None = None
         self.resumed: float | None = None
         self.heard: float | None = None
+        self.answering = False
         self._opens, self._said = opens, said or (lambda _: None)
         self._source: Detached | None = None
         self._arrived: float | None = None
@@ -115,9 +117,12 @@ class Reconnecting(Source):
                         silent = time.monotonic() - (began if self.heard is None else max(began, self.heard))
                         if silent > STALLED:
                             raise SourceError(f"{self.name} has sent nothing for {STALLED:g} s")
-                    else:
-                        self._noted(sample)
+                        yield None
+                        continue
+                    self._noted(sample)
+                    self.answering = True
                     yield sample
+                    self.answering, self.heard = False, time.monotonic()
             except (ArmloadError, OSError) as error:
                 stopped = str(error).removesuffix(": open the source again")  # that is done here
             if self._gone.is_set():

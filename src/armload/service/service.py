@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import subprocess
 import threading
 import time
@@ -51,6 +52,7 @@ class Service:
         self.processes: dict[str, subprocess.Popen[bytes]] = {}
         self._alarms = {a.name: Alarms(a.name, _rating(a), a.com_range) for a in settings.arms}
         self._answers = {a.name: _starting(a) for a in settings.arms}
+        self._lines = dict.fromkeys(self.names, -math.inf)  # when the last line of each was of [s, monotonic]
         self._heard = dict.fromkeys(self.names, time.monotonic())
         self._restarts = dict.fromkeys(self.names, 0)
         self._ended: set[str] = set()
@@ -189,12 +191,16 @@ class Service:
     def _take(self, name: str, said: dict[str, Any]) -> None:
         with self._state:
             self._answers[name] = said
-            self._tell(name)
+            self._tell(name, said["told"])
 
-    def _tell(self, name: str) -> None:
+    def _tell(self, name: str, of: float) -> None:
+        """Look for alarms, and pass on the answer, as it is `of` [s, monotonic], if a line is due; the last one is."""
         answer = self.answer(name)
         for alarm in self._alarms[name].look(answer, time.monotonic()):
             self._alarm(alarm)
+        if answer.get("connection") != "ended" and of - self._lines[name] < 0.999 * self.settings.every:
+            return
+        self._lines[name] = of
         for listener in self._listeners:
             listener(answer)
 
@@ -220,9 +226,9 @@ class Service:
         for name in self.names:
             with self._state:
                 silent = time.monotonic() - self._heard[name]
-                if silent < 2.0 * max(_LOOK, self.settings.every) or name in self._ended:
+                if silent < 2.0 * _LOOK or name in self._ended:
                     continue
-                self._tell(name)
+                self._tell(name, time.monotonic())
                 first = self._answers[name].get("t") is None
             process = self.processes.get(name)
             if silent > (HUNG_COMPILING if first else HUNG) and process is not None:

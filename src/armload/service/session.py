@@ -28,6 +28,7 @@ from armload.service.plausible import Plausibility
 from armload.service.recent import Recent
 from armload.service.session_log import SessionLog
 from armload.service.tare import Tare
+from armload.service.unknown import passing_by
 
 _KEPT = 0.1  # [s] between two estimates of a record: as often as lines come
 TICK = 0.1  # [s] between two looks at a silent source: as often as lines come
@@ -249,9 +250,13 @@ class Session:
         """What is held now counts as nothing: the last half minute becomes the tare.
 
         Raises:
-            ArmloadError: too little was seen since the payload last changed, or the method can use no tare.
+            ArmloadError: the payload is changing, something touches the arm, too little was seen since the payload last
+                changed, or the method can use no tare.
         """
         self._running()
+        why = None if self.estimate is None else passing_by(self.estimate)
+        if why is not None:
+            raise IdentificationError(f"{why.text}, and a tare is of what stays as it is; wait and try again")
         log = self._recent.recording(_TARE_LONGEST)
         seen = 0.0 if log is None else log.duration
         if log is None or seen < _TARE_SHORTEST:

@@ -26,6 +26,10 @@ if TYPE_CHECKING:
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 _PATHS = ("tare", "profile", "tool", "save", "record", "mounted")
+TOOL_OR_TARE = (  # but for a tare that is taken on the stream itself
+    "whether the tool was mounted at the tare, or in the profile's logs, cannot be found out on a stream: give the "
+    "tool, or the tare or profile"
+)
 _RANGES = {  # what numbers may be: in words, and between which two
     "every": ("a time above 0 s", 0.0, math.inf),
     "rating": ("a mass above 0 kg", 0.0, math.inf),
@@ -69,10 +73,7 @@ class ArmSettings(ArmOptions):
         if self.tare_age is not None and not 0.0 <= self.tare_age < math.inf:
             raise UsageError(f"{self.name}: tare_age is {self.tare_age:g} s: expected a time of 0 or more")
         if self.tool is not None and (self.tare is not None or self.profile is not None):
-            raise UsageError(
-                f"{self.name}: whether the tool was mounted at the tare, or in the profile's logs, cannot be found out "
-                "on a stream: give the tool, or the tare or profile"
-            )
+            raise UsageError(f"{self.name}: {TOOL_OR_TARE}")
         if self.record is not None and Path(self.record).suffix.lower() not in RECORDS:
             raise UsageError(f"{self.name}: record is {self.record}: expected a name that ends in .csv or .mcap")
         if self.steady and self.profile is not None:
@@ -186,10 +187,12 @@ def read_settings(path: str | Path, **over: Any) -> ServiceSettings:
     tables = said.pop("arm", [])
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
         raise UsageError(f"{path}: arm is no list of tables: expected [[arm]] before each")
-    if (file := said.pop("token_file", None)) is not None:
-        said["token"] = read_token(path.parent / str(file))
+    file = said.pop("token_file", None)
     arms = tuple(_arm(table, path) for table in tables)
-    service = _checked(said, ServiceSettings, f"{path}", ("arms", "duration"))
+    # a token has a file of its own, which is checked
+    service = _checked(said, ServiceSettings, f"{path}", ("arms", "duration", "token"), ("token_file",))
+    if file is not None:
+        service["token"] = read_token(path.parent / str(file))
     return ServiceSettings(arms, **{**service, **over})
 
 
@@ -241,12 +244,14 @@ def _seconds(text: str, where: str) -> float:
         raise UsageError(f"{where}: tare_age: {error}") from None
 
 
-def _checked(said: dict[str, Any], kind: type, where: str, without: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Known keys with values of their types."""
+def _checked(
+    said: dict[str, Any], kind: type, where: str, without: tuple[str, ...] = (), also: tuple[str, ...] = ()
+) -> dict[str, Any]:
+    """Known keys with values of their types; `also` are read elsewhere."""
     fields = {f.name: str(f.type).split(" | ")[0].split("[")[0] for f in dataclasses.fields(kind)}
     for key, value in said.items():
         if key not in fields or key in without:
-            known = ", ".join(name for name in fields if name not in without)
+            known = ", ".join([*(name for name in fields if name not in without), *also])
             raise UsageError(f"{where}: unknown setting {key!r}: expected some of {known}")
         expected = _KINDS[fields[key]]
         if not isinstance(value, expected) or (isinstance(value, bool) and fields[key] != "bool"):

@@ -78,10 +78,17 @@ def why_unknown(
             return Why(
                 Unknown.UNCONFIRMED, "since the interruption too little has been seen to tell whether it holds the same"
             )
+    if (passing := passing_by(estimate)) is not None:
+        return passing
+    if not estimate.determined[0]:
+        return Why(Unknown.UNDETERMINED, "the samples do not determine the mass yet")
+    return None
+
+
+def passing_by(estimate: OnlineEstimate) -> Why | None:
+    """What goes on at present, so that the newest samples are not of one payload alone; None: nothing does."""
     if estimate.settling or (estimate.p_change or 0.0) > _EVEN:
         return Why(Unknown.CHANGING, "the payload is changing")
     if (estimate.p_contact or 0.0) > _EVEN:
         return Why(Unknown.CONTACT, "something touches the arm")
-    if not estimate.determined[0]:
-        return Why(Unknown.UNDETERMINED, "the samples do not determine the mass yet")
     return None

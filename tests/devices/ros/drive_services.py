@@ -2,8 +2,9 @@
 
     drive_services.py NODE
 
-{"apply": {}}, {"set_mass": {"mass": …, "std": …}}, {"set_tool": {"m": …, "z": …, "i": …}}, {"measure": {"mass": …}},
-{"cancel": {…}}: a measurement that is cancelled after its first feedback. Every answer and frame is printed, too.
+{"apply": {}}, {"apply_twice": {}} at once, {"set_mass": {"mass": …, "std": …}}, {"set_tool": {"m": …, "z": …, "i": …}},
+{"measure": {"mass": …}}, {"cancel": {…}}: a measurement that is cancelled after its first feedback,
+{"step": {"transition": …}}. Every answer and frame is printed, too.
 """
 
 import json
@@ -108,6 +109,14 @@ for line in sys.stdin:
     ((what, given),) = json.loads(line).items()
     if what in ("measure", "cancel"):
         measure(given, what == "cancel")
+        continue
+    if what == "step":
+        step(given["transition"])
+        continue
+    if what == "apply_twice":
+        client = node.create_client(Trigger, f"{name}/apply")
+        both = [client.call_async(Trigger.Request()) for _ in range(2)]
+        say(apply_twice=[(said.message, said.success) for said in map(wait, both)])
         continue
     if what == "apply":
         said = call(Trigger, "apply", Trigger.Request())
