@@ -208,6 +208,15 @@ class Arm:
         offset = self._frame_placement.actInv(self._model.frames[index].placement)
         return parameters.moved(offset.rotation, offset.translation, self.frame)
 
+    def as_payload(self, parameters: InertialParameters) -> InertialParameters:
+        """The same body about the payload frame; a frame that the arm does not know is understood as that one.
+
+        Raises:
+            ArmError: joints lie between the two.
+        """
+        known = parameters.frame in self.frames
+        return self.in_frame(parameters if known else InertialParameters(parameters.phi))
+
     # ------------------------------------------------------------------ rigid-body dynamics
 
     def torque(self, q: ArrayLike, dq: ArrayLike | None = None, ddq: ArrayLike | None = None) -> NDArray[np.float64]:

@@ -176,10 +176,7 @@ def payload_parameters(payload: Any, arm: Arm) -> InertialParameters | None:
         return None
     if not isinstance(parameters, InertialParameters):
         raise PayloadError(f"the payload is a {type(payload).__name__}: expected InertialParameters or a Payload")
-    if not np.any(parameters.phi):
-        return None
-    # a frame that the arm does not know is understood as its payload frame, whatever it is called
-    return arm.in_frame(parameters) if parameters.frame in arm.frames else InertialParameters(parameters.phi)
+    return arm.as_payload(parameters) if np.any(parameters.phi) else None
 
 
 def _samples(arm: Arm, run: Run, rate: float, duration: float | None) -> int:
