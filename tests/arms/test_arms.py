@@ -356,6 +356,28 @@ def test_attached_payloads_add_up(panda):
     )
 
 
+def test_what_is_attached_stays_where_it_is_whatever_frame_it_or_the_arm_is_given_about(panda):
+    states, at_7 = random_states(7, 3), InertialParameters(PAYLOAD.phi, "panda_link7")
+    expected = panda.with_payload(panda.in_frame(at_7)).torque(*states)
+    assert not np.allclose(panda.with_payload(PAYLOAD).torque(*states), expected, atol=0.1)
+    about_7 = replace(panda, frame="panda_link7").with_payload(at_7)
+    for loaded in (
+        panda.with_payload(at_7),
+        replace(panda, attached=at_7),
+        about_7,
+        replace(about_7, frame="panda_link8"),
+        panda.with_payload(-PAYLOAD).with_payload(at_7).with_payload(PAYLOAD),
+    ):
+        np.testing.assert_allclose(loaded.torque(*states), expected, atol=1e-10)
+    np.testing.assert_array_equal(
+        panda.with_payload(InertialParameters(PAYLOAD.phi, "flange")).link_parameters,
+        panda.with_payload(PAYLOAD).link_parameters,
+    )
+    for attach in (panda.with_payload, lambda payload: replace(panda, attached=payload)):
+        with pytest.raises(ArmError, match="joints lie between"):
+            attach(InertialParameters(PAYLOAD.phi, "panda_link4"))
+
+
 def test_attaching_nothing_changes_nothing(panda):
     states = random_states(7, 3)
     empty = panda.with_payload(InertialParameters.zero())

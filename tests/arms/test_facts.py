@@ -9,17 +9,20 @@ import pytest
 
 import armload
 from armload.app.cli.arguments import built_in_arms
-from armload.arms import ARMS, arm, facts_of, rated_effort, rated_mass
+from armload.arms import ARMS, PAYLOAD_REACH, Arm, arm, facts_of, rated_effort, rated_mass, strength
 from armload.arms.facts import description_of, read_sheet
 from armload.devices import Simulator, open_source
 from armload.devices.opening import SCHEMES
 from armload.errors import ArmError
-from armload.motion import excitation
+from armload.identification import identify
+from armload.inertia import InertialParameters
+from armload.motion import excitation, random_motion
 from armload.motion.collision import capsule_arm
 from armload.payloads import draw_payload, hand_on
 from armload.payloads.hand import HAND
 from armload.posterior.problem import assumed_gain
 from armload.regression import payload_prior_std
+from armload.simulation import simulate
 
 SHEET = """
 [arm]
@@ -108,6 +111,41 @@ def test_what_is_assumed_of_an_unrated_arm_lies_within_a_factor_of_two_of_its_ma
     held = HELD_EVERYWHERE.get(name, known.rated_payload)
     assert 0.5 < rated_mass(replace(known, rated_payload=None)) / held < 2.0
     np.testing.assert_array_equal(rated_effort(known), known.limits.effort)
+
+
+def horizontal_arm():
+    """Two links of 0.3 m that turn about the vertical, of 30 and 15 N·m."""
+    inertia = " ".join(f'{k}="{v}"' for k, v in dict(ixx=1e-3, iyy=0.01, izz=0.01, ixy=0, ixz=0, iyz=0).items())
+    inertial = f'<inertial><origin xyz="0.15 0 0"/><mass value="1.5"/><inertia {inertia}/></inertial>'
+    text = '<robot name="horizontal"><link name="base"/>'
+    for k, (parent, at) in enumerate([("base", 0.0), ("link1", 0.3)], start=1):
+        text += f"""<link name="link{k}">{inertial}</link><joint name="joint{k}" type="revolute">
+            <parent link="{parent}"/><child link="link{k}"/><origin xyz="{at} 0 0"/><axis xyz="0 0 1"/>
+            <limit lower="-2" upper="2" effort="{30 / k}" velocity="4"/></joint>"""
+    text += """<link name="tool0"/><joint name="flange" type="fixed"><parent link="link2"/><child link="tool0"/>
+        <origin xyz="0.3 0 0"/></joint></robot>"""
+    return Arm("horizontal", text)
+
+
+def test_a_horizontal_arm_is_rated_by_what_its_joints_move(monkeypatch):
+    moved = 0.5 * 9.81 * (0.3 + PAYLOAD_REACH)  # [N·m/kg] by the second joint, the weaker one in every pose
+    assert rated_mass(horizontal_arm()) == pytest.approx(0.7 * 15.0 / moved)
+    for name in ARMS:  # of an arm that holds its payload the joints' hold decides
+        monkeypatch.setattr(strength, "_MOVED", 1e-6)
+        holds = rated_mass(replace(arm(name), rated_payload=None))
+        monkeypatch.setattr(strength, "_MOVED", 0.7)
+        assert rated_mass(replace(arm(name), rated_payload=None)) == holds
+
+
+@pytest.mark.parametrize("method", ["map-gp", "wls", "ols"])
+def test_a_horizontal_arm_does_not_determine_what_its_torques_do_not_hold(method):
+    horizontal = horizontal_arm()
+    body = InertialParameters.from_com(1.3, (0.02, -0.03, 0.06), np.diag([4e-3, 3e-3, 2e-3]))
+    log = simulate(horizontal, random_motion(horizontal, seed=1), body, rate=200.0)
+    found = identify(log, horizontal, method=method)
+    assert abs(found.mass - body.mass) < 0.01
+    assert found.determined[0]
+    assert not found.determined[3:9].any()  # m·rz and the inertia about other axes than the joints'
 
 
 def test_one_payload_is_assumed_of_an_unrated_arm_by_the_prior_and_the_simulator_alike():

@@ -285,6 +285,16 @@ def test_drake_reads_the_body(form):
 # ---------------------------------------------------------------------- ROS 2
 
 
+def test_every_number_of_ros2_yaml_is_a_number_to_a_reader_of_yaml_1_1():
+    light = InertialParameters.from_com(2e-3, (1e-5, -3e-5, 0.0), np.diag([5e-6, 6e-6, 7e-6]), "tool0")
+    reader = YAML(typ="safe")
+    reader.version = (1, 1)
+    inertia = reader.load(export_load(Load(light), "ros2"))["inertia"]
+    com = inertia.pop("com")
+    assert list(com.values()) == pytest.approx(light.com)
+    assert list(inertia.values()) == pytest.approx([2e-3, 5e-6, 0.0, 0.0, 6e-6, 0.0, 7e-6])
+
+
 def test_ros2_yaml_is_an_inertia_stamped_message():
     store = get_typestore(Stores.ROS2_HUMBLE)
     read = YAML(typ="safe").load(export_load(Load(skew_body()), "ros2"))

@@ -16,7 +16,14 @@ import pytest
 
 from armload.arms import arm
 from armload.devices import Detached, Recorded, Recorder, Replay, Ring, RingReader, Simulator, open_source
-from armload.devices.order import arm_from_json, arm_to_json
+from armload.devices.order import (
+    arm_from_json,
+    arm_to_json,
+    parameters_from_json,
+    parameters_to_json,
+    payloads_from_json,
+    payloads_to_json,
+)
 from armload.errors import ArmloadError, MotionError, PayloadError, RecordingError, SourceError
 from armload.inertia import InertialParameters
 from armload.motion import EndlessMotion, FourierMotion, Motion, taie2024
@@ -796,6 +803,19 @@ def test_a_missing_client_is_an_error_that_says_how_to_install_it(monkeypatch, s
 def test_the_simulator_s_payloads_are_in_the_arm_s_frame(panda):
     elsewhere = InertialParameters(heavy_payload().parameters.phi, "somewhere")
     assert Simulator(panda, payloads=[(1.0, elsewhere)]).truth(2.0).frame == panda.frame
+
+
+def test_a_simulator_holds_a_payload_where_it_is_in_another_process_too(panda):
+    at_7 = InertialParameters(heavy_payload().parameters.phi, "panda_link7")
+    payloads = [(0.0, panda.in_frame(at_7)), (0.1, None), (0.15, at_7)]
+    again = payloads_from_json(json.loads(json.dumps(payloads_to_json(payloads))))
+    for given in (payloads, again):
+        held = Simulator(panda, payloads=given)
+        np.testing.assert_array_equal(held.truth(0.2).phi, held.truth(0.0).phi)
+    payload = parameters_from_json(json.loads(json.dumps(parameters_to_json(at_7))))
+    held = Simulator(panda)
+    held.hold(payload, 0.0)
+    np.testing.assert_array_equal(held.truth(0.1).phi, panda.in_frame(at_7).phi)
 
 
 def test_clients_and_engines_are_loaded_only_by_the_source_that_needs_them():

@@ -245,6 +245,8 @@ def test_compiled_trees_decide_as_scikit_learns():
     probes = np.concatenate([rows(2, 300)[0], on, np.nextafter(on, np.float32(np.inf)), np.nextafter(on, -on)])
     for m, tree in enumerate(trees):
         np.testing.assert_array_equal(compiled.members(probes)[m], tree.predict(probes))
+    with pytest.raises(ModelError, match=f"expected {X.shape[1]} columns"):
+        compiled.predict(X[:, 1:])
 
 
 def test_scaling_lets_small_outputs_shape_the_splits():

@@ -349,7 +349,7 @@ def test_the_stream_passes_over_what_is_not_a_number(tree, panda, log):
 
 
 def test_the_stream_refuses_a_sample_of_another_size(tree, panda):
-    with pytest.raises(ValueError, match="another number of joints"):
+    with pytest.raises(IdentificationError, match="expected 7 numbers each"):
         LearnedIdentifier(tree[1], panda).update(Sample(0.0, np.zeros(6), np.zeros(7), np.zeros(7)))
 
 

@@ -1,5 +1,6 @@
 """The stream contract: one list of checks over every identifier there is, learned or not."""
 
+import contextlib
 import dataclasses
 import pickle
 from xml.etree import ElementTree
@@ -192,6 +193,45 @@ def test_a_recording_of_another_arm_is_refused(make):
     log = Recording(t, np.zeros((20, other.n)), np.zeros((20, other.n)), np.zeros((20, other.n)))
     with pytest.raises(ArmloadError, match="6 joints"):
         make().run(log)
+
+
+@pytest.mark.parametrize("joints", [6, 8])
+def test_a_sample_of_another_arm_is_refused_and_leaves_no_trace(make, short, joints):
+    identifier, samples, other = make(), list(short)[:60], np.zeros(joints)
+    for k, sample in enumerate(samples):
+        if k in (0, 30):
+            for at in range(3):  # any one of the three is enough
+                wrong = sample._replace(**{("q", "dq", "tau")[at]: other})
+                with pytest.raises(ArmloadError, match="7 numbers"):
+                    identifier.update(wrong)
+        last = identifier.update(sample)
+    assert last.n_samples == len(samples)
+    expected = make().run(short.select(slice(len(samples))))
+    np.testing.assert_allclose(identifier.conclude().phi, expected.phi, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("number", [np.nan, np.inf])
+def test_a_number_that_is_not_finite_enters_no_answer(make, short, number):
+    identifier, samples = make(), list(short)[:60]
+    for k, sample in enumerate(samples):
+        if k in (0, 30):
+            for channel in ("q", "dq", "tau"):
+                values = getattr(sample, channel).copy()
+                values[3] = number
+                with contextlib.suppress(ArmloadError):  # an ensemble passes over it
+                    identifier.update(sample._replace(**{channel: values}))
+        identifier.update(sample)
+    expected = make().run(short.select(slice(len(samples))))
+    np.testing.assert_allclose(identifier.conclude().phi, expected.phi, rtol=0, atol=1e-9)
+
+
+def test_before_the_first_sample_an_estimate_is_what_was_known(make):
+    identifier = make()
+    first = identifier.conclude()
+    assert first.n_samples == 0
+    assert np.all(np.isfinite(first.phi))
+    identifier.reset()
+    np.testing.assert_array_equal(identifier.conclude().phi, first.phi)
 
 
 # ---------------------------------------------------------------------- what a method says of exact data

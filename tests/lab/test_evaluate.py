@@ -272,6 +272,8 @@ def test_prior_of_a_family_has_its_moments_and_is_never_singular():
     assert np.linalg.matrix_rank(np.cov(phi.T)) < 10  # the family varies in few directions only
     with pytest.raises(IdentificationError, match="singular"):
         GaussianPrior(np.zeros(10), np.cov(phi.T))
+    with pytest.raises(IdentificationError, match="not symmetric"):  # half of one, say: only a half would be read
+        GaussianPrior(np.zeros(10), np.triu(np.full((10, 10), 0.1)) + np.eye(10))
     with pytest.raises(IdentificationError, match="at least 2"):
         GaussianPrior.of(FAMILY[:1])
 

@@ -140,6 +140,13 @@ def test_a_covariance_that_is_none_is_refused():
         MixturePrior(np.ones(1), np.zeros((1, 10)), -np.eye(10)[None], ("x",))
 
 
+def test_evidence_of_another_size_is_refused():
+    prior = MixturePrior(np.ones(1), np.zeros((1, 10)), np.eye(10)[None], ("x",))
+    for size, length in ((3, 10), (10, 300)):
+        with pytest.raises(ModelError, match="10 numbers each"):
+            prior.posterior(np.eye(size), np.zeros(length))
+
+
 @pytest.mark.parametrize(("family", "heaviest"), [("boxes", 2.8), ("shapes", 2.9), ("container", 2.2)])
 def test_error_bars_hold_for_heavy_bodies_as_for_light_ones(panda, family, heaviest):
     """Fair evidence of 15 g, 3 g·m, 4 g·m²: what the prior makes of it holds in each third of the family's weights."""

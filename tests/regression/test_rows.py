@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from armload.arms import arm, full_arm_regressor, momentum_regressor, rated_effort
+from armload.errors import IdentificationError
 from armload.regression import Correction, JointFeatures
 from armload.regression.lag import first_order_lag
 from armload.regression.rows import SPACING, FilteredRegression, Rows
@@ -109,3 +110,18 @@ def test_a_pose_of_a_standing_arm_counts_no_longer_than_it_settles():
     moving = np.linspace(0.0, 1.0, 400)[:, None] * np.ones(7)
     rows = FilteredRegression(robot, GAIN, rate=200.0, settling=0.25).rows(t, moving, still, still)
     assert rows.h.sum() == pytest.approx(t[-1])
+
+
+@pytest.mark.parametrize("wrong", range(3))
+@pytest.mark.parametrize("joints", [6, 8])
+def test_samples_of_another_arm_are_refused_and_leave_no_trace(joints, wrong):
+    t, *good = samples(7, count=40)
+    bad = [x if k != wrong else np.zeros((40, joints)) for k, x in enumerate(good)]
+    regression, expected = FilteredRegression(arm("panda"), GAIN), FilteredRegression(arm("panda"), GAIN).rows(t, *good)
+    with pytest.raises(IdentificationError, match="a number for each joint of panda"):
+        regression.rows(t, *bad)
+    with pytest.raises(IdentificationError, match="a number for each joint of panda"):
+        regression.row(t[0], *(x[0] for x in bad))
+    with pytest.raises(IdentificationError, match="a number for each joint of panda"):
+        regression.rows(t[1:], *good)
+    np.testing.assert_array_equal(regression.rows(t, *good).X, expected.X)

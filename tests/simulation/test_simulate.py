@@ -25,6 +25,7 @@ from armload.simulation import (
     rollout,
     runs,
     simulate,
+    simulate_inverse,
 )
 from armload.simulation import simulate_many as many
 
@@ -328,6 +329,15 @@ def test_chunks_do_not_change_anything(panda, monkeypatch):
     apart = many(panda, wanted, rate=50.0, duration=1.0)
     for a, b in zip(together, apart, strict=True):
         np.testing.assert_array_equal(a.tau, b.tau)
+
+
+def test_a_payload_is_simulated_where_it_is_whatever_frame_it_is_given_about(panda):
+    at_7 = InertialParameters(PAYLOAD.phi, "panda_link7")
+    about_8 = panda.in_frame(at_7)
+    moved, given = (simulate(panda, taie2024(), body, rate=100.0, duration=0.5) for body in (about_8, at_7))
+    np.testing.assert_array_equal(given.tau, moved.tau)
+    moved, given = (simulate_inverse(panda, taie2024(), [(0.0, body)]) for body in (about_8, at_7))
+    np.testing.assert_array_equal(given.tau, moved.tau)
 
 
 def test_anything_with_parameters_is_a_payload(panda):

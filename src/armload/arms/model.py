@@ -41,7 +41,8 @@ class Arm:
         urdf: text of a URDF; meshes are ignored, joints off the chain to `frame` are fixed at zero.
         frame: link whose frame the payload is about; None: the last link.
         gravity: gravity in the base's axes (3,) [m/s²]; a tilted base has a tilted gravity.
-        attached: a payload that counts as part of the arm (a hand, say), about `frame`.
+        attached: a payload that counts as part of the arm (a hand, say), about `frame`; from another frame of the last
+            link that it names it is moved there.
         links: inertial parameters (n, 10) of the moving links about their joint frames, where they are to differ from
             the URDF's.
         rated_payload: the maker's rated payload [kg], if known.
@@ -93,6 +94,8 @@ class Arm:
         object.__setattr__(self, "_joint_names", chain.joint_names)
         object.__setattr__(self, "_frames", chain.frames)
         object.__setattr__(self, "_rigid", chain.rigid)
+        if self.attached is not None and self.attached.frame in set(chain.frames) - {chain.frame}:
+            object.__setattr__(self, "attached", replace(self, attached=None).in_frame(self.attached))
         _ = self._model  # fail now, not at the first sample
 
     def __getstate__(self) -> dict[str, Any]:
@@ -160,9 +163,16 @@ class Arm:
         return replace(self, gravity=tuple(turned.tolist()))
 
     def with_payload(self, payload: InertialParameters) -> Arm:
-        """The arm with a payload (about `frame`) counted as part of it; payloads add up."""
-        total = payload if self.attached is None else self.attached + payload
-        return replace(self, attached=total)
+        """The arm with a payload counted as part of it; payloads add up.
+
+        Args:
+            payload: about `frame`, or about another frame of the last link that it names.
+
+        Raises:
+            ArmError: joints lie between the frame that it names and `frame`.
+        """
+        held = self.in_frame(payload) if payload.frame in self.frames else payload
+        return replace(self, attached=held if self.attached is None else self.attached + held)
 
     def with_links(self, links: ArrayLike) -> Arm:
         """The arm with other inertial parameters (n, 10) of its moving links, before any attached payload."""
@@ -197,6 +207,15 @@ class Arm:
         index = self._model.getFrameId(there, pin.FrameType.BODY)
         offset = self._frame_placement.actInv(self._model.frames[index].placement)
         return parameters.moved(offset.rotation, offset.translation, self.frame)
+
+    def as_payload(self, parameters: InertialParameters) -> InertialParameters:
+        """The same body about the payload frame; a frame that the arm does not know is understood as that one.
+
+        Raises:
+            ArmError: joints lie between the two.
+        """
+        known = parameters.frame in self.frames
+        return self.in_frame(parameters if known else InertialParameters(parameters.phi))
 
     # ------------------------------------------------------------------ rigid-body dynamics
 

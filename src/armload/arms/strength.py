@@ -40,6 +40,9 @@ FRICTION_WIDTH = 0.06
 _POSES = 200
 _WEAKEST = 0.15  # of the strongest joint: 0.14 of the Panda's, 0.17 of a UR10e's
 _FULL = 0.7  # of what the joints could hold almost everywhere: makers leave room for dynamics
+# of gravity's, an acceleration in any direction that each joint gives a payload, too: joints of an arm in a horizontal
+# plane hold nothing. Up to 0.7 it decides of no built-in arm (test_a_horizontal_arm_is_rated_by_what_its_joints_move)
+_MOVED = 0.5
 
 
 def rated_effort(arm: Arm) -> NDArray[np.float64]:
@@ -56,7 +59,7 @@ def rated_effort(arm: Arm) -> NDArray[np.float64]:
 
 
 def rated_mass(arm: Arm) -> float:
-    """What the arm may carry [kg]: the maker's figure, or 0.7 of what its joints hold in 95 % of all poses."""
+    """What the arm may carry [kg]: the maker's figure, or 0.7 of what its joints hold and move in 95 % of all poses."""
     return arm.rated_payload if arm.rated_payload is not None else _assumed_mass(arm)
 
 
@@ -66,9 +69,12 @@ def _assumed_mass(arm: Arm) -> float:
     q = poses(arm)
     bare = arm.torque(q)
     kilogram = InertialParameters.from_com(1.0, (0.0, 0.0, PAYLOAD_REACH), 1e-3 * np.eye(3))
-    lever = np.abs(arm.with_payload(kilogram).torque(q) - bare)
+    held = np.abs(arm.with_payload(kilogram).torque(q) - bare)
+    turn, shift = np.split(arm.frame_motion(q).jacobian, 2, axis=1)
+    reach = np.linalg.norm(shift, axis=1) + PAYLOAD_REACH * np.linalg.norm(turn, axis=1)  # at most, wherever it is
+    moved = _MOVED * np.linalg.norm(arm.gravity) * reach
     room = np.maximum(rated_effort(arm) - np.abs(bare), 0.0)
-    return float(max(0.05, _FULL * np.quantile((room / np.maximum(lever, 1e-3)).min(axis=1), 0.05)))
+    return float(max(0.05, _FULL * np.quantile((room / np.maximum(held, moved)).min(axis=1), 0.05)))
 
 
 def poses(arm: Arm) -> NDArray[np.float64]:

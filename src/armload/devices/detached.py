@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
 from armload.devices.franka.source import FrankaStatus
-from armload.devices.order import arm_to_json, payloads_to_json
+from armload.devices.order import arm_to_json, parameters_to_json, payloads_to_json
 from armload.devices.reader import Reader, columns_of
 from armload.devices.ring import RingReader
 from armload.devices.source import Source
@@ -198,7 +198,7 @@ class Detached(Source):
         Raises:
             SourceError: the source is no simulator, or did not answer.
         """
-        t = float(self._call("hold", payload.phi.tolist()))
+        t = float(self._call("hold", parameters_to_json(payload)))
         if self._twin is not None:
             self._twin.hold(payload, t)
         return t

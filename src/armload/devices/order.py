@@ -16,7 +16,7 @@ def arm_to_json(arm: Arm) -> dict[str, Any]:
     """All that makes an arm, for another process."""
     facts = {field.name: getattr(arm, field.name) for field in dataclasses.fields(arm)}
     if arm.attached is not None:
-        facts["attached"] = {"phi": arm.attached.phi.tolist(), "frame": arm.attached.frame}
+        facts["attached"] = parameters_to_json(arm.attached)
     if arm.links is not None:
         facts["links"] = np.asarray(arm.links).tolist()
     return facts
@@ -26,7 +26,7 @@ def arm_from_json(facts: dict[str, Any]) -> Arm:
     """The arm again."""
     facts = dict(facts)
     if facts["attached"] is not None:
-        facts["attached"] = InertialParameters(np.array(facts["attached"]["phi"]), facts["attached"]["frame"])
+        facts["attached"] = parameters_from_json(facts["attached"])
     if facts["links"] is not None:
         facts["links"] = np.array(facts["links"])
     for name in ("gravity", "acceleration", "jerk"):
@@ -34,12 +34,22 @@ def arm_from_json(facts: dict[str, Any]) -> Arm:
     return Arm(**facts)
 
 
+def parameters_to_json(parameters: InertialParameters) -> dict[str, Any]:
+    """Ten parameters and the name of their frame."""
+    return {"phi": parameters.phi.tolist(), "frame": parameters.frame}
+
+
+def parameters_from_json(facts: dict[str, Any]) -> InertialParameters:
+    """The parameters again."""
+    return InertialParameters(np.array(facts["phi"]), facts["frame"])
+
+
 def payloads_to_json(payloads: Sequence[tuple[float, Any]]) -> list[list[Any]]:
-    """(time, payload) pairs, each payload as its ten parameters or None."""
+    """(time, payload) pairs, each payload as its ten parameters and their frame, or None."""
     held = [(t, getattr(payload, "parameters", payload)) for t, payload in payloads]
-    return [[float(t), None if parameters is None else parameters.phi.tolist()] for t, parameters in held]
+    return [[float(t), None if parameters is None else parameters_to_json(parameters)] for t, parameters in held]
 
 
 def payloads_from_json(pairs: list[list[Any]]) -> list[tuple[float, InertialParameters | None]]:
     """The pairs again."""
-    return [(t, None if phi is None else InertialParameters(np.array(phi))) for t, phi in pairs]
+    return [(t, None if facts is None else parameters_from_json(facts)) for t, facts in pairs]

@@ -31,13 +31,12 @@ from typing import Any
 import numpy as np
 
 from armload.devices.opening import open_source, prepare
-from armload.devices.order import arm_from_json, payloads_from_json
+from armload.devices.order import arm_from_json, parameters_from_json, payloads_from_json
 from armload.devices.recorder import Recorder
 from armload.devices.remote_mover import RemoteMover
 from armload.devices.ring import Ring
 from armload.devices.source import Source
 from armload.errors import ArmloadError, SourceError
-from armload.inertia import InertialParameters
 from armload.runtime.extras import missing
 
 _CALLS = ("read_once", "set_load", "hold")  # what may be asked of a source from outside
@@ -118,7 +117,7 @@ class _Reader:
                 raise SourceError(f"{source.name} has no {method}: only {_WHO[method]} has")
             given = command["arguments"]
             if method == "hold":
-                given = [InertialParameters(x) for x in given]
+                given = [parameters_from_json(x) for x in given]
             value = getattr(source, method)(*given)
             self.report(event="answer", number=command["number"], value=value)
         except ArmloadError as error:

@@ -16,6 +16,7 @@ from typing import ClassVar, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armload.errors import ModelError
 from armload.runtime.kernels import kernel
 
 _CHUNK = 2048  # rows predicted at once: bounds the memory of a wide hidden layer
@@ -124,6 +125,8 @@ class CompiledTrees(Compiled):
 
     def members(self, X: ArrayLike) -> NDArray[np.float64]:
         X = np.ascontiguousarray(X, dtype=np.float32)
+        if X.shape[1:] != (self.n_features,):  # compiled code reads as many numbers
+            raise ModelError(f"X has shape {X.shape}: expected {self.n_features} columns")
         return _walk(X, self.roots, self.feature, self.threshold, self.left, self.right, self.values)
 
 

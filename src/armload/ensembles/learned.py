@@ -60,6 +60,7 @@ class LearnedIdentifier(Identifier):
 
     def update(self, sample: Sample) -> Estimate:
         """Take one sample and return the average, or with `single` its own prediction."""
+        self._check_size(sample)
         self._follow(*sample)
         return self._last
 
@@ -92,8 +93,6 @@ class LearnedIdentifier(Identifier):
 def _fill(row, t, q, dq, tau):  # pragma: no cover - compiled
     """Write a sample into a row (1 + 3n,) of features; whether all of it is finite."""
     n = (row.shape[0] - 1) // 3
-    if not (q.shape[0] == n and dq.shape[0] == n and tau.shape[0] == n):
-        raise ValueError("the sample is of an arm with another number of joints")
     row[0] = t
     for k in range(n):
         row[1 + k], row[1 + n + k], row[1 + 2 * n + k] = q[k], dq[k], tau[k]

@@ -11,6 +11,7 @@ tare.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -135,7 +136,12 @@ class Identifier(ABC):
         """The estimate from all samples so far, the last of them at t."""
 
     def update(self, sample: Sample) -> Estimate:
-        """Take one sample (t, q, dq, tau) and return the estimate so far."""
+        """Take one sample (t, q, dq, tau) and return the estimate so far.
+
+        Raises:
+            IdentificationError: it is of another number of joints, or holds a number that is not finite.
+        """
+        self._check_sample(sample)
         self._now = float(sample.t)
         self._take(np.array([sample.t]), sample.q[None], sample.dq[None], sample.tau[None])
         return self._estimate(self._now)
@@ -183,6 +189,24 @@ class Identifier(ABC):
         if recording.n != self.arm.n:
             raise IdentificationError(
                 f"{recording.source} has {recording.n} joints: {self.arm.name} has {self.arm.n}; name the right robot"
+            )
+
+    def _check_sample(self, sample: Sample) -> None:
+        """What `update` asks of a sample, whoever overrides it."""
+        self._check_size(sample)
+        t, q, dq, tau = sample
+        if not math.isfinite(t + q @ q + dq @ dq + tau @ tau):
+            raise IdentificationError(
+                f"the sample at {t:.6g} s holds a number that is not finite: leave it out, as OnlineIdentifier does"
+            )
+
+    def _check_size(self, sample: Sample) -> None:
+        """Compiled code reads as many numbers as the arm has joints."""
+        _, q, dq, tau = sample
+        if not q.shape == dq.shape == tau.shape == (self.arm.n,):
+            raise IdentificationError(
+                f"a sample has q, dq and tau of shapes {q.shape}, {dq.shape} and {tau.shape}: expected {self.arm.n} "
+                f"numbers each, one for each joint of {self.arm.name}; name the right robot"
             )
 
 

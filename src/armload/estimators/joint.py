@@ -78,6 +78,7 @@ class JointLeastSquares(Identifier):
         """Take one sample (t, q, dq, tau) and return the estimate so far, at most `refresh` old."""
         if sample.t - self._solved_at >= self.refresh:
             return super().update(sample)
+        self._check_sample(sample)
         self._take(np.array([sample.t]), sample.q[None], sample.dq[None], sample.tau[None])
         return self._last(sample.t)
 

@@ -135,6 +135,7 @@ class PosteriorLeastSquares(Identifier):
 
     def update(self, sample: Sample) -> Estimate:
         """Take one sample (t, q, dq, tau) and return the estimate so far, at most `publish` old."""
+        self._check_sample(sample)
         stream, step = self.stream, sample.t - self._now
         self._now, slow = sample.t, step > FAST
         self._elapsed += step if step <= GAP else 0.0
@@ -256,7 +257,7 @@ class PosteriorLeastSquares(Identifier):
         stream, now = self.stream, self._elapsed if elapsed is None else elapsed
         evidence = stream if stream.difference is None else stream.difference
         earlier = 0.0 if self.reference is None else self.reference.stream.seconds
-        speed, weak = float(np.sqrt(self._squares / self._values)), self._weak
+        speed, weak = float(np.sqrt(self._squares / max(self._values, 1))), self._weak
         difference = stream.difference is not None
         tare_time = self._tare_time + earlier
         if stream.without_tare:

@@ -206,7 +206,16 @@ class MixturePrior:
         return self.posteriors(information, vector[None])[0]
 
     def posteriors(self, information: NDArray, vectors: NDArray) -> list[MixturePosterior]:
-        """phi given Λ (10, 10) and each of several h (V, 10): one factorisation serves them all."""
+        """phi given Λ (10, 10) and each of several h (V, 10): one factorisation serves them all.
+
+        Raises:
+            ModelError: arrays of other shapes.
+        """
+        if information.shape != (10, 10) or vectors.shape[1:] != (10,):  # compiled code reads as many numbers
+            raise ModelError(
+                f"the information has shape {information.shape} and its vectors {vectors.shape}: expected (10, 10) and "
+                "10 numbers each"
+            )
         tables = (*self._tables, self._scale, self._something, self.beta)
         found = mixture_posteriors(*tables, information, vectors)
         return [MixturePosterior(m, P, w, float(total), float(x)) for m, P, w, total, x in zip(*found, strict=True)]

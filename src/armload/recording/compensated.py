@@ -29,5 +29,5 @@ def with_gravity(recording: Recording, arm: Arm, payload: InertialParameters | N
         recording: of torque without gravity [N·m]. arm: with its base's orientation.
         payload: about the arm's payload frame; None: the controller was set to none.
     """
-    loaded = arm if payload is None else arm.with_payload(InertialParameters(payload.phi, arm.frame))
+    loaded = arm if payload is None else arm.with_payload(payload)
     return replace(recording, tau=recording.tau + loaded.torque(recording.q), channel="measured")

@@ -72,7 +72,7 @@ class GaussianPrior:
         source: where the knowledge comes from, for tables.
 
     Raises:
-        IdentificationError: wrong shapes, or a covariance that is not positive definite.
+        IdentificationError: wrong shapes, or a covariance that is not symmetric and positive definite.
     """
 
     mean: NDArray[np.float64]
@@ -87,7 +87,10 @@ class GaussianPrior:
             value.setflags(write=False)
             object.__setattr__(self, name, value)
         scale = np.sqrt(np.maximum(np.diag(self.covariance), np.finfo(float).tiny))
-        if np.linalg.eigvalsh(self.covariance / np.outer(scale, scale))[0] <= 1e-12:
+        unit = self.covariance / np.outer(scale, scale)
+        if not np.allclose(unit, unit.T, rtol=0.0, atol=1e-6):
+            raise IdentificationError("the prior's covariance is not symmetric: expected the same number either way")
+        if np.linalg.eigvalsh(unit)[0] <= 1e-12:
             raise IdentificationError("the prior's covariance is singular: expected one that is positive definite")
 
     @classmethod

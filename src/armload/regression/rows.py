@@ -27,6 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
 from armload.arms.momentum_row import MomentumRow
+from armload.errors import IdentificationError
 from armload.recording import JITTERED
 from armload.regression.features import JointFeatures
 from armload.regression.lag import GAIN
@@ -123,15 +124,25 @@ class FilteredRegression:
         self._clock, self._joints, self._regressor, self._pose, self._velocity = (x.copy() for x in state)
 
     def rows(self, t: ArrayLike, q: ArrayLike, dq: ArrayLike, tau: ArrayLike) -> Rows:
-        """The rows that the next N samples complete: t (N,) rising [s]; q, dq, tau (N, n) [rad, rad/s, N·m]."""
+        """The rows that the next N samples complete: t (N,) rising [s]; q, dq, tau (N, n) [rad, rad/s, N·m].
+
+        Raises:
+            IdentificationError: arrays of other shapes.
+        """
         times = np.require(np.atleast_1d(t), float, ["C", "W"])
         poses, dq, tau = (np.require(np.atleast_2d(x), float, ["C", "W"]) for x in (q, dq, tau))
+        self._check((len(times), self.arm.n), poses, dq, tau)
         index, steps, fresh, torque = lag_torques(times, tau, self._settings, self._clock, self._joints)
         times, poses = times[index], poses[index]
         return Rows(times, poses, *self._made(poses, dq[index], torque, steps, fresh))
 
     def row(self, t: float, q: NDArray, dq: NDArray, tau: NDArray) -> Row | None:
-        """The row that a sample completes, if it does; q, dq, tau (n,)."""
+        """The row that a sample completes, if it does; q, dq, tau (n,).
+
+        Raises:
+            IdentificationError: arrays of other shapes.
+        """
+        self._check((self.arm.n,), q, dq, tau)
         done = lag_torque(t, _writable(tau), self._settings, self._clock, self._joints)
         if not done:
             return None
@@ -146,6 +157,14 @@ class FilteredRegression:
         """r (M, n) [N·m] and X (M, n, size) of the rows that the next N samples complete."""
         rows = self.rows(t, q, dq, tau)
         return rows.r, rows.X
+
+    def _check(self, shape: tuple[int, ...], q: NDArray, dq: NDArray, tau: NDArray) -> None:
+        """Compiled code reads as many numbers as there should be."""
+        if not q.shape == dq.shape == tau.shape == shape:
+            raise IdentificationError(
+                f"q, dq and tau have shapes {q.shape}, {dq.shape} and {tau.shape}: expected {shape}, a number for each "
+                f"joint of {self.arm.name} at each time"
+            )
 
     def _made(self, q: NDArray, dq: NDArray, torque: NDArray, steps: NDArray, fresh: NDArray) -> tuple:
         states = (self._clock, self._joints, self._regressor, self._pose, self._velocity)

@@ -96,7 +96,7 @@ class ContinuedRun:
         Raises:
             PayloadError, ArmError: the payload cannot be simulated.
         """
-        parameters = payload_parameters(payload)
+        parameters = payload_parameters(payload, self._arm)
         state = self._state
         actual = self._actual if parameters is None else self._actual.with_payload(parameters)
         model = build_model(actual, state.gains, state.model.opt.timestep)

@@ -77,7 +77,7 @@ def simulate_inverse(
     q, dq, ddq = (x + e for x, e in zip(motion(t), _tracking_error(t, arm.n, tracking, rng), strict=True))
     body = np.empty_like(q)
     for (since, payload), (until, _) in pairwise([*held, (np.inf, None)]):
-        rows, parameters = (t >= since) & (t < until), payload_parameters(payload)
+        rows, parameters = (t >= since) & (t < until), payload_parameters(payload, arm)
         carrying = actual if parameters is None else actual.with_payload(parameters)
         body[rows] = carrying.torque(q[rows], dq[rows], ddq[rows])
     if world.rotor_inertia is not None:

@@ -31,7 +31,8 @@ class Run:
 
     Args:
         motion: the desired motion.
-        payload: about the arm's payload frame: inertial parameters, or anything with `.parameters`; None: no payload.
+        payload: inertial parameters, or anything with `.parameters`, about the arm's payload frame or another frame of
+            its last link that they name; None: no payload.
         world: the arm as it really is; None: nominal.
         sensors: None: ideal.
         seed: of the sensors' noise.
@@ -70,7 +71,8 @@ def simulate(
     Args:
         arm: the nominal arm, as the controller knows it (with whatever is attached).
         motion: with the arm's number of joints; the run starts settled at its start.
-        payload: about the arm's payload frame: inertial parameters, or anything with `.parameters`; None: no payload.
+        payload: inertial parameters, or anything with `.parameters`, about the arm's payload frame or another frame of
+            its last link that they name; None: no payload.
         world: the arm as it really is; None: nominal.
         sensors: None: ideal.
         rate: of the log [Hz]; it has round(duration·rate) samples at t = k/rate.
@@ -153,7 +155,7 @@ def _batch(arm: Arm, gains: Gains, runs: list[Run], clock: Clock, workers: int) 
 
 def prepare(actual: Arm, gains: Gains, run: Run, world: World, command: Command, clock: Clock) -> Prepared:
     """A run ready to go, with `actual` the world's arm."""
-    payload = payload_parameters(run.payload)
+    payload = payload_parameters(run.payload, actual)
     model = build_model(actual if payload is None else actual.with_payload(payload), gains, clock.step)
     if world.rotor_inertia is not None:
         model.dof_armature[:] = world.rotor_inertia
@@ -167,15 +169,14 @@ def prepare(actual: Arm, gains: Gains, run: Run, world: World, command: Command,
     return Prepared(model, world, gains, command, start, velocity, run.start)
 
 
-def payload_parameters(payload: Any) -> InertialParameters | None:
-    """The ten parameters of what can be given as a payload; None: nothing."""
+def payload_parameters(payload: Any, arm: Arm) -> InertialParameters | None:
+    """The ten parameters of what can be given as a payload, about the arm's payload frame; None: nothing."""
     parameters = getattr(payload, "parameters", payload)
     if parameters is None:
         return None
     if not isinstance(parameters, InertialParameters):
         raise PayloadError(f"the payload is a {type(payload).__name__}: expected InertialParameters or a Payload")
-    # whatever the frame is called: a payload's frame is understood as the arm's payload frame
-    return InertialParameters(parameters.phi) if np.any(parameters.phi) else None
+    return arm.as_payload(parameters) if np.any(parameters.phi) else None
 
 
 def _samples(arm: Arm, run: Run, rate: float, duration: float | None) -> int:

@@ -92,7 +92,7 @@ def torque_controlled(
     if q.shape != (arm.n,):
         raise ArmError(f"the start has shape {q.shape}: expected ({arm.n},), the joints of {arm.name}")
     world = world or World.nominal(arm)
-    held, actual = payload_parameters(payload), world.arm(arm)
+    held, actual = payload_parameters(payload, arm), world.arm(arm)
     h, effort = float(1.0 / rate), arm.limits.effort
     model = build_model(actual if held is None else actual.with_payload(held), None, h)
     if world.rotor_inertia is not None:

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
+
 from armload.devices.load import Load, numbers_of
 from armload.errors import SinkError
 
@@ -19,7 +21,8 @@ def inertia_stamped_text(load: Load) -> str:
     """
     if load.frame is None:
         raise SinkError("the payload does not name its frame: the message's frame_id needs it; give --frame")
-    numbers = [repr(x) for x in numbers_of(load.parameters, "urdf")]
+    # without exponents: to ROS's reader, of YAML 1.1, 5e-05 is text
+    numbers = [np.format_float_positional(x, trim="0") for x in numbers_of(load.parameters, "urdf")]
     inertia = "".join(
         f"  {key}: {value}\n"
         for key, value in zip(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), numbers[4:], strict=True)

@@ -179,5 +179,5 @@ def _schedule(payloads: Sequence[tuple[float, Any]], arm: Arm) -> tuple[NDArray,
         if not (np.isfinite(t) and t > times[-1]):
             raise PayloadError(f"a payload comes at {t} s after one at {times[-1]} s: expected increasing times")
         times.append(float(t))
-        held.append(InertialParameters(parameters.phi, arm.frame))
+        held.append(arm.as_payload(parameters))
     return np.array(times), held
