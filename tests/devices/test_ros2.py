@@ -29,6 +29,7 @@ from armload.errors import MotionError, SourceError
 from armload.estimators import Estimate
 from armload.inertia import InertialParameters, is_consistent, to_order
 from armload.motion import taie2024
+from armload.online import OnlineEstimate, OnlineIdentifier
 from armload.payloads import test_payload as example_payload
 from armload.simulation import simulate
 
@@ -180,6 +181,18 @@ def test_only_a_body_that_can_exist_is_announced():
 )
 def test_what_is_not_known_is_not_announced(phi, std):
     assert announced(estimate(phi, std)) is None
+
+
+def live(p_change=0.0, p_contact=0.0, settling=False):
+    said = OnlineIdentifier(arm("panda"), method="map").update(0.0, [0.0] * 7, [0.0] * 7, [0.0] * 7)
+    of = {**vars(said), **vars(estimate(BODY, SPREAD))}
+    return OnlineEstimate.of({**of, "p_change": p_change, "p_contact": p_contact, "settling": settling})
+
+
+def test_a_live_answer_is_announced_while_nothing_passes_by():
+    assert np.array_equal(announced(live()).phi, BODY)
+    for passing in ({"p_change": 0.6}, {"p_contact": 0.6}, {"settling": True}):
+        assert announced(live(**passing)) is None
 
 
 def test_an_empty_hand_is_announced_as_nothing():

@@ -18,10 +18,11 @@ def announced(estimate: Estimate) -> InertialParameters | None:
     A subscriber may put the answer into a controller, so it is always a body that can exist: the nearest one in the
     metric of the estimate's covariance. Nothing is published while a parameter is not known at all, the mass is not
     known to 0.15 kg or a tenth of itself, or it is clearly negative (something was taken off since the tare); nor while
-    a live identifier still settles on a new payload.
+    a live identifier still settles on a new payload, or the payload is likelier changing than not, or something
+    touches the arm.
     """
     phi, covariance = estimate.phi, estimate.covariance
-    if isinstance(estimate, OnlineEstimate) and estimate.settling:
+    if isinstance(estimate, OnlineEstimate) and _passing(estimate):
         return None
     if not (np.isfinite(estimate.t) and np.all(np.isfinite(phi)) and np.all(np.isfinite(covariance))):
         return None
@@ -37,3 +38,7 @@ def announced(estimate: Estimate) -> InertialParameters | None:
     except (InertiaError, np.linalg.LinAlgError):
         return None
     return InertialParameters(nearest, estimate.frame)
+
+
+def _passing(estimate: OnlineEstimate) -> bool:
+    return estimate.settling or max(estimate.p_change or 0.0, estimate.p_contact or 0.0) > 0.5
