@@ -209,7 +209,7 @@ class ArmProcess:
                 return None
             identifier = OnlineIdentifier.restore(path, self.arm, self.settings.method, profile, every=self.every)
         except (IdentificationError, OSError) as error:
-            self.note(f"{error}: begun anew")
+            self.note(f"{str(error).removesuffix(': begin without it')}: begun anew")
             return None
         self._kept, self._continued = saved, True
         self.note(f"continued from {path}, saved {max(ago, 0.0):.0f} s ago")
