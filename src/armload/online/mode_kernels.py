@@ -110,7 +110,7 @@ def _weigh(
     rare, drift_rare, lasts, handed = rates[0], rates[1], rates[2], rates[3]
     n, hand_from, handing_from = len(d), 1 + len(sizes), 1 + len(sizes) + hands.shape[1]
     other_from = handing_from + len(bodies)
-    touches, pulls = h / rare / (len(sizes) - 1), h / rates[5] / hands.shape[1]
+    touches, pulls = h / rates[6] / (len(sizes) - 1), h / rates[5] / hands.shape[1]
     gains, y, gone = np.zeros(len(p)), np.empty(10), np.empty(len(bodies))
     for k in range(len(bodies)):
         keep, far = math.exp(-h / slow[k]), 0.0

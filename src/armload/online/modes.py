@@ -33,6 +33,7 @@ from armload.online.thresholds import (
     DRIFT_RARE,
     DRIFT_SIZE,
     DRIFT_TIME,
+    EARLY_RARE,
     HAND_LEVER,
     HAND_RARE,
     HAND_SIZES,
@@ -80,7 +81,7 @@ class Modes:
         size = np.column_stack([*(3 * [force]), *(3 * [HAND_LEVER * force])])  # (K, 6) force, then moment
         self._hands = np.array([size, np.full_like(size, HAND_TIME)])
         self._others = np.array([BODY_SIZES, HANDING_TIMES])
-        self._rates = np.array([RARE, DRIFT_RARE, CONTACT_LASTS, HANDED_OVER, LETS_GO, HAND_RARE])
+        self._rates = np.array([RARE, DRIFT_RARE, CONTACT_LASTS, HANDED_OVER, LETS_GO, HAND_RARE, RARE])
         self._weights = np.zeros(_OTHER + starts)
         self._b = np.zeros((2, len(self._pushes[0]), n))  # mean and variance of each joint's torque
         self._f = np.zeros((len(HAND_SIZES), 7, 6))  # mean and covariance of each hand's force and moment
@@ -104,6 +105,10 @@ class Modes:
     def foresee_anew(self) -> None:
         """The arm has moved, or is foreseen from another state: what that is wrong by at rest is not known."""
         self._rest[1] = -1.0
+
+    def expect(self, early: bool) -> None:
+        """Whether the stream has just begun, when changes are more frequent."""
+        self._rates[0] = EARLY_RARE if early else RARE
 
     def no_payload(self) -> None:
         """What would be held since the last row is no payload: it is something that touches the arm."""

@@ -17,6 +17,7 @@ from armload.online.runs import Gaussian
 from armload.online.thresholds import (
     AFTER_CONTACT,
     CONTACT_LONGEST,
+    EARLY,
     FIRST_MOTOR,
     FIRST_TARED,
     FIRST_UNTARED,
@@ -64,7 +65,7 @@ class Weighing:
         self._moved = np.inf  # for how long a joint has moved, by its row's weight, since the arm last stood [s]
         self._seen_steady = False  # whether the arm was steady there: what the pose is wrong by is known
         self.row_t = self.steady_t = -np.inf
-        self._first_t = np.inf  # of the run's first row
+        self._began = self._first_t = np.inf  # of the stream's first row, of the run's
 
     def begin_run(self) -> None:
         """The rows that come are of another run."""
@@ -129,7 +130,7 @@ class Weighing:
         h, self.row_t = row.t - self.row_t, row.t
         first = FIRST_MOTOR if self._motor else FIRST_TARED if stream.tares else FIRST_UNTARED
         known = stream.seconds > first
-        self._first_t = min(self._first_t, row.t)
+        self._began, self._first_t = min(self._began, row.t), min(self._first_t, row.t)
         # behind the gears friction hides no load. Its rows stand for a quarter of a second, however long it has stood
         if not self._motor and (known or row.t - self._first_t > first) and self._rests(row, state):
             known = True
@@ -171,6 +172,7 @@ class Weighing:
         modes = self.modes
         if self._motor:
             seen = _rubbing(h, row, seen, scale, run, self._coulomb)
+        modes.expect(early=not self._motor and row.t - self._began < EARLY)
         modes.take(h, seen, row.X, wrench_row(*self._chain, row.q), scale, *self._before_row(run), *how)
         impossible = modes.handing + modes.other > 0.5 and not self._possible(run)
         self._impossible_since = min(self._impossible_since, row.t) if impossible else np.inf
