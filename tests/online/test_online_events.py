@@ -86,6 +86,14 @@ def covers(estimate, phi):
     return np.abs(estimate.phi - phi) <= 1.96 * estimate.std
 
 
+@pytest.mark.parametrize("seed", [0, 6, 8])
+def test_what_is_taken_up_in_the_first_seconds_of_a_stream_is_inside_half_a_second_later(seed):
+    """The arm's own unknowns explain so much then that nothing but how often things change tells of it."""
+    taken = 1.0 + 0.07 * seed
+    estimates, _ = said(stream(seed, [(taken, box(0.3))], taken + 0.6))
+    assert covers(at(estimates, taken + 0.5), 0.3)[0]
+
+
 @pytest.mark.parametrize("rate", [200.0, pytest.param(1000.0, marks=pytest.mark.full)])
 def test_half_a_kilo_is_noticed_in_a_third_of_a_second_and_its_mass_known_in_one(rate):
     estimates, events = taken_up(rate, None)
