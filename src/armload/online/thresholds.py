@@ -53,7 +53,7 @@ RARE = 100.0
 # 95015). Not where torque is measured at the motors: what starts from rest looks like a change there
 # (test_an_empty_arm_that_starts_from_rest_is_no_change_of_payload)
 EARLY_RARE = 5.0
-# [s] that the first seconds of a stream are: then an arm that moves is known well enough for a third of a kilogram to show
+# [s] that the first seconds of a stream are: the arm is known well enough then for a third of a kilogram to show
 EARLY = 2.0
 # [s] mean duration of a hand-over: steps take one lag of the regression, slow ones seconds
 HANDED_OVER = 0.5
