@@ -253,6 +253,13 @@ def test_an_answer_is_as_old_as_the_pause_before_it(online, log):
     assert online.update(*later).age == pytest.approx(before.age + 8.0)
 
 
+@pytest.mark.parametrize("rate", [200.0, 500.0, 1000.0])
+def test_a_live_answer_is_at_most_ten_milliseconds_old_though_rows_are_taken_together(panda, online, rate):
+    log = simulate(panda, taie2024(), world=World.real_like(panda, seed=1), rate=rate, seed=2).between(0.0, 0.8)
+    ages = [online.update(*sample).age for sample in log][int(0.1 * rate) :]
+    assert max(ages) <= 0.0101
+
+
 BAD_STREAMS = {
     "degrees": (lambda t, *x: (t, *np.degrees(x[:2]), x[2]), "position of joint .* is it in degrees"),
     "no torque": (lambda t, q, dq, _: (t, q, dq, np.full(7, np.nan)), "torque of joint 1 is not a number"),
