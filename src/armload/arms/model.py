@@ -171,7 +171,7 @@ class Arm:
         Raises:
             ArmError: joints lie between the frame that it names and `frame`.
         """
-        held = self.in_frame(payload) if payload.frame in self.frames else payload
+        held = self.as_payload(payload)
         return replace(self, attached=held if self.attached is None else self.attached + held)
 
     def with_links(self, links: ArrayLike) -> Arm:

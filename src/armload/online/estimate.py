@@ -89,6 +89,16 @@ class OnlineEstimate(Estimate):
         return type(self).of({**vars(self), "age": self.age - self.lag + lag, "lag": lag})
 
     @property
+    def changing(self) -> bool:
+        """Whether the payload is changing, or has so shortly ago, more likely than not."""
+        return self.settling or (self.p_change or 0.0) > 0.5
+
+    @property
+    def touched(self) -> bool:
+        """Whether something else touches the arm, more likely than not."""
+        return (self.p_contact or 0.0) > 0.5
+
+    @property
     def low(self) -> NDArray[np.float64]:
         """Lower ends (10,) of the 95 % intervals; of what is not determined, of what was known before."""
         return self._ends[0]

@@ -28,6 +28,7 @@ from armload.regression import Correction, GaussianPrior, JointFeatures, payload
 from armload.regression.information import SAME, RegressionData, Session
 from armload.regression.lag import GAIN
 from armload.regression.noise import RIGID, NoiseModel
+from armload.regression.pooling import LATE
 
 # [s] a live answer is at most so old, and judged so often: faster than a controller takes up a new payload
 # (test_an_answer_is_at_most_ten_milliseconds_old)
@@ -146,7 +147,7 @@ class PosteriorLeastSquares(Identifier):
         new = stream.take(*sample)
         self.fresh = self._due and (slow or not new)  # of a fast stream, a row and an answer share no sample
         if new:  # it is due if it would be too old by the next row
-            self._due = self._due or 2.0 * sample.t - self.data_t - self._row_t > 1.05 * self.publish
+            self._due = self._due or 2.0 * sample.t - self.data_t - self._row_t > LATE * self.publish
             self._row_t, self._row_elapsed = sample.t, self._elapsed
             self.fresh = self._due and slow
         if self.fresh:

@@ -18,7 +18,7 @@ import numpy as np
 from armload.regression.rows import Row
 from armload.runtime.kernels import kernel
 
-_LATE = 1.05  # of the time asked for: clocks jitter
+LATE = 1.05  # of the time within which rows or answers are asked for: clocks jitter
 
 
 class Pooling:
@@ -32,7 +32,7 @@ class Pooling:
     """
 
     def __init__(self, seconds: float) -> None:
-        self._seconds = _LATE * seconds
+        self._seconds = LATE * seconds
         self.reset()
 
     def reset(self) -> None:

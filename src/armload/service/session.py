@@ -17,7 +17,7 @@ import numpy as np
 
 from armload.arms import Arm
 from armload.devices import Recorder, Source, Steadied
-from armload.errors import IdentificationError, SourceError
+from armload.errors import SourceError
 from armload.inertia import Z95, InertialParameters
 from armload.online import OnlineEstimate, OnlineIdentifier
 from armload.posterior import Known, Profile
@@ -27,12 +27,10 @@ from armload.service.history import History
 from armload.service.plausible import Plausibility
 from armload.service.recent import Recent
 from armload.service.session_log import SessionLog
-from armload.service.tare import Tare
-from armload.service.unknown import passing_by
+from armload.service.tare import Tare, tare_log
 
 _KEPT = 0.1  # [s] between two estimates of a record: as often as lines come
 TICK = 0.1  # [s] between two looks at a silent source: as often as lines come
-_TARE_LONGEST, _TARE_SHORTEST = 30.0, 3.0  # [s] of what was just seen that a tare is made of
 
 
 class Session:
@@ -254,18 +252,9 @@ class Session:
                 changed, or the method can use no tare.
         """
         self._running()
-        why = None if self.estimate is None else passing_by(self.estimate)
-        if why is not None:
-            raise IdentificationError(f"{why.text}, and a tare is of what stays as it is; wait and try again")
-        log = self._recent.recording(_TARE_LONGEST)
-        seen = 0.0 if log is None else log.duration
-        if log is None or seen < _TARE_SHORTEST:
-            raise IdentificationError(
-                f"{seen:.1f} s were seen since the payload changed: a tare needs at least {_TARE_SHORTEST:.0f} s of "
-                "motion; wait and try again"
-            )
+        log = tare_log(self._recent, self.estimate)
         tare = Tare(log, held=self.source.truth(float(log.t[-1])), taken=True)
-        self._exchange(tare, self._ordered[1], f"tared with the last {seen:.0f} s")
+        self._exchange(tare, self._ordered[1], f"tared with the last {log.duration:.0f} s")
 
     def _exchange(self, tare: Tare | None, method: str | Path | None, text: str) -> None:
         self._running()

@@ -10,7 +10,6 @@ if TYPE_CHECKING:
 
 SILENT = 0.5  # [s] without a sample: five times the longest gap within which samples belong together (`recording.GAP`)
 CONFIRMED = 1.0  # [s] of samples after an interruption, before the answer of before it is given again
-_EVEN = 0.5  # probability above which a change or a contact is more likely than none
 
 
 class Unknown(StrEnum):
@@ -87,8 +86,8 @@ def why_unknown(
 
 def passing_by(estimate: OnlineEstimate) -> Why | None:
     """What goes on at present, so that the newest samples are not of one payload alone; None: nothing does."""
-    if estimate.settling or (estimate.p_change or 0.0) > _EVEN:
+    if estimate.changing:
         return Why(Unknown.CHANGING, "the payload is changing")
-    if (estimate.p_contact or 0.0) > _EVEN:
+    if estimate.touched:
         return Why(Unknown.CONTACT, "something touches the arm")
     return None

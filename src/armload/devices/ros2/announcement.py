@@ -22,7 +22,7 @@ def announced(estimate: Estimate) -> InertialParameters | None:
     touches the arm.
     """
     phi, covariance = estimate.phi, estimate.covariance
-    if isinstance(estimate, OnlineEstimate) and _passing(estimate):
+    if isinstance(estimate, OnlineEstimate) and (estimate.changing or estimate.touched):
         return None
     if not (np.isfinite(estimate.t) and np.all(np.isfinite(phi)) and np.all(np.isfinite(covariance))):
         return None
@@ -38,7 +38,3 @@ def announced(estimate: Estimate) -> InertialParameters | None:
     except (InertiaError, np.linalg.LinAlgError):
         return None
     return InertialParameters(nearest, estimate.frame)
-
-
-def _passing(estimate: OnlineEstimate) -> bool:
-    return estimate.settling or max(estimate.p_change or 0.0, estimate.p_contact or 0.0) > 0.5
