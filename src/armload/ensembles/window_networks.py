@@ -38,7 +38,7 @@ class WindowNetworks(BaseEstimator):
     """A bag of networks over windows, by Adam on the squared error of standardised outputs.
 
     The learning rate rises for 100 steps and falls to 0 as a cosine. The weights of a member are those with the best
-    validation loss among 20 looks. The same code runs on a processor and on a GPU, wherever JAX finds one.
+    validation loss among 20 looks.
 
     >>> X = np.random.default_rng(0).normal(size=(64, 8, 2))
     >>> bag = WindowNetworks("conv", members=2, width=8, steps=40).fit(X, X.mean(axis=1))
