@@ -259,6 +259,59 @@ def test_an_arm_that_stands_and_is_pressed_upwards_puts_nothing_down(force):
     assert covers(estimates[-1], body.phi)[0]
 
 
+def tared_with(body, payloads, seconds, rate=100.0):
+    """20 s of an arm that holds a body, to be its tare, and what comes then, from t = 0 on."""
+    log = stream(3, [(0.0, body), *((t + 22.0, other) for t, other in payloads)], seconds + 22.0, rate)
+    first, then = log.t < 20.0, log.t >= 22.0
+    tare, run = (Recording(log.t[k], log.q[k], log.dq[k], log.tau[k]) for k in (first, then))
+    return tare, Recording(run.t - 22.0, run.q, run.dq, run.tau)
+
+
+def test_what_was_on_at_the_tare_and_is_taken_off_is_not_outside_the_interval():
+    tare, log = tared_with(box(0.8), [(3.0, None)], 5.0)
+    estimates, events = said(log, "map-gp", tare=tare)
+    gone = [e for e in estimates if e.t > 3.3]
+    assert events == []
+    assert all(abs(e.phi[0] + 0.8) <= 1.96 * e.std[0] < 1.3 and abs(e.phi[0]) <= 1.96 * e.std[0] for e in gone)
+    assert not any(e.interval == "calibrated" for e in gone)
+    assert all(any("was taken off" in note for note in e.notes) for e in gone)
+
+
+def test_an_arm_that_is_pressed_upwards_with_what_was_on_at_its_tare_still_holds_it():
+    tare, log = tared_with(box(0.8), [], 7.0)
+    size = np.clip(np.minimum(log.t - 3.0, 5.0 - log.t) / 0.2, 0.0, 1.0)
+    estimates, events = said(pushed(log, (0.0, 0.0, 6.0), size), "map-gp", tare=tare)
+    during = [e for e in estimates if 3.5 < e.t < 4.8]
+    assert events == []
+    assert all(covers(e, 0.0)[0] for e in during)
+    assert np.median([e.p_contact for e in during]) > 0.99
+    assert not any(e.interval == "calibrated" for e in during)
+    assert covers(estimates[-1], 0.0)[0]
+
+
+@pytest.mark.full  # more than a minute of a stream
+def test_what_was_taken_off_since_the_tare_is_believed_after_a_minute_and_what_comes_then_is_added_to_it():
+    tare, log = tared_with(box(0.8), [(3.0, None), (66.0, box(0.5))], 69.0)
+    estimates, events = said(log, "map-gp", tare=tare)
+    assert [(e.kind, round(e.mass, 1)) for e in events] == [("change", -0.8), ("change", 0.5)]
+    assert 63.0 < events[0].t < 64.0
+    assert 66.0 < events[1].t < 66.4
+    assert at(estimates, 65.9).phi[0] == pytest.approx(-0.8, abs=0.03)
+    assert estimates[-1].phi[0] == pytest.approx(-0.3, abs=0.03)
+    assert estimates[-1].notes[0].startswith("something was taken off since the tare")
+    assert not any(e.interval == "calibrated" for e in estimates if e.t > 3.1)
+
+
+def test_what_is_taken_up_where_something_was_off_before_the_stream_began_is_a_change():
+    """A changed tool: less than what was on at the tare, and more than the empty arm."""
+    tare, log = tared_with(box(0.8), [(0.0, None), (3.0, box(0.5))], 5.0)
+    estimates, events = said(log, "map-gp", tare=tare)
+    assert [(e.kind, round(e.mass, 1)) for e in events] == [("change", 0.5)]
+    assert at(estimates, 2.9).phi[0] == pytest.approx(-0.8, abs=0.03)
+    assert at(estimates, 2.9).notes[0].startswith("something was taken off since the tare")
+    assert estimates[-1].phi[0] == pytest.approx(-0.3, abs=0.03)
+
+
 def test_what_surely_changed_and_likely_stays_is_a_change_though_something_has_touched_the_arm():
     """That it may go on changing is never ruled out: one part in 600, as changes follow each other."""
     identifier = OnlineIdentifier(arm("panda"), method="map-gp")

@@ -130,6 +130,25 @@ def test_rows_one_by_one_give_the_posterior_of_the_accumulated_rows_with_a_drift
     assert running[1] == pytest.approx(whole.vector, rel=1e-6, abs=1e-6 * np.abs(whole.vector).max())
 
 
+def test_the_mass_of_all_that_is_mounted_is_that_of_the_joint_posterior(panda, old):
+    """phi_0 + phi of the Gaussian of all unknowns, in which none is eliminated first."""
+    log = old[0]
+    identifier = SmoothPosteriorLeastSquares(panda, log.tare)
+    for _, sample in zip(range(400), log.run, strict=False):
+        identifier.update(sample)
+    stream = identifier.stream
+    stream.hold()
+    problem = Problem([*stream.tares, stream.accumulated()], solution_prior_std(panda), identifier.prior, stream.noise)
+    whole, phi = problem.posterior(stream.posterior.scales), problem.last
+    state = problem.sequential(stream.posterior.scales)
+    mass, variance = state.mass_in_all(whole.mean[phi], whole.covariance[phi, phi])
+    both = np.zeros(len(whole.mean))
+    both[[0, phi.start]] = 1.0
+    assert phi.start == 10
+    assert mass == pytest.approx(both @ whole.mean, rel=1e-6)
+    assert variance == pytest.approx(both @ whole.covariance @ both, rel=1e-4)
+
+
 @pytest.mark.full  # some seconds
 def test_a_stream_that_is_concluded_doubts_an_old_tare_as_a_log_does(panda, old):
     log = old[0]

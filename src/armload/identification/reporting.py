@@ -133,15 +133,7 @@ def _doubts(found: Found, arm: Arm, mass_determined: bool, relative_to: str) -> 
 def _doubt(found: Found, arm: Arm, mass_determined: bool, relative_to: str) -> str | None:
     """What the answer itself shows, most telling first."""
     if is_removal(found.estimate, mass_determined):
-        if relative_to in ("tare", "profile"):
-            return (
-                f"something was taken off since the {relative_to}: the added mass is negative, so no body has these "
-                "parameters"
-            )
-        return (
-            "the mass is negative: less is mounted than the model of the arm and its tool assume, or the torque's "
-            "sign is turned"
-        )
+        return removal(relative_to)
     changed = arm_changed(found.drift, found.another, relative_to)
     sound = found.exchanged or found.explained
     doubt = doubt_of(found.exchanged, sound, changed, found.restlessness, found.restless_joint)
@@ -154,6 +146,17 @@ def _doubt(found: Found, arm: Arm, mass_determined: bool, relative_to: str) -> s
     if found.offset_ratio:
         return f"the torques are {found.offset_ratio:.0f} times as far off as those of an arm should be: {_CHECK}"
     return None
+
+
+def removal(relative_to: str) -> str:
+    """What a mass below nothing says; `relative_to`: as of `Identification`, or of `OnlineEstimate`."""
+    if relative_to in ("tare", "profile"):
+        off = f"something was taken off since the {relative_to}"
+        return f"{off}: the added mass is negative, so no body has these parameters"
+    if relative_to == "before":
+        return "something was taken off that was on the arm from the start: no body has these parameters"
+    less = "less is mounted than the model of the arm and its tool assume"
+    return f"the mass is negative: {less}, or the torque's sign is turned"
 
 
 def doubt_of(exchanged: bool, explained: bool, changed: str | None, restlessness: float, joint: int = 0) -> str | None:

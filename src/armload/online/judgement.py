@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.estimators import Estimate, Identifier
-from armload.identification.answer import body_of
+from armload.identification.answer import body_of, is_removal
 from armload.identification.found import explained
 from armload.identification.intervals import Before
 from armload.identification.known_payload import denied_by, determined_with, rests_on_prior
-from armload.identification.reporting import doubt_of
+from armload.identification.reporting import doubt_of, removal
 from armload.inertia import determined, held, held_probability
 from armload.online.doubts import Doubts
 from armload.online.thresholds import STANDS
@@ -27,6 +27,7 @@ _STANDING_MOTOR = "standing: a change of payload is noticed only when the arm mo
 _SLOW_MOTOR = "too slow: friction hides a change of payload until a joint moves faster"
 _CHANGING = "the payload is changing"
 _LEFT_OUT = "samples that do not fit are left out: something pulls at the arm, or the payload is changing"
+_LIFTED = "something lifts the arm, or what was on it from the start was taken off, which is believed after a minute"
 _MAYBE = (  # of p_change, p_contact and p_drift, the largest while they are large
     "the payload may be changing",
     "something may be touching the arm",
@@ -94,12 +95,12 @@ class Judgement:
         """How much older than now [s] the newest sample is that counts; 0 before one does."""
         return now - self.newest if self.newest > -np.inf else 0.0
 
-    def judge(self, estimate: Estimate, run: Identifier, moving: bool, stands: bool) -> None:
+    def judge(self, estimate: Estimate, run: Identifier, relative_to: str, moving: bool, stands: bool) -> None:
         """What the data determine, and whether anything is there.
 
         Args:
-            estimate: to be judged. run: that it is of. moving: whether the arm moves.
-            stands: whether what was seen lately says nothing new, as it stands.
+            estimate: to be judged. run: that it is of. relative_to: as of `OnlineEstimate`. moving: whether the arm
+                moves. stands: whether what was seen lately says nothing new, as it stands.
         """
         std, before, posterior = estimate.std, self.before, run if isinstance(run, PosteriorLeastSquares) else None
         taken = posterior.known if posterior is not None and posterior.taken else None
@@ -114,6 +115,8 @@ class Judgement:
         if stands:
             motor = posterior is not None and posterior.stream.posterior.torque == "motor"
             notes.append(_STANDING_MOTOR if motor else _STANDING)
+        if is_removal(estimate, bool(self.determined[0])):
+            notes.append(removal(relative_to))
         notes += self.doubts.sentences
         if self.held and posterior is not None and taken is None:
             denied = denied_by(posterior.known, posterior.log_only)
@@ -122,7 +125,7 @@ class Judgement:
 
     def left_out(self, watch: PayloadWatch) -> None:
         """Say that samples are left out."""
-        self.notes += (_CHANGING if watch.settling else _LEFT_OUT,)
+        self.notes += (_CHANGING if watch.settling else _LIFTED if watch.lifted else _LEFT_OUT,)
 
     def fields(self) -> dict[str, Any]:
         """What an `OnlineEstimate` says of the payload, by its names."""
@@ -131,7 +134,7 @@ class Judgement:
     def words(self, watch: PayloadWatch | None, blind: bool, moving: bool) -> tuple[str, ...]:
         """The notes, and what the last rows may be."""
         notes = self.notes
-        if watch is not None and not watch.sure and not {_CHANGING, _LEFT_OUT} & set(notes):
+        if watch is not None and not watch.sure and not {_CHANGING, _LEFT_OUT, _LIFTED} & set(notes):
             notes += (_MAYBE[int(np.argmax(watch.likely))],)
         if blind and _STANDING_MOTOR not in self.notes:
             notes += (_SLOW_MOTOR if moving else _STANDING_MOTOR,)

@@ -69,7 +69,7 @@ class Modes:
         steady: probability that the arm holds what it held, and nothing else pulls at it; drifting or not.
         drift: that the arm itself changes, slowly. contact: that something touches it. handing: that the payload is
             changing. other: that it has changed, and stays. stays: for how long the likeliest other payload has been
-            there [s].
+            there [s]. taken_off: of `contact`, that part of what was on the arm from the start is off instead.
     """
 
     def __init__(self, mass: float, effort: NDArray[np.float64]) -> None:
@@ -101,6 +101,7 @@ class Modes:
         for state in (self._b, self._f, self._x, self._P, self._A, self._c, self._since[1:]):
             state[:] = 0.0
         self.steady, self.drift, self.contact, self.handing, self.other, self.stays = 1.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        self.taken_off = 0.0
 
     def foresee_anew(self) -> None:
         """The arm has moved, or is foreseen from another state: what that is wrong by at rest is not known."""
@@ -110,8 +111,13 @@ class Modes:
         """Whether the stream has just begun, when changes are more frequent."""
         self._rates[0] = EARLY_RARE if early else RARE
 
-    def no_payload(self) -> None:
-        """What would be held since the last row is no payload: it is something that touches the arm."""
+    def no_payload(self, perhaps_taken_off: bool) -> None:
+        """What would be held since the last row is no payload: it is something that touches the arm.
+
+        perhaps_taken_off: or something was taken off that was on the arm from the start. What presses it upwards
+        steadily looks the same, so that neither is likelier.
+        """
+        self.taken_off = 0.5 * (self.handing + self.other) if perhaps_taken_off else 0.0
         self.contact += self.handing + self.other
         self.handing = self.other = self.stays = 0.0
 
@@ -147,6 +153,7 @@ class Modes:
         state = (self._weights, self._b, self._f, self._x, self._P, self._A, self._c, self._since)
         found = take_row(*row, *noise, *known, *state)
         self.steady, self.drift, self.contact, self.handing, self.other, self.stays = found
+        self.taken_off = 0.0
 
     def shift(self, going_on: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """By how much phi (10,) has changed if it has, and its covariance, by the likeliest such hypothesis.

@@ -275,7 +275,7 @@ class OnlineIdentifier:
 
     def _judge(self, estimate: Estimate, run: Identifier, stands: bool = False) -> None:
         stands = stands and self.trouble is None
-        self._judgement.judge(estimate, run, self._stream.moving, stands)
+        self._judgement.judge(estimate, run, self.relative_to, self._stream.moving, stands)
 
     def _present(self) -> OnlineEstimate:
         stream, judged, watch = self._stream, self._judgement, self._watch

@@ -65,7 +65,8 @@ class Runs:
         """
         mass, std = float(self.current.last.phi[0]), float(self.current.last.std[0])
         known = std <= STEP_STD * self.unit  # else nobody can tell whether anything is held
-        self._empty = self.current if known and not held(mass, std, known) else None
+        empty = known and not held(mass, std, known) and not held(-mass, std, known)  # nor was anything taken off
+        self._empty = self.current if empty else None
 
     def reference_for_next(self) -> PosteriorLeastSquares | None:
         """The run that the next one takes for a tare: the empty arm's, if it was known to be empty for long enough."""

@@ -104,7 +104,7 @@ LIGHT = 0.05
 # does not fit is believed: it may be the arm (test_a_pose_first_seen_shortly_after_a_change_is_not_another_change)
 PATIENCE = 10.0
 # [s] of rows of a contact that are left out at most: nobody leads or leans on an arm for longer, while one that was
-# knocked stays as it is
+# knocked stays as it is, and what was taken off since the tare stays off
 # (test_an_offset_that_jumps_and_stays_is_believed_at_last, test_a_push_of_half_a_minute_leaves_the_run_as_it_was)
 CONTACT_LONGEST = 60.0
 # [s] before a change that are taken back from the run that ends, at least as long as it took to notice it: what a

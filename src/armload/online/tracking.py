@@ -54,7 +54,7 @@ class Tracker:
     def track(self, modes: Modes, t: float, last: Gaussian) -> Gaussian:
         """phi (10,) and its covariance at a row at t [s]; `last`: what the run says, which did not take the row."""
         last = self.of_now(last)
-        (shift, spread), p = modes.shift(going_on=True), modes.handing + modes.other
+        (shift, spread), p = modes.shift(going_on=True), modes.handing + modes.other + modes.taken_off
         self._lagged = self._lagged + min((t - self._t) / LAG, 1.0) * (shift - self._lagged)
         self._t, late = t, p * (shift - self._lagged)
         covariance = last[1] + p * spread + p * (1.0 - p) * np.outer(shift, shift) + np.outer(late, late)

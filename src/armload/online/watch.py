@@ -104,6 +104,11 @@ class PayloadWatch:
         return self._following and sum(self.likely) < 1.0 - LIKELY
 
     @property
+    def lifted(self) -> bool:
+        """Whether the last rows are of an arm that is lifted, or that has lost what was on it from the start."""
+        return self._weighing.modes.taken_off > 0.0
+
+    @property
     def blind(self) -> bool:
         """Whether a change of payload would not show yet (`Weighing.blind`)."""
         return self._weighing.blind

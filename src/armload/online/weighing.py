@@ -60,6 +60,7 @@ class Weighing:
         self._touched = False  # whether something has touched the arm since it was steady
         self._sure_since = np.inf  # when the payload was first surely another one
         self._impossible_since = np.inf  # when what would be held first was no payload
+        self._taken_off = False  # whether it is that something was taken off that was on the arm from the start
         self._gaussian: tuple[PosteriorLeastSquares, Gaussian] | None = None  # before the row, and of which run
         self._at_rest: tuple[SequentialPosterior, NDArray[np.float64]] | None = None  # foreseen by, and where
         self._moved = np.inf  # for how long a joint has moved, by its row's weight, since the arm last stood [s]
@@ -101,20 +102,28 @@ class Weighing:
             self.steady_t, self._touched = self.row_t, False
         self._touched = self._touched or modes.contact > 0.5
         lasting = not self._touched or (modes.other > LIKELY and modes.stays >= AFTER_CONTACT)
-        sure = modes.other + modes.handing > SURE and lasting and self._impossible_since == np.inf
+        possible = self._impossible_since == np.inf or self._taken_off
+        sure = modes.other + modes.handing > SURE and lasting and possible
         self._sure_since = min(self._sure_since, self.row_t) if sure else np.inf
         return self.row_t - self._sure_since >= HOLDS
 
-    def _possible(self, run: PosteriorLeastSquares) -> bool:
-        """Whether what would be held now has a mass that can be: nothing lifts the arm but what touches it."""
-        (mean, covariance), (shift, spread) = self._before_row(run), self.modes.shift()
-        std = float(np.sqrt(covariance[0, 0] + spread[0, 0]))
-        return float(mean[0] + shift[0]) > -LIGHT * self._unit - std
+    def _possible(self, run: PosteriorLeastSquares) -> tuple[bool, bool, bool]:
+        """Whether masses can be: of what would be added now, of what was before, of all that would be mounted now.
+
+        Nothing lifts the arm but what touches it. What was on it from the start may be taken off.
+        """
+        (before, known), (shift, spread) = self._before_row(run), self.modes.shift()
+        now, covariance, state, tool = before + shift, known + spread, run.stream.state, run.arm.attached
+        mass, variance = (now[0], covariance[0, 0]) if state is None else state.mass_in_all(now, covariance)
+        mounted = mass + (0.0 if tool is None else tool.mass)
+        masses = (now[0], covariance[0, 0]), (before[0], known[0, 0]), (mounted, variance)
+        a, b, c = (bool(m > -LIGHT * self._unit - np.sqrt(v)) for m, v in masses)
+        return a, b, c
 
     def believed(self, lasted: float) -> bool:
         """Whether what has not fitted for so long [s] is believed: then a drift is the arm's."""
-        if lasted <= (CONTACT_LONGEST if self._touched else PATIENCE):
-            return False
+        if lasted <= (CONTACT_LONGEST if self._touched else PATIENCE) or self.modes.taken_off > 0.0:
+            return False  # what was taken off is a change
         self._touched = False
         return True
 
@@ -174,10 +183,12 @@ class Weighing:
             seen = _rubbing(h, row, seen, scale, run, self._coulomb)
         modes.expect(early=not self._motor and row.t - self._began < EARLY)
         modes.take(h, seen, row.X, wrench_row(*self._chain, row.q), scale, *self._before_row(run), *how)
-        impossible = modes.handing + modes.other > 0.5 and not self._possible(run)
-        self._impossible_since = min(self._impossible_since, row.t) if impossible else np.inf
-        if row.t - self._impossible_since >= HOLDS:
-            modes.no_payload()
+        added, before, mounted = self._possible(run) if modes.handing + modes.other > 0.5 else (True, True, True)
+        self._impossible_since = np.inf if added else min(self._impossible_since, row.t)
+        lasted = row.t - self._impossible_since
+        self._taken_off = mounted and (lasted > CONTACT_LONGEST or not before)
+        if lasted >= HOLDS and not self._taken_off:
+            modes.no_payload(perhaps_taken_off=mounted)
 
     def _rests(self, row: Row, state: SequentialPosterior) -> bool:
         """Whether the arm stands, or has hardly moved since it stood; it is foreseen anew elsewhere."""

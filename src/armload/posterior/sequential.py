@@ -98,6 +98,13 @@ class SequentialPosterior:
         self._condition(row, scale, seen, False)
         return seen, scale
 
+    def mass_in_all(self, phi: NDArray[np.float64], covariance: NDArray[np.float64]) -> tuple[float, float]:
+        """Mass of all that is mounted, at the tare and since [kg], and its variance, for phi of mean and covariance."""
+        if not self.tares:
+            return float(phi[0]), float(covariance[0, 0])
+        share = np.eye(10)[0] - self.shared_slope[0]
+        return float(share @ phi + self.shared_own[0]), float(share @ covariance @ share + self.shared_C[0, 0])
+
     def _condition(self, row: Row, scale: NDArray, seen: NDArray, condition: bool) -> None:
         own = (self.C, self.own, self.slope, self.order, self.active, self.late, self.waiting)
         shared = (self.shared_C, self.shared_own, self.shared_slope)
