@@ -103,7 +103,7 @@ def test_an_interval_holds_both_payloads_while_either_is_likelier_than_one_in_tw
     covariance, other = 1e-4 * np.eye(10), np.r_[0.3, np.zeros(9)]
     spread = 4e-4 * np.eye(10)
     for p in np.linspace(0.06, 0.94, 12):
-        modes = SimpleNamespace(handing=p, other=0.0, shift=lambda going_on: (other, spread))  # noqa: ARG005
+        modes = SimpleNamespace(taken_off=0.0, handing=p, other=0.0, shift=lambda going_on: (other, spread))  # noqa: ARG005
         tracker = Tracker()
         for t in np.arange(0.0, 5.0, 0.1):
             phi, found = tracker.track(modes, t, (np.zeros(10), covariance))  # type: ignore[arg-type]
