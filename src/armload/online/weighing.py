@@ -115,10 +115,12 @@ class Weighing:
         (before, known), (shift, spread) = self._before_row(run), self.modes.shift()
         now, covariance, state, tool = before + shift, known + spread, run.stream.state, run.arm.attached
         mass, variance = (now[0], covariance[0, 0]) if state is None else state.mass_in_all(now, covariance)
-        mounted = mass + (0.0 if tool is None else tool.mass)
-        masses = (now[0], covariance[0, 0]), (before[0], known[0, 0]), (mounted, variance)
-        a, b, c = (bool(m > -LIGHT * self._unit - np.sqrt(v)) for m, v in masses)
-        return a, b, c
+        mass += 0.0 if tool is None else tool.mass
+
+        def can_be(mass: float, variance: float) -> bool:
+            return bool(mass > -LIGHT * self._unit - np.sqrt(variance))
+
+        return can_be(now[0], covariance[0, 0]), can_be(before[0], known[0, 0]), can_be(mass, variance)
 
     def believed(self, lasted: float) -> bool:
         """Whether what has not fitted for so long [s] is believed: then a drift is the arm's."""
