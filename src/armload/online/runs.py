@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.inertia import held
-from armload.online.thresholds import REMEMBERED, SAME_RUN, STEP_STD, TARE_FROM
+from armload.online.thresholds import LIGHT, REMEMBERED, SAME_RUN, STEP_STD, TARE_FROM
 from armload.posterior import PosteriorLeastSquares
 from armload.regression import payload_prior_std
 
@@ -65,7 +65,7 @@ class Runs:
         """
         mass, std = float(self.current.last.phi[0]), float(self.current.last.std[0])
         known = std <= STEP_STD * self.unit  # else nobody can tell whether anything is held
-        empty = known and not held(mass, std, known) and not held(-mass, std, known)  # nor was anything taken off
+        empty = known and not held(mass, std, known) and can_be(mass, std, self.unit)
         self._empty = self.current if empty else None
 
     def reference_for_next(self) -> PosteriorLeastSquares | None:
@@ -92,6 +92,11 @@ class Runs:
             return None
         step = _step(before, run)
         return None if step is None else float(step[0][0])
+
+
+def can_be(mass: float, std: float, unit: float) -> bool:
+    """Whether anything has a mass, known to std [kg]: none is below nothing. `unit`: of a payload, as of `Runs`."""
+    return mass > -LIGHT * unit - std
 
 
 def _step(before: PosteriorLeastSquares, run: PosteriorLeastSquares) -> Gaussian | None:

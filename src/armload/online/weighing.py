@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from armload.arms.momentum_row import MomentumRow, wrench_row
 from armload.online.modes import Modes
-from armload.online.runs import Gaussian
+from armload.online.runs import Gaussian, can_be
 from armload.online.thresholds import (
     AFTER_CONTACT,
     CONTACT_LONGEST,
@@ -23,7 +23,6 @@ from armload.online.thresholds import (
     FIRST_UNTARED,
     HOLDS,
     LAG,
-    LIGHT,
     LIKELY,
     PATIENCE,
     SURE,
@@ -116,11 +115,9 @@ class Weighing:
         now, covariance, state, tool = before + shift, known + spread, run.stream.state, run.arm.attached
         mass, variance = (now[0], covariance[0, 0]) if state is None else state.mass_in_all(now, covariance)
         mass += 0.0 if tool is None else tool.mass
-
-        def can_be(mass: float, variance: float) -> bool:
-            return bool(mass > -LIGHT * self._unit - np.sqrt(variance))
-
-        return can_be(now[0], covariance[0, 0]), can_be(before[0], known[0, 0]), can_be(mass, variance)
+        masses = (now[0], covariance[0, 0]), (before[0], known[0, 0]), (mass, variance)
+        added, then, mounted = (bool(can_be(m, np.sqrt(v), self._unit)) for m, v in masses)
+        return added, then, mounted
 
     def believed(self, lasted: float) -> bool:
         """Whether what has not fitted for so long [s] is believed: then a drift is the arm's."""
