@@ -259,9 +259,9 @@ def test_an_arm_that_stands_and_is_pressed_upwards_puts_nothing_down(force):
     assert covers(estimates[-1], body.phi)[0]
 
 
-def tared_with(body, payloads, seconds, rate=100.0):
+def tared_with(body, payloads, seconds, rate=100.0, name="panda"):
     """20 s of an arm that holds a body, to be its tare, and what comes then, from t = 0 on."""
-    log = stream(3, [(0.0, body), *((t + 22.0, other) for t, other in payloads)], seconds + 22.0, rate)
+    log = stream(3, [(0.0, body), *((t + 22.0, other) for t, other in payloads)], seconds + 22.0, rate, name=name)
     first, then = log.t < 20.0, log.t >= 22.0
     tare, run = (Recording(log.t[k], log.q[k], log.dq[k], log.tau[k]) for k in (first, then))
     return tare, Recording(run.t - 22.0, run.q, run.dq, run.tau)
@@ -289,15 +289,28 @@ def test_an_arm_that_is_pressed_upwards_with_what_was_on_at_its_tare_still_holds
     assert covers(estimates[-1], 0.0)[0]
 
 
+def test_an_arm_that_is_pressed_upwards_by_more_than_was_on_at_its_tare_has_lost_nothing():
+    tare, log = tared_with(box(0.4), [], 5.0)
+    size = np.clip((log.t - 3.0) / 0.2, 0.0, 1.0)
+    estimates, events = said(pushed(log, (0.0, 0.0, 12.0), size), "map-gp", tare=tare)
+    during = [e for e in estimates if e.t > 3.5]
+    assert events == []
+    assert np.median([1.96 * e.std[0] for e in during]) < 0.1
+    assert not any("was taken off" in note for e in during for note in e.notes)
+
+
 @pytest.mark.full  # more than a minute of a stream
-def test_what_was_taken_off_since_the_tare_is_believed_after_a_minute_and_what_comes_then_is_added_to_it():
-    tare, log = tared_with(box(0.8), [(3.0, None), (66.0, box(0.5))], 69.0)
-    estimates, events = said(log, "map-gp", tare=tare)
-    assert [(e.kind, round(e.mass, 1)) for e in events] == [("change", -0.8), ("change", 0.5)]
-    assert 63.0 < events[0].t < 64.0
-    assert 66.0 < events[1].t < 66.4
-    assert at(estimates, 65.9).phi[0] == pytest.approx(-0.8, abs=0.03)
-    assert estimates[-1].phi[0] == pytest.approx(-0.3, abs=0.03)
+@pytest.mark.parametrize(("name", "on"), [("panda", 0.8), ("ur5e", 1.5), ("ur10e", 3.0)])
+def test_what_was_taken_off_since_the_tare_is_believed_after_a_minute_and_what_comes_then_is_added_to_it(name, on):
+    tare, log = tared_with(box(on), [(3.0, None), (68.0, box(0.6 * on))], 72.0, name=name)
+    estimates, events = said(log, "map-gp", tare=tare, name=name)
+    assert [e.kind for e in events] == ["change", "change"]
+    assert [e.mass / on for e in events] == pytest.approx([-1.0, 0.6], abs=0.15)
+    assert 63.0 < events[0].t < 66.0
+    assert 68.0 < events[1].t < 69.0
+    assert covers(at(estimates, 67.9), -on)[0]
+    assert covers(estimates[-1], -0.4 * on)[0]
+    assert max(at(estimates, t).std[0] for t in (67.9, 72.0)) < 0.1 * on
     assert estimates[-1].notes[0].startswith("something was taken off since the tare")
     assert not any(e.interval == "calibrated" for e in estimates if e.t > 3.1)
 

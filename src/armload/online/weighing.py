@@ -60,6 +60,7 @@ class Weighing:
         self._sure_since = np.inf  # when the payload was first surely another one
         self._impossible_since = np.inf  # when what would be held first was no payload
         self._taken_off = False  # whether it is that something was taken off that was on the arm from the start
+        self._lifted_since = np.inf  # when that may first have been so, since the arm was steady
         self._gaussian: tuple[PosteriorLeastSquares, Gaussian] | None = None  # before the row, and of which run
         self._at_rest: tuple[SequentialPosterior, NDArray[np.float64]] | None = None  # foreseen by, and where
         self._moved = np.inf  # for how long a joint has moved, by its row's weight, since the arm last stood [s]
@@ -70,7 +71,7 @@ class Weighing:
     def begin_run(self) -> None:
         """The rows that come are of another run."""
         self.modes.reset()
-        self._sure_since = self._impossible_since = self._first_t = np.inf
+        self._sure_since = self._impossible_since = self._lifted_since = self._first_t = np.inf
 
     @property
     def likely(self) -> tuple[float, float, float]:
@@ -98,7 +99,7 @@ class Weighing:
         """Whether the last row shows that the payload is surely another one than the run's."""
         modes = self.modes
         if self.steady > LIKELY:
-            self.steady_t, self._touched = self.row_t, False
+            self.steady_t, self._touched, self._lifted_since = self.row_t, False, np.inf
         self._touched = self._touched or modes.contact > 0.5
         lasting = not self._touched or (modes.other > LIKELY and modes.stays >= AFTER_CONTACT)
         possible = self._impossible_since == np.inf or self._taken_off
@@ -111,18 +112,23 @@ class Weighing:
 
         Nothing lifts the arm but what touches it. What was on it from the start may be taken off.
         """
-        (before, known), (shift, spread) = self._before_row(run), self.modes.shift()
-        now, covariance, state, tool = before + shift, known + spread, run.stream.state, run.arm.attached
-        mass, variance = (now[0], covariance[0, 0]) if state is None else state.mass_in_all(now, covariance)
-        mass += 0.0 if tool is None else tool.mass
-        masses = (now[0], covariance[0, 0]), (before[0], known[0, 0]), (mass, variance)
-        added, then, mounted = (bool(can_be(m, np.sqrt(v), self._unit)) for m, v in masses)
+        (phi, known), (shift, spread), tool = self._before_row(run), self.modes.shift(), run.arm.attached
+        state = run.stream.state
+        before, variance = float(phi[0]), float(known[0, 0])
+        in_all, doubt = (before, variance) if state is None else state.mass_in_all(phi, known)
+        in_all += 0.0 if tool is None else tool.mass
+        step, spread = float(shift[0]), float(spread[0, 0])
+        masses = (before + step, variance + spread), (before, variance), (in_all + step, doubt + spread)
+        added, then, mounted = (can_be(m, np.sqrt(v), self._unit) for m, v in masses)
         return added, then, mounted
 
     def believed(self, lasted: float) -> bool:
         """Whether what has not fitted for so long [s] is believed: then a drift is the arm's."""
-        if lasted <= (CONTACT_LONGEST if self._touched else PATIENCE) or self.modes.taken_off > 0.0:
-            return False  # what was taken off is a change
+        patience = CONTACT_LONGEST if self._touched else PATIENCE
+        if self._taken_off or self.modes.taken_off > 0.0:  # rather a change, which may not be sure at once
+            patience = CONTACT_LONGEST + PATIENCE
+        if lasted <= patience:
+            return False
         self._touched = False
         return True
 
@@ -184,9 +190,10 @@ class Weighing:
         modes.take(h, seen, row.X, wrench_row(*self._chain, row.q), scale, *self._before_row(run), *how)
         added, before, mounted = self._possible(run) if modes.handing + modes.other > 0.5 else (True, True, True)
         self._impossible_since = np.inf if added else min(self._impossible_since, row.t)
-        lasted = row.t - self._impossible_since
-        self._taken_off = mounted and (lasted > CONTACT_LONGEST or not before)
-        if lasted >= HOLDS and not self._taken_off:
+        if not added and mounted:
+            self._lifted_since = min(self._lifted_since, row.t)
+        self._taken_off = not added and mounted and (row.t - self._lifted_since > CONTACT_LONGEST or not before)
+        if row.t - self._impossible_since >= HOLDS and not self._taken_off:
             modes.no_payload(perhaps_taken_off=mounted)
 
     def _rests(self, row: Row, state: SequentialPosterior) -> bool:

@@ -99,7 +99,7 @@ class SequentialPosterior:
         return seen, scale
 
     def mass_in_all(self, phi: NDArray[np.float64], covariance: NDArray[np.float64]) -> tuple[float, float]:
-        """Mass of all that is mounted, at the tare and since [kg], and its variance, for phi of mean and covariance."""
+        """Mass of all that is mounted, at the tare and since [kg], and its variance, if rows say phi ± covariance."""
         if not self.tares:
             return float(phi[0]), float(covariance[0, 0])
         share = np.eye(10)[0] - self.shared_slope[0]
