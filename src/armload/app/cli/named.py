@@ -170,18 +170,19 @@ def robot_of(source: str) -> str:
 
 
 def motion_of(name: str, arm: Arm, of_arm: bool = True) -> Motion:
-    """A motion by name (`taie2024`), from a JSON file, or drawn for the arm (`random:SEED`).
+    """A motion by name (`taie2024`), from a JSON file or an exported table (CSV), or drawn for the arm (`random:SEED`).
 
     of_arm: whether it must be one of the arm's; else the arm is what a random one is drawn for.
 
     Raises:
         MotionError: it cannot be read, or moves another number of joints than the arm has.
     """
-    from armload.motion import check_joints, load_motion, random_motion, taie2024
+    from armload.motion import PathMotion, check_joints, load_motion, random_motion, taie2024
 
     if name.startswith("random:"):
         return random_motion(arm, whole_number(name, "motion"))
-    motion = taie2024() if name == "taie2024" else load_motion(name)
+    read = PathMotion.read if name.lower().endswith(".csv") else load_motion
+    motion = taie2024() if name == "taie2024" else read(name)
     if of_arm:
         check_joints(motion, arm)
     return motion
