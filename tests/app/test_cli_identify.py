@@ -129,6 +129,27 @@ def test_json_has_the_contracts_keys_in_order_and_finite_numbers(answer, logs):
     assert com_to_phi(found["mass"], found["com"], found["inertia_com"]) == pytest.approx(found["phi"], abs=1e-9)
 
 
+def test_a_hand_in_the_description_is_a_tool_and_nobody_is_told_to_take_it_off_again(answer, logs, tmp_path, capsys):
+    with_hand = (
+        '<joint name="to_hand" type="fixed"><origin rpy="0 0 -0.7853981633974483"/>'
+        '<parent link="panda_link8"/><child link="panda_hand"/></joint>'
+        '<link name="panda_hand"><inertial><origin xyz="-0.01 0 0.03"/><mass value="0.73"/>'
+        '<inertia ixx="0.001" ixy="0" ixz="0" iyy="0.0025" iyz="0" izz="0.0017"/></inertial></link></robot>'
+    )
+    (tmp_path / "cell.urdf").write_text(arm("panda").urdf.replace("</robot>", with_hand))
+    described = ["--robot", tmp_path / "cell.urdf", "--frame", "panda_link8"]
+    found = answer(logs / "both.csv", *described)
+    assert found["relative_to"] == "tool"
+    assert found["mass"] == pytest.approx(BODY.mass, rel=0.01)
+    assert answer(logs / "both.csv", *described, "--tare", logs / "hand.csv")["relative_to"] == "tare"
+    for form, said in (("franka", ""), ("ur", "add the tool with --plus")):
+        capsys.readouterr()
+        assert main(["identify", str(logs / "both.csv"), *map(str, described), "--to", form]) == 0
+        err = capsys.readouterr().err
+        assert said in err
+        assert "--minus" not in err
+
+
 @pytest.mark.parametrize("method", ["hybrid", "map-gp", "map", "rls", "rls-filter"])
 def test_every_method_finds_the_simulated_body(answer, logs, method):
     found = answer(logs / "body.csv", "--robot", "panda", "--method", method)
