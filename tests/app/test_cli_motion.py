@@ -201,6 +201,7 @@ def test_a_path_of_a_table_or_a_trajectory_is_enriched(form, tmp_path, capsys):
     [
         ("a.csv", "time,x\n0,1\n", "expected t, q1"),
         ("a.csv", "t,q1,q2,q3,q4,q5,q6,q7\n0,1\n", "not 8 numbers"),
+        ("hole.csv", "t,q1,q2,q3,q4,q5,q6,q7\n0,0,0,0,0,0,0,0\n1,0,0,nan,0,0,0,0\n", "joint 3 at point 2"),
         ("of_eight.csv", "t,q1,q2,q3,q4,q5,q6,q7,q8\n0,1,1,1,1,1,1,1,1\n", "q8: expected t, q1 … q7"),
         ("a.yaml", "joint_names: [a]\npoints: []\n", "no JointTrajectory of panda"),
         ("a.yaml", "- 1\n", "is no path"),
