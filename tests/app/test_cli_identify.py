@@ -347,6 +347,21 @@ def test_gravity_that_a_controller_took_out_is_put_back(answer, logs, panda, tmp
     assert found["mass"] == pytest.approx(BODY.mass + franka_hand().parameters.mass, abs=0.05)
 
 
+def test_what_a_controller_was_set_to_carry_is_read_once_for_log_and_tare(logs, panda, tmp_path, capsys):
+    hand = franka_hand().parameters
+    (tmp_path / "set.json").write_text(json.dumps({"mass": hand.mass, "com": hand.com.tolist(), "frame": hand.frame}))
+    known, words = panda.with_payload(InertialParameters(hand.phi, panda.frame)), ["identify"]
+    for name, option in (("both", None), ("hand", "--tare")):
+        log = read_recording(logs / f"{name}.csv", panda)
+        still = np.zeros_like(log.q)
+        write_recording(tmp_path / f"{name}.csv", replace(log, tau=log.tau - known.torque(log.q, still, still)))
+        words += [*([option] if option else []), str(tmp_path / f"{name}.csv")]
+    assert main([*words, "--robot", "panda", "--compensated", str(tmp_path / "set.json"), "--json"]) == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out)["mass"] == pytest.approx(BODY.mass, rel=0.01)
+    assert err.count("the inertia is not given") == 1
+
+
 def test_a_tool_s_file_of_mass_and_centre_alone_is_taken_with_wider_intervals(answer, logs, tmp_path):
     hand = franka_hand().parameters
     (tmp_path / "hand.json").write_text(json.dumps({"mass": hand.mass, "com": hand.com.tolist(), "frame": hand.frame}))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
@@ -111,11 +112,12 @@ def _reads(path: str, arm: Arm) -> bool:
     return True
 
 
-def uncompensated(log: Recording, arm: Arm, payload: str) -> Recording:
-    """A log with the gravity that its controller took out of the torque: the arm's, and a payload's or `nothing`'s."""
+def uncompensated(logs: Sequence[Recording | None], arm: Arm, payload: str) -> list[Recording | None]:
+    """Logs with the gravity that their controller took out of the torque: the arm's, and a payload's or `nothing`'s."""
     from armload.recording import with_gravity
 
-    return with_gravity(log, arm, None if payload == "nothing" else payload_of(payload, arm))
+    held = None if payload == "nothing" else payload_of(payload, arm)  # once: it may be a pipe
+    return [None if log is None else with_gravity(log, arm, held) for log in logs]
 
 
 def arm_of(options: argparse.Namespace) -> Arm:
