@@ -369,6 +369,15 @@ def test_what_is_taken_off_a_load_since_a_tare_names_no_tool_that_nobody_gave(ex
     assert "relative to the tool" not in err
 
 
+@pytest.mark.parametrize("option", ["--plus", "--minus"])
+def test_a_part_in_grams_is_refused(export, tmp_path, option):
+    write_payload(tmp_path / "part.json", Payload("part", InertialParameters(900 * HELD.phi, HELD.frame)))
+    out, err = export(result_of(HELD), "--to", "urdf", option, str(tmp_path / "part.json"), code=2)
+    assert out == ""
+    assert "give kilograms" in err
+    assert err.count("\n") == 1
+
+
 def test_the_rest_of_a_subtraction_is_made_a_body_and_that_is_said(export, tmp_path):
     # a part whose inertia is larger than what was measured of the whole
     part = InertialParameters.from_com(0.5, (0.02, -0.03, 0.08), np.diag([9e-3, 9e-3, 9e-3]), "panda_link8")

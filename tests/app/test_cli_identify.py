@@ -129,6 +129,27 @@ def test_json_has_the_contracts_keys_in_order_and_finite_numbers(answer, logs):
     assert com_to_phi(found["mass"], found["com"], found["inertia_com"]) == pytest.approx(found["phi"], abs=1e-9)
 
 
+def test_a_hand_in_the_description_is_a_tool_and_nobody_is_told_to_take_it_off_again(answer, logs, tmp_path, capsys):
+    with_hand = (
+        '<joint name="to_hand" type="fixed"><origin rpy="0 0 -0.7853981633974483"/>'
+        '<parent link="panda_link8"/><child link="panda_hand"/></joint>'
+        '<link name="panda_hand"><inertial><origin xyz="-0.01 0 0.03"/><mass value="0.73"/>'
+        '<inertia ixx="0.001" ixy="0" ixz="0" iyy="0.0025" iyz="0" izz="0.0017"/></inertial></link></robot>'
+    )
+    (tmp_path / "cell.urdf").write_text(arm("panda").urdf.replace("</robot>", with_hand))
+    described = ["--robot", tmp_path / "cell.urdf", "--frame", "panda_link8"]
+    found = answer(logs / "both.csv", *described)
+    assert found["relative_to"] == "tool"
+    assert found["mass"] == pytest.approx(BODY.mass, rel=0.01)
+    assert answer(logs / "both.csv", *described, "--tare", logs / "hand.csv")["relative_to"] == "tare"
+    for form, said in (("franka", ""), ("ur", "add the tool with --plus")):
+        capsys.readouterr()
+        assert main(["identify", str(logs / "both.csv"), *map(str, described), "--to", form]) == 0
+        err = capsys.readouterr().err
+        assert said in err
+        assert "--minus" not in err
+
+
 @pytest.mark.parametrize("method", ["hybrid", "map-gp", "map", "rls", "rls-filter"])
 def test_every_method_finds_the_simulated_body(answer, logs, method):
     found = answer(logs / "body.csv", "--robot", "panda", "--method", method)
@@ -324,6 +345,21 @@ def test_gravity_that_a_controller_took_out_is_put_back(answer, logs, panda, tmp
     found = answer(tmp_path / "taken.csv", "--robot", "panda", "--compensated", "franka-hand")
     np.testing.assert_allclose(found["phi"], answer(logs / "both.csv", "--robot", "panda")["phi"], atol=1e-4)
     assert found["mass"] == pytest.approx(BODY.mass + franka_hand().parameters.mass, abs=0.05)
+
+
+def test_what_a_controller_was_set_to_carry_is_read_once_for_log_and_tare(logs, panda, tmp_path, capsys):
+    hand = franka_hand().parameters
+    (tmp_path / "set.json").write_text(json.dumps({"mass": hand.mass, "com": hand.com.tolist(), "frame": hand.frame}))
+    known, words = panda.with_payload(InertialParameters(hand.phi, panda.frame)), ["identify"]
+    for name, option in (("both", None), ("hand", "--tare")):
+        log = read_recording(logs / f"{name}.csv", panda)
+        still = np.zeros_like(log.q)
+        write_recording(tmp_path / f"{name}.csv", replace(log, tau=log.tau - known.torque(log.q, still, still)))
+        words += [*([option] if option else []), str(tmp_path / f"{name}.csv")]
+    assert main([*words, "--robot", "panda", "--compensated", str(tmp_path / "set.json"), "--json"]) == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out)["mass"] == pytest.approx(BODY.mass, rel=0.01)
+    assert err.count("the inertia is not given") == 1
 
 
 def test_a_tool_s_file_of_mass_and_centre_alone_is_taken_with_wider_intervals(answer, logs, tmp_path):

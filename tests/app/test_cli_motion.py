@@ -52,6 +52,23 @@ def test_a_design_is_exported_with_the_pose_first_at_rest_and_the_pose_again(des
     assert (folder / "m-empty.json").exists()
 
 
+def test_the_table_of_a_motion_is_that_motion_to_every_command(designed, tmp_path, capsys):
+    file, table = designed[1]["motion"], str(tmp_path / "m.csv")
+    assert main(["motion", "export", file, "--format", "csv", "--rate", "1000", "--out", table]) == 0
+    found = []
+    for motion in (file, table):
+        capsys.readouterr()
+        assert main(["motion", "check", motion, "--robot", "panda", "--payload", "none", "--json"]) == 0
+        found.append(json.loads(capsys.readouterr().out))
+        assert main(["motion", "show", motion, "--robot", "panda"]) == 0
+        assert main(["motion", "export", motion, "--format", "ros2"]) == 0
+    assert [one["kind"] for one in found] == ["motion", "motion"]
+    np.testing.assert_allclose(found[1]["peak"]["velocity"], found[0]["peak"]["velocity"], atol=1e-6)
+    np.testing.assert_allclose(
+        found[1]["without_tare"]["half_width"], found[0]["without_tare"]["half_width"], rtol=1e-3
+    )
+
+
 def test_an_export_without_a_file_is_printed_and_a_figure_is_a_picture(designed, tmp_path, capsys):
     _, said = designed
     export = ["motion", "export", said["motion"], "--format", "csv"]
@@ -184,6 +201,8 @@ def test_a_path_of_a_table_or_a_trajectory_is_enriched(form, tmp_path, capsys):
     [
         ("a.csv", "time,x\n0,1\n", "expected t, q1"),
         ("a.csv", "t,q1,q2,q3,q4,q5,q6,q7\n0,1\n", "not 8 numbers"),
+        ("hole.csv", "t,q1,q2,q3,q4,q5,q6,q7\n0,0,0,0,0,0,0,0\n1,0,0,nan,0,0,0,0\n", "joint 3 at point 2"),
+        ("of_eight.csv", "t,q1,q2,q3,q4,q5,q6,q7,q8\n0,1,1,1,1,1,1,1,1\n", "q8: expected t, q1 … q7"),
         ("a.yaml", "joint_names: [a]\npoints: []\n", "no JointTrajectory of panda"),
         ("a.yaml", "- 1\n", "is no path"),
         ("a.yaml", "{]", "neither JSON nor YAML"),

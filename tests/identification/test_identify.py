@@ -448,3 +448,11 @@ def test_friction_that_drives_a_joint_is_told_by_the_joint(name, turned):
     assert told <= set(turned)
     assert len(told) > 0.8 * len(turned)
     assert not any("friction drives" in note for note in identify(log, robot).notes)
+
+
+@pytest.mark.parametrize("samples", [2, 3, 5])
+def test_a_log_of_some_milliseconds_is_answered_and_tells_little(samples, loaded, real_like):
+    panda, _ = real_like
+    answer = identify(loaded.select(np.arange(len(loaded)) < samples), panda)
+    assert answer.phi_low[0] < BOX.mass < answer.phi_high[0]
+    assert not answer.determined[1:].any()  # the mass may be: it is weighed in one pose

@@ -67,8 +67,8 @@ class Identification:
     """What the arm holds, with 95 % intervals; the fields are those of `armload identify --json`.
 
     method: the method's name; robot, frame: whose payload, about which frame's origin and axes.
-    relative_to: "arm" (the bare arm), "tool" (what `--tool` describes), "tare" or "profile" (what was mounted at the
-        tare, or in the profile's logs).
+    relative_to: "arm" (the bare arm), "tool" (what `--tool` describes, or a description with a hand), "tare" or
+        "profile" (what was mounted at the tare, or in the profile's logs).
     n_samples, duration: samples used and the time they span [s].
     phi, phi_low, phi_high: ten parameters (10,) in the paper's order, and their 95 % interval.
     interval: "calibrated" or "approximate"; what is in doubt is never called calibrated.

@@ -42,7 +42,8 @@ def answer_of_one_payload(recording: Recording, arm: Arm, question: Question) ->
     """The answer for a log, or the part of one, throughout which the payload is the same."""
     tare, mounted, asked, notes = question.tare, question.mounted, question.asked, question.notes
     tared = tare is not None or asked.profile is not None
-    without = "profile" if asked.profile is not None else "arm"
+    bare = "arm" if arm.attached is None else "tool"  # that of a description with a hand, say
+    without = bare if asked.profile is None else "profile"
     if mounted is None:
         relative_to = without if tare is None else "tare"
         return answered(found_in(recording, arm, tare, asked), arm, recording, tared, relative_to, notes)

@@ -34,15 +34,15 @@ def check_plausible(recording: Recording, arm: Arm) -> None:
 
     Raises:
         RecordingError: another number or other names of joints; degrees; positions outside the limits; positions that
-            jump; dq that is not the derivative of q (unit, sign, swapped columns, time in milliseconds); too fast;
-            torque missing, frozen, too large, or not that of this arm (wrong arm, unit, sign, base orientation,
-            exchanged columns, or a channel without gravity). One sentence that names the place.
+            jump; times too small; dq that is not the derivative of q (unit, sign, swapped columns, time in
+            milliseconds); too fast; torque missing, frozen, too large, or not that of this arm (wrong arm, unit, sign,
+            base orientation, exchanged columns, or a channel without gravity). One sentence that names the place.
     """
     _check_joints(recording, arm)
     _check_radians(recording, arm)
     _check_jumps(recording, arm)
     _check_limits(recording, arm)
-    _check_velocity_is_derivative(recording)
+    _check_velocity_is_derivative(recording, arm)
     _check_speed(recording, arm)
     check_torque(recording, arm)
 
@@ -114,10 +114,29 @@ def _check_jumps(recording: Recording, arm: Arm) -> None:
         )
 
 
-def _check_velocity_is_derivative(recording: Recording) -> None:
+def _check_pace(recording: Recording, arm: Arm) -> None:
+    """See that no joint gets farther from where it is first than it can: for logs, or times, too short for windows."""
+    speed = np.where(np.isfinite(arm.limits.velocity), arm.limits.velocity, ANY_SPEED)
+    start = recording.q[:1][0]
+    for part in blocks(len(recording)):
+        since = (recording.t[part] - recording.t[0])[:, None]
+        bad = np.argwhere(np.abs(recording.q[part] - start) > SPEED * speed * since + JUMP)
+        if not len(bad):
+            continue
+        k, j = part.start + bad[0][0], int(bad[0][1])
+        away = abs(float(recording.q[k : k + 1][0, j] - start[j]))
+        raise RecordingError(
+            f"{recording.source}: q{j + 1} changes by {away:.3f} rad in {recording.t[k] - recording.t[0]:.2g} s, which "
+            f"{arm.joint_names[j]} cannot do (its limit is {speed[j]:.4g} rad/s): expected s, but t looks too small; "
+            "check its unit, --columns t_unit=…"
+        )
+
+
+def _check_velocity_is_derivative(recording: Recording, arm: Arm) -> None:
     """Compare the change of q over short windows with the integral of dq, which noise hardly touches."""
     parts = windows(recording)
     if len(parts.first) < 3:
+        _check_pace(recording, arm)
         return
     change = recording.q[parts.last] - recording.q[parts.first]
     integral = integrals(recording, lambda rows: recording.dq[rows], parts)
@@ -144,9 +163,9 @@ def _why_not_derivative(change: NDArray, integral: NDArray, wrong: NDArray) -> s
             (-1.0, "it has the opposite sign; turn it around"),
             (1.0 / _DEGREE, "it looks like degrees per second: --columns dq_unit=deg/s"),
             (_DEGREE, "q looks like degrees: --columns q_unit=deg"),
-            (1e-3, "t looks like milliseconds; divide it by 1000"),
-            (1e-6, "t looks like microseconds; divide it by 1e6"),
-            (1e-9, "t looks like nanoseconds; divide it by 1e9"),
+            (1e-3, "t looks like milliseconds: --columns t_unit=ms"),
+            (1e-6, "t looks like microseconds: --columns t_unit=us"),
+            (1e-9, "t looks like nanoseconds: --columns t_unit=ns"),
             (np.pi / 30.0, "it looks like revolutions per minute; multiply dq by pi/30"),
         ):
             if abs(factor / value - 1.0) < 0.25:

@@ -111,6 +111,8 @@ def changes_at_rest(
         t, q, r: rows: times (M,), joint angles (M, n) [rad], what the bare arm does not explain (M, n) [N·m].
         correction: of the arm. coulomb: finds its Coulomb friction (n,) [N·m], and is asked where it matters.
     """
+    if len(t) < 2:  # a log of some milliseconds: one mean, beside which there is none
+        return []
     rests, hop, out = _Rests.of(t, q, r, correction, coulomb), max(int(_HOP / max(np.median(np.diff(t)), 1e-9)), 1), []
     rows = np.flatnonzero(rests.settled)[::hop]
     reference, seen, turned = -1, -1, np.zeros(correction.arm.n)

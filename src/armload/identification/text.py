@@ -126,7 +126,7 @@ def rests_on(result: Identification) -> str:
     why = f" ({result.why})" if result.why else ""
     scale = result.torque_gain_std
     how = "known" if result.gain_known else "assumed to be right"
-    known = "" if scale is None else f" for a torque scale {how} to {100 * scale:.1g} %"
+    known = "" if scale is None else f" for a torque scale {how} to {100 * scale:.2g} %"
     if result.same_arm_assumed:
         known += f"{' and' if known else ' for'} a {_before(result)} of this very arm, which nothing here confirms"
     return (

@@ -96,13 +96,21 @@ class PathMotion(Motion):
         except ValueError:
             raise MotionError(f"motion file {path} is not a table of numbers under a header") from None
         n = (len(header) - 1) // 3
-        names = ["t", *(f"{kind}{joint + 1}" for kind in ("q", "dq", "ddq") for joint in range(n))]
-        if n < 1 or header != names or table.ndim != 2:
+        if not _is_header(header) or table.ndim != 2:
             raise MotionError(
                 f"motion file {path} has the columns {', '.join(header)[:80]}: expected t, q1 …, dq1 …, ddq1 … as "
                 "`armload motion export --format csv` writes them"
             )
         return cls(table[:, 0], table[:, 1 : n + 1], table[:, n + 1 : 2 * n + 1], table[:, 2 * n + 1 :], str(path))
+
+    @staticmethod
+    def is_table(path: str | Path) -> bool:
+        """Whether a file begins as such a table does: it has accelerations, and no torque as a log has."""
+        try:
+            with open(path, newline="", encoding="utf-8") as file:
+                return _is_header(next(csv.reader(file), []))
+        except (OSError, ValueError, csv.Error):
+            return False
 
     def derivative(self, t: NDArray[np.float64], order: int) -> NDArray[np.float64]:
         """The derivative of q of any order ≥ 0 at times t (N,) within 0 … the last; (N, n)."""
@@ -124,3 +132,8 @@ class PathMotion(Motion):
         for power in range(5, order - 1, -1):
             out = out * s + parts[power] * (factorial(power) / factorial(power - order))
         return out
+
+
+def _is_header(header: list[str]) -> bool:
+    n = (len(header) - 1) // 3
+    return n > 0 and header == ["t", *(f"{kind}{joint + 1}" for kind in ("q", "dq", "ddq") for joint in range(n))]

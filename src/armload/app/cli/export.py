@@ -185,14 +185,20 @@ def _is_flange(frame: str) -> bool:
 
 
 def _part(name: str, load: Load, arm: Arm | None) -> InertialParameters:
-    """A part about the load's own frame; the Franka Hand sits on the flange, whatever that is called."""
+    """A part about the load's own frame; the Franka Hand sits on the flange, whatever that is called.
+
+    Raises:
+        IdentificationError: the arm cannot carry it: it is given in grams, say.
+    """
     from armload.devices import about
+    from armload.identification import plausible_tool
     from armload.payloads import franka_hand
     from armload.payloads.hand import HAND, fits
 
     if name == HAND and load.frame is not None and fits(load.frame):
         return franka_hand(load.frame).parameters
-    return about(payload_of(name, arm), load.frame, arm)
+    part = about(payload_of(name, arm), load.frame, arm)
+    return part if arm is None else plausible_tool(part, arm)
 
 
 def _doubts(parts: list[str], load: Load) -> list[str]:

@@ -96,7 +96,7 @@ def run(options: argparse.Namespace) -> None:
         log, tare = read_logs(options, arm, options.log, options.tare, topics=topics)
         assert log is not None
         if options.compensated is not None:
-            log, tare = (None if x is None else uncompensated(x, arm, options.compensated) for x in (log, tare))
+            log, tare = uncompensated((log, tare), arm, options.compensated)
             assert log is not None
         result = identify(
             log,

@@ -47,7 +47,7 @@ def run(options: argparse.Namespace) -> int | None:
     profile = None if options.profile is None else load_profile(options.profile)
     if profile is not None:
         profile.check(arm)
-    motion = None if options.motion is None else _motion(options.motion, arm)
+    motion = None if options.motion is None else motion_of(options.motion, arm)
     accuracy = None if options.until is None else Accuracy.read(options.until)
     mass = None if options.mass is None else KnownMass(*options.mass)
     com = None if options.com is None else KnownCentre(*options.com)
@@ -95,16 +95,6 @@ def run(options: argparse.Namespace) -> int | None:
             _apply(found, mover, mounted, options)
         _print(found, options)
     return None
-
-
-def _motion(name: str, arm: Arm) -> Motion:
-    from armload.motion import PathMotion, check_joints
-
-    if not name.lower().endswith(".csv"):
-        return motion_of(name, arm)
-    motion = PathMotion.read(name)
-    check_joints(motion, arm)
-    return motion
 
 
 def _tool(options: argparse.Namespace, arm: Arm) -> InertialParameters:

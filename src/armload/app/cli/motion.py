@@ -31,8 +31,9 @@ examples:
   armload motion export taie2024 --format ros2 --robot panda --out excite.yaml
   armload motion export mine.json --format csv --robot panda --from 0,-0.4,0,-2,0,1.6,0.8 --out mine.csv
 
-MOTION is taie2024, a JSON file, or random:SEED. `check` says whether the arm may run a motion, exits with 3 if not, and
-says which parameters of a payload it can tell, and how well; it takes a log (CSV, Parquet, NPZ, HDF5, ROS bag) as well.
+MOTION is taie2024, a JSON file, the table (CSV) that `export` wrote, or random:SEED. `check` says whether the arm may
+run a motion, exits with 3 if not, and says which parameters of a payload it can tell, and how well; it takes a log
+(CSV, Parquet, NPZ, HDF5, ROS bag) as well.
 """
 
 
@@ -75,7 +76,7 @@ def parser() -> Parser:
         "or a log against the limits; say which parameters of a payload it can tell, and how well: the Bayesian "
         "Cramér-Rao bound.",
     )
-    check.add_argument("motion", metavar="LOG|MOTION", help="a log, or taie2024, a JSON file, or random:SEED")
+    check.add_argument("motion", metavar="LOG|MOTION", help="a log, or taie2024, a JSON or CSV file, or random:SEED")
     add_arm_arguments(check)
     check.add_argument(
         "--payload",

@@ -18,13 +18,14 @@ if TYPE_CHECKING:
 
 
 def run_of(options: argparse.Namespace, name: str, arm: Arm, is_tare: bool = False) -> Recording | Motion:
-    """A log by the suffix of its file (or the folder of one), else a motion."""
+    """A log by the suffix of its file (or the folder of one), else a motion; a motion's own table is one, too."""
     from armload.app.cli.named import motion_of, read_logs
     from armload.identification import check_plausible
+    from armload.motion import PathMotion
     from armload.recording import LOG_SUFFIXES
 
     path = Path(name)
-    if path.suffix.lower() not in LOG_SUFFIXES and not path.is_dir():
+    if not path.is_dir() and (path.suffix.lower() not in LOG_SUFFIXES or PathMotion.is_table(path)):
         return motion_of(name, arm)
     log = read_logs(options, arm, None, name)[1] if is_tare else read_logs(options, arm, name)[0]
     assert log is not None

@@ -23,7 +23,7 @@ _DEFAULT = "panda"
 def add_show_arguments(parser: argparse.ArgumentParser) -> None:
     """All of `armload motion show`."""
     add = parser.add_argument
-    add("motion", metavar="MOTION", help="taie2024, a JSON file, or random:SEED")
+    add("motion", metavar="MOTION", help="taie2024, a JSON or CSV file, or random:SEED")
     add_arm_arguments(parser, default=_DEFAULT)
     parser.set_defaults(robot=None)  # a table needs no arm: only one that is named must fit
     add("--figure", type=output_file, metavar="F.png", help="draw the joints against their limits")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
@@ -111,11 +112,12 @@ def _reads(path: str, arm: Arm) -> bool:
     return True
 
 
-def uncompensated(log: Recording, arm: Arm, payload: str) -> Recording:
-    """A log with the gravity that its controller took out of the torque: the arm's, and a payload's or `nothing`'s."""
+def uncompensated(logs: Sequence[Recording | None], arm: Arm, payload: str) -> list[Recording | None]:
+    """Logs with the gravity that their controller took out of the torque: the arm's, and a payload's or `nothing`'s."""
     from armload.recording import with_gravity
 
-    return with_gravity(log, arm, None if payload == "nothing" else payload_of(payload, arm))
+    held = None if payload == "nothing" else payload_of(payload, arm)  # once: it may be a pipe
+    return [None if log is None else with_gravity(log, arm, held) for log in logs]
 
 
 def arm_of(options: argparse.Namespace) -> Arm:
@@ -170,18 +172,19 @@ def robot_of(source: str) -> str:
 
 
 def motion_of(name: str, arm: Arm, of_arm: bool = True) -> Motion:
-    """A motion by name (`taie2024`), from a JSON file, or drawn for the arm (`random:SEED`).
+    """A motion by name (`taie2024`), from a JSON file or an exported table (CSV), or drawn for the arm (`random:SEED`).
 
     of_arm: whether it must be one of the arm's; else the arm is what a random one is drawn for.
 
     Raises:
         MotionError: it cannot be read, or moves another number of joints than the arm has.
     """
-    from armload.motion import check_joints, load_motion, random_motion, taie2024
+    from armload.motion import PathMotion, check_joints, load_motion, random_motion, taie2024
 
     if name.startswith("random:"):
         return random_motion(arm, whole_number(name, "motion"))
-    motion = taie2024() if name == "taie2024" else load_motion(name)
+    read = PathMotion.read if name.lower().endswith(".csv") else load_motion
+    motion = taie2024() if name == "taie2024" else read(name)
     if of_arm:
         check_joints(motion, arm)
     return motion

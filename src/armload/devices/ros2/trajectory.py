@@ -60,11 +60,15 @@ class TrajectoryMotion(Motion):
             raise MotionError(f"the {self.name} has {times.size} point(s): expected at least 2, times (K,), (K, n)")
         for name in ("positions", "velocities", "accelerations"):
             value = getattr(self, name)
-            if value is not None and (value.shape != (len(times), shape[1]) or not np.all(np.isfinite(value))):
+            if value is None:
+                continue
+            if value.shape != (len(times), shape[1]):
                 raise MotionError(
-                    f"the {name} of the {self.name} have shape {value.shape}: expected ({len(times)}, {shape[1]}), "
-                    "finite"
+                    f"the {name} of the {self.name} have shape {value.shape}: expected ({len(times)}, {shape[1]})"
                 )
+            if len(bad := np.argwhere(~np.isfinite(value))):
+                k, j = bad[0].tolist()
+                raise MotionError(f"the {name} of the {self.name} are not finite: joint {j + 1} at point {k + 1}")
         if times[0] != 0 or not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0):
             raise MotionError(f"the times of the {self.name} do not rise from 0: expected each point after the last")
 
