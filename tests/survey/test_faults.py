@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import threading
+from dataclasses import replace
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -239,6 +240,18 @@ def test_a_method_that_needs_a_tare_is_asked_with_one(logs, tmp_path):
     asked = Settings("panda", method="difference", tare=str(logs / "0.csv"))
     found = survey([str(logs / "1.csv")], asked, tmp_path / "survey.json", jobs=1)
     assert (found.logs, len(found.rows)) == (1, 1)
+
+
+def test_each_arms_tare_among_the_logs_is_passed_over_as_one_of_all_arms_is(panda, share, tmp_path):
+    arm = share.name
+    log = simulate_inverse(panda, random_motion(panda, 9, duration=3.0), rate=100.0, seed=9)
+    write_recording(share / "tare.csv", log)
+    for tare in (share / "tare.csv", share.with_name("{arm}") / "tare.csv"):
+        settings = replace(SETTINGS, tare=str(tare))
+        found = survey([str(share)], settings, tmp_path / "survey.json", jobs=1)
+        assert {row["arm"] for row in found.rows} == {arm}
+        assert str(share / "tare.csv") not in {row["log"] for row in found.rows}
+        assert found.logs == 3
 
 
 def test_paths_of_which_none_is_there_are_refused_and_one_among_others_has_a_row(logs, tmp_path):

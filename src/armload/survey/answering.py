@@ -60,7 +60,7 @@ def _rows(log: Log, settings: Settings, about: dict[str, Any]) -> list[dict[str,
     if not log.arm:
         return [unusable(f"{log.name}: --arm-of names no arm in its path", about)]
     try:
-        with _here(log) as path:
+        with on_this_machine(log) as path:
             try:
                 return _of_one(log, settings, path, about)
             except EpisodesError as error:
@@ -112,8 +112,12 @@ def _reason(error: Exception) -> str:
 
 
 @contextmanager
-def _here(log: Log) -> Iterator[Path]:
-    """The log as a path on this machine; an object is fetched, and removed afterwards."""
+def on_this_machine(log: Log) -> Iterator[Path]:
+    """The log as a path on this machine; an object is fetched, and removed afterwards.
+
+    Raises:
+        RecordingError: it is no regular file, or its store does not give it.
+    """
     if not log.remote:
         if special := next((file for file in log.files if is_special(file)), None):
             raise RecordingError(f"{special} cannot be read: {NO_FILE}")
