@@ -14,7 +14,7 @@ import pinocchio as pin
 import pytest
 
 from armload.arms import ARMS, Arm, arm, full_arm_regressor, momentum_regressor, payload_regressor, rated_effort
-from armload.errors import ArmError, ArmloadError, PayloadError
+from armload.errors import ArmError, ArmloadError, InertiaError, PayloadError
 from armload.inertia import InertialParameters, is_consistent, to_order
 from armload.payloads import franka_hand, hand_on
 from armload.regression import FilteredRegression, first_order_lag
@@ -813,3 +813,20 @@ def test_a_file_that_is_no_description_is_an_arm_error(tmp_path):
         arm(tmp_path / "torn.urdf")
     with pytest.raises(ArmError, match=r"missing\.urdf is not there: expected the path of a URDF file"):
         arm(tmp_path / "missing.urdf")
+
+
+@pytest.mark.parametrize("call", ["in_frame", "as_payload", "with_payload"])
+def test_a_whole_payload_is_told_to_give_its_parameters(call):
+    with pytest.raises(InertiaError, match=r"a Payload was given: .* give its \.parameters"):
+        getattr(arm("panda"), call)(franka_hand())
+
+
+@pytest.mark.parametrize("shape", [(), (6,), (8,), (3, 7), (7, 7)])
+def test_the_inertia_of_the_joints_is_of_one_position(shape):
+    with pytest.raises(ArmError, match="panda has 7 joints"):
+        arm("panda").mass_matrix(np.zeros(shape))
+
+
+def test_positions_in_three_axes_are_refused():
+    with pytest.raises(ArmError, match="panda has 7 joints"):
+        arm("panda").torque(np.zeros((2, 7, 7)))
