@@ -3,7 +3,7 @@
 import copy
 import pickle
 import re
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import FrozenInstanceError, replace
 from multiprocessing import get_context
 
@@ -830,3 +830,18 @@ def test_the_inertia_of_the_joints_is_of_one_position(shape):
 def test_positions_in_three_axes_are_refused():
     with pytest.raises(ArmError, match="panda has 7 joints"):
         arm("panda").torque(np.zeros((2, 7, 7)))
+
+
+def test_threads_that_share_an_arm_get_the_numbers_that_one_alone_gets():
+    """Pinocchio writes into one place and is read after it: not a place that another thread writes into meanwhile."""
+    panda = arm("panda")
+
+    def asked(q):
+        motion, links = panda.frame_motion(q), panda.link_motions(q)
+        return [motion.jacobian, motion.gravity, *panda.frame_pose(q), *panda.momentum(q, q), links[3].jacobian]
+
+    positions = [random_states(7, 1000, seed)[0] for seed in range(4)]
+    alone = [asked(q) for q in positions]
+    with ThreadPoolExecutor(len(positions)) as pool:
+        together = list(pool.map(asked, positions))
+    assert all(np.array_equal(x, y) for a, b in zip(alone, together, strict=True) for x, y in zip(a, b, strict=True))

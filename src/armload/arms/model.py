@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import threading
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -99,7 +100,7 @@ class Arm:
         _ = self._model  # fail now, not at the first sample
 
     def __getstate__(self) -> dict[str, Any]:
-        return {k: v for k, v in self.__dict__.items() if k not in ("_model", "_data", "limits")}
+        return {k: v for k, v in self.__dict__.items() if k not in ("_model", "_of_threads", "limits")}
 
     # ------------------------------------------------------------------ what it is
 
@@ -290,8 +291,14 @@ class Arm:
         return built(*about, self.links, self.attached)
 
     @cached_property
+    def _of_threads(self) -> threading.local:
+        return threading.local()
+
+    @property
     def _data(self) -> pin.Data:
-        return self._model.createData()
+        """Where Pinocchio writes: each thread's own, as what a call wrote is read after it."""
+        own = self._of_threads.__dict__
+        return own["data"] if "data" in own else own.setdefault("data", self._model.createData())
 
     @property
     def _frame_placement(self) -> pin.SE3:
