@@ -153,6 +153,19 @@ def test_a_log_that_vanishes_before_it_is_read_leaves_no_key(share):
     assert answer_log(log, SETTINGS, "key", stamp, content)["key"] == ""
 
 
+def test_a_log_that_does_not_fit_in_memory_is_asked_again_and_is_no_bug(share, whole, tmp_path, monkeypatch):
+    def full(*_):
+        raise MemoryError
+
+    with monkeypatch.context() as poor:
+        poor.setattr(Settings, "recording", full)
+        found = survey([str(share)], SETTINGS, tmp_path / "survey.json", jobs=1)
+        assert all("too little memory" in row["reason"] and "bug" not in row["reason"] for row in found.rows)
+    again = survey([str(share)], SETTINGS, tmp_path / "survey.json", jobs=1)
+    assert again.anew == 3
+    assert answers(again.rows) == answers(whole)
+
+
 def test_a_full_disk_is_said_and_the_survey_goes_on_from_there(share, whole, tmp_path):
     out = tmp_path / "survey.json"
     most = 4000  # bytes of a file: cells of a log fit, the table of all three does not
