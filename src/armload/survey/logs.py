@@ -196,7 +196,7 @@ def _arm(name: str, pattern: re.Pattern[str] | None) -> str:
 
 
 def _expanded(paths: Sequence[str], within: tuple[str, ...] = ()) -> Iterator[str]:
-    """The paths that are meant. within: the lists that these stand in, one in the other."""
+    """The paths that are meant; `within`: the lists that they stand in, one in the other."""
     for path in paths:
         if path.startswith("@"):
             here = Path(path[1:])
@@ -234,8 +234,7 @@ def _of_store(fs: Any, inside: str) -> Iterator[str]:
 def _units(path: str, hidden: set[str]) -> Iterator[tuple[str, int | None, tuple[Path, ...]]]:
     """Name, episode and files of every unit behind a path.
 
-    hidden: real paths that are passed over (`Path.resolve` raises of a link that leads to itself); a folder is one from
-        then on, as links may lead to it again.
+    hidden: real paths that are passed over (`Path.resolve` raises of a loop of links); a folder is one from then on.
     """
     here = Path(path)
     if is_url(path):
