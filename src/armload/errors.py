@@ -1,5 +1,7 @@
 """Every exception armload raises on purpose. Each message says what was found, what was expected and what to do."""
 
+from typing import Any
+
 
 def one_line(error: Exception) -> str:
     """The message of another library's exception on one line; its type where it has no message."""
@@ -36,6 +38,9 @@ class EpisodesError(RecordingError):
     def __init__(self, message: str, episodes: tuple[int, ...]) -> None:
         super().__init__(message)
         self.episodes = episodes
+
+    def __reduce__(self) -> tuple[Any, ...]:  # a pool of processes hands errors over, and breaks where it cannot
+        return type(self), (str(self), self.episodes)
 
 
 class DatasetError(ArmloadError, ValueError):

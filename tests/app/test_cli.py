@@ -155,6 +155,15 @@ def test_a_bug_told_after_an_interruption_is_a_bug(capsys, monkeypatch):
     assert "ZeroDivisionError" in refused(capsys, ["identify", "log.csv", "--robot", "panda"], code=1)
 
 
+def test_too_little_memory_is_no_bug(capsys, monkeypatch):
+    def full(*_, **__):
+        raise MemoryError
+
+    monkeypatch.setattr("armload.arms.arm", full)
+    said = refused(capsys, ["identify", "run.csv", "--robot", "panda"])
+    assert said == "armload: too little memory: no more can be had"
+
+
 def test_a_bug_is_one_line_with_a_hint_and_the_traceback_on_request(capsys, monkeypatch):
     def broken(*_, **__):
         raise ZeroDivisionError("by zero,\nsomewhere")

@@ -214,6 +214,12 @@ def test_train_refuses_what_is_no_data_set(call, tmp_path):
     assert "mixed" in captured.err
 
 
+def test_epochs_of_trees_are_refused_and_not_passed_over(call, tmp_path):
+    for kind in ((), ("--kind", "tree")):
+        argv = ("train", "--dataset", tmp_path, *kind, "--epochs", "3", "--out", tmp_path / "m.safetensors")
+        assert "--epochs is of networks" in call(*argv, code=2).err
+
+
 def test_a_trained_model_identifies_its_motion_and_refuses_another(work, call, tmp_path):
     panda = arm("panda")
     write_recording(tmp_path / "same.csv", simulate(panda, taie2024(), franka_hand(), rate=100.0))

@@ -3,7 +3,7 @@
 import copy
 import pickle
 import re
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import FrozenInstanceError, replace
 from multiprocessing import get_context
 
@@ -14,7 +14,7 @@ import pinocchio as pin
 import pytest
 
 from armload.arms import ARMS, Arm, arm, full_arm_regressor, momentum_regressor, payload_regressor, rated_effort
-from armload.errors import ArmError, ArmloadError, PayloadError
+from armload.errors import ArmError, ArmloadError, InertiaError, PayloadError
 from armload.inertia import InertialParameters, is_consistent, to_order
 from armload.payloads import franka_hand, hand_on
 from armload.regression import FilteredRegression, first_order_lag
@@ -813,3 +813,35 @@ def test_a_file_that_is_no_description_is_an_arm_error(tmp_path):
         arm(tmp_path / "torn.urdf")
     with pytest.raises(ArmError, match=r"missing\.urdf is not there: expected the path of a URDF file"):
         arm(tmp_path / "missing.urdf")
+
+
+@pytest.mark.parametrize("call", ["in_frame", "as_payload", "with_payload"])
+def test_a_whole_payload_is_told_to_give_its_parameters(call):
+    with pytest.raises(InertiaError, match=r"a Payload was given: .* give its \.parameters"):
+        getattr(arm("panda"), call)(franka_hand())
+
+
+@pytest.mark.parametrize("shape", [(), (6,), (8,), (3, 7), (7, 7)])
+def test_the_inertia_of_the_joints_is_of_one_position(shape):
+    with pytest.raises(ArmError, match="panda has 7 joints"):
+        arm("panda").mass_matrix(np.zeros(shape))
+
+
+def test_positions_in_three_axes_are_refused():
+    with pytest.raises(ArmError, match="panda has 7 joints"):
+        arm("panda").torque(np.zeros((2, 7, 7)))
+
+
+def test_threads_that_share_an_arm_get_the_numbers_that_one_alone_gets():
+    """Pinocchio writes into one place and is read after it: not a place that another thread writes into meanwhile."""
+    panda = arm("panda")
+
+    def asked(q):
+        motion, links = panda.frame_motion(q), panda.link_motions(q)
+        return [motion.jacobian, motion.gravity, *panda.frame_pose(q), *panda.momentum(q, q), links[3].jacobian]
+
+    positions = [random_states(7, 1000, seed)[0] for seed in range(4)]
+    alone = [asked(q) for q in positions]
+    with ThreadPoolExecutor(len(positions)) as pool:
+        together = list(pool.map(asked, positions))
+    assert all(np.array_equal(x, y) for a, b in zip(alone, together, strict=True) for x, y in zip(a, b, strict=True))

@@ -188,6 +188,17 @@ def test_unknown_settings_are_named():
         BaggingEnsemble(NetworkLearner(max_epochs=0)).fit(X, y)
     with pytest.raises(ModelError, match="expects the ten of phi"):
         TwoStage("tree").fit(X, y[:, :4])
+    for setting, wrong in (("members", 2.5), ("members", "3"), ("seed", None), ("hold_out", 1.0), ("hold_out", -0.1)):
+        with pytest.raises(ModelError, match=f"{setting} is {wrong!r}"):
+            BaggingEnsemble("tree", **{setting: wrong}).fit(X, y)
+    with pytest.raises(ModelError, match=r"unknown kind of learner \['tree'\]"):
+        BaggingEnsemble(["tree"]).fit(X, y)
+
+
+def test_however_much_is_held_out_a_row_is_left_to_train_on():
+    X, y = rows(0, 20)
+    bag = draw_bag(X, y, None, members=2, seed=0, bootstrap=True, scale="standard", hold_out=0.99)
+    assert (len(bag.X), len(bag.X_val)) == (1, 19)
 
 
 def test_one_member_has_no_spread_to_show():

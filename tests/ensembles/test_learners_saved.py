@@ -422,6 +422,10 @@ def test_error_bars_rest_on_held_out_payloads_and_not_on_the_members_agreement(p
     known = save_model(tmp_path / "known.safetensors", bag, **where, error_std=error)
     save_model(tmp_path / "unknown.safetensors", bag, **where)
     assert np.array_equal(load_model(tmp_path / "known.safetensors").error_std, error)
+    for wrong in (error[:3], -error, np.full(10, np.nan)):
+        with pytest.raises(ModelError, match="expected 10 finite numbers, none below 0"):
+            save_model(tmp_path / "known.safetensors", bag, **where, error_std=wrong)
+    assert np.array_equal(load_model(tmp_path / "known.safetensors").error_std, error)  # the file stayed as it was
 
     log = simulate(panda, motion, dataset.truth(int(dataset.run[split.test][0])), rate=100.0)
     answer = identify(log, panda, method=tmp_path / "known.safetensors")

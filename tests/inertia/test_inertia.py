@@ -21,6 +21,7 @@ from armload.inertia import (
     inertia_matrix,
     is_consistent,
     log_cholesky,
+    log_cholesky_jacobian,
     near_consistent,
     nearest_consistent,
     phi_to_com,
@@ -30,6 +31,7 @@ from armload.inertia import (
     to_order,
     vech,
 )
+from armload.payloads import test_payload as make_payload
 
 SEEDS = range(8)
 PRINCIPAL = [7e-3, 8e-3, 11e-3]  # [kg·m²] obeys the triangle inequality with room to spare
@@ -423,3 +425,44 @@ def test_a_near_body_is_a_body_and_hardly_farther_than_the_nearest(seed):
 def test_what_is_a_body_already_is_its_own_near_body(shift):
     phi = InertialParameters.from_com(1.0, (0.0, 0.1, 0.2), np.zeros((3, 3))).phi + shift * np.eye(10)[4]
     assert np.array_equal(near_consistent(phi, np.eye(10)), phi) == is_consistent(phi)
+
+
+@pytest.mark.parametrize("wrong", [[1.0, 2.0], 1.0, [], np.ones(11), np.ones((4, 10)), "abc", None, make_payload()])
+@pytest.mark.parametrize(
+    "function",
+    [is_consistent, log_cholesky, from_log_cholesky, log_cholesky_jacobian, phi_to_com, nearest_consistent],
+)
+def test_what_is_not_ten_numbers_is_refused_in_a_sentence(function, wrong):
+    with pytest.raises(InertiaError, match="expected 10 numbers"):
+        function(wrong)
+
+
+@pytest.mark.parametrize(
+    ("function", "wrong"),
+    [
+        (pseudo_inertia, np.ones(11)),
+        (pseudo_inertia_to_phi, np.ones((3, 3))),
+        (inertia_matrix, np.ones(10)),
+        (vech, np.ones((2, 2))),
+        (skew, np.ones(10)),
+        (lambda mass: InertialParameters.from_com(mass, (0, 0, 0), np.eye(3)), [1.0, 2.0]),
+        (lambda inertia: InertialParameters.from_com(1.0, (0, 0, 0), inertia), "abc"),
+        (lambda rotation: frame_change_matrix(rotation, (0, 0, 0)), "abc"),
+        (lambda payload: to_order(payload, "ur"), make_payload()),
+        (log_cholesky, np.full(10, np.nan)),
+    ],
+)
+def test_numbers_of_another_shape_are_refused_and_never_cut(function, wrong):
+    with pytest.raises(InertiaError, match="expected"):
+        function(wrong)
+
+
+@pytest.mark.parametrize("odd", [np.nan, np.inf, -np.inf])
+def test_no_body_has_a_number_that_is_not_finite(odd):
+    for k in range(10):
+        assert not is_consistent(np.where(np.arange(10) == k, odd, make_payload().parameters.phi))
+
+
+def test_parameters_are_added_to_parameters_only():
+    with pytest.raises(TypeError, match="unsupported operand"):
+        make_payload().parameters + make_payload()

@@ -257,6 +257,16 @@ def test_the_first_page_says_where_the_hybrid_loses_and_which_targets_it_missed(
     assert (row[1], row[7], row[8]) == ("–", "–", "50")  # 1 s and rls-filter are not measured; 4.9 holds the last time
 
 
+def test_where_nothing_that_is_judged_was_measured_the_tables_say_so_and_name_nobody(tmp_path):
+    errors = np.random.default_rng(3).uniform(3.0, 4.0, 40)
+    cells = made(errors, "ols") | made(0.5 * errors, "rls-filter") | made(2.0 * errors, "training mean")
+    assert "none of hybrid, map-gp, map was measured" in losses_table(gather(cells, SMALL)).note
+    written = write_results(cells, SMALL, tmp_path / "s.json", tmp_path / "p.md", tmp_path / "r.html")
+    pages = [path.read_text(encoding="utf-8") for path in written.values() if path.suffix == ".md"]
+    assert len(pages) == 2
+    assert not any("None" in page for page in pages)
+
+
 def test_a_target_is_reached_missed_or_not_clear():
     errors = np.random.default_rng(1).uniform(3.0, 4.0, 40)
     small = gather(made(errors, "hybrid") | made(1.1 * errors, "map-gp"), SMALL)

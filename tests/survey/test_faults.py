@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import threading
+from dataclasses import replace
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -152,6 +153,19 @@ def test_a_log_that_vanishes_before_it_is_read_leaves_no_key(share):
     assert answer_log(log, SETTINGS, "key", stamp, content)["key"] == ""
 
 
+def test_a_log_that_does_not_fit_in_memory_is_asked_again_and_is_no_bug(share, whole, tmp_path, monkeypatch):
+    def full(*_):
+        raise MemoryError
+
+    with monkeypatch.context() as poor:
+        poor.setattr(Settings, "recording", full)
+        found = survey([str(share)], SETTINGS, tmp_path / "survey.json", jobs=1)
+        assert all("too little memory" in row["reason"] and "bug" not in row["reason"] for row in found.rows)
+    again = survey([str(share)], SETTINGS, tmp_path / "survey.json", jobs=1)
+    assert again.anew == 3
+    assert answers(again.rows) == answers(whole)
+
+
 def test_a_full_disk_is_said_and_the_survey_goes_on_from_there(share, whole, tmp_path):
     out = tmp_path / "survey.json"
     most = 4000  # bytes of a file: cells of a log fit, the table of all three does not
@@ -239,6 +253,18 @@ def test_a_method_that_needs_a_tare_is_asked_with_one(logs, tmp_path):
     asked = Settings("panda", method="difference", tare=str(logs / "0.csv"))
     found = survey([str(logs / "1.csv")], asked, tmp_path / "survey.json", jobs=1)
     assert (found.logs, len(found.rows)) == (1, 1)
+
+
+def test_each_arms_tare_among_the_logs_is_passed_over_as_one_of_all_arms_is(panda, share, tmp_path):
+    arm = share.name
+    log = simulate_inverse(panda, random_motion(panda, 9, duration=3.0), rate=100.0, seed=9)
+    write_recording(share / "tare.csv", log)
+    for tare in (share / "tare.csv", share.with_name("{arm}") / "tare.csv"):
+        settings = replace(SETTINGS, tare=str(tare))
+        found = survey([str(share)], settings, tmp_path / "survey.json", jobs=1)
+        assert {row["arm"] for row in found.rows} == {arm}
+        assert str(share / "tare.csv") not in {row["log"] for row in found.rows}
+        assert found.logs == 3
 
 
 def test_paths_of_which_none_is_there_are_refused_and_one_among_others_has_a_row(logs, tmp_path):

@@ -142,6 +142,10 @@ def test_a_survey_without_dates_has_its_page_too(rows, tmp_path):
         ),
         (["survey", "report", "--out", "r.html"], "takes one table"),
         (["survey", "report", "none.parquet", "--out", "r.html"], "none.parquet is not there"),
+        (
+            ["survey", "report", "s.parquet", "--out", "r.html", "--json", "--arm-of", "(.)"],
+            "leave out --arm-of, --json",
+        ),
         (["survey", "report", "x.csv", "--out", "r.html"], "is no table of a survey, but a log"),
     ],
 )

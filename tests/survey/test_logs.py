@@ -1,6 +1,8 @@
 """Which logs there are, and whose."""
 
 import json
+import os
+from pathlib import Path
 
 import pytest
 
@@ -46,6 +48,33 @@ def test_globs_lists_and_names_give_each_log_once(folder):
     (folder / "list.txt").write_text(f"# two\n{folder}/cell-1/a.csv\n{folder}/cell-2/readme.txt.md\n")
     found = find_logs([f"{folder}/*/*.csv", f"@{folder}/list.txt", f"{folder}/cell-1"])
     assert names(found, folder) == ["cell-1/a.csv", "cell-1/deep/b.npz", "cell-2/readme.txt.md"]
+
+
+def test_a_list_may_have_been_written_on_windows_and_its_comments_stand_anywhere(folder):
+    lines = ["\ufeff" + f"{folder}/cell-1/a.csv", "  # a note", "", f"  {folder}/cell-2/c.mcap "]
+    (folder / "list.txt").write_bytes("\r\n".join(lines).encode())
+    assert names(find_logs([f"@{folder}/list.txt"]), folder) == ["cell-1/a.csv", "cell-2/c.mcap"]
+
+
+def test_lists_that_name_one_another_are_refused_and_one_that_is_named_twice_is_read(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    Path("one.txt").write_text("@two.txt\n@two.txt\n")
+    Path("two.txt").write_text("cell-1/a.csv\n")
+    assert [log.name for log in find_logs(["@one.txt"])] == ["cell-1/a.csv"]
+    Path("two.txt").write_text("@one.txt\n")
+    with pytest.raises(UsageError, match=r"the list one\.txt names itself"):
+        find_logs(["@one.txt"])
+
+
+def test_a_link_that_leads_to_itself_is_one_log_and_the_others_are_found(folder):
+    (folder / "cell-1" / "loop.csv").symlink_to("loop.csv")
+    found = names(find_logs([str(folder)]), folder)
+    assert found == ["cell-1/a.csv", "cell-1/deep/b.npz", "cell-1/loop.csv", "cell-2/c.mcap"]
+
+
+def test_a_folder_that_cannot_be_listed_is_one_log_and_the_others_are_found(folder, monkeypatch):
+    monkeypatch.setattr(os, "access", lambda path, _: Path(path).name != "deep")  # root may read whatever it likes
+    assert names(find_logs([str(folder)]), folder) == ["cell-1/a.csv", "cell-1/deep", "cell-2/c.mcap"]
 
 
 def test_arms_are_told_apart_by_the_folder_or_by_an_expression(folder):

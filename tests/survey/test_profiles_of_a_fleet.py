@@ -65,3 +65,33 @@ def test_a_stretch_that_holds_something_is_left_out_and_the_profile_made_of_the_
     assert list(apart) == [1]
     assert "beside what is mounted in the other logs" in apart[1]
     assert len(profile.sessions) == 2
+
+
+def test_logs_in_an_object_store_teach_the_profile_that_those_on_disk_do(panda, tmp_path):
+    """And a log that is no arm's teaches none."""
+    fsspec = pytest.importorskip("fsspec")
+    store, world, rows = fsspec.filesystem("memory"), World.real_like(panda, 3), {"disk": [], "store": []}
+    bounds = {"t0": 0.0, "t1": 20.5, "held": False, "mass_low": -1.0, "mass_high": 1.0, "moves": False}
+    try:
+        for day in range(2):
+            log = simulate_inverse(panda, random_motion(panda, day, duration=21.0), world=world, rate=50.0, seed=day)
+            write_recording(file := tmp_path / f"{day}.npz", replace(log, t=log.t + 1.79e9 + 86400.0 * day))
+            store.pipe(f"/cell/{day}.npz", file.read_bytes())
+            about = {
+                "arm": "a",
+                "episode": None,
+                "part": 0,
+                "date": 86400.0 * day,
+                "status": "answered",
+                "key": str(day),
+            }
+            for place, name in (("disk", str(file)), ("store", f"memory://cell/{day}.npz")):
+                rows[place].append(about | bounds | {"log": name, "determined": "m"})
+        for place, some in rows.items():
+            nobodys = some[0] | {"arm": "", "status": "unusable"}
+            said = learning.learn_profiles([*some, nobodys], Settings("panda"), tmp_path / place)
+            assert said == {"a": "learned from 2 stretches"}
+        one, other = (load_profile(tmp_path / place / "a.profile") for place in rows)
+        assert np.array_equal(one.b, other.b)
+    finally:
+        store.rm("/cell", recursive=True)

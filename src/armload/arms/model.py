@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import threading
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -15,7 +16,7 @@ from armload.arms.description import read_chain
 from armload.arms.limits import Limits
 from armload.arms.rigid_body import Body, BodyMotion, body_motions, built, placement_of
 from armload.errors import ArmError
-from armload.inertia import InertialParameters, from_order
+from armload.inertia import InertialParameters, from_order, parameters_only
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 # [m/s²] least and most at a base that an arm works on: the Moon has 1.62, and a base on the Earth that brakes or turns
@@ -99,7 +100,7 @@ class Arm:
         _ = self._model  # fail now, not at the first sample
 
     def __getstate__(self) -> dict[str, Any]:
-        return {k: v for k, v in self.__dict__.items() if k not in ("_model", "_data", "limits")}
+        return {k: v for k, v in self.__dict__.items() if k not in ("_model", "_of_threads", "limits")}
 
     # ------------------------------------------------------------------ what it is
 
@@ -194,7 +195,7 @@ class Arm:
         Raises:
             ArmError: the parameters' frame is not a frame of this arm, or joints lie between.
         """
-        there = parameters.frame
+        there = parameters_only(parameters).frame
         if there is None or there == self.frame:
             return InertialParameters(parameters.phi, self.frame)
         if there not in self.frames:
@@ -214,7 +215,7 @@ class Arm:
         Raises:
             ArmError: joints lie between the two.
         """
-        known = parameters.frame in self.frames
+        known = parameters_only(parameters).frame in self.frames
         return self.in_frame(parameters if known else InertialParameters(parameters.phi))
 
     # ------------------------------------------------------------------ rigid-body dynamics
@@ -230,8 +231,10 @@ class Arm:
         return out if np.ndim(q) == 2 else out[0]
 
     def mass_matrix(self, q: ArrayLike) -> NDArray[np.float64]:
-        """Joint-space inertia M(q) (n, n) [kg·m²]."""
-        M = np.triu(pin.crba(self._model, self._data, np.asarray(q, dtype=float)))
+        """Joint-space inertia M(q) (n, n) of one position q (n,) [kg·m²]."""
+        M = np.triu(
+            pin.crba(self._model, self._data, self._samples(np.asarray(q, dtype=float)[None], None, None)[0][0])
+        )
         return M + np.triu(M, 1).T
 
     def momentum(self, q: ArrayLike, dq: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -288,8 +291,14 @@ class Arm:
         return built(*about, self.links, self.attached)
 
     @cached_property
+    def _of_threads(self) -> threading.local:
+        return threading.local()
+
+    @property
     def _data(self) -> pin.Data:
-        return self._model.createData()
+        """Where Pinocchio writes: each thread's own, as what a call wrote is read after it."""
+        own = self._of_threads.__dict__
+        return own["data"] if "data" in own else own.setdefault("data", self._model.createData())
 
     @property
     def _frame_placement(self) -> pin.SE3:
@@ -299,7 +308,7 @@ class Arm:
         q = np.asarray(q, dtype=float)
         rows = [q, np.zeros_like(q) if dq is None else dq, np.zeros_like(q) if ddq is None else ddq]
         out = tuple(np.ascontiguousarray(np.atleast_2d(np.asarray(x, dtype=float))) for x in rows)
-        if any(x.shape != out[0].shape for x in out) or out[0].shape[1] != self.n:
+        if any(x.shape != out[0].shape for x in out) or out[0].shape[1:] != (self.n,):
             raise ArmError(f"joint arrays have shapes {[x.shape for x in out]}: {self.name} has {self.n} joints")
         return out
 

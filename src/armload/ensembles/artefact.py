@@ -70,7 +70,8 @@ def save_model(
         notes: anything worth remembering.
 
     Raises:
-        ModelError: the model is not fitted, has other columns, or the frame is not the arm's.
+        ModelError: the model is not fitted, has other columns, or its errors are none; the frame is not the arm's; the
+            file cannot be written.
     """
     compiled: Compiled | None = getattr(model, "compiled_", None)
     if compiled is None:
@@ -82,6 +83,9 @@ def save_model(
         )
     if frame not in (None, arm.frame):
         raise ModelError(f"frame is {frame!r}: the arm's payload frame is {arm.frame!r}; set the arm to that frame")
+    errors = None if error_std is None else np.asarray(error_std, dtype=float)
+    if errors is not None and (errors.shape != (10,) or not np.all(np.isfinite(errors) & (errors >= 0.0))):
+        raise ModelError(f"error_std is {errors.tolist()}: expected 10 finite numbers, none below 0")
     motions = motion if isinstance(motion, Sequence) else () if motion is None else (motion,)
     prints = [m if isinstance(m, MotionFingerprint) else MotionFingerprint.of(m) for m in motions]
     tensors: dict[str, NDArray] = {}
@@ -95,7 +99,7 @@ def save_model(
         "features": column_names(arm.n),
         "phi_mean": model.y_mean_.tolist(),
         "phi_std": model.y_std_.tolist(),
-        "error_std": None if error_std is None else np.asarray(error_std, dtype=float).tolist(),
+        "error_std": None if errors is None else errors.tolist(),
         "settings": {k: v for k, v in model.get_params().items() if isinstance(v, str | int | float | bool | None)}
         | {"members": compiled.n_members},
         "epochs": None if model.epochs_ is None else model.epochs_.tolist(),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from numbers import Integral, Real
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal, Self, overload
@@ -53,8 +54,8 @@ class Ensemble(RegressorMixin, BaseEstimator, ABC):
                 made of several writes one for each: training.npz → training.stage1.npz, …
 
         Raises:
-            ModelError: unknown kind or scale, fewer than one member, a checkpoint of another training, or for two-stage
-                training a y that does not have the ten columns of phi.
+            ModelError: unknown kind or scale, fewer than one member, a share to hold out that is none, a checkpoint of
+                another training, or for two-stage training a y that does not have the ten columns of phi.
         """
         rows, validation = self._checked(X, y, X_val, y_val)
         self._train(rows, validation, progress, Path(checkpoint) if checkpoint else None)
@@ -169,8 +170,11 @@ class BaggingEnsemble(OneKind):
     ) -> None:
         learner = as_learner(self.kind)
         for name, least in (("members", 1), ("seed", 0)):
-            if getattr(self, name) < least:
-                raise ModelError(f"{name} is {getattr(self, name)}: expected a whole number of at least {least}")
+            given = getattr(self, name)
+            if not isinstance(given, Integral) or given < least:
+                raise ModelError(f"{name} is {given!r}: expected a whole number of at least {least}")
+        if not isinstance(self.hold_out, Real) or not 0.0 <= self.hold_out < 1.0:
+            raise ModelError(f"hold_out is {self.hold_out!r}: expected a share of the rows, from 0 to less than 1")
         X, y = rows
         bag = draw_bag(
             X,
@@ -195,6 +199,6 @@ def as_learner(kind: str | Learner) -> Learner:
     """The learner a `kind` names."""
     if isinstance(kind, Learner):
         return kind
-    if kind not in KINDS:
+    if not isinstance(kind, str) or kind not in KINDS:
         raise ModelError(f"unknown kind of learner {kind!r}: expected one of {', '.join(KINDS)}, or a Learner")
     return KINDS[kind]()

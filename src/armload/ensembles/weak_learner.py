@@ -123,7 +123,7 @@ def draw_bag(
     scaling = Scaling.of(X, y, scale)
     if validation is None:
         X_val, y_val = X, y
-        count = round(hold_out * len(X))
+        count = min(round(hold_out * len(X)), len(X) - 1)
         if len(X) >= 10 and count:
             order = np.random.default_rng([seed, 0, HOLD_OUT]).permutation(len(X))
             held, kept = np.sort(order[:count]), np.sort(order[count:])

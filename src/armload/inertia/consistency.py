@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armload.errors import InertiaError
-from armload.inertia.parameters import inertia_matrix, vech
+from armload.inertia.parameters import InertialParameters, inertia_matrix, numbers, vech
 
 # Lengths are divided by this before matrices are compared, so that kg, kg·m and kg·m² weigh alike.
 LENGTH = 0.1  # [m]
@@ -22,7 +22,7 @@ LENGTH = 0.1  # [m]
 
 def pseudo_inertia(phi: ArrayLike) -> NDArray[np.float64]:
     """J(phi), shape (..., 4, 4) [kg·m², kg·m, kg]; linear in phi (..., 10)."""
-    phi = np.asarray(phi, dtype=float)
+    phi = numbers(phi, "phi", 10)
     inertia = inertia_matrix(phi[..., 4:])
     trace = np.trace(inertia, axis1=-2, axis2=-1)
     J = np.empty((*phi.shape[:-1], 4, 4))
@@ -34,7 +34,7 @@ def pseudo_inertia(phi: ArrayLike) -> NDArray[np.float64]:
 
 def pseudo_inertia_to_phi(J: ArrayLike) -> NDArray[np.float64]:
     """phi (..., 10) of a pseudo-inertia (..., 4, 4): I = tr(S)·1 − S with S its upper left block."""
-    J = np.asarray(J, dtype=float)
+    J = numbers(J, "J", 4, 4)
     S = J[..., :3, :3]
     inertia = np.trace(S, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - S
     return np.concatenate([J[..., 3, 3, None], J[..., :3, 3], vech(inertia)], axis=-1)
@@ -43,8 +43,15 @@ def pseudo_inertia_to_phi(J: ArrayLike) -> NDArray[np.float64]:
 def is_consistent(phi: ArrayLike, tolerance: float = 1e-9) -> bool:
     """Whether a body with these parameters can exist: m > 0 and J(phi) ⪰ −tolerance (lengths in units of 0.1 m).
 
-    The tolerance [kg] forgives rounding only: a point mass, which lies on the border, counts as consistent.
+    The tolerance [kg] forgives rounding only: a point mass, which lies on the border, counts as consistent. Numbers
+    that are not finite belong to no body.
+
+    Raises:
+        InertiaError: phi is not ten numbers.
     """
+    phi = _one(phi, "phi")
+    if not np.isfinite(phi).all():
+        return False
     J = _scaled(pseudo_inertia(phi))
     return bool(J[3, 3] > 0 and np.linalg.eigvalsh(J)[0] >= -tolerance * max(1.0, float(J[3, 3])))
 
@@ -55,9 +62,9 @@ def log_cholesky(phi: ArrayLike) -> NDArray[np.float64]:
     J = U·Uᵀ, U = e^α·[[e^d1, s12, s13, t1], [0, e^d2, s23, t2], [0, 0, e^d3, t3], [0, 0, 0, 1]].
 
     Raises:
-        InertiaError: phi is not strictly consistent (J is not positive definite).
+        InertiaError: phi is not ten finite numbers, or not strictly consistent (J is not positive definite).
     """
-    J = pseudo_inertia(phi)
+    J = pseudo_inertia(InertialParameters(numbers(phi, "phi", 10)).phi)
     flip = J[::-1, ::-1]  # J = U·Uᵀ with U upper triangular ⇔ the flipped J has a lower Cholesky factor
     try:
         U = np.linalg.cholesky(flip)[::-1, ::-1]
@@ -71,7 +78,11 @@ def log_cholesky(phi: ArrayLike) -> NDArray[np.float64]:
 
 
 def from_log_cholesky(theta: ArrayLike) -> NDArray[np.float64]:
-    """phi of log-Cholesky coordinates (10,): consistent for every real θ."""
+    """phi of log-Cholesky coordinates (10,): consistent for every real θ.
+
+    Raises:
+        InertiaError: θ is not ten numbers.
+    """
     U = _root_of_chart(theta)
     return pseudo_inertia_to_phi(U @ U.T)
 
@@ -110,10 +121,18 @@ def _root_derivatives(U: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _root_of_chart(theta: ArrayLike) -> NDArray[np.float64]:
-    alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3 = np.asarray(theta, dtype=float)
+    alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3 = _one(theta, "theta")
     return np.exp(alpha) * np.array(
         [[np.exp(d1), s12, s13, t1], [0, np.exp(d2), s23, t2], [0, 0, np.exp(d3), t3], [0, 0, 0, 1]]
     )
+
+
+def _one(values: ArrayLike, name: str) -> NDArray[np.float64]:
+    """Ten numbers, not several times ten."""
+    out = numbers(values, name, 10)
+    if out.ndim > 1:
+        raise InertiaError(f"{name} has shape {out.shape}: expected 10 numbers, of one body")
+    return out
 
 
 def _scaled(J: NDArray[np.float64]) -> NDArray[np.float64]:

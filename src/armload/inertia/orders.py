@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armload.errors import InertiaError
-from armload.inertia.parameters import InertialParameters, inertia_matrix, phi_to_com, vech
+from armload.inertia.parameters import InertialParameters, inertia_matrix, parameters_only, phi_to_com, vech
 
 # position of each of the other program's six inertia numbers in (xx, xy, xz, yy, yz, zz)
 _ABOUT_ORIGIN = {"paper": [0, 1, 2, 3, 4, 5], "pinocchio": [0, 1, 3, 2, 4, 5]}
@@ -35,8 +35,10 @@ def to_order(parameters: InertialParameters, order: str) -> NDArray[np.float64]:
     [2.0, 0.0, 0.0, 0.1, 1.0, 2.0, 3.0, 0.0, 0.0, 0.0]
 
     Raises:
-        InertiaError: the order is unknown, or needs a CoM that a massless body does not have.
+        InertiaError: what is given are no parameters; the order is unknown, or needs a CoM that a massless body does
+            not have.
     """
+    parameters = parameters_only(parameters)
     if order in _ABOUT_ORIGIN:
         return np.concatenate([parameters.phi[:4], parameters.phi[4:][_ABOUT_ORIGIN[order]]])
     _known(order)

@@ -26,9 +26,25 @@ _COLUMNS = np.array([0, 1, 2, 1, 2, 2])
 _SIX = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])  # where each entry of the matrix is among the six
 
 
+def numbers(values: ArrayLike, name: str, *shape: int) -> NDArray[np.float64]:
+    """The values (..., *shape) as floats; `name` is what a sentence calls them.
+
+    Raises:
+        InertiaError: they are no numbers, or their last axes have another shape.
+    """
+    expected = f"expected {'×'.join(map(str, shape))} numbers"
+    try:
+        out = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise InertiaError(f"{name} is not numeric: {expected}, found {values!r}") from None
+    if out.shape[-len(shape) :] != shape:
+        raise InertiaError(f"{name} has shape {out.shape}: {expected}")
+    return out
+
+
 def skew(v: ArrayLike) -> NDArray[np.float64]:
     """Matrix of the cross product, [v]× w = v × w; v has shape (..., 3), the result (..., 3, 3)."""
-    v = np.asarray(v, dtype=float)
+    v = numbers(v, "v", 3)
     out = np.zeros((*v.shape, 3))
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
     out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
@@ -37,12 +53,12 @@ def skew(v: ArrayLike) -> NDArray[np.float64]:
 
 def vech(inertia: ArrayLike) -> NDArray[np.float64]:
     """The six numbers (xx, xy, xz, yy, yz, zz) of symmetric matrices (..., 3, 3)."""
-    return np.asarray(inertia, dtype=float)[..., _ROWS, _COLUMNS]
+    return numbers(inertia, "inertia", 3, 3)[..., _ROWS, _COLUMNS]
 
 
 def inertia_matrix(six: ArrayLike) -> NDArray[np.float64]:
     """The symmetric matrices (..., 3, 3) of six numbers (..., 6) in the order xx, xy, xz, yy, yz, zz."""
-    return np.asarray(six, dtype=float)[..., _SIX]
+    return numbers(six, "the inertia", 6)[..., _SIX]
 
 
 def com_to_phi(mass: float, com: ArrayLike, inertia_com: ArrayLike) -> NDArray[np.float64]:
@@ -52,12 +68,19 @@ def com_to_phi(mass: float, com: ArrayLike, inertia_com: ArrayLike) -> NDArray[n
         mass: m [kg].
         com: r, shape (3,) [m].
         inertia_com: inertia about the CoM in the frame's axes, shape (3, 3) [kg·m²].
+
+    Raises:
+        InertiaError: a number is none, is not finite, or there are more or fewer; the inertia is not symmetric.
     """
     r, inertia = _vector3(com, "com"), _symmetric(inertia_com, "inertia_com")
-    if not np.isfinite(mass):
-        raise InertiaError(f"mass is {mass}: expected a finite number of kilograms")
-    about_origin = inertia + mass * (r @ r * np.eye(3) - np.outer(r, r))
-    return np.concatenate([[mass], mass * r, vech(about_origin)])
+    try:
+        m = float(mass)
+    except (TypeError, ValueError):
+        m = np.nan
+    if not np.isfinite(m):
+        raise InertiaError(f"mass is {mass!r}: expected a finite number of kilograms")
+    about_origin = inertia + m * (r @ r * np.eye(3) - np.outer(r, r))
+    return np.concatenate([[m], m * r, vech(about_origin)])
 
 
 def phi_to_com(phi: ArrayLike) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
@@ -80,7 +103,7 @@ def frame_change_matrix(rotation: ArrayLike, translation: ArrayLike) -> NDArray[
     A point x_b has coordinates x_a = R·x_b + p in frame a. First moments: m·r_a = R·m·r_b + m·p; second moments
     S = ∫ x·xᵀ dm (inertia I = tr(S)·1 − S): S_a = R·S_b·Rᵀ + (R·m·r_b)·pᵀ + p·(R·m·r_b)ᵀ + m·p·pᵀ.
     """
-    R, p = np.asarray(rotation, dtype=float), _vector3(translation, "translation")
+    R, p = numbers(rotation, "rotation", 3, 3), _vector3(translation, "translation")
     if R.shape != (3, 3) or not np.allclose(R @ R.T, np.eye(3), atol=1e-6) or np.linalg.det(R) < 0:
         raise InertiaError("rotation is not a proper 3×3 rotation matrix: expected R·Rᵀ = 1 and det R = +1")
     T = np.empty((10, 10))
@@ -163,9 +186,13 @@ class InertialParameters:
         return InertialParameters(frame_change_matrix(rotation, translation) @ self.phi, frame)
 
     def __add__(self, other: InertialParameters) -> InertialParameters:
+        if not isinstance(other, InertialParameters):
+            return NotImplemented
         return InertialParameters(self.phi + other.phi, self._common_frame(other))
 
     def __sub__(self, other: InertialParameters) -> InertialParameters:
+        if not isinstance(other, InertialParameters):
+            return NotImplemented
         return InertialParameters(self.phi - other.phi, self._common_frame(other))
 
     def __neg__(self) -> InertialParameters:
@@ -183,6 +210,18 @@ class InertialParameters:
         where = f" about {self.frame}" if self.frame else ""
         rows = [f"{n:>5} = {v:+.6f} {u}" for n, v, u in zip(NAMES, self.phi, UNITS, strict=True)]
         return f"inertial parameters{where}:\n" + "\n".join(rows)
+
+
+def parameters_only(given: InertialParameters) -> InertialParameters:
+    """What was given, if it is what is meant.
+
+    Raises:
+        InertiaError: it is something else, such as a whole payload.
+    """
+    if not isinstance(given, InertialParameters):
+        kind = type(given).__name__
+        raise InertiaError(f"a {kind} was given: expected InertialParameters; of a Payload give its .parameters")
+    return given
 
 
 def _phi(values: ArrayLike | Sequence[float]) -> NDArray[np.float64]:
@@ -209,7 +248,7 @@ def _vector3(values: ArrayLike, name: str) -> NDArray[np.float64]:
 
 
 def _symmetric(values: ArrayLike, name: str) -> NDArray[np.float64]:
-    matrix = np.asarray(values, dtype=float)
+    matrix = numbers(values, name, 3, 3)
     if matrix.shape != (3, 3) or not np.all(np.isfinite(matrix)):
         raise InertiaError(f"{name} has shape {matrix.shape}: expected a finite symmetric 3×3 matrix")
     if not np.allclose(matrix, matrix.T, rtol=1e-6, atol=1e-9):

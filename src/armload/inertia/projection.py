@@ -17,7 +17,7 @@ from armload.inertia.cone import pseudo
 from armload.inertia.consistency import LENGTH, is_consistent
 from armload.inertia.interior_point import nearest
 from armload.inertia.orthogonal import eigen
-from armload.inertia.parameters import InertialParameters
+from armload.inertia.parameters import InertialParameters, numbers
 from armload.runtime.kernels import kernel
 
 _SCALE = np.array([1.0] + [1 / LENGTH] * 3 + [1 / LENGTH**2] * 6)
@@ -67,8 +67,12 @@ def nearest_consistent(phi: ArrayLike, information: ArrayLike | None = None, mar
     Raises:
         InertiaError: phi is not ten finite numbers, the information is not what is expected, or no answer was found.
     """
-    phi = InertialParameters(np.asarray(phi, dtype=float)).phi  # ten finite numbers, or a sentence
-    weight = np.diag(_SCALE**2) if information is None else np.ascontiguousarray(information, dtype=float)
+    phi = InertialParameters(numbers(phi, "phi", 10)).phi  # ten finite numbers, or a sentence
+    weight = (
+        np.diag(_SCALE**2)
+        if information is None
+        else np.ascontiguousarray(numbers(information, "the information", 10, 10))
+    )
     if weight.shape != (10, 10) or not np.all(np.isfinite(weight)):
         raise InertiaError(
             f"the information of phi has shape {weight.shape} or is not finite: expected a finite matrix (10, 10), "
@@ -96,9 +100,9 @@ def near_consistent(phi: ArrayLike, precision: ArrayLike) -> NDArray[np.float64]
     Raises:
         InertiaError: numbers that are not finite, or as for `nearest_consistent`.
     """
-    phi = np.ascontiguousarray(phi, dtype=float)
-    P = np.ascontiguousarray(precision, dtype=float)
-    if phi.shape != (10,) or P.shape != (10, 10):
+    phi = np.ascontiguousarray(numbers(phi, "phi", 10))
+    P = np.ascontiguousarray(numbers(precision, "the information", 10, 10))
+    if phi.ndim > 1 or P.ndim > 2:
         return nearest_consistent(phi, P)  # which says so
     x, bound, left = _project(phi, P, _ANSWER, -_CONSISTENT * max(1.0, phi[0]), _CLOSE, _NEAR)
     return x if bound <= 1.0 and left <= _INDEFINITE else nearest_consistent(phi, P, _ANSWER)

@@ -40,7 +40,7 @@ def lost_log(log: Log, key: str) -> dict[str, Any]:
 
 
 class _Unread(RecordingError):
-    """A log that could not be fetched just now, which says nothing of its content."""
+    """A log that could not be fetched or held just now, which says nothing of its content."""
 
 
 def _stayed(log: Log, stamp: str) -> bool:
@@ -60,7 +60,7 @@ def _rows(log: Log, settings: Settings, about: dict[str, Any]) -> list[dict[str,
     if not log.arm:
         return [unusable(f"{log.name}: --arm-of names no arm in its path", about)]
     try:
-        with _here(log) as path:
+        with on_this_machine(log) as path:
             try:
                 return _of_one(log, settings, path, about)
             except EpisodesError as error:
@@ -70,6 +70,9 @@ def _rows(log: Log, settings: Settings, about: dict[str, Any]) -> list[dict[str,
                 return of_each
     except _Unread:
         raise
+    except MemoryError:
+        why = "too little memory for it: the next run of the survey tries it again; give that fewer processes (--jobs)"
+        raise _Unread(f"{log.name}: {why}") from None
     except Exception as error:
         return [unusable(_reason(error), about)]
 
@@ -77,6 +80,8 @@ def _rows(log: Log, settings: Settings, about: dict[str, Any]) -> list[dict[str,
 def _of_episode(log: Log, settings: Settings, path: Path, about: dict[str, Any]) -> list[dict[str, Any]]:
     try:
         return _of_one(log, settings, path, about)
+    except MemoryError:  # of the whole log
+        raise
     except Exception as error:
         return [unusable(_reason(error), about)]
 
@@ -112,8 +117,12 @@ def _reason(error: Exception) -> str:
 
 
 @contextmanager
-def _here(log: Log) -> Iterator[Path]:
-    """The log as a path on this machine; an object is fetched, and removed afterwards."""
+def on_this_machine(log: Log) -> Iterator[Path]:
+    """The log as a path on this machine; an object is fetched, and removed afterwards.
+
+    Raises:
+        RecordingError: it is no regular file, or its store does not give it.
+    """
     if not log.remote:
         if special := next((file for file in log.files if is_special(file)), None):
             raise RecordingError(f"{special} cannot be read: {NO_FILE}")

@@ -26,6 +26,7 @@ from armload.posterior.profile_learning import by_clock
 from armload.posterior.profile_session import check_fits
 from armload.recording import Recording
 from armload.runtime.atomic import replacing
+from armload.survey.answering import on_this_machine
 from armload.survey.logs import Log
 from armload.survey.rows import ANSWERED, SEPARATOR
 from armload.survey.settings import Settings
@@ -53,7 +54,8 @@ def learn_profiles(
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    return {arm: _of_arm(arm, rows, settings, folder, say) for arm in sorted({row["arm"] for row in rows})}
+    arms = sorted({row["arm"] for row in rows} - {""})  # what --arm-of does not fit is nobody's
+    return {arm: _of_arm(arm, rows, settings, folder, say) for arm in arms}
 
 
 def empty_stretches(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -141,5 +143,7 @@ def _of_those_that_agree(
 
 
 def _stretch(row: dict[str, Any], settings: Settings) -> Recording:
-    log = settings.recording(Log(row["log"], row["arm"], row["episode"]), Path(row["log"]), row["episode"])
+    one = Log(row["log"], row["arm"], row["episode"])
+    with on_this_machine(one) as path:
+        log = settings.recording(one, path, row["episode"])
     return log.between(log.t[0] + row["t0"], log.t[0] + row["t1"])

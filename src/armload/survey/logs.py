@@ -9,6 +9,7 @@ from __future__ import annotations
 import errno
 import glob
 import hashlib
+import os
 import re
 import stat
 from collections.abc import Iterator, Sequence
@@ -161,7 +162,7 @@ def find_logs(paths: Sequence[str], arm_of: str | None = None, without: Sequence
         UsageError: nothing was found, a list cannot be read, or an expression is none, has no group or fits no log.
     """
     pattern = _expression(arm_of)
-    hidden = {path.resolve() for path in without}
+    hidden = {os.path.realpath(path) for path in without}
     found: dict[tuple[str, int | None], Log] = {}
     for path in _expanded(paths):
         for name, episode, files in _units(path, hidden):
@@ -189,25 +190,34 @@ def _expression(arm_of: str | None) -> re.Pattern[str] | None:
 
 def _arm(name: str, pattern: re.Pattern[str] | None) -> str:
     if pattern is None:
-        return PurePosixPath(name).parent.name or Path(name).resolve().parent.name or "/"
+        return PurePosixPath(name).parent.name or Path(os.path.realpath(name)).parent.name or "/"
     match = pattern.search(name)
     return "" if match is None else match[1] or ""
 
 
-def _expanded(paths: Sequence[str]) -> Iterator[str]:
+def _expanded(paths: Sequence[str], within: tuple[str, ...] = ()) -> Iterator[str]:
+    """The paths that are meant; `within`: the lists that they stand in, one in the other."""
     for path in paths:
         if path.startswith("@"):
-            try:
-                lines = Path(path[1:]).read_text(encoding="utf-8").splitlines()
-            except (OSError, UnicodeDecodeError) as error:
-                raise UsageError(f"the list {path[1:]} cannot be read: {error}") from None
-            yield from _expanded([line.strip() for line in lines if line.strip() and not line.startswith("#")])
+            here = Path(path[1:])
+            if (real := os.path.realpath(here)) in within:
+                raise UsageError(f"the list {here} names itself, directly or through another list: leave that line out")
+            yield from _expanded(_lines(here), (*within, real))
         elif is_url(path):
             yield from _of_store(*filesystem(path))
         elif _WILD.search(path) and not Path(path).exists():
             yield from sorted(glob.glob(path, recursive=True))
         else:
             yield path
+
+
+def _lines(file: Path) -> list[str]:
+    """What a list names, without comments (#); a mark of the byte order, which Windows writes, is not in the first."""
+    try:
+        lines = [line.strip() for line in file.read_text(encoding="utf-8-sig").splitlines()]
+    except (OSError, UnicodeDecodeError) as error:
+        raise UsageError(f"the list {file} cannot be read: {error}") from None
+    return [line for line in lines if line and not line.startswith("#")]
 
 
 def _of_store(fs: Any, inside: str) -> Iterator[str]:
@@ -221,26 +231,39 @@ def _of_store(fs: Any, inside: str) -> Iterator[str]:
     yield from (fs.unstrip_protocol(one) for one in there if one == inside or one.lower().endswith(suffixes))
 
 
-def _units(path: str, hidden: set[Path]) -> Iterator[tuple[str, int | None, tuple[Path, ...]]]:
+def _units(path: str, hidden: set[str]) -> Iterator[tuple[str, int | None, tuple[Path, ...]]]:
     """Name, episode and files of every unit behind a path.
 
-    hidden: is passed over; a folder is from then on, as links may lead to it again.
+    hidden: real paths that are passed over (`Path.resolve` raises of a loop of links); a folder is one from then on.
     """
     here = Path(path)
     if is_url(path):
         yield path, None, ()
-    elif not here.is_dir():
+    elif not here.is_dir() or (inside := _inside(here)) is None:
         yield path, None, (here,)
     elif is_data_set(here):
         yield from _episodes(here)
     elif (here / "metadata.yaml").is_file():
-        yield str(here), None, tuple(sorted(file for file in here.iterdir() if file.is_file()))
-    elif (real := here.resolve()) not in hidden:
+        yield str(here), None, tuple(file for file in inside if file.is_file())
+    elif (real := os.path.realpath(here)) not in hidden:
         hidden.add(real)
-        for inner in sorted(here.iterdir()):
+        for inner in inside:
             known = inner.is_dir() or (is_log(inner) and not is_special(inner))
-            if known and not inner.name.startswith(".") and inner.resolve() not in hidden and not of_survey(inner):
+            if (
+                known
+                and not inner.name.startswith(".")
+                and os.path.realpath(inner) not in hidden
+                and not of_survey(inner)
+            ):
                 yield from _units(str(inner), hidden)
+
+
+def _inside(folder: Path) -> list[Path] | None:
+    """What lies in a folder, by name; None: it is not ours to read, or gone, and its row will say so."""
+    try:
+        return sorted(folder.iterdir()) if os.access(folder, os.X_OK) else None
+    except OSError:
+        return None
 
 
 def is_special(path: Path) -> bool:

@@ -72,6 +72,8 @@ def survey(
     folder = cells_of(out)
     named = [Path(p) for p in (settings.tool, settings.tare, settings.profile) if p is not None]
     logs = find_logs(paths, arm_of, without=[out, folder, *named])
+    if tares := settings.tares_of({log.arm for log in logs} - {""}):  # they may lie among the logs
+        logs = find_logs(paths, arm_of, without=[out, folder, *named, *tares])
     n = settings.arm().n
     # what all logs of an arm would fail of is said before the first is answered
     for arm in sorted({log.arm for log in logs} - {""}):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -48,6 +49,12 @@ class Settings(ArmOptions):
         if _ARM in template:
             return None
         raise UsageError(f"{path} is not there: expected the --{what} of all logs; for one of each arm write {_ARM}")
+
+    def tares_of(self, arms: Collection[str]) -> list[Path]:
+        """The tares that a template names, of those arms that have one; a tare of all arms is not among them."""
+        if self.tare is None or _ARM not in self.tare:
+            return []
+        return [path for arm in sorted(arms) if (path := self.of_arm("tare", arm)) is not None]
 
     def lacking(self, arm: str) -> list[str]:
         """What was named by a template, and is not there of this arm."""

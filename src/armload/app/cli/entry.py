@@ -114,6 +114,8 @@ def _guarded(arguments: list[str], show_traceback: bool) -> int:
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
         return _fail(f"{where}{error.strerror or error}", 2, show_traceback)
+    except MemoryError as error:  # what was asked for is too large for this machine, which is no bug
+        return _fail(f"too little memory: {str(error) or 'no more can be had'}", 2, show_traceback)
     except ModuleNotFoundError as error:
         needed = missing(error)
         return _bug(error, show_traceback) if needed is None else _fail(needed, 2, show_traceback)

@@ -136,6 +136,9 @@ def _report(options: argparse.Namespace) -> None:
         raise UsageError(
             "armload survey report takes one table: armload survey report survey.parquet --out report.html"
         )
+    if stray := [name for name, value in vars(options).items() if name not in ("paths", "out") and value]:
+        given = ", ".join(f"--{name.replace('_', '-')}" for name in stray)
+        raise UsageError(f"armload survey report draws what is in its table: leave out {given}")
     check_page(options.out)
     with working("drawing and writing"):
         findings = write_survey_report(options.paths[1], options.out)

@@ -148,6 +148,8 @@ def settle(options: argparse.Namespace) -> None:
     missing = [f"--{name}" for name in needed if getattr(options, name) is None]
     if missing:
         raise UsageError(f"the following arguments are required: {', '.join(missing)}; see 'armload train --help'")
+    if options.epochs is not None and options.kind in (None, "tree"):
+        raise UsageError("--epochs is of networks, trees have none: leave it out, or choose --kind network or mixed")
     for name, value in own.items():
         if getattr(options, name) is None:
             setattr(options, name, value)

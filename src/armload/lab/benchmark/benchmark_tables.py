@@ -16,7 +16,6 @@ Results = Mapping[str, Measured]  # by population
 SUBJECTS = ("hybrid", "map-gp", "map")  # the first that is measured is what the tables judge
 AHEAD = "◂"
 MISSING = "–"
-_AHEAD_OF = AHEAD + ": ahead of {} by more than two standard errors of the paired difference."
 _CERTAIN = 2.0  # standard errors of a paired difference beyond which it counts
 
 
@@ -83,7 +82,7 @@ def group_table(results: Results, group: str, time: float) -> Table:
         rows.append((row, *cells))
     unit = SHOWN_UNITS[GROUPS[group]][0]
     columns = ("method", *(m.population.title for m in shown.values()))
-    note = f"± is the standard error over the episodes. {_AHEAD_OF.format(of)}"
+    note = f"± is the standard error over the episodes.{_ahead_of(of)}"
     return _table(f"Mean absolute error of the {group} after {time:g} s [{unit}]", columns, rows, note)
 
 
@@ -100,9 +99,7 @@ def time_table(m: Measured, group: str, of: str | None) -> Table:
     unit = SHOWN_UNITS[GROUPS[group]][0]
     columns = ("method", *(f"{time:g} s" for time in m.times))
     title = f"{m.population.name}: mean absolute error of the {group} over time [{unit}]"
-    return _table(
-        title, columns, rows, f"± is the standard error over {m.runs} episodes. {_AHEAD_OF.format(of)}{_refused(m)}"
-    )
+    return _table(title, columns, rows, f"± is the standard error over {m.runs} episodes.{_ahead_of(of)}{_refused(m)}")
 
 
 def parameter_table(m: Measured, time: float) -> Table:
@@ -224,11 +221,14 @@ def losses(results: Results) -> list[dict]:
 def losses_table(results: Results) -> Table:
     """Where another row is ahead of the subject, the one that is most."""
     of, rows = subject(results), []
+    if of is None:
+        why = f"Nothing is judged: none of {', '.join(SUBJECTS)} was measured."
+        return Table("Where the default loses", ("population", "after", "group"), (), why)
     for loss in losses(results):
         unit = SHOWN_UNITS[GROUPS[loss["group"]]][0]
         values = (f"{short(SHOWN_SCALE * loss[key])} {unit}" for key in ("error", "better"))
         rows.append((loss["population"], f"{loss['time']:g} s", loss["group"], *values, loss["which"]))
-    columns = ("population", "after", "group", str(of), "better", "which")
+    columns = ("population", "after", "group", of, "better", "which")
     note = (
         f"Every population, time and group where some row is ahead of {of} by more than two standard errors of the "
         "paired difference."
@@ -244,6 +244,10 @@ def cost_table(results: Results) -> Table:
         rows.append((row, short(1e3 * float(np.median(np.concatenate(walls))))))
     note = "Median over all episodes, tare included, answers at the tables' times only; one core of a shared machine."
     return _table("Computing time of an episode [ms]", ("method", "time"), rows, note)
+
+
+def _ahead_of(of: str | None) -> str:
+    return f" {AHEAD}: ahead of {of} by more than two standard errors of the paired difference." if of else ""
 
 
 def _refused(m: Measured) -> str:

@@ -59,16 +59,19 @@ def table(summary: Summary) -> Table:
     rows = []
     for name, found in _populations(summary).items():
         cells = [_mass(summary, found["methods"], method, time) for method, time in shown]
-        held = MISSING if of not in found["methods"] else f"{100 * np.mean(found['methods'][of]['coverage']):.0f}"
-        rows.append((f"{name}: {ALL[name].tries}", *cells, held))
+        if of is not None:
+            asked = of in found["methods"]
+            cells.append(f"{100 * np.mean(found['methods'][of]['coverage']):.0f}" if asked else MISSING)
+        rows.append((f"{name}: {ALL[name].tries}", *cells))
     heads = [f"{method}, {time:g} s" for method, time in shown]
-    return Table(
-        "Mean absolute error of the mass [g]",
-        ("population", *heads, "intervals that hold [%]"),
-        tuple(rows),
-        "± is the standard error over the episodes. `rls-filter` is calibrated wherever there is a tare. "
-        f"The last column: 95 % intervals of `{of}` that contain the truth, all ten parameters and all times together.",
-    )
+    note = "± is the standard error over the episodes. `rls-filter` is calibrated wherever there is a tare."
+    if of is not None:
+        heads.append("intervals that hold [%]")
+        note += (
+            f" The last column: 95 % intervals of `{of}` that contain the truth, all ten parameters and all times "
+            "together."
+        )
+    return Table("Mean absolute error of the mass [g]", ("population", *heads), tuple(rows), note)
 
 
 def picture(summary: Summary) -> Figure:
