@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 from armload.arms import arm, rated_effort
 from armload.errors import ArmError
 from armload.inertia import InertialParameters, is_consistent
-from armload.motion import FourierMotion, random_motion
+from armload.motion import FourierMotion, StraightMotion, random_motion
 from armload.simulation import (
     ContinuedRun,
     Drift,
@@ -122,6 +122,29 @@ def test_a_run_that_goes_on_is_the_run_in_one_piece_stiction_and_all():
     assert rms(world.sticking(6)(whole.dq)).max() > 0.1
     # pieces iterate towards the motor's friction on their own
     assert np.all(rms(tau - whole.tau[:300]) < 0.05 * rated_effort(ur))
+
+
+@pytest.mark.parametrize("name", ["ur10e", "ur5e", "xarm7"])
+def test_an_arm_that_is_told_to_stand_stands_whatever_friction_its_joints_have(name):
+    robot = arm(name)
+    pose = random_motion(robot, 1).position([0.0])[0]
+    standing = StraightMotion(pose, pose, 5.0)
+    going = ContinuedRun(robot, standing, world=World.real_like(robot, 0), rate=500.0, comes_to_rest=True)
+    assert max(np.abs(going.advance(10)[2]).max() for _ in range(150)) < 1e-6
+
+
+def test_a_run_that_comes_to_rest_has_the_torque_of_its_own_motion_by_pinocchio():
+    """The log holds what moved the bodies, whatever the iteration for friction leaves."""
+    ur = arm("ur10e")
+    motion, world = random_motion(ur, 3, duration=2.0), World.real_like(ur, 3)
+    going = ContinuedRun(ur, motion, PAYLOAD, world=world, rate=500.0, comes_to_rest=True)
+    t, q, dq, tau = map(np.concatenate, zip(*(going.advance(10) for _ in range(100)), strict=True))
+    ddq = CubicSpline(t, dq)(t, 1)
+    rigid = world.arm(ur).with_payload(PAYLOAD).torque(q, dq, ddq) + world.rotor_inertia * ddq
+    expected = world.measured(rigid + world.disturbance(q, dq, rigid), t) + world.sticking(0)(dq)
+    # between two pieces the acceleration jumps, which a spline does not know
+    assert np.all(np.median(np.abs(tau - expected), axis=0) < 5e-4 * rated_effort(ur))
+    assert np.all(rms(dq) > 0.05)
 
 
 def test_a_drift_starts_at_nothing_and_ends_at_its_size():

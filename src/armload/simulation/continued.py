@@ -20,7 +20,7 @@ from armload.motion import Motion
 from armload.simulation.controller import Command, Gains
 from armload.simulation.plant import build_model
 from armload.simulation.resolution import FINE, Resolution
-from armload.simulation.rollout import Clock, roll_on
+from armload.simulation.rollout import Clock, damping_at_rest, roll_on
 from armload.simulation.runs import Run, payload_parameters, prepare
 from armload.simulation.worlds import World
 
@@ -59,6 +59,8 @@ class ContinuedRun:
         payload: at the start.
         world: the arm as it really is; None: nominal.
         rate: [Hz]. seed: of what stiction holds at rest.
+        comes_to_rest: friction at rest is implicit (`rollout`): an arm that is told to stand does, whatever its joints'
+            friction.
 
     Raises:
         MotionError: the motion has another number of joints.
@@ -75,6 +77,7 @@ class ContinuedRun:
         rate: float = 1000.0,
         resolution: Resolution = FINE,
         seed: int = 0,
+        comes_to_rest: bool = False,
     ) -> None:
         if not (np.isfinite(rate) and rate > 0):
             raise ArmError(f"the rate is {rate}: expected a positive number of Hz")
@@ -88,7 +91,7 @@ class ContinuedRun:
         clock = Clock.at(rate, 2, resolution)
         command = Command.along(arm, motion, clock.step, clock.steps, resolution.knots)
         self._state = prepare(self._actual, gains, Run(motion, payload), world, command, clock)
-        self._rows = 0
+        self._rows, self._comes_to_rest = 0, comes_to_rest
 
     def hold(self, payload: Any | None) -> None:
         """Change the payload, from the next sample on; None: nothing is held.
@@ -112,7 +115,10 @@ class ContinuedRun:
         clock = Clock.at(self.rate, samples + 1, self._resolution)
         ahead = _From(self._motion, self._rows / self.rate)
         command = Command.along(self._arm, ahead, clock.step, clock.steps, self._resolution.knots)
-        (q, dq, tau), self._state = roll_on(replace(self._state, command=command), clock)
+        state = replace(self._state, command=command)
+        if self._comes_to_rest:
+            state = replace(state, damping=damping_at_rest(state))
+        (q, dq, tau), self._state = roll_on(state, clock)
         if not np.all(np.isfinite(tau)):
             raise ArmError(f"the simulated {self._arm.name} diverged: its gains do not suit its motion")
         tau = tau + self._sticking(dq)

@@ -13,6 +13,11 @@ The rollout cannot call back into Python. Friction and residual d(q, dq) therefo
 evaluated along the desired motion, then along the motion that came out (Picard iteration, `Resolution.passes`
 rollouts). The log is exact whatever is left of that iteration, because it holds what moved the rigid bodies plus d at
 the logged q and dq. The rest only means that the controller acted as if it had misread its own torque by as much.
+
+At rest friction is so steep a damper that the iteration swings up from piece to piece of a run that stands. There its
+slope D (n,) at rest may be left to the implicit integrator, with d(q, dq) less what the last pass lets D take off:
+
+    d applied in step j = d(q, dq) + D·(v_{j+1} − v_{j+1} of the last pass)
 """
 
 from __future__ import annotations
@@ -31,6 +36,8 @@ from armload.simulation.worlds import World
 
 if TYPE_CHECKING:
     import mujoco
+
+_NUDGE = 1e-6  # [rad/s] finite difference for the friction's slope
 
 
 @dataclass(frozen=True)
@@ -65,7 +72,10 @@ class Clock:
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A run ready to go: plant, world, gains, command, where it starts (q_0 and v_0, each (n,)), and when [s]."""
+    """A run ready to go: plant, world, gains, command, where it starts (q_0 and v_0, each (n,)), and when [s].
+
+    damping: D (n,) [N·m·s/rad] of the module's text; None: none.
+    """
 
     model: mujoco.MjModel
     world: World
@@ -74,6 +84,14 @@ class Prepared:
     position: NDArray[np.float64]
     velocity: NDArray[np.float64]
     start: float = 0.0
+    damping: NDArray[np.float64] | None = None
+
+
+def damping_at_rest(run: Prepared) -> NDArray[np.float64]:
+    """How the friction grows with velocity at rest (n,) [N·m·s/rad], under the torque of the run's start."""
+    torque = run.command.control(run.gains)[0] - run.gains.stiffness * run.position
+    here, there = run.world.friction(np.outer([0.0, 1.0], np.full(len(torque), _NUDGE)), np.tile(torque, (2, 1)))
+    return np.maximum((there - here) / _NUDGE, 0.0)
 
 
 def roll_out(
@@ -134,13 +152,30 @@ def _picard(runs: Sequence[Prepared], clock: Clock, workers: int) -> tuple[NDArr
     threads = [mujoco.MjData(models[0]) for _ in range(max(1, min(workers, len(runs))))]
     start = np.array([np.concatenate([[0.0], run.position, run.velocity]) for run in runs])
     control = np.array([run.command.control(run.gains) for run in runs])
+    damping = np.array([np.zeros(len(run.position)) if run.damping is None else run.damping for run in runs])[:, None]
+    after = np.array([run.command.velocity for run in runs])  # v_{j+1}, as far as it is known
+
+    def rolled(applied: NDArray[np.float64]) -> NDArray[np.float64]:
+        for model, (taken_off,) in zip(models, damping, strict=True):
+            model.dof_damping[:] = taken_off
+        states = np.asarray(
+            rollout.rollout(models, threads, start, control - applied + damping * after)[0], dtype=float
+        )
+        for model in models:
+            model.dof_damping[:] = 0.0
+        return states
+
     commands = ((run.world, run.command) for run in runs)
     applied = np.array([_disturbance(w, clock, c.position, c.velocity, c.feed_forward) for w, c in commands])
-    states = np.asarray(rollout.rollout(models, threads, start, control - applied)[0], dtype=float)
-    if any(run.world.disturbed for run in runs):
-        for _ in range(clock.resolution.passes - 1):
-            applied = np.array([_along(*each) for each in zip(runs, repeat(clock), states, applied, strict=False)])
-            states = np.asarray(rollout.rollout(models, threads, start, control - applied)[0], dtype=float)
+    states = rolled(applied)
+    passes = clock.resolution.passes if any(run.world.disturbed for run in runs) else 1
+    for k in range(passes):
+        found = states[:, :, 1 + len(runs[0].position) :]
+        applied, after = applied + damping * (found - after), found
+        if k == passes - 1:
+            break
+        applied = np.array([_along(*each) for each in zip(runs, repeat(clock), states, applied, strict=False)])
+        states = rolled(applied)
     return states, applied
 
 

@@ -58,7 +58,7 @@ class SimulatedMover(StreamedMover):
         standing = StraightMotion(at, at, 1.0, "standing")
         held = [] if mounted is None else [(0.0, mounted)]
         settings: Any = {"world": world, "sensors": sensors, "rate": rate, "speed": speed, "seed": seed, "ahead": ahead}
-        self.simulator = Simulator(arm, standing, held, **settings)
+        self.simulator = Simulator(arm, standing, held, **settings, comes_to_rest=True)
         self.simulator.motion = self._commanded = CommandedMotion(standing)
         self.name, self.rate, self.speed = self.simulator.name, rate, self.simulator.speed
         self._payload = payload

@@ -49,7 +49,7 @@ class Simulator(Source):
         speed: 1: real time; 2: twice as fast; None: as fast as possible.
         duration: [s]; None: for ever.
         seed: of the sensors' noise and of a random motion.
-        ahead: how much is computed at once [s].
+        ahead: how much is computed at once [s]. comes_to_rest: see `ContinuedRun`.
 
     Raises:
         PayloadError: times out of order, or a payload that is none.
@@ -70,6 +70,7 @@ class Simulator(Source):
         duration: float | None = None,
         seed: int = 0,
         ahead: float = _PIECE,
+        comes_to_rest: bool = False,
     ) -> None:
         if motion is None:
             motion = excitation(arm, seed)
@@ -83,7 +84,7 @@ class Simulator(Source):
         self._world, self._sensors, self._seed = world, sensors, seed
         self._end = None if duration is None else round(duration * rate)
         self._pace = Pace(speed)
-        self._piece = max(2, round(ahead * rate))
+        self._piece, self._comes_to_rest = max(2, round(ahead * rate)), comes_to_rest
         self._row = 0  # the first that is not computed yet
         self.speed = speed or 1.0
 
@@ -131,9 +132,8 @@ class Simulator(Source):
     def _pieces(self) -> Iterator[tuple[NDArray, NDArray, NDArray, NDArray]]:
         """The run, as the sensors show it, in pieces that end where the payload changes."""
         start = int(np.searchsorted(self._changes(), 0, side="right")) - 1
-        run = ContinuedRun(
-            self.arm, self.motion, self._payloads[start], world=self._world, rate=self.rate, seed=self._seed
-        )
+        about: Any = {"world": self._world, "rate": self.rate, "seed": self._seed, "comes_to_rest": self._comes_to_rest}
+        run = ContinuedRun(self.arm, self.motion, self._payloads[start], **about)
         before = None
         while self._end is None or self._row < self._end:
             with self._scheduling:
