@@ -163,3 +163,12 @@ def test_a_centre_that_is_none_is_refused(com, std, said):
 def test_a_centre_is_read_as_it_is_typed():
     assert centre("0.02,-0.02,0.08±0.002") == (COM, 0.002)
     assert centre("-1e-2,0,0.08+-0.01") == ((-0.01, 0.0, 0.08), 0.01)
+
+
+@pytest.mark.parametrize(
+    ("mass", "com"),
+    [(1.5, None), ((1.5,), None), (("heavy", 0.1), None), (None, (0.0, 0.0, 0.1)), (None, (COM, (0.1, 0.1, 0.1)))],
+)
+def test_what_is_known_in_another_form_is_refused_in_a_sentence(mass, com):
+    with pytest.raises(IdentificationError, match="expected two things"):
+        Known.of(mass, com)

@@ -6,7 +6,7 @@ import pytest
 from armload.arms import arm, full_arm_regressor, momentum_regressor, rated_effort
 from armload.errors import IdentificationError
 from armload.regression import Correction, JointFeatures
-from armload.regression.lag import first_order_lag
+from armload.regression.lag import Lag, first_order_lag
 from armload.regression.rows import SPACING, FilteredRegression, Rows
 
 GAIN = 20.0
@@ -125,3 +125,10 @@ def test_samples_of_another_arm_are_refused_and_leave_no_trace(joints, wrong):
     with pytest.raises(IdentificationError, match="a number for each joint of panda"):
         regression.rows(t[1:], *good)
     np.testing.assert_array_equal(regression.rows(t, *good).X, expected.X)
+
+
+@pytest.mark.parametrize("gain", [-1.0, 0.0, np.nan, np.inf, "20", None])
+def test_a_lag_that_is_none_is_refused(gain):
+    for made in (Lag, lambda value: FilteredRegression(arm("panda"), value)):
+        with pytest.raises(ValueError, match="expected the lag's"):
+            made(gain)

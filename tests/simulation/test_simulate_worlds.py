@@ -20,6 +20,7 @@ from armload.simulation import (
     SmoothTorque,
     World,
     simulate,
+    simulate_inverse,
     simulate_many,
 )
 
@@ -261,3 +262,15 @@ def test_stiffer_gains_sag_less(panda):
         )
     ]
     np.testing.assert_allclose(sag, sag[1] * np.array([2.0, 1.0, 0.5]), rtol=0.05)
+
+
+# ---------------------------------------------------------------- by inverse dynamics
+
+
+def test_inverse_dynamics_take_a_payload_as_the_simulation_does(panda):
+    motion = motion_of(panda)
+    one, same, none = (simulate_inverse(panda, motion, held) for held in (PAYLOAD, [(0.0, PAYLOAD)], None))
+    np.testing.assert_array_equal(one.tau, same.tau)
+    carried = panda.with_payload(PAYLOAD).torque(one.q, np.zeros_like(one.q), np.zeros_like(one.q))
+    bare = panda.torque(one.q, np.zeros_like(one.q), np.zeros_like(one.q))
+    assert np.median(np.abs(one.tau - none.tau - carried + bare), axis=0).max() < 1.0  # gravity is most of it

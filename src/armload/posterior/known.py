@@ -14,7 +14,7 @@ centre alone.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -138,8 +138,8 @@ class Known:
         Raises:
             IdentificationError: see `KnownMass` and `KnownCentre`.
         """
-        weighed = mass if mass is None or isinstance(mass, KnownMass) else KnownMass(*mass)
-        centre = com if com is None or isinstance(com, KnownCentre) else KnownCentre(*com)  # type: ignore[arg-type]
+        weighed = mass if mass is None or isinstance(mass, KnownMass) else KnownMass(*_pair("mass", mass))
+        centre = com if com is None or isinstance(com, KnownCentre) else KnownCentre(*_pair("centre of mass", com))
         return None if weighed is None and centre is None else cls(weighed, centre, None, if_held)
 
     def with_tool(self, tool: NDArray[np.float64]) -> Self:
@@ -185,6 +185,17 @@ class Known:
     def _own(self, mean: NDArray[np.float64]) -> NDArray[np.float64]:
         """Less the tool."""
         return mean if self.tool is None else mean - self.tool
+
+
+def _pair(what: str, given: Any) -> tuple[Any, float]:
+    """A value and its standard deviation, one number."""
+    try:
+        value, std = given
+        return (float(value) if what == "mass" else value), float(std)
+    except (TypeError, ValueError):
+        raise IdentificationError(
+            f"a known {what} of {given!r}: expected two things, the {what} and one standard deviation"
+        ) from None
 
 
 def _given(

@@ -11,6 +11,7 @@ as `check_fits` asks of a log that is added later.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,9 @@ class DisagreementError(IdentificationError):
     def __init__(self, message: str, log: int) -> None:
         super().__init__(message)
         self.log = log
+
+    def __reduce__(self) -> tuple[Any, ...]:  # a pool of processes hands errors over, and breaks where it cannot
+        return type(self), (str(self), self.log)
 
 
 def carried(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from numbers import Real
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -24,15 +26,29 @@ def _lag(u: NDArray, h: NDArray, gain: float, state: NDArray, last: NDArray) -> 
     return out
 
 
+def checked_gain(gain: float) -> float:
+    """λ [1/s] of a lag, as it was given.
+
+    Raises:
+        ValueError: it is no finite number above zero.
+    """
+    if not (isinstance(gain, Real) and 0.0 < gain < np.inf):
+        raise ValueError(f"gain is {gain!r}: expected the lag's λ, a number above 0 [1/s]")
+    return float(gain)
+
+
 class Lag:
     """A first-order lag y = λ/(s + λ)·u fed in pieces, at any sample times (bilinear rule, constant memory).
 
     Args:
         gain: λ [1/s].
+
+    Raises:
+        ValueError: see `checked_gain`.
     """
 
     def __init__(self, gain: float) -> None:
-        self.gain = gain
+        self.gain = checked_gain(gain)
         self.reset()
 
     def reset(self) -> None:

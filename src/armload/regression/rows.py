@@ -30,7 +30,7 @@ from armload.arms.momentum_row import MomentumRow
 from armload.errors import IdentificationError
 from armload.recording import JITTERED
 from armload.regression.features import JointFeatures
-from armload.regression.lag import GAIN
+from armload.regression.lag import GAIN, checked_gain
 from armload.regression.mismatch import Correction
 from armload.regression.row_kernels import FRESH, lag_torque, lag_torques, make_rows
 
@@ -80,6 +80,9 @@ class FilteredRegression:
         features: of each joint's smooth mismatch; None: the rows have none.
         rate: rows per second at most [Hz]; None: every sample gives one.
         settling: [s] that one pose of a standing arm counts; beyond it a row stands for no time.
+
+    Raises:
+        ValueError: see `checked_gain`.
     """
 
     def __init__(
@@ -91,7 +94,7 @@ class FilteredRegression:
         rate: float | None = None,
         settling: float = np.inf,
     ) -> None:
-        self.arm, self.gain = arm, gain
+        self.arm, self.gain = arm, checked_gain(gain)
         self._momentum = MomentumRow(arm)
         self._torque_gain = None if mismatch is None else mismatch.gain
         self._links = np.ascontiguousarray(arm.link_parameters.ravel())

@@ -32,7 +32,7 @@ _WAVES, _BAND = 8, (0.2, 3.0)  # of each joint's error [Hz]: above, a stiff cont
 def simulate_inverse(
     arm: Arm,
     motion: Motion,
-    held: Sequence[tuple[float, Any | None]] = ((0.0, None),),
+    held: Sequence[tuple[float, Any | None]] | Any | None = None,
     *,
     world: World | None = None,
     sensors: Sensors | None = None,
@@ -53,8 +53,8 @@ def simulate_inverse(
     Args:
         arm: the nominal arm (with whatever is attached).
         motion: with the arm's number of joints.
-        held: (time [s], payload) in order, the first at 0: what is held from then on; a payload is anything that
-            `simulate` takes, None is nothing.
+        held: a payload, anything that `simulate` takes, None is nothing; or (time [s], payload) in order, the first at
+            0: what is held from then on.
         world: the arm as it really is; None: nominal.
         sensors: None: ideal.
         rate: of the log [Hz]. duration: of the log [s]; None: the motion's.
@@ -68,6 +68,7 @@ def simulate_inverse(
     """
     if motion.n != arm.n:
         raise MotionError(f"the motion moves {motion.n} joints: {arm.name} has {arm.n}")
+    held = held if isinstance(held, Sequence) else [(0.0, held)]
     samples = round((motion.duration if duration is None else duration) * rate)
     if samples < 2:
         raise MotionError(f"a log of {samples} sample(s): expected at least 2; give a longer duration or a higher rate")
