@@ -28,7 +28,7 @@ LINK_SPREAD = (0.02, 0.002, 0.05)
 
 @dataclass(frozen=True, eq=False)
 class Arm:
-    """A serial arm, the frame its payload is about, and the gravity at its base.
+    """A serial arm, the frame its payload is about, and the gravity at its base. Threads may share one.
 
     >>> from armload.arms import arm
     >>> panda = arm("panda")

@@ -64,7 +64,6 @@ class Feedback:
     def __init__(
         self, arm: Arm, controller: Controller, mounted: InertialParameters | None, note: Callable[[str], None]
     ) -> None:
-        # a model computes in a memory of its own, which two threads must not share
         self._arm, self._bare = arm, replace(arm, attached=None)
         self._controller, self._mounted, self._note = controller, mounted, note
         self.mass: float | None = None

@@ -45,7 +45,7 @@ class Plausibility:
     """
 
     def __init__(self, arm: Arm, name: str, steadied: bool = False) -> None:
-        # what is attached is a payload to the checks; and a model computes in a memory that two threads must not share
+        # what is attached is a payload to the checks
         self._arm, self._name = replace(arm, attached=None), name
         self._advises = not (steadied or arm.motor_torque)
         self.reset()

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 from queue import SimpleQueue
 
@@ -276,8 +275,7 @@ class Session:
 
     def _made(self, tare: Tare | None, method: str | Path | None) -> OnlineIdentifier:
         log, age = (None, 0.0) if tare is None else (self.source.as_handed_on(tare.recording), tare.age_now)
-        # an arm's model computes in a memory of its own, which two threads must not share
-        return OnlineIdentifier(replace(self.arm), log, method, self.profile, self._known, self._every, age)
+        return OnlineIdentifier(self.arm, log, method, self.profile, self._known, self._every, age)
 
     def _write(self, text: str) -> None:
         self.log.write(self._t, text)

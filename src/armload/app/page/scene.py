@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -26,14 +25,14 @@ class DrawnArm:
 
     Args:
         scene: viser's scene.
-        arm: copied, so that its model is not computed in two threads at once.
+        arm: that is drawn.
 
     Attributes:
         reach: length of all links [m].
     """
 
     def __init__(self, scene: Any, arm: Arm) -> None:
-        self._arm = replace(arm)
+        self._arm = arm
         reach = self.reach = float(
             np.linalg.norm(np.diff(frame_poses(self._arm, np.zeros(arm.n))[1], axis=0), axis=1).sum()
         )
