@@ -319,6 +319,8 @@ def test_what_the_log_did_not_determine_is_said_on_both_streams(export):
     out, err = export(result, "--to", "sdf")
     assert "not determined by the log: Ixx, Ixy, Ixz, Iyy, Iyz, Izz" in out
     assert "not determined by the log: Ixx, Ixy, Ixz, Iyy, Iyz, Izz" in err
+    _, err = export(result, "--to", "ur-payload")
+    assert "written as known beforehand" not in err  # it has no inertia
     out, err = export(result, "--to", "franka-desk")  # JSON has no comments
     json.loads(out)
     assert "not determined" in err

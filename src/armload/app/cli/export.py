@@ -147,7 +147,7 @@ def write(
         print_note("nothing seems to be held: the mass is within three standard deviations of zero")
     if elsewhere:
         print_note(f"a controller counts from its flange; these numbers are about {load.frame}, as was asked for")
-    for note in (*earlier, *doubts, *([] if earlier else _on_numbers(body)), *_on_use(body, to, added)):
+    for note in (*earlier, *doubts, *([] if earlier else _on_numbers(body, to)), *_on_use(body, to, added)):
         print_note(note)
     if out is None:
         print(text, end="")
@@ -212,9 +212,10 @@ def _doubts(parts: list[str], load: Load) -> list[str]:
     return doubts
 
 
-def _on_numbers(load: Load) -> list[str]:
-    """What the numbers rest on."""
-    missing = ", ".join(load.undetermined)
+def _on_numbers(load: Load, to: str) -> list[str]:
+    """What the numbers that are written rest on."""
+    written = (name for name in load.undetermined if to != "ur-payload" or name[0] != "I")  # it has no inertia
+    missing = ", ".join(written)
     return [*([f"not determined by the log: {missing}; written as known beforehand"] if missing else []), *load.remarks]
 
 
