@@ -153,29 +153,25 @@ def _picard(runs: Sequence[Prepared], clock: Clock, workers: int) -> tuple[NDArr
     start = np.array([np.concatenate([[0.0], run.position, run.velocity]) for run in runs])
     control = np.array([run.command.control(run.gains) for run in runs])
     damping = np.array([np.zeros(len(run.position)) if run.damping is None else run.damping for run in runs])[:, None]
-    after = np.array([run.command.velocity for run in runs])  # v_{j+1}, as far as it is known
 
-    def rolled(applied: NDArray[np.float64]) -> NDArray[np.float64]:
+    def rolled(applied: NDArray[np.float64], after: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+        """The states, the disturbance that acted, and v_{j+1}, of which `after` was expected."""
         for model, (taken_off,) in zip(models, damping, strict=True):
             model.dof_damping[:] = taken_off
-        states = np.asarray(
-            rollout.rollout(models, threads, start, control - applied + damping * after)[0], dtype=float
-        )
+        found = rollout.rollout(models, threads, start, control - applied + damping * after)[0]
+        states = np.asarray(found, dtype=float)
         for model in models:
             model.dof_damping[:] = 0.0
-        return states
+        moved = states[:, :, 1 + len(runs[0].position) :]
+        return states, applied + damping * (moved - after), moved
 
     commands = ((run.world, run.command) for run in runs)
     applied = np.array([_disturbance(w, clock, c.position, c.velocity, c.feed_forward) for w, c in commands])
-    states = rolled(applied)
-    passes = clock.resolution.passes if any(run.world.disturbed for run in runs) else 1
-    for k in range(passes):
-        found = states[:, :, 1 + len(runs[0].position) :]
-        applied, after = applied + damping * (found - after), found
-        if k == passes - 1:
-            break
-        applied = np.array([_along(*each) for each in zip(runs, repeat(clock), states, applied, strict=False)])
-        states = rolled(applied)
+    states, applied, after = rolled(applied, np.array([run.command.velocity for run in runs]))
+    if any(run.world.disturbed for run in runs):
+        for _ in range(clock.resolution.passes - 1):
+            applied = np.array([_along(*each) for each in zip(runs, repeat(clock), states, applied, strict=False)])
+            states, applied, after = rolled(applied, after)
     return states, applied
 
 
