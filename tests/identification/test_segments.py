@@ -73,6 +73,21 @@ def test_a_payload_taken_up_within_a_log_is_found_and_each_part_answered(panda, 
     assert json.loads(json.dumps(found.to_dict()))["segments"][1]["mass"] == found.mass
 
 
+@pytest.mark.parametrize("when", [3.0, 6.0])
+def test_what_was_on_at_the_tare_and_comes_off_within_a_log_is_found(panda, when):
+    """No body has what is left then, which is no sign of one that swings."""
+    body = draw_payload("boxes", 3, 0.8)
+    how = {"world": World.real_like(panda, 3), "sensors": Sensors.of(panda), "rate": 100.0}
+    held = [(0.0, body), (22.0 + when, None)]
+    source = Simulator(panda, random_motion(panda, 3), held, speed=None, duration=34.0, seed=3, **how)
+    log = Recording(*map(np.array, zip(*source, strict=True)))
+    found = identify(log.between(22.0, 34.0), panda, tare=log.between(0.0, 20.0))
+    assert [part.start for part in found.segments] == [0.0, pytest.approx(when, abs=0.1)]
+    low, high = found.phi_low[0], found.phi_high[0]
+    assert low <= -body.parameters.mass <= high < low + 0.2
+    assert found.notes[0].startswith("something was taken off since the tare")
+
+
 def test_what_is_taken_up_shortly_before_the_end_is_found(panda, payload):
     found = identify(log_of(panda, [(0.0, None), (5.2, payload)]), panda)
     assert [part.start for part in found.segments] == [0.0, pytest.approx(5.2, abs=0.1)]

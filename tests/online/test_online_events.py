@@ -277,6 +277,17 @@ def test_what_was_on_at_the_tare_and_is_taken_off_is_not_outside_the_interval():
     assert all(any("was taken off" in note for note in e.notes) for e in gone)
 
 
+def test_a_stream_that_ends_with_something_off_since_its_tare_ends_with_what_it_said_last():
+    tare, log = tared_with(box(0.8), [(3.0, None)], 4.0)
+    identifier = OnlineIdentifier(arm("panda"), tare, "map-gp")
+    last = [identifier.update(*sample) for sample in log][-1]
+    end = identifier.conclude()
+    identifier.close()
+    assert end.phi == pytest.approx(last.phi)
+    assert covers(end, -0.8)[0]
+    assert end.notes == last.notes
+
+
 def test_an_arm_that_is_pressed_upwards_with_what_was_on_at_its_tare_still_holds_it():
     tare, log = tared_with(box(0.8), [], 7.0)
     size = np.clip(np.minimum(log.t - 3.0, 5.0 - log.t) / 0.2, 0.0, 1.0)

@@ -82,6 +82,7 @@ def answered(
     if is_held or not determined[0]:  # an empty hand has no inertia to be determined
         every_note += lacking(arm, tared, determined, found.known_arm_std, weak)
         every_note += leaning_on_prior(leans)
+    rigid = found.explained or is_removal(estimate, determined[0])  # what was taken off is no body, and need not swing
     consistent = is_consistent(phi)
     trusted = found.calibrated and not doubts and consistent and otherwise is None and unsure is None
     mass, com, inertia_com = about_com(phi)
@@ -109,7 +110,7 @@ def answered(
         date=datetime.now(UTC).isoformat(timespec="seconds"),
         why=found.why,
         kappa=found.kappa,
-        moves=found.restlessness > RESTLESS or not found.explained,
+        moves=found.restlessness > RESTLESS or not rigid,
         another=found.another is not None and found.another.found,
         health=found.health,
         same_arm_assumed=tared and found.another is None,

@@ -90,7 +90,7 @@ class PayloadWatch:
     @property
     def undecided(self) -> bool:
         """Whether the last rows are likelier of another payload than of the run's, and no run has them yet."""
-        return self.settling or (self._doubted_at is not None and self.likely[0] > 0.5)
+        return self.settling or self.lifted or (self._doubted_at is not None and self.likely[0] > 0.5)
 
     @property
     def likely(self) -> tuple[float, float, float]:
