@@ -1,7 +1,8 @@
 """Is it a change? Each row weighed by what it may be (`modes.py`), whether a run has taken it or not.
 
 A change is detected once it has been sure for `HOLDS`; after a contact, once the new payload also stays. What would
-have less than no mass for as long is a contact.
+have less than no mass for as long is a contact; or something that was on the arm from the start has been taken off, if
+all that is mounted keeps a mass then and it lasts for `CONTACT_LONGEST`.
 """
 
 from __future__ import annotations
