@@ -7,7 +7,7 @@ all that is mounted keeps a mass then and it lasts for `CONTACT_LONGEST`.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,17 @@ from armload.recording import GAP, Sample
 from armload.regression import payload_prior_std
 from armload.regression.row_kernels import STILL
 from armload.regression.rows import Row
+
+
+class _Possible(NamedTuple):
+    """Whether a mass can be: of what would have been added by now, of what was before, of all that would be mounted.
+
+    What was on the arm from the start may be taken off.
+    """
+
+    added: bool
+    before: bool
+    mounted: bool
 
 
 class Weighing:
@@ -108,11 +119,8 @@ class Weighing:
         self._sure_since = min(self._sure_since, self.row_t) if sure else np.inf
         return self.row_t - self._sure_since >= HOLDS
 
-    def _possible(self, run: PosteriorLeastSquares) -> tuple[bool, bool, bool]:
-        """Whether masses can be: of what would be added now, of what was before, of all that would be mounted now.
-
-        Nothing lifts the arm but what touches it. What was on it from the start may be taken off.
-        """
+    def _possible(self, run: PosteriorLeastSquares) -> _Possible:
+        """Which masses can be: nothing lifts the arm but what touches it."""
         (phi, known), (shift, spread), tool = self._before_row(run), self.modes.shift(), run.arm.attached
         state = run.stream.state
         before, variance = float(phi[0]), float(known[0, 0])
@@ -120,8 +128,7 @@ class Weighing:
         in_all += 0.0 if tool is None else tool.mass
         step, spread = float(shift[0]), float(spread[0, 0])
         masses = (before + step, variance + spread), (before, variance), (in_all + step, doubt + spread)
-        added, then, mounted = (can_be(m, np.sqrt(v), self._unit) for m, v in masses)
-        return added, then, mounted
+        return _Possible(*(can_be(m, np.sqrt(v), self._unit) for m, v in masses))
 
     def believed(self, lasted: float) -> bool:
         """Whether what has not fitted for so long [s] is believed: then a drift is the arm's."""
@@ -189,13 +196,13 @@ class Weighing:
             seen = _rubbing(h, row, seen, scale, run, self._coulomb)
         modes.expect(early=not self._motor and row.t - self._began < EARLY)
         modes.take(h, seen, row.X, wrench_row(*self._chain, row.q), scale, *self._before_row(run), *how)
-        added, before, mounted = self._possible(run) if modes.handing + modes.other > 0.5 else (True, True, True)
-        self._impossible_since = np.inf if added else min(self._impossible_since, row.t)
-        if not added and mounted:
-            self._lifted_since = min(self._lifted_since, row.t)
-        self._taken_off = not added and mounted and (row.t - self._lifted_since > CONTACT_LONGEST or not before)
+        possible = self._possible(run) if modes.handing + modes.other > 0.5 else _Possible(True, True, True)
+        lifted = not possible.added and possible.mounted
+        self._impossible_since = np.inf if possible.added else min(self._impossible_since, row.t)
+        self._lifted_since = min(self._lifted_since, row.t) if lifted else self._lifted_since
+        self._taken_off = lifted and (row.t - self._lifted_since > CONTACT_LONGEST or not possible.before)
         if row.t - self._impossible_since >= HOLDS and not self._taken_off:
-            modes.no_payload(perhaps_taken_off=mounted)
+            modes.no_payload(perhaps_taken_off=lifted)
 
     def _rests(self, row: Row, state: SequentialPosterior) -> bool:
         """Whether the arm stands, or has hardly moved since it stood; it is foreseen anew elsewhere."""
