@@ -232,9 +232,8 @@ class Arm:
 
     def mass_matrix(self, q: ArrayLike) -> NDArray[np.float64]:
         """Joint-space inertia M(q) (n, n) of one position q (n,) [kg·m²]."""
-        M = np.triu(
-            pin.crba(self._model, self._data, self._samples(np.asarray(q, dtype=float)[None], None, None)[0][0])
-        )
+        (one,), _, _ = self._samples(np.asarray(q, dtype=float)[None], None, None)
+        M = np.triu(pin.crba(self._model, self._data, one))
         return M + np.triu(M, 1).T
 
     def momentum(self, q: ArrayLike, dq: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

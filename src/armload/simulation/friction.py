@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armload.errors import ArmError
 
+_NUDGE = 1e-6  # [rad/s] finite difference for the slope
 _EXTRAS = ("asymmetry", "stribeck", "viscous", "load")  # what is zero in plain friction
 
 
@@ -91,6 +92,11 @@ class Friction:
         if torque is not None:
             size = size + self.load * np.abs(torque)
         return direction * size + self.viscous * dq
+
+    def with_slope(self, dq: NDArray[np.float64], torque: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
+        """f (n,) at dq (n,) and a torque (n,), and how it grows with dq (n,), at least 0 [N·m·s/rad]."""
+        here, there = self(np.stack([dq, dq + _NUDGE]), torque)
+        return here, np.maximum((there - here) / _NUDGE, 0.0)
 
     @property
     def numbers(self) -> list[NDArray[np.float64]]:

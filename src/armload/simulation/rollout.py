@@ -37,8 +37,6 @@ from armload.simulation.worlds import World
 if TYPE_CHECKING:
     import mujoco
 
-_NUDGE = 1e-6  # [rad/s] finite difference for the friction's slope
-
 
 @dataclass(frozen=True)
 class Clock:
@@ -90,8 +88,7 @@ class Prepared:
 def damping_at_rest(run: Prepared) -> NDArray[np.float64]:
     """How the friction grows with velocity at rest (n,) [N·m·s/rad], under the torque of the run's start."""
     torque = run.command.control(run.gains)[0] - run.gains.stiffness * run.position
-    here, there = run.world.friction(np.outer([0.0, 1.0], np.full(len(torque), _NUDGE)), np.tile(torque, (2, 1)))
-    return np.maximum((there - here) / _NUDGE, 0.0)
+    return run.world.friction.with_slope(np.zeros_like(torque), torque)[1]
 
 
 def roll_out(

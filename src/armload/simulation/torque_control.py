@@ -29,7 +29,6 @@ from armload.simulation.runs import payload_parameters
 from armload.simulation.torque_laws import Law
 from armload.simulation.worlds import World
 
-_NUDGE = 1e-6  # [rad/s] finite difference of friction
 _TOO_FAST = 100.0  # [rad/s]
 
 
@@ -134,6 +133,6 @@ def _lost(
     """Friction and residual (n,) [N·m], and how the friction grows with velocity (n,), at least 0 [N·m·s/rad]."""
     if not world.disturbed:
         return np.zeros_like(q), np.zeros_like(q)
-    here, there = world.friction(np.stack([v, v + _NUDGE]), torque)
+    friction, slope = world.friction.with_slope(v, torque)
     residual = 0.0 if world.residual is None else world.residual(q)[0]
-    return here + residual, np.maximum((there - here) / _NUDGE, 0.0)
+    return friction + residual, slope
