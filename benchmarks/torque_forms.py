@@ -5,8 +5,9 @@
 Logs of 3, 6 or 20 s at 200 Hz of a random motion, 0.3 to 1 times as fast as it is drawn, of UR3e, UR5e and UR10e that
 differ from their model as real ones do, and of arms beyond those, in turn. They hold nothing in a third, else 0 to 1.2
 times the rated payload. Each is asked as it is (sound), with its torque divided by 11 N·m/A (currents), and less the
-gravity of the bare arm (without gravity), as a controller that is set to carry nothing reports it. Called so: refused,
-by the form's own name; refused: by any; covered or doubted: refused, or called approximate by `identify`, or with the
+gravity of the bare arm (without gravity), as a controller that is set to carry nothing reports it; the latter and the
+sound logs are asked once more with `--compensated nothing`, which puts gravity back. Called so: refused, by the form's
+own name; refused: by any; covered or doubted: refused, or called approximate by `identify`, or with the
 mass in its interval, which is that of what was known before where the log does not determine it. In the result stand,
 too, the log odds of torque without gravity (`OTHER_FORM`): the most of the sound logs, and the least of those without.
 Written to benchmarks/results/torque_forms.json and a table of docs/recordings.md; three minutes of one core.
@@ -23,7 +24,7 @@ from script import ROOT, markdown_table, options, say, write, write_table
 from armload import Recording, arm, identify
 from armload.arms import rated_mass
 from armload.errors import RecordingError
-from armload.identification import check_plausible
+from armload.identification import check_plausible, uncompensated
 from armload.identification.torque_scale import torque_scale
 from armload.motion import random_motion
 from armload.recording import with_gravity
@@ -32,7 +33,14 @@ from armload.simulation import Sensors, World, simulate
 ROBOTS = ("ur3e", "ur5e", "ur10e")
 CONSTANT = 11.0  # [N·m/A]
 COLUMNS = ("called so", "refused", "covered or doubted")
-FORMS = {"sound": "", "currents": "look like currents", "without gravity": "gravity taken out"}
+PUT_BACK = ", compensated"
+FORMS = {
+    "sound": "",
+    "currents": "look like currents",
+    "without gravity": "gravity taken out",
+    f"without gravity{PUT_BACK}": "",
+    f"sound{PUT_BACK}": "gravity in it already",
+}
 
 
 def log_of(robot: str, seed: int) -> tuple[Recording, float]:
@@ -52,21 +60,30 @@ def as_form(log: Recording, robot: str, form: str) -> Recording:
     """The same log with its torque in another form."""
     if form == "currents":
         return replace(log, tau=log.tau / CONSTANT)
-    return log if form == "sound" else replace(log, tau=log.tau - arm(robot).torque(log.q))
+    return replace(log, tau=log.tau - arm(robot).torque(log.q)) if form.startswith("without gravity") else log
 
 
-def refusal(log: Recording, robot: str) -> str:
+def read(log: Recording, robot: str, form: str) -> Recording:
+    """A log as `identify` takes it: looked at, and with gravity put back where that is asked for."""
+    log = as_form(log, robot, form)
+    if form.endswith(PUT_BACK):
+        (log,) = uncompensated([log], arm(robot))
+    check_plausible(log, arm(robot))
+    return log
+
+
+def refusal(log: Recording, robot: str, form: str) -> str:
     """Why a log is refused; "": it is not."""
     try:
-        check_plausible(log, arm(robot))
+        read(log, robot, form)
     except RecordingError as error:
         return str(error)
     return ""
 
 
-def is_fine(log: Recording, robot: str, held: float) -> bool:
+def is_fine(log: Recording, robot: str, form: str, held: float) -> bool:
     """Whether an answer doubts itself, or holds the mass."""
-    answer = identify(log, arm(robot))
+    answer = identify(read(log, robot, form), arm(robot))
     return answer.interval != "calibrated" or answer.phi_low[0] <= held <= answer.phi_high[0]
 
 
@@ -85,11 +102,10 @@ def main() -> None:
         logs = [log_of(robot, 1000 * asked.seed + k) for k in range(asked.logs)]
         found[robot] = {}
         for form, name in FORMS.items():
-            said = [refusal(as_form(log, robot, form), robot) for log, _ in logs]
+            said = [refusal(log, robot, form) for log, _ in logs]
             called = sum(bool(name) and name in text for text in said)
             fine = sum(
-                bool(text) or is_fine(as_form(log, robot, form), robot, held)
-                for text, (log, held) in zip(said, logs, strict=True)
+                bool(text) or is_fine(log, robot, form, held) for text, (log, held) in zip(said, logs, strict=True)
             )
             counts = {"called so": called, "refused": sum(map(bool, said)), "covered or doubted": int(fine)}
             found[robot][form] = {"logs": len(logs)} | counts
@@ -103,7 +119,7 @@ def main() -> None:
         for form, case in forms.items()
     ]
     for row in rows:
-        if row[1] == "sound":
+        if not FORMS[row[1]]:
             row[2] = ""
     table = markdown_table(["arm", "torque", *COLUMNS], "llrrr", rows)
     write_table(ROOT / "docs" / "recordings.md", "torque forms", table)

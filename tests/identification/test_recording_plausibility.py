@@ -5,17 +5,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
-from armload.arms import arm, rated_effort
+from armload.arms import arm, rated_effort, rated_mass
 from armload.devices import Simulator
 from armload.errors import RecordingError
-from armload.identification import check_plausible
+from armload.identification import check_plausible, uncompensated
 from armload.identification.exchanged import check_for_exchanged_torques
 from armload.identification.torque_scale import torque_scale
 from armload.inertia import InertialParameters
 from armload.lab.episodes import draw_episodes
 from armload.motion import random_motion, taie2024
-from armload.payloads import draw_payload
+from armload.payloads import draw_payload, franka_hand
 from armload.recording import Recording, read_recording, with_gravity
 from armload.recording.windows import integrals, windows
 from armload.simulation import Run, Sensors, World, simulate, simulate_many
@@ -468,6 +469,39 @@ def test_torque_without_gravity_is_called_so_with_what_to_do(real_data, name):
     with pytest.raises(RecordingError, match=r"gravity taken out.*--compensated nothing"):
         check_plausible(taken, robot)
     check_plausible(with_gravity(taken, robot), robot)
+
+
+def test_gravity_that_was_never_taken_out_is_not_put_back(real_data):
+    """With it twice, the empty arm's log would be one of a payload; the same torque without gravity is restored."""
+    robot = arm("ur10e")
+    empty, loaded = (
+        read_recording(real_data / name, robot) for name in ("ur10e_unloaded.csv", "ur10e_loaded_2805g.csv")
+    )
+    for logs in ([loaded], [loaded, empty]):
+        with pytest.raises(RecordingError, match=r"ur10e_\w+\.csv: tau seems to have gravity in it already"):
+            uncompensated(logs, robot)
+        taken = [replace(log, tau=log.tau - robot.torque(log.q)) for log in logs]
+        for log, restored in zip(logs, uncompensated(taken, robot), strict=True):
+            assert_allclose(restored.tau, log.tau, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("name", ["panda", "ur5e"])
+def test_a_tare_tells_with_the_run_whether_gravity_is_in_the_torque(name, seed):
+    robot = arm(name)
+    world, sensors = World.real_like(robot, 700 + seed), Sensors.of(robot)
+    logs = [
+        simulate(
+            robot, random_motion(robot, 70 + seed + k, duration=6.0), payload, world=world, sensors=sensors, rate=200.0
+        )
+        for k, payload in enumerate((heavy(0.5 * rated_mass(robot), seed), None))
+    ]
+    with pytest.raises(RecordingError, match="gravity in it already"):
+        uncompensated(logs, robot)
+    set_to = franka_hand().parameters if name == "panda" else None
+    loaded = robot if set_to is None else robot.with_payload(set_to)
+    taken = [replace(log, tau=log.tau - loaded.torque(log.q)) for log in logs]
+    assert_allclose(uncompensated(taken, robot, set_to)[0].tau, logs[0].tau, atol=1e-9)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2, 3])

@@ -17,7 +17,7 @@ from armload.app.cli.arguments import (
     output_file,
 )
 from armload.app.cli.export import FORMS, write
-from armload.app.cli.named import arm_of, payload_named, read_logs, uncompensated
+from armload.app.cli.named import arm_of, payload_named, read_logs, with_gravity_put_back
 from armload.app.cli.printing import print_json, print_note, working, write_json
 
 _EXAMPLES = """\
@@ -96,8 +96,7 @@ def run(options: argparse.Namespace) -> None:
         log, tare = read_logs(options, arm, options.log, options.tare, topics=topics)
         assert log is not None
         if options.compensated is not None:
-            log, tare = uncompensated((log, tare), arm, options.compensated)
-            assert log is not None
+            log, tare = with_gravity_put_back(log, tare, arm, options.compensated)
         result = identify(
             log,
             arm,

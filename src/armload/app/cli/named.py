@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
@@ -112,12 +111,15 @@ def _reads(path: str, arm: Arm) -> bool:
     return True
 
 
-def uncompensated(logs: Sequence[Recording | None], arm: Arm, payload: str) -> list[Recording | None]:
+def with_gravity_put_back(
+    log: Recording, tare: Recording | None, arm: Arm, payload: str
+) -> tuple[Recording, Recording | None]:
     """Logs with the gravity that their controller took out of the torque: the arm's, and a payload's or `nothing`'s."""
-    from armload.recording import with_gravity
+    from armload.identification import uncompensated
 
     held = None if payload == "nothing" else payload_of(payload, arm)  # once: it may be a pipe
-    return [None if log is None else with_gravity(log, arm, held) for log in logs]
+    log, *rest = uncompensated([log] if tare is None else [log, tare], arm, held)
+    return log, next(iter(rest), None)
 
 
 def arm_of(options: argparse.Namespace) -> Arm:
