@@ -182,6 +182,26 @@ def test_swapped_joints_are_left_out(online, log):
     assert online.health.used == 190
 
 
+@pytest.mark.parametrize("counted_from", [0.0, -np.pi])
+def test_a_joint_that_turns_without_end_may_be_counted_anew(counted_from):
+    """Kinova's drivers tell its angles from -pi to pi, or from 0 to 2 pi."""
+    gen3, t, endless = arm("gen3"), np.arange(600) / 200.0, [0, 2, 4, 6]
+    q = 0.3 * np.sin(np.outer(t, np.arange(1.0, 8.0)))
+    q[:, endless] += np.outer(t, [1.0, -1.0, 1.2, -1.2])
+    dq = np.gradient(q, t, axis=0)
+    tau = gen3.torque(q, dq)
+    wrapped = q.copy()
+    wrapped[:, endless] = np.mod(q[:, endless] - counted_from, 2.0 * np.pi) + counted_from
+    assert np.abs(np.diff(wrapped, axis=0)).max() > 6.0
+    said = []
+    for angles in (q, wrapped):
+        identifier = OnlineIdentifier(gen3)
+        said.append(fed(identifier, map(Sample, t, angles, dq, tau)))
+        assert identifier.health.used == len(t)
+        identifier.close()
+    assert np.allclose(said[0].phi, said[1].phi, atol=1e-9)
+
+
 def test_an_arm_that_is_elsewhere_after_a_pause_is_believed(online, log):
     samples = list(log)
     later = [Sample(s.t + 5.0, s.q, s.dq, s.tau) for s in samples[600:900]]

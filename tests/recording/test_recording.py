@@ -281,7 +281,7 @@ def stacks(**changed):
         (stacks(tau=log().tau * 1j), r"array tau holds complex128"),
         (stacks(tau=np.array([[None, {}]] * 5)), r"not a NumPy archive that can be read: it holds Python objects"),
         (stacks(channel="guessed"), r"channel is 'guessed': expected one of measured, desired, external"),
-        ({"t": log().t, "q": log().q}, r"lacks columns of velocity"),
+        ({"t": log().t, "q": log().q}, r"lacks columns of torque"),
     ],
 )
 def test_a_bad_npz_is_refused_by_array(tmp_path, stack, says):
@@ -295,9 +295,9 @@ def test_what_is_no_log_file_is_refused(tmp_path):
         read_recording(tmp_path / "none.csv")
     with pytest.raises(RecordingError, match=r"is a folder without metadata\.yaml, \.db3, \.mcap or meta/info\.json"):
         read_recording(tmp_path)
-    (tmp_path / "log.dat").write_text(text(log()))
-    with pytest.raises(RecordingError, match=r"unsupported suffix '\.dat': expected \.csv, .*\.npz, .*\.bag"):
-        read_recording(tmp_path / "log.dat")
+    (tmp_path / "log.dta").write_text(text(log()))
+    with pytest.raises(RecordingError, match=r"unsupported suffix '\.dta': expected \.csv, .*\.npz, .*\.bag"):
+        read_recording(tmp_path / "log.dta")
     for suffix in (*SUFFIXES, ".bag", ".db3", ".mcap"):
         (tmp_path / f"nothing{suffix}").touch()
         with pytest.raises(RecordingError, match=r"is empty"):

@@ -66,12 +66,6 @@ def test_effort_under_another_key_is_named(tmp_path):
     same(read_recording(path, PANDA, columns="tau=observation.sensors.load"), log())
 
 
-def test_a_data_set_without_velocities_is_refused(tmp_path):
-    path = lerobot(tmp_path / "log.parquet", [log()], **{"observation.velocity": None})
-    with pytest.raises(RecordingError, match=r"lacks columns of velocity; it is not differentiated here"):
-        read_recording(path, PANDA)
-
-
 def test_a_state_with_the_gripper_behind_the_joints_needs_its_range(tmp_path):
     state = pa.array([[*q, 0.04] for q in log().q], pa.list_(pa.float64()))
     path = lerobot(tmp_path / "log.parquet", [log()], **{"observation.state": state})

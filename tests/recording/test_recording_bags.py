@@ -189,7 +189,10 @@ def test_identify_reads_the_tare_from_its_own_topic(tmp_path, capsys):
         ({"/joint_states": samples(PANDA[:5])}, r"joints panda_joint6, panda_joint7 are not on topic .*found panda_jo"),
         ({"/a": samples(PANDA[:6]), "/b": samples(("x",))}, r"joint panda_joint7 is not on topics /a, /b: found panda"),
         ({"/joint_states": samples(effort=[])}, r"/joint_states message 1 has no effort for 7 joints"),
-        ({"/joint_states": samples(velocity=[])}, r"/joint_states message 1 has no velocity for 7 joints"),
+        (
+            {"/joint_states": [*samples(rows=3), *((m[0] + 10**9, *m[1:]) for m in samples(rows=3, velocity=[]))]},
+            r"/joint_states message 4 has no velocity for 7 joints",
+        ),
         ({"/joint_states": samples(position=[1.0])}, r"/joint_states message 1 has 1 values of position for 7 joints"),
         ({"/joint_states": samples(effort=[0, 0, np.nan, 0, 0, 0, 0])}, r"/joint_states message 1: tau3 is NaN"),
         (

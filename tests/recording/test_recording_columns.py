@@ -5,7 +5,7 @@ import pytest
 
 from armload.arms import arm
 from armload.errors import RecordingError
-from armload.recording import ColumnSpec, Recording, read_recording, write_recording
+from armload.recording import ColumnSpec, Recording, read_long, read_recording, write_recording
 
 PANDA, ROWS = arm("panda"), 12
 
@@ -146,3 +146,25 @@ def test_the_canonical_form_is_read_bit_for_bit_and_without_a_note(tmp_path, log
         assert found.notes == ()
         for name in ("t", "q", "dq", "tau"):
             np.testing.assert_array_equal(getattr(found, name), getattr(log, name))
+
+
+BY_NUMBER = "t=1,q={2..8},dq={9..15},tau={16..22}"
+
+
+@pytest.mark.parametrize(("separator", "head"), [(" ", ""), (",", "# run 3, of Monday\n"), ("\t", "% run 3\n\n")])
+def test_columns_without_a_header_are_called_by_their_numbers(tmp_path, separator, head):
+    rng = np.random.default_rng(3)
+    table = np.column_stack([np.arange(20) / 100.0, rng.normal(size=(20, 21))])
+    path = tmp_path / "log.txt"
+    rows = "\n".join(separator.join(map(repr, row)) for row in table.tolist())
+    path.write_text(head + rows + "\n")
+    for read in (read_recording(path, PANDA, columns=BY_NUMBER), read_long(path, PANDA, columns=BY_NUMBER, long=0)):
+        np.testing.assert_array_equal(np.column_stack([read.t, read.q[:], read.dq[:], read.tau[:]]), table)
+    line = head.count("\n") + 1
+    with pytest.raises(RecordingError, match=rf"line {line} holds numbers: .* 22 columns .*t=1,q=\{{2\.\.8\}},dq="):
+        read_recording(path, PANDA)
+    with pytest.raises(RecordingError, match=r"lacks a column of time"):
+        read_recording(path, PANDA, columns=BY_NUMBER.removeprefix("t=1,"))
+    path.write_text("\n".join(separator.join(map(repr, row)) for row in table[:, :-1].tolist()))
+    with pytest.raises(RecordingError, match=r"has no column '22'"):
+        read_recording(path, PANDA, columns=BY_NUMBER)

@@ -150,7 +150,10 @@ def _check_velocity_is_derivative(recording: Recording, arm: Arm) -> None:
     what = f"dq{j + 1} is not the derivative of q{j + 1}"
     if size_dq[j] < 1e-3 * size_q[j]:
         what = f"dq{j + 1} is zero although q{j + 1} moves"
-    raise RecordingError(f"{recording.source}: {what}: {_why_not_derivative(change, integral, wrong)}")
+    raise RecordingError(
+        f"{recording.source}: {what}: {_why_not_derivative(change, integral, wrong)}; where the positions are right, "
+        "--columns dq=none takes the velocities from them"
+    )
 
 
 def _why_not_derivative(change: NDArray, integral: NDArray, wrong: NDArray) -> str:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.identification.thresholds import DEGREES_FROM, EFFORT
-from armload.recording import GAP, Sample
+from armload.recording import GAP, TURN, Sample, endless
 from armload.runtime.kernels import kernel
 
 REASONS = (
@@ -88,6 +88,7 @@ class Gate:
                 np.where(known, _JUMP_TIMES * limits.velocity, _ANY_VELOCITY),
             ]
         )
+        self._endless = np.flatnonzero(endless(arm))
         self.reset()
 
     def reset(self) -> None:
@@ -107,6 +108,10 @@ class Gate:
             return self._leave_out("wrong size")
         if not q.shape == dq.shape == tau.shape == (self.n,):
             return self._leave_out("wrong size")
+        if len(self._endless):  # some robots count them anew after each turn
+            near = self._q[self._endless]  # zero at first
+            with np.errstate(invalid="ignore"):  # what is not finite is left out below
+                q[self._endless] -= TURN * np.rint((q[self._endless] - near) / TURN)
         found = _look(now, q, dq, tau, self._limits, self._t, self._q)
         if _NOTHING < found < _JUMPED:
             return self._leave_out(REASONS[found])

@@ -9,8 +9,9 @@ from armload.recording.files import LOG_SUFFIXES, PACKED_SUFFIXES, has_topics, r
 from armload.recording.lerobot import data_set_episodes, is_data_set
 from armload.recording.recording import BLOCK, CHANNELS, GAP, JITTERED, Recording, Sample
 from armload.recording.spooled import blocks, largest, parts_of, span
-from armload.recording.steadied import steadied
+from armload.recording.steadied import steadied, with_velocities_of_positions
 from armload.recording.steadying import Steadying
+from armload.recording.turns import TURN, endless
 
 __all__ = [
     "BLOCK",
@@ -19,6 +20,7 @@ __all__ = [
     "JITTERED",
     "LOG_SUFFIXES",
     "PACKED_SUFFIXES",
+    "TURN",
     "Alignment",
     "ColumnSpec",
     "Recording",
@@ -28,6 +30,7 @@ __all__ = [
     "check_own_measurements",
     "data_set_episodes",
     "digest_of",
+    "endless",
     "has_topics",
     "is_data_set",
     "largest",
@@ -41,5 +44,6 @@ __all__ = [
     "span",
     "steadied",
     "with_gravity",
+    "with_velocities_of_positions",
     "write_recording",
 ]

@@ -12,6 +12,8 @@ is left out. Sources, in the order of the tables:
 - Universal Robots' RTDE client (`csv_writer.py`, separated by spaces) and ur_rtde (`startFileRecording`): actual_q_0 …,
   `timestamp` in seconds since the controller was started, actual_current in amperes.
 - LeRobot data sets: `observation.state`, `timestamp` in seconds, `episode_index`. ALOHA: `observations/qpos`.
+- Kinova's Kortex, `BaseCyclic.Feedback`: actuators[0].position, .velocity, .torque; degrees.
+- NIST's robot measurements: ROBOT_ACTUAL_JOINT_POSITIONS (J1) …
 - polymetis (DROID), `franka_torque_control_client.cpp`: motor_torques_measured is libfranka's tau_J.
 """
 
@@ -26,15 +28,18 @@ CALLED = {"t": "time", "q": "position", "dq": "velocity", "tau": "torque"}
 # what is left of a name without index, joint and neutral words: the quantity it holds
 WORDS = {
     **dict.fromkeys(("q", "qpos", "jpos", "pos", "position", "positions", "angle", "angles"), "q"),
-    **dict.fromkeys(("dq", "qd", "qdot", "q_dot", "qvel", "jvel", "vel", "velocity", "velocities", "speed"), "dq"),
-    **dict.fromkeys(("tau", "torque", "torques", "trq", "effort", "efforts"), "tau"),
+    **dict.fromkeys(
+        ("dq", "qd", "qdot", "q_dot", "qvel", "jvel", "vel", "velocity", "velocities", "speed", "speeds"), "dq"
+    ),
+    **dict.fromkeys(("tau", "torque", "torques", "trq", "eff", "effort", "efforts"), "tau"),
 }
 CURRENTS = frozenset({"current", "currents", "motor_current", "motor_currents"})
+MEASURED = frozenset(("measured", "meas", "actual", "act"))
 NEUTRAL = frozenset(
     (
-        *("j", "jnt", "joint", "joints", "axis", "arm", "robot", "franka", "controller", "broadcaster"),
-        *("field", "msg", "header", "observation", "observations", "obs", "state", "states"),
-        *("measured", "meas", "actual", "act"),
+        *("j", "jnt", "joint", "joints", "axis", "actuator", "actuators", "arm", "robot", "franka"),
+        *("controller", "broadcaster", "field", "msg", "header", "observation", "observations", "obs"),
+        *("state", "states", *MEASURED),
     )
 )
 # words of what a controller wants or its model expects; of what is left after the arm's own torque is taken out
@@ -56,6 +61,7 @@ WHOLE = {
 
 # moment and current that a controller wants of each joint: torque per ampere follows from them (`torque_constants.py`)
 WANTED = ("target_moment", "target_current")
+MOMENTS = frozenset(("moment", "moments"))  # what RTDE calls the torque that is wanted
 
 TIMES = frozenset(
     ("t", "time", "timestamp", "timestamps", "stamp", "header_stamp", "time_stamp", "elapsed", "elapsed_time")

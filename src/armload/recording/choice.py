@@ -69,6 +69,10 @@ class Header:
         named = [family for family in self.families if family.by_name and family.quantity == "q"]
         return tuple(str(key) for key in named[0].places) if named else None
 
+    def lacks(self, quantity: str) -> bool:
+        """Whether no column speaks of what was measured of a quantity."""
+        return not any(family.quantity == quantity and family.kind == "measured" for family in self.families)
+
     def family(self, quantity: str) -> Family:
         """The columns of position, velocity or torque.
 
@@ -86,12 +90,12 @@ class Header:
             raise self._two(quantity, *(complete + larger)[:2])
         wanted = [f for f in mine if f.kind == "desired" and quantity == "tau" and f.complete(self.n, self.joints)]
         if complete:
-            if wanted:
+            if wanted and not complete[0].is_said_to_be_measured:
                 raise self._two(quantity, complete[0], wanted[0])
             return self._once(complete[0])
         currents = [f for f in mine if f.kind == "current" and f.complete(self.n, self.joints)]
         if not measured and currents:
-            rivals = [*currents[1:], *wanted]
+            rivals = currents[1:] + ([] if currents[0].is_said_to_be_measured else wanted)
             if rivals:
                 raise self._two(quantity, currents[0], rivals[0])
             return self._once(currents[0])
@@ -220,10 +224,8 @@ class Header:
                     f"{self.where} lacks the measured {called}: {self.shown(found[0])} {why}; record the measured one, "
                     f"or, if it is there under a name of its own, say so with --columns {quantity}=NAME{{i}}"
                 )
-        smoothed = "; it is not differentiated here: record it, too, add columns smoothed as suits your log"
-        also = smoothed if quantity == "dq" else ""
         return RecordingError(
-            f"{self.where} lacks columns of {called}{also}, or name them with --columns {quantity}=NAME{{i}} "
+            f"{self.where} lacks columns of {called}, or name them with --columns {quantity}=NAME{{i}} "
             f"(found {abridged(self.names)})"
         )
 

@@ -11,13 +11,14 @@ from armload.arms import Arm
 from armload.errors import RecordingError
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.csv_file import csv_chunks
-from armload.recording.files import has_topics, read_recording
+from armload.recording.files import TABLES, has_topics, read_recording
 from armload.recording.hdf5_file import hdf5_chunks
 from armload.recording.npz_file import npz_chunks
 from armload.recording.parquet_file import parquet_chunks
 from armload.recording.recording import BLOCK, Recording
 from armload.recording.ros_bag import bag_chunks
 from armload.recording.spooled import spooled
+from armload.recording.turns import Turns
 
 # [bytes] of a file from which a log is long: below, reading it whole takes a few times as much memory, and no disk
 LONG = 8e6
@@ -26,7 +27,7 @@ _TABLES: dict[str, Callable[..., Iterator[Recording]]] = {
     ".parquet": parquet_chunks,
     ".npz": npz_chunks,
     **dict.fromkeys((".hdf5", ".h5"), hdf5_chunks),
-    **dict.fromkeys((".csv", ".tsv", ".txt"), csv_chunks),
+    **dict.fromkeys(TABLES, csv_chunks),
 }
 
 
@@ -50,7 +51,12 @@ def recording_chunks(
     Raises:
         RecordingError: as `read_recording`, but of a bag only once its flaw is reached.
     """
-    path, spec = Path(path), ColumnSpec.of(columns)
+    parts = _parts(Path(path), arm, topic, columns, size)
+    yield from parts if arm is None else map(Turns(arm).of, parts)
+
+
+def _parts(path: Path, arm: Arm | None, topic: str | None, columns: Any, size: int) -> Iterator[Recording]:
+    spec = ColumnSpec.of(columns)
     read = _TABLES.get(path.suffix.lower())
     if path.exists() and has_topics(path) and spec == spec.of_values:
         yield from bag_chunks(path, str(path), arm, topic, size, spec)

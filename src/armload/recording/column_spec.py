@@ -13,6 +13,7 @@ from armload.recording.aliases import AMPERE, QUANTITIES, UNITS
 
 _COLUMNS = ("t", *QUANTITIES)
 _OF_VALUES = (*(f"{key}_unit" for key in QUANTITIES), "torque_constants")
+NONE = "none"  # of velocities: the log has none that are of use
 _HINT = 'expected KEY=VALUE pairs such as "t=time,q=joint_pos_{i},dq=joint_vel_{i},tau=effort_{i}", or a .toml file'
 
 
@@ -27,7 +28,7 @@ class ColumnSpec:
     'ms'
 
     Args:
-        t: the column of time. q, dq, tau: those of position, velocity and torque.
+        t: the column of time. q, dq, tau: those of position, velocity and torque; dq may be "none".
         t_unit: s, ms, us or ns. q_unit: rad or deg. dq_unit: rad/s or deg/s. tau_unit: Nm, or A for motor currents.
         torque_constants: joint torque per motor current (n,) [N·m/A], where tau is in A.
         rate: samples per second [Hz] of a file without times.
@@ -87,8 +88,14 @@ class ColumnSpec:
 
     @property
     def of_values(self) -> ColumnSpec:
-        """What it says of units of position, velocity and torque: all that a bag leaves open."""
-        return ColumnSpec(**{key: getattr(self, key) for key in _OF_VALUES})
+        """What it says of units of position, velocity and torque, and of none: all that a bag leaves open."""
+        units = {key: getattr(self, key) for key in _OF_VALUES}
+        return ColumnSpec(**units, dq=NONE if self.without_velocities else None)
+
+    @property
+    def without_velocities(self) -> bool:
+        """Whether it says that there are none."""
+        return self.dq == NONE
 
     @property
     def of_currents(self) -> bool:

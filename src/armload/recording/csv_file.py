@@ -24,7 +24,7 @@ from armload.arms import Arm
 from armload.errors import RecordingError
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.columns import column_names
-from armload.recording.csv_layout import NUMBER, layout_of
+from armload.recording.csv_layout import NUMBER, check_named, layout_of
 from armload.recording.dates import nanoseconds
 from armload.recording.recording import Recording
 from armload.recording.table import NotInPieces, read_table, table_chunks
@@ -37,7 +37,9 @@ _NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)", re.IGNORECASE)
 
 def read_csv(path: Path, where: str, arm: Arm | None = None, spec: ColumnSpec | None = None) -> Recording:
     """Read a text log; see `read_recording` for what it raises."""
-    return read_table(_Csv(path.read_bytes(), where), where, arm, spec or ColumnSpec())
+    spec, table = spec or ColumnSpec(), _Csv(path.read_bytes(), where)
+    check_named(table.layout, spec, None if arm is None else arm.n, where)
+    return read_table(table, where, arm, spec)
 
 
 def csv_chunks(path: Path, where: str, arm: Arm | None, spec: ColumnSpec, size: int) -> Iterator[Recording]:

@@ -1,7 +1,8 @@
 """How a text file of numbers is laid out: its header line and its separator.
 
 Read from the header and the first row below it. Comment lines in front (`#`, `%`) are passed over, unless the last of
-them is the header itself, as NumPy's `savetxt` and `rostopic echo -p` write it.
+them is the header itself, as NumPy's `savetxt` and `rostopic echo -p` write it. Columns without a header are called by
+their numbers, the first being 1.
 """
 
 from __future__ import annotations
@@ -13,10 +14,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armload.errors import RecordingError
+from armload.recording.column_spec import ColumnSpec
 
 NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,5})?")
 _SEPARATORS = ("\t", ";", ",", " ")  # a space parts only what nothing else does
 _EXPECTED = "expected the header, such as t,q1..qn,dq1..dqn,tau1..taun before the data"
+_JOINTS = 7  # of an example
 
 
 @dataclass(frozen=True)
@@ -26,11 +29,13 @@ class Layout:
     names: of the columns; one without a name is called as pandas calls it, `Unnamed: 0`.
     first: line of the file with the first row, counted from 1.
     separator: between cells; a space stands for any number of them.
+    nameless: whether there is no header, and the names are the columns' numbers.
     """
 
     names: tuple[str, ...]
     first: int
     separator: str
+    nameless: bool = False
 
     def cells(self, line: str) -> list[str]:
         """The cells of one line.
@@ -45,30 +50,55 @@ def layout_of(lines: Sequence[str], where: str) -> Layout:
     """The layout of a file's lines.
 
     Raises:
-        RecordingError: there is no header, or it and the first row are separated differently.
+        RecordingError: there is nothing but comments, or a header that cannot be read.
     """
-    header = 0
-    while header < len(lines) and (not lines[header].strip() or lines[header].lstrip().startswith(("#", "%"))):
-        header += 1
-    comments = [k for k in range(header) if lines[k].strip()]
-    if comments and (header == len(lines) or _numeric(lines[header])):
-        header = comments[-1]
-    if header == len(lines):
+    first = 0
+    while first < len(lines) and (not lines[first].strip() or lines[first].lstrip().startswith(("#", "%"))):
+        first += 1
+    comments = [k for k in range(first) if lines[k].strip()]
+    if first == len(lines) and not comments:
         raise RecordingError(f"{where} has no header: expected a line that names the columns, then rows of numbers")
+    if first < len(lines) and not _numeric(lines[first]):
+        return _headed(lines, first, where)
+    if comments:
+        headed = _headed(lines, comments[-1], where, "#")
+        if first == len(lines) or len(headed.names) == len(_cells(lines[first], headed.separator)):
+            return headed
+    row = lines[first].strip(" \r\n")
+    separator = _separator(row, row)
+    names = tuple(str(k + 1) for k in range(len(_cells(row, separator))))
+    return Layout(names, first + 1, separator, nameless=True)
+
+
+def check_named(layout: Layout, spec: ColumnSpec, n: int | None, where: str) -> None:
+    """Refuse a file without a header of which nobody says what its columns are; n: joints, where they are known."""
+    if layout.nameless and not any(getattr(spec, key) for key in ("q", "dq", "tau")):
+        n = n or _JOINTS
+        ranges = ",".join(f"{key}={{{2 + k * n}..{1 + (k + 1) * n}}}" for k, key in enumerate(("q", "dq", "tau")))
+        raise RecordingError(
+            f"{where}, line {layout.first} holds numbers: {_EXPECTED}; or name its {len(layout.names)} columns by "
+            f'their numbers, such as --columns "t=1,{ranges}"'
+        )
+
+
+def _headed(lines: Sequence[str], header: int, where: str, sign: str = "") -> Layout:
+    """The layout under a header line, which may begin with the `sign` of a comment."""
     text = lines[header].strip(" \r\n")
-    if header in comments and text.startswith("#"):
-        text = text.lstrip("# ")
-    rows = (line for line in lines[header + 1 :] if line.strip())
-    row = next(rows, "").strip(" \r\n")
-    if header not in comments and _numeric(text):
-        raise RecordingError(f"{where}, line {header + 1} holds numbers: {_EXPECTED}")
+    if sign and text.startswith(sign):
+        text = text.lstrip(f"{sign} ")
+    row = next((line for line in lines[header + 1 :] if line.strip()), "").strip(" \r\n")
     try:
         separator = _separator(text, row)
         names = [name.strip() for name in cells_of(text, separator)]
     except csv.Error as error:
         raise RecordingError(f"{where}, line {header + 1}: the header cannot be read ({error}): {_EXPECTED}") from None
-    named = tuple(name or f"Unnamed: {k}" for k, name in enumerate(names))
-    return Layout(named, header + 2, separator)
+    return Layout(tuple(name or f"Unnamed: {k}" for k, name in enumerate(names)), header + 2, separator)
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    with contextlib.suppress(csv.Error):
+        return cells_of(line.strip(" \r\n"), separator)
+    return []
 
 
 def _numeric(line: str) -> bool:

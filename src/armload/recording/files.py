@@ -17,16 +17,18 @@ from armload.recording.npz_file import read_npz, write_npz
 from armload.recording.parquet_file import read_parquet, write_parquet
 from armload.recording.recording import Recording
 from armload.recording.ros_bag import BAG_SUFFIXES, read_bag
+from armload.recording.turns import Turns
 from armload.runtime.atomic import replacing
 
-_TABLES = (".csv", ".tsv", ".txt")
+_NAMED = (".dat", ".log", ".asc")  # text that is read where it is named; in a folder it is mostly something else
+TABLES = (".csv", ".tsv", ".txt", *_NAMED)
 _READERS = {
-    **dict.fromkeys(_TABLES, read_csv),
+    **dict.fromkeys(TABLES, read_csv),
     ".parquet": read_parquet,
     ".npz": read_npz,
     **dict.fromkeys((".hdf5", ".h5"), read_hdf5),
 }
-LOG_SUFFIXES = (*_READERS, *BAG_SUFFIXES)
+LOG_SUFFIXES = tuple(suffix for suffix in (*_READERS, *BAG_SUFFIXES) if suffix not in _NAMED)
 PACKED_SUFFIXES = (".gz", ".bz2", ".xz", ".zst", ".zip")
 _FORMS = "CSV, Parquet, NPZ, HDF5, ROS bag or LeRobot folder"
 _WRITERS = {".csv": write_csv, ".parquet": write_parquet, ".npz": write_npz}
@@ -74,8 +76,12 @@ def read_recording(
         RecordingError: the file cannot be read, its columns are not clear, or a line of it is not valid; one sentence
             that names the place (for CSV the line of the file, the first being 1).
     """
-    path, where = Path(path), str(path)
-    spec = ColumnSpec.of(columns).over(rate=rate, episode=episode)
+    recording = _read(Path(path), arm, topic, ColumnSpec.of(columns).over(rate=rate, episode=episode))
+    return recording if arm is None else Turns(arm).of(recording)
+
+
+def _read(path: Path, arm: Arm | None, topic: str | None, spec: ColumnSpec) -> Recording:
+    where = str(path)
     try:
         if not path.exists():
             raise RecordingError(f"{where} does not exist: expected the path of a log ({_FORMS})")
@@ -156,7 +162,7 @@ def _looks_like(path: Path, suffix: str) -> str:
     for signature, suffixes in _SIGNATURES.items():
         if head.startswith(signature):
             return "" if suffix in suffixes else f": it starts like a {suffixes[0]} file; rename it"
-    if suffix not in _TABLES and _is_text(head) and not any(signature in head for signature in _SIGNATURES):
+    if suffix not in TABLES and _is_text(head) and not any(signature in head for signature in _SIGNATURES):
         return ": it is text; if it is a table, its name should end in .csv"
     return ""
 

@@ -7,9 +7,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 
-from armload.recording.aliases import CURRENTS, DESIRED, EXTERNAL, NAMES, NEUTRAL, TIME_UNITS, TIMES, WHOLE, WORDS
+from armload.recording.aliases import (
+    CURRENTS,
+    DESIRED,
+    EXTERNAL,
+    MEASURED,
+    MOMENTS,
+    NAMES,
+    NEUTRAL,
+    TIME_UNITS,
+    TIMES,
+    WHOLE,
+    WORDS,
+)
 
 _BRACKET = re.compile(r"\s*[\[(]\s*([^\[\]()]*[^\W\d][^\[\]()]*|°[^\[\]()]*)\s*[\])]\s*$")
+_INDEX = re.compile(r"\s*[\[(]\s*(?:j|jnt|joint|axis|a)[\s_]*([0-9]{1,3})\s*[\])]\s*$", re.IGNORECASE)  # (J1)
 _CAMEL = re.compile(r"(?<=[a-z]{2})(?=[A-Z])|(?<=(?<![A-Za-z])q)(?=D)")  # qD is no qd
 _WORD = re.compile(r"[^\W\d_]+|[0-9]+")
 _LAST_NUMBER = re.compile(r"^(.*?)([0-9]{1,3})([^0-9]*)$", re.DOTALL)
@@ -50,6 +63,11 @@ class Family:
         """The stem without its last word: what the fields of one message have in common."""
         return self.stem.rpartition("_")[0]
 
+    @property
+    def is_said_to_be_measured(self) -> bool:
+        """Whether its name says so, beside others that are wanted."""
+        return not MEASURED.isdisjoint(self.stem.split("_"))
+
     def base(self) -> int:
         """Where the indices begin: 0 if there is a 0, else 1."""
         return 0 if 0 in self.places else 1
@@ -83,6 +101,8 @@ def read_name(name: str, joints: tuple[str, ...]) -> Reading | None:
     'elbow_joint'
     """
     bare, unit = name, None
+    if index := _INDEX.search(name):
+        return _classified(name[: index.start()], int(index[1]), None)
     if bracket := _BRACKET.search(name):
         bare, unit = name[: bracket.start()], bracket[1].strip().lower()
     if joints and not re.fullmatch(r"(q|dq|tau)[0-9]+", bare):
@@ -130,6 +150,23 @@ def _classified(rest: str, key: int | str, unit: str | None) -> Reading | None:
     if core in CURRENTS:
         return Reading("tau", "current", stem, key, unit) if kind == "measured" else None
     return Reading(WORDS[core], kind, stem, key, unit) if core in WORDS else None
+
+
+def wanted_of(name: str) -> tuple[str, int]:
+    """Whether a column is the "moment" or the "current" that a controller wants of a joint, and the joint's index.
+
+    >>> wanted_of("target_moment_0"), wanted_of("ROBOT_TARGET_JOINT_CURRENTS (J1)"), wanted_of("actual_current_0")
+    (('moment', 0), ('current', 1), ('', 0))
+    """
+    index = _INDEX.search(name)
+    bare = f"{name[: index.start()]} {index[1]}" if index else name
+    if (number := _LAST_NUMBER.match(bare)) is None:
+        return "", 0
+    words = words_of(f"{number[1]} {number[3]}")
+    core = "_".join(word for word in words if word not in NEUTRAL | DESIRED)
+    what = "current" if core in CURRENTS else "moment" if core in MOMENTS or WORDS.get(core) == "tau" else ""
+    wanted = what and "target" in words
+    return (what, int(number[2])) if wanted else ("", 0)
 
 
 def _time(words: list[str], unit: str | None) -> Reading | None:

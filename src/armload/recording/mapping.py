@@ -18,7 +18,7 @@ from armload.recording.choice import WHY_NOT, Header, TimeColumns, some
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.columns import check_joint_count, column_names
 from armload.recording.currents import no_constants, of_currents, torque_constants
-from armload.recording.header import Family, Reading, families_of, read_name, words_of
+from armload.recording.header import Family, Reading, families_of, read_name, wanted_of, words_of
 from armload.recording.templates import abridged, named_columns
 
 
@@ -28,7 +28,8 @@ class ColumnMap:
 
     Args:
         time: None: the table has no times.
-        places: of each quantity, the place in the header of each joint's column (n,).
+        places: of each quantity, the place in the header of each joint's column (n,); of velocity none where there are
+            no such columns.
         scales: of each quantity, what its columns are multiplied with (n,) to be in rad, rad/s, N·m.
         joints: names of the joints, where they are known.
         episode: the column that tells several episodes apart.
@@ -77,7 +78,7 @@ def map_columns(
     families = _with_joint_names(families, names, where, text)
     given = {}
     for key in QUANTITIES:
-        if (template := getattr(spec, key)) is not None:
+        if (template := getattr(spec, key)) is not None and not (key == "dq" and spec.without_velocities):
             given[key] = named_columns(template, key, names, where, arm)
     if not given and not any(family.quantity in QUANTITIES for family in families):
         raise RecordingError(
@@ -88,6 +89,9 @@ def map_columns(
     places: dict[str, list[int]] = {}
     scales, notes, wanted = {}, [], None
     for key in QUANTITIES:
+        if key == "dq" and key not in given and (spec.without_velocities or header.lacks(key)):
+            places[key], scales[key] = [], ()
+            continue
         places[key] = given[key] if key in given else header.family(key).order(header.n, header.joints)
         if len(places[key]) != header.n:
             raise RecordingError(
@@ -218,11 +222,14 @@ def _not_measured(header: Header, places: list[int]) -> list[str]:
 
 def _wanted(header: Header) -> tuple[list[int], list[int]] | None:
     """Places of the moments and of the currents (n,) that the controller wanted, where the header has all of them."""
-    at = {tuple(words_of(name)): place for place, name in enumerate(header.names)}
+    found: dict[str, dict[int, list[int]]] = {"moment": {}, "current": {}}
+    for place, name in enumerate(header.names):
+        what, index = wanted_of(name)
+        if what:
+            found[what].setdefault(index, []).append(place)
     for first in (0, 1):
-        numbers = [str(k) for k in range(first, first + header.n)]
-        found = [[at.get((*stem.split("_"), k)) for k in numbers] for stem in WANTED]
-        moments, currents = ([place for place in places if place is not None] for places in found)
+        joints = range(first, first + header.n)
+        moments, currents = ([places[j][0] for j in joints if len(places.get(j, ())) == 1] for places in found.values())
         if len(moments) == len(currents) == header.n:
             return moments, currents
     return None
@@ -260,6 +267,8 @@ def _notes(header: Header, places: dict[str, list[int]], time: TimeColumns | Non
         by = f" as {time.tool} writes" if time.tool else ""
         parts.append(f"t from {names[time.place]!r} [{time.unit or 's'}{by}]")
     for key in QUANTITIES:
+        if not places[key]:
+            continue
         first, last = names[places[key][0]], names[places[key][-1]]
         parts.append(f"{key} from {first!r}" + (f" … {last!r}" if header.n > 1 else ""))
     return [f"{header.where}: read {', '.join(parts)}{out}"]

@@ -24,6 +24,7 @@ from armload.recording.column_spec import ColumnSpec
 from armload.recording.currents import in_si
 from armload.recording.mcap_file import is_cut_off, mended
 from armload.recording.recording import Recording
+from armload.recording.steadied import with_velocities_of_positions
 from armload.runtime.extras import missing
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
@@ -193,6 +194,7 @@ def _recordings(
     columns: dict[tuple[str, ...], list[int] | None] = {}  # by names in a message: places of the arm's joints
     messages: list[tuple[int, int, int, NDArray[np.float64]]] = []  # number, stamp, time of logging, values
     scale, said = None, ()  # what values are multiplied with, and why
+    moving: bool | None = None  # whether the messages have velocities
     channel = "desired" if "desired" in topic.rsplit("/", 1)[-1] else "measured"
     tables = _Tables(where, topic)
     chunks = Chunks(where, channel)
@@ -209,7 +211,10 @@ def _recordings(
         order = columns[message.names]
         if order is None:
             continue  # another device on the same topic, such as a gripper
-        values = scale * np.concatenate(_values(message, order, f"{where}, {topic} message {number}"))
+        if moving is None:
+            moving = len(message.values[1]) > 0 and not spec.without_velocities
+            size = size if moving else None  # what comes after a sample tells of its velocity, too
+        values = scale * np.concatenate(_values(message, order, moving, f"{where}, {topic} message {number}"))
         messages.append((number, message.stamp, message.log_time, values))
         if len(messages) == size:
             yield from chunks.take(*tables.of(messages), joint_names=wanted, epoch=tables.epoch)
@@ -221,7 +226,8 @@ def _recordings(
             _refuse_joints(where, f"topic {topic}", arm, sorted({name for names in columns for name in names}))
     if messages:
         yield from chunks.take(*tables.of(messages), joint_names=wanted, epoch=tables.epoch)
-    yield chunks.last((*bag.notes, *tables.notes, *said))
+    last = chunks.last((*bag.notes, *tables.notes, *said))
+    yield last if moving else with_velocities_of_positions(last)
 
 
 class _Tables:
@@ -261,10 +267,13 @@ class _Tables:
         return np.column_stack([t, np.array(values)]).astype(float), lambda k: f"{self._topic} message {numbers[k]}"
 
 
-def _values(message: _Message, order: list[int], place: str) -> list[NDArray[np.float64]]:
-    """Position, velocity and effort of the wanted joints."""
+def _values(message: _Message, order: list[int], moving: bool, place: str) -> list[NDArray[np.float64]]:
+    """Position, velocity and effort of the wanted joints; velocities of 0 where the topic has none."""
     out = []
     for what, values in zip(("position", "velocity", "effort"), message.values, strict=True):
+        if what == "velocity" and not moving:
+            out.append(np.zeros(len(order)))
+            continue
         if len(values) != len(message.names):
             found = f"no {what}" if len(values) == 0 else f"{len(values)} values of {what}"
             also = " (joint torque); record a topic that carries the torque" if what == "effort" else ""

@@ -8,6 +8,8 @@ by least squares, weighted by how noisy each is; c_1 is the velocity. A velocity
 regression, as momentum of arm and payload: the slower a log is sampled, the less of it the lag takes away, and what
 hardly turns seems to have less inertia than it has, surely.
 
+A log without velocities has those that its positions tell alone: the same without dq.
+
 Sources: local regression, Cleveland, J. Am. Stat. Assoc. 74, 1979 (here of two channels, all of a window alike); bias
 by noise of the regressor: Fuller, Measurement Error Models, 1987.
 """
@@ -15,6 +17,7 @@ by noise of the regressor: Fuller, Measurement Error Models, 1987.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +29,8 @@ from armload.recording.spooled import blocks, parts_of
 # (test_velocities_told_by_both_channels_have_a_third_of_the_noise_and_all_of_the_motion). With 0.05 s half is, and one
 # in six sound logs of a Gen3 stays doubted
 AROUND = 0.075
+# samples to either side at least, of a log without velocities: five points tell a cubic and its error
+_STEPS = 2.1
 _POWER = np.add.outer(np.arange(4), np.arange(4))  # of s in the normal equations' matrix
 _FACTORIAL = np.array([1.0, 1.0, 2.0, 6.0])
 _OF_BOTH = np.outer(_FACTORIAL, _FACTORIAL)
@@ -35,23 +40,37 @@ _HELD = 1e-9  # of the weight of one sample: holds what too few samples around d
 
 def steadied(recording: Recording) -> Recording:
     """The same log with the velocities that its positions and velocities tell together; none is told across a gap."""
-    return recording.with_velocities(_velocities(recording))
+    precision = precision_of(_noise(recording.q), _noise(recording.dq))
+    return recording.with_velocities(_velocities(recording, precision, AROUND))
 
 
-def _velocities(recording: Recording) -> Iterator[NDArray[np.float64]]:
-    """dq a block of samples at a time."""
+def with_velocities_of_positions(recording: Recording) -> Recording:
+    """The same log with the velocities that its positions tell; none is told across a gap, a lone sample has 0."""
+    still = replace(recording, dq=np.zeros_like(recording.q))
+    precision = np.ones(recording.n), np.full(recording.n, _HELD)
+    around = max(AROUND, _STEPS / recording.rate)
+    note = (
+        f"{recording.source} has no velocities: they are told by the positions within {around:.2g} s of each moment, "
+        "and by the times, which must be those of the samples"
+    )
+    return replace(still.with_velocities(_velocities(still, precision, around)), notes=(*recording.notes, note))
+
+
+def _velocities(
+    recording: Recording, precision: tuple[NDArray[np.float64], NDArray[np.float64]], around: float
+) -> Iterator[NDArray[np.float64]]:
+    """dq a block of samples at a time; around: [s] to either side that tell each."""
     t, n = recording.t, recording.n
     pieces = np.r_[0, np.cumsum(np.diff(t) > GAP)]
-    precision = precision_of(_noise(recording.q), _noise(recording.dq))
-    reach = int(np.max(np.searchsorted(t, t + AROUND, side="right") - np.arange(len(t)))) - 1
+    reach = int(np.max(np.searchsorted(t, t + around, side="right") - np.arange(len(t)))) - 1
     for part in blocks(len(t)):
         first, stop = max(part.start - reach, 0), min(part.stop + reach, len(t))
-        q, dq = recording.q[first:stop], AROUND * recording.dq[first:stop]
+        q, dq = recording.q[first:stop], around * recording.dq[first:stop]
         rows = np.arange(part.start, part.stop)
         moments, q_sums, dq_sums = np.zeros((7, len(rows))), np.zeros((4, len(rows), n)), np.zeros((3, len(rows), n))
         for away in range(-reach, reach + 1):
             k = np.clip(rows + away, 0, len(t) - 1)
-            s = (t[k] - t[part]) / AROUND
+            s = (t[k] - t[part]) / around
             power = ((k == rows + away) & (np.abs(s) <= 1.0) & (pieces[k] == pieces[rows])).astype(float)
             for p in range(7):  # Σ sᵖ, Σ sᵖ·q and Σ sᵖ·dq over what is near
                 moments[p] += power
@@ -60,7 +79,7 @@ def _velocities(recording: Recording) -> Iterator[NDArray[np.float64]]:
                 if p < 3:
                     dq_sums[p] += power[:, None] * dq[k - first]
                 power = power * s
-        yield told(moments, q_sums, dq_sums, precision)
+        yield told(moments, q_sums, dq_sums, precision) * (AROUND / around)
 
 
 def precision_of(q_std: NDArray[np.float64], dq_std: NDArray[np.float64]) -> tuple[NDArray, NDArray]:

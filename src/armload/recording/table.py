@@ -18,6 +18,7 @@ from armload.recording.columns import checked_recording
 from armload.recording.currents import of_currents
 from armload.recording.mapping import ColumnMap, map_columns
 from armload.recording.recording import GAP, Recording
+from armload.recording.steadied import with_velocities_of_positions
 from armload.recording.torque_constants import controller_constants
 
 
@@ -81,7 +82,7 @@ def read_table(table: Table, where: str, arm: Arm | None, spec: ColumnSpec, chan
             *notes,
             of_currents(where, constants.tolist(), " (the controller's own target_moment over target_current)"),
         )
-    return checked_recording(
+    recording = checked_recording(
         motion,
         where,
         lambda k: table.row_name(int(rows[k])),
@@ -91,6 +92,7 @@ def read_table(table: Table, where: str, arm: Arm | None, spec: ColumnSpec, chan
         notes=(*table.notes, *notes),
         epoch=reading.epoch,
     )
+    return recording if columns.places["dq"] else with_velocities_of_positions(recording)
 
 
 def table_chunks(
@@ -110,6 +112,8 @@ def table_chunks(
             columns = map_columns(table.names, where, arm, spec, _refuse_text, table.dates)
             if columns.wanted is not None:
                 raise NotInPieces(f"{where}: torque per ampere is found from all rows")
+            if not columns.places["dq"]:
+                raise NotInPieces(f"{where}: velocities are told by the positions before and after")
             reading = _Reading(columns, where, spec, in_pieces=True)
             chunks = Chunks(where, channel, reading.labels(table))
             names, dates = list(table.names), list(table.dates)
@@ -144,7 +148,11 @@ class _Reading:
     def labels(self, table: Table) -> list[str]:
         """How to call the columns in a message."""
         time = self._columns.time
-        return ["t" if time is None else table.names[time.place], *(table.names[place] for place in self._places)]
+        names = [table.names[place] for place in self._places]
+        n = len(self._columns.places["q"])
+        if not self._columns.places["dq"]:
+            names[n:n] = [f"dq{j}" for j in range(1, n + 1)]
+        return ["t" if time is None else table.names[time.place], *names]
 
     def values(self, table: Table) -> tuple[NDArray, NDArray[np.intp]]:
         """The rows (N, 1 + 3n) of the episode asked for, and their places in the table."""
@@ -167,6 +175,9 @@ class _Reading:
             t = self._seconds(table, time, raw[:, 0])
         self._count += len(rows)
         motion = raw[:, len(extra) : len(extra) + len(self._places)] * self._scales
+        if not columns.places["dq"]:
+            q, tau = np.split(motion, 2, axis=1)
+            motion = np.hstack([q, np.zeros_like(q), tau])
         return np.column_stack([t, motion])[rows], rows
 
     def _seconds(self, table: Table, time: TimeColumns, raw: NDArray[np.float64]) -> NDArray:
