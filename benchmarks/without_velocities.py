@@ -1,6 +1,6 @@
 """What an answer loses where the log has no velocities and its positions tell them.
 
-    python benchmarks/without_velocities.py [--robots panda,ur5e,gen3] [--logs 24] [--seed 40]
+    python benchmarks/without_velocities.py [--robots panda,ur5e,gen3] [--logs 16] [--seed 40]
 
 Sound logs of wrong_cases.py (6 s, arms that differ from their model as real ones do, sensors with noise, jitter, lost
 samples), each with its tare of 20 s, at 200 Hz and thinned to 50 and 25 Hz. Each pair is answered by `identify` with
@@ -9,7 +9,7 @@ first moments [g·m] and inertia [g·m²], the second over the first (± one sta
 differences), and the share of the true values inside their intervals. Called approximate: of the answers. Then the
 real logs that are at hand (`ARMLOAD_REAL_DATA`): mass and 95 % interval either way.
 
-Written to benchmarks/results/without_velocities.json and tables of docs/recordings.md; ten minutes of one core.
+Written to benchmarks/results/without_velocities.json and tables of docs/recordings.md; fifteen minutes of one core.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def of_real_logs() -> dict[str, dict[str, list[float]]]:
 
 
 def main() -> None:
-    asked = options(__doc__, robots="panda,ur5e,gen3", logs=24, seed=40)
+    asked = options(__doc__, robots="panda,ur5e,gen3", logs=16, seed=40)
     cells: dict[str, dict[str, dict]] = {}
     for robot in asked.robots.split(","):
         cells[robot] = {}

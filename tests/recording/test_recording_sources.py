@@ -9,7 +9,7 @@ import pytest
 
 from armload.arms import arm
 from armload.errors import RecordingError
-from armload.recording import Recording, read_recording, write_recording
+from armload.recording import Recording, read_long, read_recording, write_recording
 
 ROWS, EPOCH = 24, 1_700_000_000_123_456_789  # [1], [ns] since 1970: no multiple of what a double resolves
 
@@ -231,6 +231,25 @@ def test_a_stamp_in_two_parts_is_read_to_the_nanosecond(tmp_path):
     columns["header.stamp.sec"] = [stamp // 10**9 for stamp in stamps(log)]
     columns["header.stamp.nanosec"] = [stamp % 10**9 for stamp in stamps(log)]
     same(read_recording(write(tmp_path / "log.csv", columns), PANDA), log)
+
+
+def test_ros2_topic_echo_as_csv_reads(tmp_path):
+    """It writes no header: a stamp in two parts, the frame, names, positions, velocities, efforts."""
+    log, order = canonical(PANDA), [4, 0, 6, 2, 1, 5, 3]
+    rows = [
+        ",".join(
+            [
+                *(str(part) for part in divmod(stamp, 10**9)),
+                "base",
+                *(PANDA.joint_names[k] for k in order),
+                *(repr(float(x[k])) for x in (q, dq, tau) for k in order),
+            ]
+        )
+        for stamp, q, dq, tau in zip(stamps(log), log.q, log.dq, log.tau, strict=True)
+    ]
+    (tmp_path / "log.csv").write_text("\n".join(rows) + "\n")
+    same(read_recording(tmp_path / "log.csv", PANDA), log)
+    same(read_long(tmp_path / "log.csv", PANDA, long=0), log)
 
 
 def test_messages_that_are_not_stamped_have_the_time_of_logging(tmp_path):

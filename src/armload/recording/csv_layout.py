@@ -2,7 +2,7 @@
 
 Read from the header and the first row below it. Comment lines in front (`#`, `%`) are passed over, unless the last of
 them is the header itself, as NumPy's `savetxt` and `rostopic echo -p` write it. Columns without a header are called by
-their numbers, the first being 1.
+their numbers, the first being 1; those of `ros2 topic echo --csv /joint_states` are known by what is in them.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,5})?")
 _SEPARATORS = ("\t", ";", ",", " ")  # a space parts only what nothing else does
 _EXPECTED = "expected the header, such as t,q1..qn,dq1..dqn,tau1..taun before the data"
 _JOINTS = 7  # of an example
+_STAMP = ("header.stamp.sec", "header.stamp.nanosec", "header.frame_id")
 
 
 @dataclass(frozen=True)
@@ -66,8 +67,9 @@ def layout_of(lines: Sequence[str], where: str) -> Layout:
             return headed
     row = lines[first].strip(" \r\n")
     separator = _separator(row, row)
-    names = tuple(str(k + 1) for k in range(len(_cells(row, separator))))
-    return Layout(names, first + 1, separator, nameless=True)
+    cells = _cells(row, separator)
+    echoed = _echoed(cells)
+    return Layout(echoed or tuple(str(k + 1) for k in range(len(cells))), first + 1, separator, nameless=not echoed)
 
 
 def check_named(layout: Layout, spec: ColumnSpec, n: int | None, where: str) -> None:
@@ -79,6 +81,20 @@ def check_named(layout: Layout, spec: ColumnSpec, n: int | None, where: str) -> 
             f"{where}, line {layout.first} holds numbers: {_EXPECTED}; or name its {len(layout.names)} columns by "
             f'their numbers, such as --columns "t=1,{ranges}"'
         )
+
+
+def _echoed(cells: Sequence[str]) -> tuple[str, ...]:
+    """The columns of a row of `ros2 topic echo --csv` of a JointState; (): it is none.
+
+    It writes the fields of each message in their order: a stamp in two parts, the frame, and four arrays of n.
+    """
+    n = (len(cells) - len(_STAMP)) // 4
+    names, numbers = cells[len(_STAMP) : len(_STAMP) + n], [*cells[:2], *cells[len(_STAMP) + n :]]
+    if n < 1 or len(cells) != len(_STAMP) + 4 * n or not all(map(NUMBER.fullmatch, numbers)):
+        return ()
+    if any(not name or NUMBER.fullmatch(name) for name in names):
+        return ()
+    return (*_STAMP, *(f"{field}{k}" for field in ("name", "position", "velocity", "effort") for k in range(n)))
 
 
 def _headed(lines: Sequence[str], header: int, where: str, sign: str = "") -> Layout:
