@@ -18,9 +18,8 @@ from armload.recording.recording import GAP, Recording
 TURN = 2.0 * np.pi
 # [rad] to which a jump between neighbouring samples is a full turn: at 10 Hz a joint moves by less meanwhile
 _MOVED = 1.0
-_MOST = (
-    2  # turns that an angle is off at most at first: degrees taken for radians are off by more, and stay as they are
-)
+# turns that an angle is off at most at first: degrees taken for radians are off by more, and stay as they are
+_MOST = 2
 
 
 def endless(arm: Arm) -> NDArray[np.bool_]:
