@@ -24,6 +24,7 @@ from armload.devices.ros2 import (
     parameters_of,
     read_trajectory,
 )
+from armload.devices.ros2.effort import Effort
 from armload.devices.ros2.joint_states import JointStates
 from armload.errors import MotionError, SourceError
 from armload.estimators import Estimate
@@ -31,6 +32,7 @@ from armload.inertia import InertialParameters, is_consistent, to_order
 from armload.motion import taie2024
 from armload.online import OnlineEstimate, OnlineIdentifier
 from armload.payloads import test_payload as example_payload
+from armload.payloads import write_payload
 from armload.simulation import simulate
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -85,6 +87,25 @@ def test_joints_are_known_by_another_driver_s_names_on_the_arm_s_sheet():
     names = [f"iiwa_joint_{k}" for k in range(1, 8)]
     sample = states.sample(joint_state(names[::-1], q[::-1], q[::-1], q[::-1], SECOND), 0)
     assert np.array_equal([sample.q, sample.dq, sample.tau], [q, q, q])
+
+
+def test_efforts_that_are_currents_or_lack_gravity_become_torque(tmp_path):
+    """As UR's driver publishes them: of joints in another order, from the first message on."""
+    ur, rng = arm("ur5e"), np.random.default_rng(2)
+    q, dq, tau = rng.normal(size=(3, 6))
+    constants = np.array([12.0, 12.0, 10.0, 11.0, 11.0, 11.0])
+    held = example_payload()
+    write_payload(tmp_path / "set.json", held)
+    tool = ur.with_payload(InertialParameters.from_com(0.8, (0.0, 0.0, 0.05), 1e-3 * np.eye(3)))
+    for robot in (ur, tool):  # the controller knows nothing of a tool but what it was set to
+        for how, sent in (
+            ({"torque_constants": constants}, tau / constants),
+            ({"compensated": "nothing"}, tau - ur.torque(q)),
+            ({"compensated": str(tmp_path / "set.json")}, tau - ur.with_payload(held.parameters).torque(q)),
+        ):
+            states = JointStates(robot, "/joint_states", Effort(robot, **how))
+            message = joint_state(ur.joint_names[::-1], q[::-1], dq[::-1], sent[::-1], SECOND)
+            assert np.allclose(states.sample(message, 0).tau, tau, atol=1e-9)
 
 
 def test_a_message_of_another_device_is_no_sample(panda):

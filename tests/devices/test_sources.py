@@ -755,6 +755,11 @@ def test_an_arm_with_a_tool_other_links_and_a_tilted_base_too(panda):
         ("fr3://", "names no robot"),
         ("ur://", "names no robot"),
         ("ur://127.0.0.1?torque_constant=1,2,3,4,5,6", "unknown option 'torque_constant'"),
+        ("ur://127.0.0.1?compensated=nothing", r"unknown option 'compensated': .* \?torque_constants=…$"),
+        ("ros2:///joint_states?steady=1", r"unknown option 'steady': .*\?torque_constants=… or \?compensated=… or"),
+        ("ros2:///joint_states?torque_constants=1,2", "expected 7 positive numbers"),
+        ("ros2:///joint_states?torque_constants=1,1,1,1,1,1,1&compensated=nothing", "leave one out"),
+        ("ros2:///joint_states?compensated=no_such.json", "no_such.json"),
         ("panda://127.0.0.1?torque_constants=1,2,3,4,5,6,7", "unknown option 'torque_constants'"),
         ("no/such/file.csv", "does not exist"),
         ("simulator", "unsupported suffix|does not exist"),
@@ -769,7 +774,7 @@ def test_a_source_that_cannot_be_opened_says_why(panda, spec, text):
 @pytest.mark.parametrize("spec", ["ros2:///arm/joint_states", "ros2://arm/joint_states"])
 def test_a_topic_may_be_written_with_two_slashes_or_three(panda, monkeypatch, spec):
     asked = []
-    monkeypatch.setattr("armload.devices.opening.Ros2Source", lambda topic, _: asked.append(topic))
+    monkeypatch.setattr("armload.devices.opening.Ros2Source", lambda topic, *_, **__: asked.append(topic))
     open_source(spec, panda)
     assert [topic.lstrip("/") for topic in asked] == ["arm/joint_states"]
 
@@ -780,7 +785,7 @@ def test_a_ur_without_torque_constants_asks_for_them():
         open_source("ur://127.0.0.1", unknown, detached=False)
     with pytest.raises(SourceError, match="six"):
         open_source("ur://127.0.0.1?torque_constants=1,2", unknown, detached=False)
-    with pytest.raises(SourceError, match="six"):
+    with pytest.raises(SourceError, match="one in N·m/A for each joint"):
         open_source("ur://127.0.0.1?torque_constants=a,b", unknown, detached=False)
 
 

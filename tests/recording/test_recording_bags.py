@@ -343,7 +343,7 @@ def test_units_of_positions_in_a_bag_may_be_said_and_nothing_else(tmp_path):
     np.testing.assert_allclose(log.dq, np.radians(plain.dq), rtol=1e-14)
     np.testing.assert_array_equal(log.tau, plain.tau)
     for said in ("tau=effort", "t_unit=ms", "rate=100"):
-        with pytest.raises(RecordingError, match=r"leave them out .units may be said: q_unit, dq_unit, tau_unit"):
+        with pytest.raises(RecordingError, match=r"leave them out .but q_unit, dq_unit, tau_unit, torque"):
             read_recording(path, arm("ur10e"), columns=said)
 
 

@@ -1,10 +1,14 @@
 """`columns`: what the user says of a log's columns decides, and what is wrong with it is said in one sentence."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from armload.arms import arm
 from armload.errors import RecordingError
+from armload.payloads import test_payload as make_payload
+from armload.payloads import write_payload
 from armload.recording import ColumnSpec, Recording, read_long, read_recording, write_recording
 
 PANDA, ROWS = arm("panda"), 12
@@ -168,3 +172,28 @@ def test_columns_without_a_header_are_called_by_their_numbers(tmp_path, separato
     path.write_text("\n".join(separator.join(map(repr, row)) for row in table[:, :-1].tolist()))
     with pytest.raises(RecordingError, match=r"has no column '22'"):
         read_recording(path, PANDA, columns=BY_NUMBER)
+
+
+@pytest.mark.parametrize("carries", ["nothing", "a file"])
+def test_gravity_that_a_controller_took_out_is_put_back(tmp_path, carries):
+    """In a log that is read whole as in one that is read in parts, once."""
+    rng, robot = np.random.default_rng(5), arm("ur5e")
+    log = Recording(np.arange(300) / 100.0, *rng.normal(size=(3, 300, 6)))
+    loaded = robot if carries == "nothing" else robot.with_payload(make_payload().parameters)
+    if carries != "nothing":
+        write_payload(tmp_path / "set.json", make_payload())
+        carries = str(tmp_path / "set.json")
+    write_recording(tmp_path / "log.csv", replace(log, tau=log.tau - loaded.torque(log.q)))
+    said = {"compensated": carries}
+    tool = robot.with_payload(make_payload().parameters)  # a tool that is known is none of the controller's
+    for of in (robot, tool):
+        for read in (
+            read_recording(tmp_path / "log.csv", of, columns=said),
+            read_long(tmp_path / "log.csv", of, columns=said, long=0, size=50),
+        ):
+            np.testing.assert_allclose(read.tau[:], log.tau, atol=1e-9)
+            assert any("gravity was put back into the torque" in note for note in read.notes)
+    with pytest.raises(RecordingError, match=r"gravity is put back for an arm: name it"):
+        read_recording(tmp_path / "log.csv", columns=said)
+    with pytest.raises(RecordingError, match=r"compensated is of torque, and tau is said to be motor current"):
+        ColumnSpec.of({**said, "tau_unit": "A"})

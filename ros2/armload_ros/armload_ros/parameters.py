@@ -8,11 +8,13 @@ from typing import Any
 
 from armload import Recording, arm, read_payload, read_recording
 from armload.arms import Arm
+from armload.devices.ros2 import Effort
 from armload.errors import UsageError
 from armload.identification import check_usable, plausible_tool
 from armload.identification.tare_age import age_of, seconds_of
 from armload.inertia import InertialParameters
 from armload.posterior import Profile, load_profile
+from armload.recording import NOTHING, has_topics
 
 DEFAULTS: dict[str, Any] = {
     "robot": "panda",
@@ -24,6 +26,8 @@ DEFAULTS: dict[str, Any] = {
     "tare_age": "",
     "profile": "",
     "steady": False,
+    "torque_constants": [0.0],
+    "compensated": "",
     "tare_duration": 20.0,
     "rate": 10.0,
     "timeout": 2.0,
@@ -35,7 +39,6 @@ DEFAULTS: dict[str, Any] = {
     "end_effector": 0.0,
     "touch_links": [""],
 }
-NOTHING = "nothing"  # in the place of a file
 
 
 class Parameters:
@@ -64,11 +67,15 @@ class Parameters:
         """What the controller counts before it is told anything."""
         return self._body("counted", bare)
 
+    def effort(self, robot: Arm) -> Effort:
+        """What `effort` is on the topic of the joint states."""
+        return Effort(robot, **self._of_effort())
+
     def tare(self, robot: Arm) -> Recording | None:
         """The log of the arm before the payload was mounted."""
         if not (path := self.value("tare")):
             return None
-        tare = read_recording(path, robot)
+        tare = read_recording(path, robot, columns=self._of_effort() if has_topics(path) else None)
         check_usable(tare, robot)
         return tare
 
@@ -82,6 +89,12 @@ class Parameters:
     def profile(self) -> Profile | None:
         """What was learned of the arm from many logs."""
         return load_profile(self.value("profile")) if self.value("profile") else None
+
+    def _of_effort(self) -> dict[str, Any]:
+        """What the parameters say of it, of the topic and of a bag of it."""
+        constants, compensated = tuple(self.value("torque_constants")), self.value("compensated")
+        given = {"torque_constants": constants if any(constants) else None, "compensated": compensated or None}
+        return {key: value for key, value in given.items() if value is not None}
 
     def _body(self, name: str, bare: Arm) -> InertialParameters | None:
         path = self.value(name)

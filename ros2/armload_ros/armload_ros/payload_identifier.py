@@ -145,7 +145,7 @@ class PayloadIdentifier(LifecycleNode):
         given, bare = self.parameters, self.parameters.bare_arm()
         self._bare, tool = bare, given.tool(bare)
         robot = bare if tool is None else bare.with_payload(tool)
-        self._states = JointStates(robot, "joint_states")
+        self._states = JointStates(robot, "joint_states", given.effort(robot))
         log = given.tare(robot)
         age, aged = given.tare_age(log)
         for note in aged:

@@ -15,6 +15,7 @@ from armload.devices.files.source import Replay
 from armload.devices.franka import source as franka
 from armload.devices.franka.source import FrankaSource
 from armload.devices.recorder import Recorded
+from armload.devices.ros2.effort import Effort
 from armload.devices.ros2.source import Ros2Source
 from armload.devices.source import Source
 from armload.devices.ur import source as ur
@@ -23,6 +24,8 @@ from armload.errors import SourceError
 from armload.recording import ColumnSpec
 
 SCHEMES = ("fr3", "panda", "ur", "ros2")
+# what may follow an address: of a UR joint torque per current, of ROS 2 what `effort` is, and who moves the arm
+_OPTIONS = {"ur": ("torque_constants",), "ros2": ("torque_constants", "compensated", "controller")}
 _DETACHED = ("fr3", "panda", "ur")  # read in a process of their own by default
 
 
@@ -52,7 +55,7 @@ def open_source(
     | `sim` | the simulator |
     | `fr3://ADDRESS`, `panda://ADDRESS` | a Franka robot |
     | `ur://ADDRESS`, `ur://ADDRESS?torque_constants=12,12,10,11,11,11` | a UR arm |
-    | `ros2:///joint_states` | a ROS 2 topic |
+    | `ros2:///joint_states`, with `?torque_constants=…` or `?compensated=nothing` | a ROS 2 topic (`ros2.Effort`) |
 
     >>> from armload.arms import arm
     >>> with open_source("sim", arm("panda"), speed=None, duration=0.01) as source:
@@ -141,11 +144,17 @@ def prepare(spec: str) -> str | None:
 
 
 class Address(NamedTuple):
-    """A robot's, from scheme://HOST?torque_constants=…; the constants (6,) in N·m/A, of a UR arm."""
+    """A robot's, from scheme://HOST?torque_constants=… [N·m/A]; of ROS 2 `host` is the topic, as is ros2://TOPIC."""
 
     scheme: str
     host: str
     torque_constants: list[float] | None
+    compensated: str | None = None
+    controller: str | None = None
+
+    def effort(self, arm: Arm, torque_constants: Sequence[float] | None = None) -> Effort:
+        """What `effort` is on its topic."""
+        return Effort(arm, self.torque_constants or torque_constants, self.compensated)
 
 
 def address_of(name: str) -> Address:
@@ -155,27 +164,30 @@ def address_of(name: str) -> Address:
         SourceError: it names no robot, or has an option that there is not.
     """
     parts = urlsplit(name)
-    if not parts.hostname:
+    host = parts.netloc + parts.path if parts.scheme == "ros2" else parts.hostname
+    if not host:
         raise SourceError(
             f"{name} names no robot: expected {parts.scheme}://ADDRESS, such as {parts.scheme}://172.16.0.2"
         )
     asked = parse_qs(parts.query, keep_blank_values=True)
-    stray = [key for key in asked if (parts.scheme, key) != ("ur", "torque_constants")]
+    options = _OPTIONS.get(parts.scheme, ())
+    stray = [key for key in asked if key not in options]
     if stray:
-        raise SourceError(f"{name}: unknown option {stray[0]!r}: expected the address, with ur:// ?torque_constants=…")
+        said = " or ".join(f"?{key}=…" for key in options)
+        raise SourceError(f"{name}: unknown option {stray[0]!r}: expected the address{said and f', with {said}'}")
     given = asked.get("torque_constants", [""])[-1]
     try:
         constants = [float(x) for x in given.split(",")] if "torque_constants" in asked else None
     except ValueError:
-        raise SourceError(f"{name}: torque_constants are {given!r}: expected six numbers in N·m/A") from None
-    return Address(parts.scheme, parts.hostname, constants)
+        raise SourceError(f"{name}: torque_constants are {given!r}: expected one in N·m/A for each joint") from None
+    of_ros2 = {key: values[-1] for key, values in asked.items() if key != "torque_constants"}
+    return Address(parts.scheme, host, constants, **of_ros2)
 
 
 def _robot(name: str, arm: Arm, torque_constants: Sequence[float] | None) -> Source:
-    parts = urlsplit(name)
-    if parts.scheme == "ros2":
-        return Ros2Source(parts.netloc + parts.path, arm)  # ros2://joint_states means the same
     address = address_of(name)
+    if address.scheme == "ros2":
+        return Ros2Source(address.host, arm, effort=address.effort(arm, torque_constants))
     if address.scheme == "ur":
         return URSource(address.host, arm, address.torque_constants or torque_constants)
     return FrankaSource(address.host, arm, address.scheme)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from typing import Any
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import urlsplit
 
 from numpy.typing import ArrayLike
 
@@ -59,9 +59,8 @@ def open_mover(
     if scheme not in SCHEMES:
         raise SourceError(f"{spec} cannot be moved: expected sim, {', '.join(f'{s}://ADDRESS' for s in SCHEMES)}")
     if scheme == "ros2":
-        parts = urlsplit(spec)
-        controller = parse_qs(parts.query).get("controller", [CONTROLLER])[-1]
-        return Ros2Mover(parts.netloc + parts.path, arm, controller)
+        address = address_of(spec)
+        return Ros2Mover(address.host, arm, address.controller or CONTROLLER, address.effort(arm))
     return DetachedMover(spec, arm)
 
 

@@ -11,14 +11,14 @@ from armload.arms import Arm
 from armload.errors import RecordingError
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.csv_file import csv_chunks
-from armload.recording.files import TABLES, has_topics, read_recording
+from armload.recording.files import TABLES, has_topics, read_as_told, read_recording
 from armload.recording.hdf5_file import hdf5_chunks
 from armload.recording.npz_file import npz_chunks
+from armload.recording.of_arm import OfArm
 from armload.recording.parquet_file import parquet_chunks
 from armload.recording.recording import BLOCK, Recording
 from armload.recording.ros_bag import bag_chunks
 from armload.recording.spooled import spooled
-from armload.recording.turns import Turns
 
 # [bytes] of a file from which a log is long: below, reading it whole takes a few times as much memory, and no disk
 LONG = 8e6
@@ -51,18 +51,18 @@ def recording_chunks(
     Raises:
         RecordingError: as `read_recording`, but of a bag only once its flaw is reached.
     """
-    parts = _parts(Path(path), arm, topic, columns, size)
-    yield from parts if arm is None else map(Turns(arm).of, parts)
-
-
-def _parts(path: Path, arm: Arm | None, topic: str | None, columns: Any, size: int) -> Iterator[Recording]:
     spec = ColumnSpec.of(columns)
+    of_arm = OfArm(arm, spec, str(path))
+    yield from map(of_arm.of, _parts(Path(path), arm, topic, spec, size))
+
+
+def _parts(path: Path, arm: Arm | None, topic: str | None, spec: ColumnSpec, size: int) -> Iterator[Recording]:
     read = _TABLES.get(path.suffix.lower())
     if path.exists() and has_topics(path) and spec == spec.of_values:
         yield from bag_chunks(path, str(path), arm, topic, size, spec)
         return
     if read is None or topic is not None or not path.is_file():
-        yield read_recording(path, arm, topic=topic, columns=columns)
+        yield read_as_told(path, arm, topic, spec)
         return
     many = size * (_TEXT if read is csv_chunks else 1)
     begun = False
@@ -73,7 +73,7 @@ def _parts(path: Path, arm: Arm | None, topic: str | None, columns: Any, size: i
     except Exception as error:  # a decoder may fail in any way; read whole, the log says in which
         if begun:
             raise _Begun from error
-        yield read_recording(path, arm, columns=columns)
+        yield read_as_told(path, arm, None, spec)
 
 
 class _Begun(RecordingError):

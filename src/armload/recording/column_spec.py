@@ -12,7 +12,7 @@ from armload.errors import RecordingError, one_line
 from armload.recording.aliases import AMPERE, QUANTITIES, UNITS
 
 _COLUMNS = ("t", *QUANTITIES)
-_OF_VALUES = (*(f"{key}_unit" for key in QUANTITIES), "torque_constants")
+_OF_VALUES = (*(f"{key}_unit" for key in QUANTITIES), "torque_constants", "compensated")
 NONE = "none"  # of velocities: the log has none that are of use
 _HINT = 'expected KEY=VALUE pairs such as "t=time,q=joint_pos_{i},dq=joint_vel_{i},tau=effort_{i}", or a .toml file'
 
@@ -31,6 +31,8 @@ class ColumnSpec:
         t: the column of time. q, dq, tau: those of position, velocity and torque; dq may be "none".
         t_unit: s, ms, us or ns. q_unit: rad or deg. dq_unit: rad/s or deg/s. tau_unit: Nm, or A for motor currents.
         torque_constants: joint torque per motor current (n,) [N·m/A], where tau is in A.
+        compensated: where a controller has taken gravity out of the torque, the payload it was set to carry: a file, or
+            "nothing".
         rate: samples per second [Hz] of a file without times.
         episode: which one of a file that holds several.
     """
@@ -44,6 +46,7 @@ class ColumnSpec:
     dq_unit: str | None = None
     tau_unit: str | None = None
     torque_constants: tuple[float, ...] | None = None
+    compensated: str | None = None
     rate: float | None = None
     episode: int | None = None
 
@@ -60,6 +63,10 @@ class ColumnSpec:
                 )
             if not all(0.0 < constant < float("inf") for constant in self.torque_constants):
                 raise RecordingError("columns: torque_constants must be positive numbers [N·m/A], one for each joint")
+        if self.compensated is not None and self.of_currents:
+            raise RecordingError(
+                "columns: compensated is of torque, and tau is said to be motor current: leave one out"
+            )
         if self.rate is not None and not 0.0 < self.rate < float("inf"):
             raise RecordingError(f"columns: rate is {self.rate:g}: expected a positive number of samples per second")
 

@@ -12,7 +12,20 @@ from dataclasses import replace
 
 from armload.arms import Arm
 from armload.inertia import InertialParameters
+from armload.payloads import read_payload
 from armload.recording.recording import Recording
+
+NOTHING = "nothing"  # in the place of a payload's file
+
+
+def arm_as_set(arm: Arm, carries: str) -> Arm:
+    """The bare arm with what its controller is set to carry: a payload's file, or `NOTHING`.
+
+    Raises:
+        PayloadError: the file cannot be read, or is about another frame.
+    """
+    bare = replace(arm, attached=None)
+    return bare if carries == NOTHING else bare.with_payload(bare.in_frame(read_payload(carries).parameters))
 
 
 def with_gravity(recording: Recording, arm: Arm, payload: InertialParameters | None = None) -> Recording:

@@ -14,10 +14,10 @@ from armload.recording.csv_file import read_csv, write_csv
 from armload.recording.hdf5_file import read_hdf5
 from armload.recording.lerobot import is_data_set, read_data_set
 from armload.recording.npz_file import read_npz, write_npz
+from armload.recording.of_arm import OfArm
 from armload.recording.parquet_file import read_parquet, write_parquet
 from armload.recording.recording import Recording
 from armload.recording.ros_bag import BAG_SUFFIXES, read_bag
-from armload.recording.turns import Turns
 from armload.runtime.atomic import replacing
 
 _NAMED = (".dat", ".log", ".asc")  # text that is read where it is named; in a folder it is mostly something else
@@ -76,11 +76,13 @@ def read_recording(
         RecordingError: the file cannot be read, its columns are not clear, or a line of it is not valid; one sentence
             that names the place (for CSV the line of the file, the first being 1).
     """
-    recording = _read(Path(path), arm, topic, ColumnSpec.of(columns).over(rate=rate, episode=episode))
-    return recording if arm is None else Turns(arm).of(recording)
+    spec = ColumnSpec.of(columns).over(rate=rate, episode=episode)
+    of_arm = OfArm(arm, spec, str(path))
+    return of_arm.of(read_as_told(Path(path), arm, topic, spec))
 
 
-def _read(path: Path, arm: Arm | None, topic: str | None, spec: ColumnSpec) -> Recording:
+def read_as_told(path: Path, arm: Arm | None, topic: str | None, spec: ColumnSpec) -> Recording:
+    """What the file says; what else the log says of the arm is another matter (`OfArm`)."""
     where = str(path)
     try:
         if not path.exists():
@@ -92,7 +94,7 @@ def _read(path: Path, arm: Arm | None, topic: str | None, spec: ColumnSpec) -> R
             if spec != spec.of_values:
                 raise RecordingError(
                     f"{where}: columns, a rate or an episode were named, but a ROS bag has its joints by name; leave "
-                    "them out (units may be said: q_unit, dq_unit, tau_unit, torque_constants)"
+                    "them out (but q_unit, dq_unit, tau_unit, torque_constants, compensated and dq=none may be said)"
                 )
             if path.is_dir():
                 return read_bag(path, where, arm, topic, spec)

@@ -43,6 +43,7 @@ examples:
   armload live 'ur://192.168.0.10?torque_constants=12,12,10,11,11,11' --robot ur5e    (yours; the UR10e's are built in)
   armload live ros2:///joint_states --robot iiwa14 --steady   (velocities that are differences of positions)
   armload live ros2:///joint_states --robot my_arm.urdf --frame tool0
+  armload live "ros2:///joint_states?compensated=nothing" --robot ur5e   (effort has gravity taken out)
 
 The page is for this machine only (http://127.0.0.1:8080) unless --host says otherwise. Its address then has a token,
 and nobody gets in without: whoever does can read everything, switch the method and tare. Nothing is written to the

@@ -27,7 +27,8 @@ examples:
   ros2 topic pub --once /joint_trajectory_controller/joint_trajectory \\
       trajectory_msgs/msg/JointTrajectory "$(cat excite.yaml)"
 
-Both need a Python with ROS 2 (rclpy), see docs/ros2.md, and run until Ctrl-C. Effort is joint torque in N·m.
+Both need a Python with ROS 2 (rclpy), see docs/ros2.md, and run until Ctrl-C. Effort is joint torque in N·m, gravity
+in it; UR's driver may publish another: see there.
 """
 
 
@@ -47,7 +48,12 @@ def parser() -> Parser:
     )
     add_arm_arguments(node)
     node.add_argument(
-        "--topic", type=file_name, default="/joint_states", metavar="T", help="of the joint states (/joint_states)"
+        "--topic",
+        type=file_name,
+        default="/joint_states",
+        metavar="T",
+        help="of the joint states (/joint_states); with ?torque_constants=… or ?compensated=PAYLOAD, where effort is "
+        "no joint torque",
     )
     node.add_argument(
         "--publish", type=file_name, default="/payload/inertia", metavar="T", help="of the payload (/payload/inertia)"
@@ -90,7 +96,11 @@ def parser() -> Parser:
         "--rate", type=at_least(20.0, float, 1000.0), default=200.0, metavar="HZ", help="joint states per second (200)"
     )
     simulate.add_argument(
-        "--topic", type=file_name, default="/joint_states", metavar="T", help="of the joint states (/joint_states)"
+        "--topic",
+        type=file_name,
+        default="/joint_states",
+        metavar="T",
+        help="of the joint states (/joint_states)",
     )
     simulate.add_argument(
         "--command",
@@ -110,6 +120,7 @@ def run(options: argparse.Namespace) -> None:
 
 def _node(options: argparse.Namespace) -> None:
     from armload.devices import Ros2Source
+    from armload.devices.opening import address_of
     from armload.devices.ros2 import PayloadNode
     from armload.identification.tare_age import age_of
     from armload.inertia import InertialParameters
@@ -118,6 +129,8 @@ def _node(options: argparse.Namespace) -> None:
 
     check_tare_age(options)
     arm = arm_of(options)
+    address = address_of(options.topic if "://" in options.topic else f"ros2://{options.topic}")
+    effort = address.effort(arm)
     _, tare = read_logs(options, arm, None, options.tare, topics=(None, None))
     profile = None if options.profile is None else load_profile(options.profile)
     age, aged = age_of(tare, time.time(), options.tare_age)
@@ -132,10 +145,11 @@ def _node(options: argparse.Namespace) -> None:
             print_note(f"publishing {options.publish}: {body.mass:.3f} kg about {body.frame} to begin with")
             begun = True
 
-    print_note(f"waiting for {options.topic}; method {identifier.method}")
+    print_note(f"waiting for {address.host}; method {identifier.method}")
     try:
-        with Ros2Source(options.topic, arm, timeout=options.timeout, node="armload_payload") as source:
-            print_note(f"{options.topic}: {arm.n} joints of {arm.name} at {source.rate:.0f} Hz")
+        named = {"timeout": options.timeout, "node": "armload_payload", "effort": effort}
+        with Ros2Source(address.host, arm, **named) as source:
+            print_note(f"{address.host}: {arm.n} joints of {arm.name} at {source.rate:.0f} Hz")
             node = PayloadNode(source, lambda sample: identifier.update(*sample), options.publish, rate=options.rate)
             node.run(tell)
     finally:

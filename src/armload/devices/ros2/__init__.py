@@ -9,6 +9,7 @@ from armload.runtime.lazy import on_first_use
 if TYPE_CHECKING:
     from armload.devices.ros2.announcement import announced
     from armload.devices.ros2.connection import Ros2Connection
+    from armload.devices.ros2.effort import Effort
     from armload.devices.ros2.messages import message_of, parameters_of
     from armload.devices.ros2.payload_node import PayloadNode
     from armload.devices.ros2.robot_node import RobotNode
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CommandedMotion",
+    "Effort",
     "PayloadNode",
     "RobotNode",
     "Ros2Connection",

@@ -2,8 +2,8 @@
 
 Joints are known by **name**, that of the description or another on the arm's sheet: a message may list them in any
 order and others beside them (gripper fingers). Time is the header's stamp, counted from the first; where messages are
-not stamped (all zero) it is the time of receipt. `effort` is the joint torque. `armload.recording.ros_bag` does the
-same for whole logs, and refuses what is only suspicious here.
+not stamped (all zero) it is the time of receipt. `effort` is the joint torque, or what `Effort` makes of it.
+`armload.recording.ros_bag` does the same for whole logs, and refuses what is only suspicious here.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm, names_among
+from armload.devices.ros2.effort import Effort
 from armload.errors import SourceError
 from armload.recording import Sample
 
@@ -27,14 +28,15 @@ class JointStates:
     Args:
         arm: whose joints, and in which order.
         topic: what errors call the source.
+        effort: what the publisher calls effort; None: joint torque, gravity in it.
 
     Attributes:
         others: names of joints seen in messages that did not have all of the arm's.
     """
 
-    def __init__(self, arm: Arm, topic: str) -> None:
+    def __init__(self, arm: Arm, topic: str, effort: Effort | None = None) -> None:
         self.others: set[str] = set()
-        self._arm, self._topic = arm, topic
+        self._arm, self._topic, self._effort = arm, topic, effort
         self._called: tuple[str, ...] | None = None  # what the topic calls the arm's joints
         self._layouts: dict[tuple[str, ...], list[int] | None] = {}
         self._first_received: int | None = None  # [ns] since 1970, as all times here
@@ -67,8 +69,11 @@ class JointStates:
         if not self._begun:
             self._check(message, len(names))
             self._begun = True
-        rows = [_in_order(v, len(names), order) for v in (message.position, message.velocity, message.effort)]
-        return Sample(self._time(message.header.stamp, received), *rows)
+        rows = (message.position, message.velocity, message.effort)
+        q, dq, tau = (_in_order(values, len(names), order) for values in rows)
+        if self._effort is not None:
+            tau = self._effort.torque(q, tau)
+        return Sample(self._time(message.header.stamp, received), q, dq, tau)
 
     def stamp(self, t: float) -> int:
         """When t was on the robot's clock, since 1970 (or the start of simulated time) [ns]; 0 before any sample."""

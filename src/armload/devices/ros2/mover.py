@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.devices.mover import StreamedMover
+from armload.devices.ros2.effort import Effort
 from armload.devices.ros2.source import Ros2Source
 from armload.devices.supervision import Thresholds
 from armload.errors import SafetyError
@@ -42,14 +43,15 @@ class Ros2Mover(StreamedMover):
         topic: of its sensor_msgs/JointState messages.
         arm: whose joints.
         controller: the controller's name, under which its topic is.
+        effort: as of `Ros2Source`.
 
     Raises:
         SourceError: no ROS 2, no such topic name, nothing to hear in time, joints or efforts missing.
     """
 
-    def __init__(self, topic: str, arm: Arm, controller: str = CONTROLLER) -> None:
+    def __init__(self, topic: str, arm: Arm, controller: str = CONTROLLER, effort: Effort | None = None) -> None:
         super().__init__(arm)
-        self._source = Ros2Source(topic, arm)
+        self._source = Ros2Source(topic, arm, effort=effort)
         self.name, self.rate = topic, self._source.rate
         self._connection = self._source.connection
         try:

@@ -11,6 +11,7 @@ import numpy as np
 
 from armload.arms import Arm
 from armload.devices.ros2.connection import SENSOR_DEPTH, Ros2Connection
+from armload.devices.ros2.effort import Effort
 from armload.devices.ros2.joint_states import JointStates
 from armload.devices.source import Source
 from armload.errors import SourceError
@@ -32,6 +33,7 @@ class Ros2Source(Source):
         rate: samples per second [Hz]; None: measured from the first five, which opening then waits for.
         timeout: longest time without a sample [s]; None: wait for ever.
         node: name of the ROS 2 node.
+        effort: what the publisher calls effort; None: joint torque, gravity in it.
 
     Attributes:
         connection: the node, for whoever has something to publish.
@@ -41,11 +43,18 @@ class Ros2Source(Source):
     """
 
     def __init__(
-        self, topic: str, arm: Arm, *, rate: float | None = None, timeout: float | None = 10.0, node: str = "armload"
+        self,
+        topic: str,
+        arm: Arm,
+        *,
+        rate: float | None = None,
+        timeout: float | None = 10.0,
+        node: str = "armload",
+        effort: Effort | None = None,
     ) -> None:
         self.name, self.n = topic, arm.n
         self._arm, self._timeout, self._closed = arm, timeout, False
-        self._states = JointStates(arm, topic)
+        self._states = JointStates(arm, topic, effort)
         self._received: deque[tuple[Any, int]] = deque(maxlen=SENSOR_DEPTH)
         self._first: deque[tuple[Sample, float]] = deque()
         self._arrived: float | None = None
