@@ -7,6 +7,7 @@ Python is ARMLOAD_ROS_PYTHON, one that can import rclpy and armload, or else tha
 import importlib.util
 import json
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -335,13 +336,19 @@ ARMLOAD = ("-m", "armload", "ros2")
 
 
 @pytest.mark.full
-def test_joint_states_in_and_inertia_out_between_processes(ros, wait_until, panda, tmp_path):
+@pytest.mark.parametrize("effort", ["torque", "without gravity", "currents"])
+def test_joint_states_in_and_inertia_out_between_processes(ros, wait_until, panda, tmp_path, effort):
     """A driver's messages in, read back by plain rclpy: numbers as Pinocchio has them, the frame and the stamp."""
     truth = example_payload().parameters
-    log = simulate(panda, taie2024(), truth, rate=200.0)
-    file = write_log(tmp_path / "log.npz", log, panda.joint_names)
+    log = sent = simulate(panda, taie2024(), truth, rate=200.0)
+    topic = "/arm/states"
+    if effort == "without gravity":
+        sent, topic = replace(log, tau=log.tau - panda.torque(log.q)), f"{topic}?compensated=nothing"
+    elif effort == "currents":
+        sent, topic = replace(log, tau=log.tau / 8.0), f"{topic}?torque_constants=8,8,8,8,8,8,8"
+    file = write_log(tmp_path / "log.npz", sent, panda.joint_names)
     start = 1_700_000_000_000_000_001
-    node = (*ARMLOAD, "node", "--robot", "panda", "--topic", "/arm/states", "--publish", "/arm/load", "--method", "ols")
+    node = (*ARMLOAD, "node", "--robot", "panda", "--topic", topic, "--publish", "/arm/load", "--method", "ols")
     with (
         ros(ROOT / "tests" / "devices" / "ros" / "listen.py", "inertia", "/arm/load") as listener,
         ros(*node) as identifier,

@@ -18,6 +18,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import yaml
+from tests.recording.test_recording_bags import write_bag
 
 from armload.errors import UsageError
 from armload.inertia import InertialParameters
@@ -348,6 +349,23 @@ def test_a_tool_on_ros_goes_with_a_tare_of_the_stream_alone(package, panda):
     with pytest.raises(UsageError, match="cannot be found out on a stream"):
         stream(robot, Tare(log))
     stream(robot, Tare(log, taken=True)).close()
+
+
+@pytest.mark.parametrize("kind", ["torque", "without gravity", "currents"])
+def test_the_parameters_say_what_effort_is_on_the_topic_and_in_a_tares_bag(package, panda, tmp_path, kind):
+    parameters, log = package("parameters"), simulate(panda, taie2024(), rate=100.0)
+    given = dict(parameters.DEFAULTS)
+    sent = {"torque": log.tau, "without gravity": log.tau - panda.torque(log.q), "currents": log.tau / 8.0}[kind]
+    if kind == "without gravity":
+        given["compensated"] = "nothing"
+    elif kind == "currents":
+        given["torque_constants"] = [8.0] * 7
+    stamps = [1_700_000_000_000_000_000 + round(1e9 * t) for t in log.t]
+    rows = zip(stamps, stamps, [panda.joint_names] * len(log), log.q, log.dq, sent, strict=True)
+    given["tare"] = str(write_bag(tmp_path, "mcap", {"/joint_states": list(rows)}))
+    asked = parameters.Parameters(given.__getitem__)
+    assert np.allclose(asked.effort(panda).torque(log.q[7], sent[7]), log.tau[7], atol=1e-9)
+    assert np.allclose(asked.tare(panda).tau, log.tau, atol=1e-9)
 
 
 @pytest.mark.full
