@@ -7,6 +7,7 @@ import re
 import signal
 import subprocess
 import sys
+from pathlib import Path
 from time import sleep
 
 import numpy as np
@@ -95,6 +96,14 @@ def test_sim_is_what_live_runs_by_itself(capsys):
     records = [finite_json(line) for line in capsys.readouterr().out.splitlines()]
     assert records[-1]["t"] == pytest.approx(0.4, abs=0.01)
     assert records[-1]["method"] == "map"
+
+
+def test_the_page_has_a_row_for_every_field_of_a_line(capsys):
+    assert main(["live", "--headless", "--speed", "max", "--duration", "0.1", "--method", "map"]) == 0
+    page = (Path(__file__).resolve().parents[2] / "docs" / "live.md").read_text(encoding="utf-8")
+    rows = page.split("## Lines of JSON")[1].split("\n## ")[0].splitlines()
+    told = {name for row in rows if row.startswith("| `") for name in re.findall(r"`(\w+)`", row.split("|")[1])}
+    assert told == set(finite_json(capsys.readouterr().out.splitlines()[-1]))
 
 
 @pytest.mark.parametrize("method", ["ols", "rls", "map-gp"])

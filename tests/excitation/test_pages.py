@@ -106,7 +106,7 @@ def test_how_good_a_designed_pair_is_and_how_soon_is_what_was_measured():
     same, own = (
         " · ".join(f"{1e3 * x:.2g}" for x in panda[name]["error"]["2.0"]) for name in ("designed same", "pair")
     )
-    assert f"With it the designed 2 s leave {same}, and {own} with an empty run of its own" in words
+    assert f"The designed 2 s leave {same}, or {own} with an empty run of its own" in words
     soon, mostly = (panda["designed same"][f"reached_{which}_s"] for which in ("median", "90"))
     assert f"is reached in {soon:g} s (90 %: {mostly:g} s)" in words
     assert f"reaches it in {100 * panda['excitation']['reached_share']:.0f} % of the worlds" in words

@@ -1,5 +1,9 @@
 """What a file may say, and what is said of one that cannot be meant."""
 
+import dataclasses
+import re
+from pathlib import Path
+
 import pytest
 
 from armload.app.cli import main
@@ -40,6 +44,27 @@ def test_a_file_says_what_it_says_with_paths_from_its_own_folder(tmp_path):
     assert (left.steady, right.steady) == (False, True)
     assert (left.tare_age, right.tare_age) == (3 * 86400.0, None)
     assert (right.source, right.gravity, right.state) == ("sim", (0.0, 0.0, -9.8), None)
+
+
+def test_descriptions_and_models_are_files_beside_it_while_names_stay_names(tmp_path):
+    (tmp_path / "cell.toml").write_text(
+        CELL.replace('robot = "fr3"', 'robot = "my_arm.urdf"\nmethod = "models/mine.safetensors"')
+    )
+    left, right = read_settings(tmp_path / "cell.toml").arms
+    assert left.robot == str(tmp_path / "my_arm.urdf")
+    assert left.method == str(tmp_path / "models" / "mine.safetensors")
+    assert (right.robot, right.method) == ("panda", None)
+    (tmp_path / "cell.toml").write_text(CELL.replace('robot = "fr3"', 'robot = "fr3"\nmethod = "map-gp"'))
+    assert read_settings(tmp_path / "cell.toml").arms[0].method == "map-gp"
+
+
+def test_the_page_has_a_row_for_every_setting():
+    page = (Path(__file__).resolve().parents[2] / "docs" / "service.md").read_text(encoding="utf-8")
+    rows = [line.split("|")[1] for line in page.split("## Its lines")[0].splitlines() if line.startswith("| `")]
+    told = {name for row in rows for name in re.findall(r"`(\w+)`", row)}
+    of_arms = {field.name for field in dataclasses.fields(ArmSettings)}
+    of_the_service = {field.name for field in dataclasses.fields(ServiceSettings)} - {"arms", "token", "duration"}
+    assert told == of_arms | of_the_service | {"token_file"}
 
 
 @pytest.mark.parametrize(

@@ -31,8 +31,8 @@ class OnlineEstimate(Estimate):
     lag: how long ago the last sample had arrived when it was answered, as far as that is known (`behind`) [s]: what
         waits for an identifier that is too slow gets old.
     since: when this payload was taken up, on the stream's clock [s].
-    relative_to: "arm", "tool" (which the arm was given with), "tare", or "before": the run of the empty arm before the
-        last change was taken for a tare. method: its name.
+    relative_to: "arm", "tool" (which the arm was given with), "tare", "profile", or "before": the run of the empty arm
+        before the last change was taken for a tare. method: its name.
     determined: which parameters (10,) the data determine. held: whether anything is there at all.
     rests_on_prior, torque_gain_std, same_arm_assumed: as of an `Identification`; the arm is taken for the tare's until
         there was enough to ask.

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 _PATHS = ("tare", "profile", "tool", "save", "record", "mounted")
+_NAMES_OR_PATHS = ("robot", "method")  # a path has a suffix or a folder, a name has neither
 TOOL_OR_TARE = (  # but for a tare that is taken on the stream itself
     "whether the tool was mounted at the tare, or in the profile's logs, cannot be found out on a stream: give the "
     "tool, or the tare or profile"
@@ -222,6 +223,10 @@ def _arm(table: dict[str, Any], path: Path) -> ArmSettings:
     for key in _PATHS:
         if key in settings and settings[key] not in ("franka-hand", "test", "nothing"):
             settings[key] = str(path.parent / settings[key])
+    for key in _NAMES_OR_PATHS:
+        said = Path(settings.get(key, ""))
+        if said.suffix or len(said.parts) > 1:
+            settings[key] = str(path.parent / said)
     if "://" not in settings["source"] and settings["source"] != "sim":
         settings["source"] = str(path.parent / settings["source"])
     if "gravity" in settings:
