@@ -253,7 +253,7 @@ def _loose(value: NDArray, low: NDArray, high: NDArray, known: Sequence[bool]) -
     """
     which = (np.shape(value) == np.shape(low) == np.shape(high) == (3,)) and (high - low > value)
     names = [NAMES[k] for k, hardly in zip(_MOMENTS, np.broadcast_to(which, 3), strict=True) if hardly and known[k]]
-    return (f"moments of inertia known to no better than half of themselves: {', '.join(names)}",) if names else ()
+    return (f"moments of inertia uncertain by more than half of their value: {', '.join(names)}",) if names else ()
 
 
 def _flags(content: dict[str, Any], key: str, path: str | Path) -> tuple[bool, ...] | None:
