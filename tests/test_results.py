@@ -187,6 +187,17 @@ def test_the_width_of_the_shipped_hybrid_is_that_of_its_training_s_report():
     assert f"of which there are few episodes, up to {np.nanmax(ratio[2]):.1f}." in page
 
 
+def test_how_long_a_shipped_hybrid_took_to_train_is_what_its_reports_say():
+    page = " ".join((ROOT / "docs" / "hybrid.md").read_text(encoding="utf-8").split())
+    reports = [json.loads(path.read_text()) for path in RESULTS.glob("hybrid_*.json")]
+    whole = [found for found in reports if "wall_s" in found and not found["resumed"]]
+    minutes = [found["wall_s"] / 60.0 for found in whole]
+    assert {found["episodes"] for found in whole} == {1000, 1200}
+    assert {found["jobs"] for found in whole} == {1, 2}
+    said = f"of 1 000 and 1 200 episodes took {min(minutes):.0f} to {max(minutes):.0f} minutes each, on one core or two"
+    assert said in page
+
+
 def test_what_the_intervals_promise_is_what_new_episodes_showed():
     page = " ".join((ROOT / "docs" / "hybrid.md").read_text(encoding="utf-8").split())
     found = json.loads((RESULTS / "fresh_episodes_panda.json").read_text())

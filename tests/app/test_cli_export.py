@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 
 from armload.app.cli import main
-from armload.app.cli.export import _EXAMPLES
+from armload.app.cli.export import _EXAMPLES, write
 from armload.app.cli.export import FORMS as NAMED
 from armload.arms import arm
-from armload.devices import FORMS
+from armload.devices import FORMS, Load
+from armload.devices.load import HARDLY_KNOWN
 from armload.inertia import NAMES, InertialParameters
 from armload.payloads import Payload, franka_hand, write_payload
 from armload.recording import write_recording
@@ -326,6 +327,17 @@ def test_what_the_log_did_not_determine_is_said_on_both_streams(export):
     assert "not determined" in err
 
 
+def test_moments_that_are_hardly_known_are_said_beside_the_notes_of_an_identification_and_nothing_twice(capsys):
+    leaning, hardly = "rests on what payloads are usually like more than on the log: Ixy", f"{HARDLY_KNOWN}: Ixx, Iyy"
+    load = Load(HELD, robot="panda", relative_to="tare", remarks=(leaning, hardly))
+    write(load, "franka-desk", earlier=["the intervals of Ixy rest on what payloads are usually like"])
+    err = capsys.readouterr().err
+    assert (err.count(hardly), err.count(leaning)) == (1, 0)
+    write(load, "franka-desk")
+    err = capsys.readouterr().err
+    assert (err.count(hardly), err.count(leaning)) == (1, 1)
+
+
 @pytest.mark.parametrize(
     ("to", "relative_to", "says"),
     [
@@ -361,7 +373,7 @@ def test_parts_are_added_before_others_are_taken_off(export, tmp_path):
 def test_what_is_added_to_a_load_since_a_tare_is_not_said_to_contain_what_was_mounted_then(export, tmp_path):
     err = export(of_arm("panda", relative_to="tare"), "--to", "franka", "--plus", part_of(tmp_path, 0.2, "camera"))[1]
     assert "contains any hand" not in err
-    assert "what was mounted at the tare is in it as far as it was added" in err
+    assert "see that --plus names all that was mounted at the tare" in err
 
 
 def test_what_is_taken_off_a_load_since_a_tare_names_no_tool_that_nobody_gave(export, tmp_path):

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 _KNOWN = (True,) * 10
 _MOMENTS = (4, 7, 9)  # places of Ixx, Iyy, Izz
+HARDLY_KNOWN = "moments of inertia uncertain by more than half of their value"
 _RELATIVE = {"before": "empty arm before"}  # what reads otherwise than it is called
 _MISFIT = 3.0  # standard deviations between what is left and the nearest body, beyond which too much was taken off
 
@@ -253,7 +254,7 @@ def _loose(value: NDArray, low: NDArray, high: NDArray, known: Sequence[bool]) -
     """
     which = (np.shape(value) == np.shape(low) == np.shape(high) == (3,)) and (high - low > value)
     names = [NAMES[k] for k, hardly in zip(_MOMENTS, np.broadcast_to(which, 3), strict=True) if hardly and known[k]]
-    return (f"moments of inertia known to no better than half of themselves: {', '.join(names)}",) if names else ()
+    return (f"{HARDLY_KNOWN}: {', '.join(names)}",) if names else ()
 
 
 def _flags(content: dict[str, Any], key: str, path: str | Path) -> tuple[bool, ...] | None:

@@ -93,8 +93,8 @@ def run(options: argparse.Namespace) -> None:
     added = bool(options.plus) and load.relative_to in _SINCE
     if added:
         doubts.append(
-            f"what was mounted {_SINCE[str(load.relative_to)]} is in it as far as it was added: see that nothing is "
-            "counted twice, or not at all"
+            f"see that --plus names all that was mounted {_SINCE[str(load.relative_to)]}, and nothing that is in the "
+            "answer already"
         )
     for part in options.plus:  # first: what is taken off may be in it
         load = load + _part(part, load, arm)
@@ -117,12 +117,14 @@ def write(
     """Write a load in a form, to a file or to stdout, about the frame asked for, else the one the form wants.
 
     doubts: notes to print with those on the load. earlier: notes of its identification, which say already what was
-    not determined and what rests on the prior. added: whether parts were added to what is relative to a tare.
+    not determined and what rests on the prior, but not which moments are hardly known. added: whether parts were added
+    to what is relative to a tare.
 
     Raises:
         SinkError: the form's frame is not known, or no body has the load's parameters and a mass above 0.
     """
     from armload.devices import CONTROLLERS, export_load
+    from armload.devices.load import HARDLY_KNOWN
     from armload.inertia import held
 
     nothing = load.std is not None and load.determined[0] and not held(load.parameters.mass, load.std[0], True)
@@ -147,7 +149,8 @@ def write(
         print_note("nothing seems to be held: the mass is within three standard deviations of zero")
     if elsewhere:
         print_note(f"a controller counts from its flange; these numbers are about {load.frame}, as was asked for")
-    for note in (*earlier, *doubts, *([] if earlier else _on_numbers(body, to)), *_on_use(body, to, added)):
+    numbers = [note for note in _on_numbers(body, to) if not earlier or note.startswith(HARDLY_KNOWN)]
+    for note in (*earlier, *doubts, *numbers, *_on_use(body, to, added)):
         print_note(note)
     if out is None:
         print(text, end="")
