@@ -228,8 +228,8 @@ def _check_form(recording: Recording, arm: Arm, seen: TorqueScale) -> None:
         raise _currents(recording, arm, seen)
     raise RecordingError(
         f"{recording.source}: tau seems to have gravity taken out: expected the measured joint torque in N·m, gravity "
-        "included; say what the controller was set to carry (--compensated nothing, or a payload's file), or how the "
-        "base is mounted (--gravity) if gravity is in it"
+        "included; say what the controller was set to carry (--compensated nothing, or a payload's file; of a ROS 2 "
+        "topic ?compensated=…), or how the base is mounted (--gravity) if gravity is in it"
     )
 
 
