@@ -48,7 +48,7 @@ COMMANDS = {
     "benchmark": "measure every method on every population: errors over time, intervals, repeatability",
     "reproduce": "run the paper's study again and put a verdict beside each of its claims",
     "ros2": "ROS 2: joint states in and the payload out; or a simulated robot that takes trajectories",
-    "motion": "design, show, check, export or draw an excitation motion",
+    "motion": "design, draw, show, check or export an excitation motion; enrich a task's own path",
 }
 _EXAMPLES = """\
 examples:

@@ -40,7 +40,9 @@ run a motion, exits with 3 if not, and says which parameters of a payload it can
 def parser() -> Parser:
     """The arguments of `armload motion`."""
     parser = Parser(
-        prog="armload motion", description="Design, show, check, export or draw an excitation motion.", epilog=_EXAMPLES
+        prog="armload motion",
+        description="Design, draw, show, check or export an excitation motion; enrich a path.",
+        epilog=_EXAMPLES,
     )
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
 
