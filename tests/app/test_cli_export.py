@@ -376,6 +376,17 @@ def test_what_is_added_to_a_load_since_a_tare_is_not_said_to_contain_what_was_mo
     assert "see that --plus names all that was mounted at the tare" in err
 
 
+def test_nothing_mounted_at_a_tare_is_said_once_and_asked_no_more(export, tmp_path):
+    held = of_arm("ur10e", relative_to="tare")
+    plain, asks = export(held, "--to", "ur")
+    told, err = export(held, "--to", "ur", "--plus", "nothing")
+    assert "add what was mounted at the tare" in asks
+    assert "mounted" not in err
+    assert re.findall(r"set_target_payload\(.*", told) == re.findall(r"set_target_payload\(.*", plain) != []
+    both = ["--plus", "nothing", "--plus", part_of(tmp_path, 0.2, "b")]
+    assert "see that --plus names" in export(of_arm("panda", relative_to="tare"), "--to", "franka", *both)[1]
+
+
 def test_what_is_taken_off_a_load_since_a_tare_names_no_tool_that_nobody_gave(export, tmp_path):
     part = part_of(tmp_path, 0.2, "camera")
     _, err = export(of_arm("panda", relative_to="tare"), "--to", "urdf", "--minus", part)

@@ -13,8 +13,9 @@ from armload.errors import UsageError
 from armload.identification import check_usable, plausible_tool
 from armload.identification.tare_age import age_of, seconds_of
 from armload.inertia import InertialParameters
+from armload.payloads import NOTHING
 from armload.posterior import Profile, load_profile
-from armload.recording import NOTHING, has_topics
+from armload.recording import has_topics
 
 DEFAULTS: dict[str, Any] = {
     "robot": "panda",

@@ -8,11 +8,12 @@ from armload.payloads.families import FAMILIES, draw_payload, random_payload, ra
 from armload.payloads.hand import franka_hand, hand_on
 from armload.payloads.mesh import from_mesh
 from armload.payloads.payload import INERTIA_ASSUMED, Box, Payload
-from armload.payloads.payload_file import read_payload, write_payload
+from armload.payloads.payload_file import NOTHING, read_payload, write_payload
 
 __all__ = [
     "FAMILIES",
     "INERTIA_ASSUMED",
+    "NOTHING",
     "Box",
     "Payload",
     "container",

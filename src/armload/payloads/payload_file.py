@@ -31,6 +31,7 @@ from armload.payloads.uncertainty import Uncertainty
 from armload.runtime.atomic import replacing
 
 FORMAT = "armload-payload/1"
+NOTHING = "nothing"  # what options and settings call no payload, in the place of a file
 _TRIPLE = ("mass", "com", "inertia_com")
 _KEYS = ("format", "name", "frame", "phi", *_TRIPLE, "boxes", "std")
 _ALIKE = 0.7  # of two words (difflib): "inertia" is meant as "inertia_com", a comment is not

@@ -3,7 +3,7 @@
 from armload.recording.alignment import Alignment, same_motion
 from armload.recording.chunks import read_long, recording_chunks
 from armload.recording.column_spec import ColumnSpec
-from armload.recording.compensated import NOTHING, arm_as_set, with_gravity
+from armload.recording.compensated import arm_as_set, with_gravity
 from armload.recording.copies import check_own_measurements, digest_of, marks_of, shared_samples
 from armload.recording.files import LOG_SUFFIXES, PACKED_SUFFIXES, has_topics, read_recording, write_recording
 from armload.recording.lerobot import data_set_episodes, is_data_set
@@ -19,7 +19,6 @@ __all__ = [
     "GAP",
     "JITTERED",
     "LOG_SUFFIXES",
-    "NOTHING",
     "PACKED_SUFFIXES",
     "TURN",
     "Alignment",

@@ -12,10 +12,8 @@ from dataclasses import replace
 
 from armload.arms import Arm
 from armload.inertia import InertialParameters
-from armload.payloads import read_payload
+from armload.payloads import NOTHING, read_payload
 from armload.recording.recording import Recording
-
-NOTHING = "nothing"  # in the place of a payload's file
 
 
 def arm_as_set(arm: Arm, carries: str) -> Arm:

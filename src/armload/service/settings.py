@@ -116,8 +116,9 @@ class ArmSettings(ArmOptions):
             PayloadError: its file is missing or none.
         """
         from armload.inertia import InertialParameters  # slow to load, and the supervisor needs none
+        from armload.payloads import NOTHING
 
-        if self.mounted == "nothing":
+        if self.mounted == NOTHING:
             return InertialParameters.zero(bare.frame)
         tool = dataclasses.replace(self, tool=self.mounted or self.tool).tool_on(bare)
         return None if tool is None else tool.parameters

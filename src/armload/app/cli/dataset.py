@@ -6,7 +6,7 @@ import argparse
 import sys
 
 from armload.app.cli.arguments import Parser, add_arm_arguments, add_cluster_argument, at_least, output_folder
-from armload.app.cli.named import arm_of, motion_of, whole_number, world_of
+from armload.app.cli.named import arm_of, motion_of, payload_named, whole_number, world_of
 
 _EXAMPLES = """\
 examples:
@@ -14,7 +14,7 @@ examples:
   armload dataset --out data/wide --payloads random:200 --world real-like:3
   armload dataset --out data/ur --robot ur10e --motion random:0 random:1 --payloads random:50 --rows 600
 
---payloads is loadings (the container's 77), random:COUNT, or JSON files. An interrupted build goes on when it is
+--payloads is loadings (the container's 77), random:COUNT, test, or JSON files. An interrupted build goes on when it is
 started again. `armload train` learns from it.
 """
 
@@ -66,7 +66,7 @@ def parser() -> Parser:
 def run(options: argparse.Namespace) -> None:
     """Build the data set and say what it holds."""
     from armload.lab.dataset import build_dataset
-    from armload.payloads import Payload, container_loadings, random_payloads, read_payload
+    from armload.payloads import Payload, container_loadings, random_payloads
     from armload.simulation import Sensors
 
     arm = arm_of(options)
@@ -77,7 +77,7 @@ def run(options: argparse.Namespace) -> None:
         elif name.startswith("random:"):
             payloads += random_payloads(whole_number(name, "payloads"), options.seed)
         else:
-            payloads.append(read_payload(name))
+            payloads.append(payload_named(name, arm))
     dataset = build_dataset(
         options.out,
         arm,

@@ -70,7 +70,7 @@ def parser() -> Parser:
         metavar="FILE",
         action="append",
         default=[],
-        help="a known part to add first, likewise",
+        help="a known part to add first, likewise; `nothing`: nothing else was mounted",
     )
     add("--frame", metavar="F", help="link to write it about (default: a controller's flange, else that of RESULT)")
     add("--robot", metavar="NAME|FILE.urdf", help="the arm, where frames differ (default: that of RESULT)")
@@ -82,6 +82,7 @@ def run(options: argparse.Namespace) -> None:
     """Read, combine, move, write."""
     from armload.arms import ARMS
     from armload.devices import Load, read_load
+    from armload.payloads import NOTHING
 
     arm = None if options.robot is None else _arm(options.robot, options.frame)
     built_in = options.result in ("franka-hand", "test")
@@ -91,7 +92,7 @@ def run(options: argparse.Namespace) -> None:
         arm = _arm(facts.name)
     doubts = _doubts(options.minus, load)
     added = bool(options.plus) and load.relative_to in _SINCE
-    if added:
+    if added and set(options.plus) != {NOTHING}:
         doubts.append(
             f"see that --plus names all that was mounted {_SINCE[str(load.relative_to)]}, and nothing that is in the "
             "answer already"
@@ -195,9 +196,12 @@ def _part(name: str, load: Load, arm: Arm | None) -> InertialParameters:
     """
     from armload.devices import about
     from armload.identification import plausible_tool
-    from armload.payloads import franka_hand
+    from armload.inertia import InertialParameters
+    from armload.payloads import NOTHING, franka_hand
     from armload.payloads.hand import HAND, fits
 
+    if name == NOTHING:
+        return InertialParameters.zero(load.frame)
     if name == HAND and load.frame is not None and fits(load.frame):
         return franka_hand(load.frame).parameters
     part = about(payload_of(name, arm), load.frame, arm)

@@ -116,8 +116,9 @@ def with_gravity_put_back(
 ) -> tuple[Recording, Recording | None]:
     """Logs with the gravity that their controller took out of the torque: the arm's, and a payload's or `nothing`'s."""
     from armload.identification import uncompensated
+    from armload.payloads import NOTHING
 
-    held = None if payload == "nothing" else payload_of(payload, arm)  # once: it may be a pipe
+    held = None if payload == NOTHING else payload_of(payload, arm)  # once: it may be a pipe
     log, *rest = uncompensated([log] if tare is None else [log, tare], arm, held)
     return log, next(iter(rest), None)
 
