@@ -20,7 +20,7 @@ import pytest
 import yaml
 from tests.recording.test_recording_bags import write_bag
 
-from armload.errors import UsageError
+from armload.errors import RecordingError, UsageError
 from armload.inertia import InertialParameters
 from armload.motion import taie2024
 from armload.payloads import test_payload as example_payload
@@ -366,6 +366,11 @@ def test_the_parameters_say_what_effort_is_on_the_topic_and_in_a_tares_bag(packa
     asked = parameters.Parameters(given.__getitem__)
     assert np.allclose(asked.effort(panda).torque(log.q[7], sent[7]), log.tau[7], atol=1e-9)
     assert np.allclose(asked.tare(panda).tau, log.tau, atol=1e-9)
+    if kind == "without gravity":  # what armload itself has recorded of the topic
+        rows = zip(stamps, stamps, [panda.joint_names] * len(log), log.q, log.dq, log.tau, strict=True)
+        given["tare"] = str(write_bag(tmp_path, "mcap", {"/joint_states": list(rows)}, "recorded"))
+        with pytest.raises(RecordingError, match="gravity in it already"):
+            asked.tare(panda)
 
 
 @pytest.mark.full

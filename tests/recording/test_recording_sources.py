@@ -117,14 +117,14 @@ def rtde(log, constants, moments=False):
 
 
 def nist(log, constants):
-    """NIST's measurements of a UR5, as its file names columns."""
+    """NIST's measurements of a UR5, as flat tables of them name columns."""
     return {
         "ROBOT_TIME": log.t.tolist(),
         **noise(log, "ROBOT_TARGET_JOINT_POSITIONS (J{})", 7),
         **numbered("ROBOT_ACTUAL_JOINT_POSITIONS (J{})", log.q, 1),
         **noise(log, "ROBOT_TARGET_JOINT_VELOCITIES (J{})", 7),
         **numbered("ROBOT_ACTUAL_JOINT_VELOCITIES (J{})", log.dq, 1),
-        **numbered("ROBOT_ACTUAL_JOINT_CURRENTS (J{})", log.tau / np.array(constants), 1),
+        **numbered("ROBOT_ACTUAL_JOINT_CURRENT (J{})", log.tau / np.array(constants), 1),
         **noise(log, "ROBOT_TARGET_JOINT_TORQUES (J{})", 7),
         **noise(log, "ROBOT_JOINT_TEMP (J{})", 7),
     }

@@ -35,7 +35,7 @@ def uncompensated(
         surest = logs[odds.index(max(odds))]
         raise RecordingError(
             f"{surest.source}: tau seems to have gravity in it already: expected torque from which a controller has "
-            "taken gravity; leave out --compensated, or check how the base is mounted (--gravity)"
+            "taken gravity; leave `compensated` out, or check how the base is mounted (--gravity)"
         )
     return restored
 

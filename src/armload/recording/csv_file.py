@@ -28,6 +28,7 @@ from armload.recording.csv_layout import NUMBER, check_named, layout_of
 from armload.recording.dates import nanoseconds
 from armload.recording.recording import Recording
 from armload.recording.table import NotInPieces, read_table, table_chunks
+from armload.recording.text_lines import lines_of, refuse_zeros
 
 _BEGINS_A_NUMBER = re.compile(r"[+-]?[0-9]*\.?[0-9]*([eE][+-]?[0-9]*)?")
 _DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+([eE][+-]?[0-9]{1,5})?")
@@ -82,7 +83,7 @@ class _Csv:
 
     def __init__(self, data: bytes, where: str) -> None:
         self.where = where
-        lines = _lines(data, where)
+        lines = lines_of(data, where)
         self.layout = layout_of(lines, where)
         self.names: Sequence[str] = self.layout.names
         self.notes: list[str] = []
@@ -245,7 +246,7 @@ class _Csv:
             cut = len(last.encode()) + zeros
             self.notes.append(f"{self.where}: dropped the last line, which was cut off: {cut} bytes")
         elif zeros:
-            _refuse_zeros(self.where, self.layout.first + len(self._body) - 1)
+            refuse_zeros(self.where, self.layout.first + len(self._body) - 1)
 
 
 class _Piece(_Csv):
@@ -278,27 +279,3 @@ def _nanoseconds(cell: str) -> float:
 
 def _is_number(cell: str, comma: bool) -> bool:
     return NUMBER.fullmatch(cell) is not None or (comma and _DECIMAL_COMMA.fullmatch(cell) is not None)
-
-
-def _refuse_zeros(where: str, line: int) -> None:
-    raise RecordingError(f"{where}, line {line}: the file holds zero bytes: expected text; it is binary or damaged")
-
-
-def _lines(data: bytes, where: str) -> list[str]:
-    """The lines of a file, without their ends; the last is what follows the last line end."""
-    if not data.strip():
-        raise RecordingError(f"{where} is empty: expected a header line and one line per sample")
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-            raise RecordingError(f"{where} is UTF-16: expected a CSV file in UTF-8; save it as that") from None
-        line = data.count(b"\n", 0, error.start) + 1
-        raise RecordingError(
-            f"{where}, line {line}: byte 0x{data[error.start]:02x} is not text: expected a CSV file in UTF-8; the file "
-            "is binary, damaged or in another encoding"
-        ) from None
-    whole = text.rstrip("\0")  # a file system may have promised blocks that it never wrote
-    if "\0" in whole:
-        _refuse_zeros(where, text.count("\n", 0, text.index("\0")) + 1)
-    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")

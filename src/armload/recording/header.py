@@ -101,8 +101,8 @@ def read_name(name: str, joints: tuple[str, ...]) -> Reading | None:
     'elbow_joint'
     """
     bare, unit = name, None
-    if index := _INDEX.search(name):
-        return _classified(name[: index.start()], int(index[1]), None)
+    if _INDEX.search(name) and (numbered := _numbered(name)):
+        return _classified(*numbered, None)
     if bracket := _BRACKET.search(name):
         bare, unit = name[: bracket.start()], bracket[1].strip().lower()
     if joints and not re.fullmatch(r"(q|dq|tau)[0-9]+", bare):
@@ -113,9 +113,17 @@ def read_name(name: str, joints: tuple[str, ...]) -> Reading | None:
             reading = _classified(bare[: found[0].start()] + " " + bare[found[0].end() :], joint, unit)
             if reading is not None:
                 return reading
-    if number := _LAST_NUMBER.match(bare):
-        return _classified(f"{number[1]} {number[3]}", int(number[2]), unit)
+    if numbered := _numbered(bare):
+        return _classified(*numbered, unit)
     return _time(words_of(bare), unit)
+
+
+def _numbered(name: str) -> tuple[str, int] | None:
+    """A name without its index, and that: the one in brackets, or the last number."""
+    if index := _INDEX.search(name):
+        return name[: index.start()], int(index[1])
+    number = _LAST_NUMBER.match(name)
+    return None if number is None else (f"{number[1]} {number[3]}", int(number[2]))
 
 
 def words_of(name: str) -> list[str]:
@@ -155,18 +163,16 @@ def _classified(rest: str, key: int | str, unit: str | None) -> Reading | None:
 def wanted_of(name: str) -> tuple[str, int]:
     """Whether a column is the "moment" or the "current" that a controller wants of a joint, and the joint's index.
 
-    >>> wanted_of("target_moment_0"), wanted_of("ROBOT_TARGET_JOINT_CURRENTS (J1)"), wanted_of("actual_current_0")
+    >>> wanted_of("target_moment_0"), wanted_of("ROBOT_TARGET_JOINT_CURRENT (J1)"), wanted_of("actual_current_0")
     (('moment', 0), ('current', 1), ('', 0))
     """
-    index = _INDEX.search(name)
-    bare = f"{name[: index.start()]} {index[1]}" if index else name
-    if (number := _LAST_NUMBER.match(bare)) is None:
+    if (numbered := _numbered(name)) is None:
         return "", 0
-    words = words_of(f"{number[1]} {number[3]}")
+    rest, index = numbered
+    words = words_of(rest)
     core = "_".join(word for word in words if word not in NEUTRAL | DESIRED)
     what = "current" if core in CURRENTS else "moment" if core in MOMENTS or WORDS.get(core) == "tau" else ""
-    wanted = what and "target" in words
-    return (what, int(number[2])) if wanted else ("", 0)
+    return (what, index) if what and "target" in words else ("", 0)
 
 
 def _time(words: list[str], unit: str | None) -> Reading | None:

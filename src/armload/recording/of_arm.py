@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from armload.arms import Arm
 from armload.errors import RecordingError
+from armload.payloads import NOTHING
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.compensated import arm_as_set, with_gravity
 from armload.recording.recording import Recording
@@ -35,5 +36,6 @@ class OfArm:
         recording = recording if self._turns is None else self._turns.of(recording)
         if self._set is None:
             return recording
-        note = f"{recording.source}: gravity was put back into the torque, of the arm and of {self._carries}"
+        also = "" if self._carries == NOTHING else f" and of {self._carries}"
+        note = f"{recording.source}: gravity was put back into the torque, of the arm{also}"
         return replace(with_gravity(recording, self._set), notes=(*recording.notes, note))

@@ -50,8 +50,8 @@ def with_velocities_of_positions(recording: Recording) -> Recording:
     precision = np.ones(recording.n), np.full(recording.n, _HELD)
     around = max(AROUND, _STEPS / recording.rate)
     note = (
-        f"{recording.source} has no velocities: they are told by the positions within {around:.2g} s of each moment, "
-        "and by the times, which must be those of the samples"
+        f"{recording.source}: velocities are told by the positions within {around:.2g} s of each moment, and by the "
+        "times, which must be those of the samples"
     )
     return replace(still.with_velocities(_velocities(still, precision, around)), notes=(*recording.notes, note))
 

@@ -40,8 +40,8 @@ class Turns:
     def __init__(self, arm: Arm) -> None:
         self._low, self._high = arm.limits.position_low, arm.limits.position_high
         self._endless = endless(arm)
-        self._added: NDArray[np.float64] | None = None  # to each joint at the last sample, a whole number of turns
-        self._last: tuple[float, NDArray[np.float64]] | None = None  # time and angles of it, as they came
+        # of the last sample: time [s], angles as they came, and what was added to each, whole turns
+        self._last: tuple[float, NDArray[np.float64], NDArray[np.float64]] | None = None
         self._counted: list[int] = []  # joints that have had turns added, in this chunk or before
 
     def of(self, recording: Recording) -> Recording:
@@ -49,15 +49,13 @@ class Turns:
         q, t = np.asarray(recording.q), recording.t
         if not self._endless.any() or recording.n != len(self._low) or not len(t):
             return recording
-        if self._last is None or self._added is None:
-            self._last, self._added = (t[0], q[0]), self._first(q[0])
-        before = np.vstack([self._last[1], q[:-1]])
-        near = (np.diff(t, prepend=self._last[0]) <= GAP)[:, None]
-        step = q - before
+        last_t, last_q, so_far = (t[0], q[0], self._first(q[0])) if self._last is None else self._last
+        near = (np.diff(t, prepend=last_t) <= GAP)[:, None]
+        step = np.diff(q, axis=0, prepend=last_q[None])
         turns = np.rint(step / TURN)
         jumps = near & (np.abs(turns) == 1.0) & (np.abs(step - TURN * turns) < _MOVED)
-        added = self._added - np.cumsum(np.where(jumps, TURN * turns, 0.0), axis=0)
-        self._last, self._added = (float(t[-1]), q[-1].copy()), added[-1].copy()
+        added = so_far - np.cumsum(np.where(jumps, TURN * turns, 0.0), axis=0)
+        self._last = float(t[-1]), q[-1].copy(), added[-1].copy()
         if not added.any():
             return recording
         self._counted = sorted({*self._counted, *(np.flatnonzero(added.any(axis=0)) + 1).tolist()})

@@ -13,20 +13,15 @@ import os
 import re
 import stat
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
-from typing import IO, Any
 
 from armload.errors import ArmloadError, UsageError
 from armload.recording import LOG_SUFFIXES, PACKED_SUFFIXES, data_set_episodes, is_data_set
+from armload.survey.stores import WILD, is_url, logs_in, stamp_of
 
-_URL = re.compile(r"[a-z][a-z0-9+.-]*://")
-_WILD = re.compile(r"[*?\[]")
-_VALIDATORS = ("ETag", "Content-MD5", "Digest", "Last-Modified")  # of a file behind HTTP: all that fsspec keeps
 NO_FILE = "it is a pipe, a socket or a device: expected a regular file; copy what it gives into one"
-_BLOCK = 1 << 20  # bytes that are hashed at a time
 
 
 @dataclass(frozen=True)
@@ -60,8 +55,7 @@ class Log:
             OSError: a file or an object is not there, or its store does not answer.
         """
         if self.remote:
-            fs, path = filesystem(self.name)
-            return _of_web(fs, path) if _is_web(fs) else str(fs.ukey(path))
+            return stamp_of(self.name)
         seen = [(str(file), (about := file.stat()).st_size, about.st_mtime_ns) for file in self.files]
         return hashlib.sha256(repr(seen).encode()).hexdigest()
 
@@ -82,53 +76,6 @@ def cells_of(table: str | Path) -> Path:
     return table.with_name(f"{table.name}.cells")
 
 
-def is_url(path: str) -> bool:
-    """Whether a path names an object store, as fsspec understands it."""
-    return _URL.match(path) is not None
-
-
-def filesystem(url: str) -> tuple[Any, str]:
-    """fsspec's file system of a URL, and the path in it.
-
-    Raises:
-        UsageError: fsspec, or what it needs for this kind of store, is not installed.
-    """
-    try:
-        from fsspec.core import url_to_fs  # type: ignore[import-not-found]
-
-        return url_to_fs(url)
-    except ImportError as error:
-        raise UsageError(
-            f"{url}: object stores are read through fsspec, and {error.name or 'a package of the store'} is missing: "
-            "pip install fsspec, and the store's package (aiohttp of a web server, s3fs, gcsfs, adlfs)"
-        ) from None
-    except ValueError as error:
-        raise UsageError(f"{url}: {error}") from None
-
-
-def _is_web(fs: Any) -> bool:
-    return "http" in ((fs.protocol,) if isinstance(fs.protocol, str) else fs.protocol)
-
-
-def _of_web(fs: Any, url: str) -> str:
-    """What a web server says of a file's content (RFC 9110, 8.8), as fsspec takes it to stay for ever (`ukey`).
-
-    From a server that says nothing, the file is read.
-    """
-    about = fs.info(url)
-    if validators := {name: about[name] for name in _VALIDATORS if about.get(name)}:
-        return hashlib.sha256(repr((url, about["size"], validators)).encode()).hexdigest()
-    with fs.open(url, block_size=0) as stream:  # as it comes: such a server may know no ranges
-        return _digest(stream)
-
-
-def _digest(stream: IO[bytes]) -> str:
-    digest = hashlib.sha256()
-    while block := stream.read(_BLOCK):
-        digest.update(block)
-    return digest.hexdigest()
-
-
 def file_hash(file: Path) -> str:
     """SHA-256 of a file, which is not hashed again while its size and time stay.
 
@@ -144,7 +91,7 @@ def file_hash(file: Path) -> str:
 @lru_cache(maxsize=4096)
 def _hash(file: Path, _size: int, _time: int) -> str:
     with file.open("rb") as stream:
-        return _digest(stream)
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def find_logs(paths: Sequence[str], arm_of: str | None = None, without: Sequence[Path] = ()) -> list[Log]:
@@ -204,8 +151,8 @@ def _expanded(paths: Sequence[str], within: tuple[str, ...] = ()) -> Iterator[st
                 raise UsageError(f"the list {here} names itself, directly or through another list: leave that line out")
             yield from _expanded(_lines(here), (*within, real))
         elif is_url(path):
-            yield from _of_store(*filesystem(path))
-        elif _WILD.search(path) and not Path(path).exists():
+            yield from logs_in(path)
+        elif WILD.search(path) and not Path(path).exists():
             yield from sorted(glob.glob(path, recursive=True))
         else:
             yield path
@@ -218,17 +165,6 @@ def _lines(file: Path) -> list[str]:
     except (OSError, UnicodeDecodeError) as error:
         raise UsageError(f"the list {file} cannot be read: {error}") from None
     return [line for line in lines if line and not line.startswith("#")]
-
-
-def _of_store(fs: Any, inside: str) -> Iterator[str]:
-    suffixes = tuple(LOG_SUFFIXES)
-    there = [inside]
-    if _WILD.search(inside):
-        there = fs.glob(inside)
-    elif not inside.lower().endswith(suffixes):  # to ask a web server whether it is a folder fetches it
-        with suppress(Exception):  # of the store's package: the row of what is named will say why
-            there = fs.find(inside) if fs.isdir(inside) else there
-    yield from (fs.unstrip_protocol(one) for one in there if one == inside or one.lower().endswith(suffixes))
 
 
 def _units(path: str, hidden: set[str]) -> Iterator[tuple[str, int | None, tuple[Path, ...]]]:

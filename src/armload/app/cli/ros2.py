@@ -96,11 +96,7 @@ def parser() -> Parser:
         "--rate", type=at_least(20.0, float, 1000.0), default=200.0, metavar="HZ", help="joint states per second (200)"
     )
     simulate.add_argument(
-        "--topic",
-        type=file_name,
-        default="/joint_states",
-        metavar="T",
-        help="of the joint states (/joint_states)",
+        "--topic", type=file_name, default="/joint_states", metavar="T", help="of the joint states (/joint_states)"
     )
     simulate.add_argument(
         "--command",
