@@ -24,7 +24,7 @@ from script import ROOT, markdown_table, options, say, write, write_table
 from armload import Recording, arm, identify
 from armload.arms import rated_mass
 from armload.errors import RecordingError
-from armload.identification import check_plausible, uncompensated
+from armload.identification import check_plausible
 from armload.identification.torque_scale import torque_scale
 from armload.motion import random_motion
 from armload.recording import with_gravity
@@ -67,7 +67,7 @@ def read(log: Recording, robot: str, form: str) -> Recording:
     """A log as `identify` takes it: looked at, and with gravity put back where that is asked for."""
     log = as_form(log, robot, form)
     if form.endswith(PUT_BACK):
-        (log,) = uncompensated([log], arm(robot))
+        log = with_gravity(log, arm(robot))
     check_plausible(log, arm(robot))
     return log
 
@@ -89,7 +89,8 @@ def is_fine(log: Recording, robot: str, form: str, held: float) -> bool:
 
 def log_odds(log: Recording, robot: str) -> float:
     """Log odds of torque without gravity over torque with it."""
-    with_it, without = torque_scale(log, arm(robot)), torque_scale(with_gravity(log, arm(robot)), arm(robot))
+    known = arm(robot)
+    with_it, without = torque_scale(log, known), torque_scale(log, known, lacks=known.torque)
     assert with_it is not None
     assert without is not None
     return without.evidence - with_it.evidence

@@ -159,6 +159,27 @@ def test_a_tare_taken_from_a_steadied_stream_is_steadied_too(logs):
     assert abs(session.estimate.phi[0]) < 0.3
 
 
+@pytest.mark.parametrize("steady", [False, True])
+def test_a_stream_whose_joints_are_counted_anew_after_a_turn_is_not_doubted_and_can_be_tared(steady):
+    robot, t, endless = arm("gen3"), np.arange(1600) / 200.0, [0, 2, 4, 6]
+    q = 0.5 * np.sin(np.outer(t, np.linspace(0.8, 1.6, 7)))
+    q[:, endless] += np.outer(t, [1.0, -1.0, 1.2, -1.2])
+    dq = np.gradient(q, t, axis=0)
+    log = Recording(t, q, dq, robot.torque(q, dq, np.gradient(dq, t, axis=0)))
+    wrapped = q.copy()
+    wrapped[:, endless] = np.mod(q[:, endless], 2.0 * np.pi)
+    assert np.abs(np.diff(wrapped, axis=0)).max() > 6.0
+    source = Replay(replace(log, q=wrapped), speed=None)
+    session = Session(Steadied(source) if steady else source, robot, method="map")
+    for k, _ in enumerate(session.estimates()):
+        if k == 1200:
+            session.take_tare()
+    session.close()
+    assert session.doubt is None
+    assert session.tare is not None
+    assert np.abs(np.diff(session.tare.recording.q, axis=0)).max() < 0.1
+
+
 def test_a_profile_and_steadied_velocities_are_refused_together(capsys):
     assert main(["live", "sim", "--headless", "--steady", "--profile", "arm.profile"]) == 2
     out, err = capsys.readouterr()

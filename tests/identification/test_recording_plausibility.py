@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from armload.arms import arm, rated_effort, rated_mass
 from armload.devices import Simulator
 from armload.errors import RecordingError
-from armload.identification import check_plausible, uncompensated
+from armload.identification import check_gravity_was_missing, check_plausible
 from armload.identification.exchanged import check_for_exchanged_torques
 from armload.identification.torque_scale import torque_scale
 from armload.inertia import InertialParameters
@@ -479,9 +479,10 @@ def test_gravity_that_was_never_taken_out_is_not_put_back(real_data):
     )
     for logs in ([loaded], [loaded, empty]):
         with pytest.raises(RecordingError, match=r"ur10e_\w+\.csv: tau seems to have gravity in it already"):
-            uncompensated(logs, robot)
-        taken = [replace(log, tau=log.tau - robot.torque(log.q)) for log in logs]
-        for log, restored in zip(logs, uncompensated(taken, robot), strict=True):
+            check_gravity_was_missing([with_gravity(log, robot) for log in logs], robot)
+        taken = [with_gravity(replace(log, tau=log.tau - robot.torque(log.q)), robot) for log in logs]
+        check_gravity_was_missing(taken, robot)
+        for log, restored in zip(logs, taken, strict=True):
             assert_allclose(restored.tau, log.tau, atol=1e-9)
 
 
@@ -497,11 +498,21 @@ def test_a_tare_tells_with_the_run_whether_gravity_is_in_the_torque(name, seed):
         for k, payload in enumerate((heavy(0.5 * rated_mass(robot), seed), None))
     ]
     with pytest.raises(RecordingError, match="gravity in it already"):
-        uncompensated(logs, robot)
+        check_gravity_was_missing([with_gravity(log, robot) for log in logs], robot)
     set_to = franka_hand().parameters if name == "panda" else None
     loaded = robot if set_to is None else robot.with_payload(set_to)
     taken = [replace(log, tau=log.tau - loaded.torque(log.q)) for log in logs]
-    assert_allclose(uncompensated(taken, robot, set_to)[0].tau, logs[0].tau, atol=1e-9)
+    restored = [with_gravity(log, robot, set_to) for log in taken]
+    check_gravity_was_missing(restored, robot)
+    assert_allclose(restored[0].tau, logs[0].tau, atol=1e-9)
+
+
+def test_gravity_is_put_back_once():
+    robot, still = arm("panda"), np.zeros((3, 7))
+    log = with_gravity(Recording(np.arange(3) * 0.1, still, still, still), robot)
+    with pytest.raises(RecordingError, match="said twice"):
+        with_gravity(log, robot)
+    assert log.between(0.0, 0.15).gravity_of is log.gravity_of
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2, 3])

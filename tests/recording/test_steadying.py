@@ -78,6 +78,17 @@ def test_what_is_no_sample_is_handed_on_in_its_turn_and_the_others_are_told_as_w
     np.testing.assert_allclose(told, [s.dq for _, _, s in through(without)], atol=0.1 * NOISE)
 
 
+def test_angles_that_are_counted_anew_after_a_turn_are_told_as_if_they_went_on():
+    t = np.arange(400) / 200.0
+    q = np.outer(t, [2.0, -2.5])
+    log = Recording(t, q, [2.0, -2.5] + NOISE * np.random.default_rng(1).normal(size=q.shape), np.zeros_like(q))
+    wrapped = Recording(t, np.mod(q + np.pi, 2.0 * np.pi) - np.pi, log.dq, log.tau)
+    assert np.abs(np.diff(wrapped.q, axis=0)).max() > 6.0
+    out = through(list(wrapped))
+    np.testing.assert_allclose([s.dq for _, _, s in out], [s.dq for _, _, s in through(list(log))], atol=1e-9)
+    assert all(np.array_equal(s.q, wrapped.q[k]) for _, k, s in out)
+
+
 def test_samples_that_come_twice_tell_nothing_more():
     log, _ = swinging(200.0, 1.0)
     once, twice = through(list(log)), through([s for s in log for _ in range(2)])

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from armload.identification.answer import Identification
     from armload.identification.arm_health import ArmHealth
     from armload.identification.choice import DEFAULT, Choice, choose, default_for
-    from armload.identification.compensated import uncompensated
+    from armload.identification.compensated import check_gravity_was_missing
     from armload.identification.identify_log import check_usable, identify
     from armload.identification.left_out import LEFT_OUT
     from armload.identification.methods import METHODS, Method
@@ -25,6 +25,7 @@ __all__ = [
     "Choice",
     "Identification",
     "Method",
+    "check_gravity_was_missing",
     "check_plausible",
     "check_usable",
     "choose",
@@ -32,7 +33,6 @@ __all__ = [
     "identify",
     "plausible_known",
     "plausible_tool",
-    "uncompensated",
 ]
 
 __getattr__, __dir__ = on_first_use(__name__)

@@ -14,6 +14,7 @@ from armload.arms import Arm
 from armload.arms import arm as arm_named
 from armload.errors import IdentificationError
 from armload.identification.answer import Identification, Segment
+from armload.identification.compensated import check_gravity_was_missing
 from armload.identification.found import Asked, found_in
 from armload.identification.notes import (
     ALLOWED,
@@ -88,6 +89,7 @@ def identify(
         if log is not None:
             check_usable(log, arm)
     if tare is not None:
+        check_gravity_was_missing([recording, tare], arm)
         check_own_measurements(recording, tare)
     drift, aged = (0.0, ()) if tare is None else drift_since(tare, recording, tare_age)
     profile = load_profile(profile) if isinstance(profile, str | Path) else profile

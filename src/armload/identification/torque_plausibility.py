@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from armload.arms import ARMS, Arm, rated_effort
 from armload.errors import RecordingError
+from armload.identification.compensated import check_gravity_was_missing
 from armload.identification.exchanged import check_for_exchanged_joints, check_for_exchanged_torques
 from armload.identification.thresholds import (
     CURRENT_HIGH,
@@ -27,7 +28,7 @@ from armload.identification.thresholds import (
     PARTS_SHARE,
 )
 from armload.identification.torque_scale import TorqueScale, log_odds_of_change, torque_scale
-from armload.recording import Recording, blocks, largest, parts_of, span, with_gravity
+from armload.recording import Recording, blocks, largest, parts_of, span
 
 # of the arm's own torque: of what holds less the percentage is said
 _NEARLY_NONE = 0.25
@@ -43,6 +44,7 @@ def check_torque(recording: Recording, arm: Arm) -> None:
     """
     _check_effort(recording, arm)
     if recording.channel == "measured":  # the others need not hold the arm's own weight
+        check_gravity_was_missing([recording], arm)
         _check_torque_goes_on(recording)
         _check_no_torque_is_dead(recording)
         _check_no_torque_stands_still(recording, arm)
@@ -212,7 +214,7 @@ def _check_form(recording: Recording, arm: Arm, seen: TorqueScale) -> None:
     constants = (facts and facts.torque_constants) or (CURRENT_USUAL,) * arm.n
     forms = {
         "currents": torque_scale(recording, arm, np.array(constants)),
-        "compensated": torque_scale(with_gravity(recording, arm), arm),
+        "compensated": torque_scale(recording, arm, lacks=arm.torque),
     }
     sound = {
         name: fit.evidence

@@ -27,6 +27,7 @@ is averaged over the cuts, none of which is likelier than another.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -51,6 +52,7 @@ from armload.regression.prior import REACH
 _MOST_WINDOWS = 120  # spread over the log: one factor needs no more, whatever the log's length
 _ALIKE = 4  # neighbouring windows that err alike, and count for one
 _POINTS = 9  # model evaluations per window of 0.25 s: the trapezoidal rule errs by 0.3 % at 1 Hz
+_WEIGHT = np.r_[0.5, np.ones(_POINTS - 2), 0.5] / (_POINTS - 1)  # of each in its mean
 
 
 class TorqueScale(NamedTuple):
@@ -89,15 +91,20 @@ class TorqueScale(NamedTuple):
 
 
 def torque_scale(
-    recording: Recording, arm: Arm, constants: NDArray[np.float64] | None = None, most: int = _MOST_WINDOWS
+    recording: Recording,
+    arm: Arm,
+    constants: NDArray[np.float64] | None = None,
+    most: int = _MOST_WINDOWS,
+    lacks: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
 ) -> TorqueScale | None:
     """Fit the model above to a log; None if the log is too short to say anything.
 
-    constants: (n,) [N·m/A] if tau is current. most: windows, spread over the log.
+    constants: (n,) [N·m/A] if tau is current. most: windows, spread over the log. lacks: what was taken out of tau, at
+    positions (M, n), (M, n) [N·m].
     """
     if constants is not None:
         recording = replace(recording, tau=recording.tau * constants)
-    system = _System.of(recording, arm, most)
+    system = _System.of(recording, arm, most, lacks)
     if system is None:
         return None
     A, b, y, inner = system.A, system.b, system.y, system.inner
@@ -154,12 +161,20 @@ class _System(NamedTuple):
     y: NDArray[np.float64]
 
     @classmethod
-    def of(cls, recording: Recording, arm: Arm, most: int = _MOST_WINDOWS) -> _System | None:
+    def of(
+        cls,
+        recording: Recording,
+        arm: Arm,
+        most: int = _MOST_WINDOWS,
+        lacks: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
+    ) -> _System | None:
         """The model above of a log; None: it is too short to say anything."""
         parts = _some(windows(recording), most)
         if len(parts.first) < 2:
             return None
         own, payload, tau, friction, moving = _averages(recording, arm, parts)
+        if lacks is not None:
+            tau = tau + _mean(recording, parts, lacks)
         W, n = own.shape
         rated = rated_effort(arm)
         offset = np.broadcast_to(np.eye(n), (W, n, n))
@@ -183,18 +198,30 @@ def _averages(recording: Recording, arm: Arm, parts: Windows) -> tuple[NDArray, 
     """Window means: bare arm's torque (W, n), payload regressor (W, n, 10), tau, tanh(dq/width) and its size (W, n)."""
     q, dq = recording.q, recording.dq
     T = (recording.t[parts.last] - recording.t[parts.first])[:, None]
-    rows = np.linspace(parts.first, parts.last, _POINTS, axis=1).round().astype(int)  # (W, P)
+    rows = _points(parts)
     shape = rows.shape
     p, drift = (x.reshape(*shape, -1) for x in arm.momentum(q[rows.ravel()], dq[rows.ravel()]))
     Y = momentum_regressor(arm.frame_motion(q[rows.ravel()]), dq[rows.ravel()])
     Yp, Yd = (x.reshape(*shape, arm.n, 10) for x in Y)
-    weight = np.r_[0.5, np.ones(_POINTS - 2), 0.5] / (_POINTS - 1)  # trapezoidal mean
-    own = (p[:, -1] - p[:, 0]) / T + np.einsum("wpi,p->wi", drift, weight)
-    payload = (Yp[:, -1] - Yp[:, 0]) / T[:, :, None] + np.einsum("wpij,p->wij", Yd, weight)
+    own = (p[:, -1] - p[:, 0]) / T + np.einsum("wpi,p->wi", drift, _WEIGHT)
+    payload = (Yp[:, -1] - Yp[:, 0]) / T[:, :, None] + np.einsum("wpij,p->wij", Yd, _WEIGHT)
     tau = integrals(recording, lambda rows: recording.tau[rows], parts) / T
     friction = integrals(recording, lambda rows: np.tanh(dq[rows] / FRICTION_WIDTH), parts) / T
     moving = integrals(recording, lambda rows: np.abs(np.tanh(dq[rows] / FRICTION_WIDTH)), parts) / T
     return own, payload, tau, friction, moving
+
+
+def _points(parts: Windows) -> NDArray[np.intp]:
+    """The rows (W, P) of each window that the model is evaluated at."""
+    return np.linspace(parts.first, parts.last, _POINTS, axis=1).round().astype(np.intp)
+
+
+def _mean(
+    recording: Recording, parts: Windows, torque: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+) -> NDArray[np.float64]:
+    """Window means (W, n) of a torque that positions (M, n) tell [N·m]."""
+    rows = _points(parts)
+    return np.einsum("wpi,p->wi", torque(recording.q[rows.ravel()]).reshape(*rows.shape, -1), _WEIGHT)
 
 
 def _some(parts: Windows, most: int) -> Windows:

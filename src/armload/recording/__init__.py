@@ -11,7 +11,7 @@ from armload.recording.recording import BLOCK, CHANNELS, GAP, JITTERED, Recordin
 from armload.recording.spooled import blocks, largest, parts_of, span
 from armload.recording.steadied import steadied, with_velocities_of_positions
 from armload.recording.steadying import Steadying
-from armload.recording.turns import TURN, endless
+from armload.recording.turns import TURN, Turns, endless
 
 __all__ = [
     "BLOCK",
@@ -26,6 +26,7 @@ __all__ = [
     "Recording",
     "Sample",
     "Steadying",
+    "Turns",
     "arm_as_set",
     "blocks",
     "check_own_measurements",

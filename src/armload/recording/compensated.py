@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from armload.arms import Arm
+from armload.errors import RecordingError
 from armload.inertia import InertialParameters
 from armload.payloads import NOTHING, read_payload
 from armload.recording.recording import Recording
@@ -39,6 +40,12 @@ def with_gravity(recording: Recording, arm: Arm, payload: InertialParameters | N
     Args:
         recording: of torque without gravity [N·m]. arm: with its base's orientation.
         payload: about the arm's payload frame; None: the controller was set to none.
+
+    Raises:
+        RecordingError: it was put back already.
     """
+    if recording.gravity_of is not None:
+        raise RecordingError(f"{recording.source}: `compensated` is said twice: leave one of them out")
     loaded = arm if payload is None else arm.with_payload(payload)
-    return replace(recording, tau=recording.tau + loaded.torque(recording.q), channel="measured")
+    tau = recording.tau + loaded.torque(recording.q)
+    return replace(recording, tau=tau, channel="measured", gravity_of=loaded)

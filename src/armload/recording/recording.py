@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from html import escape
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armload.errors import RecordingError
+
+if TYPE_CHECKING:
+    from armload.arms import Arm
 
 # What a torque column can mean; "measured" is the contract: rigid body + friction, gravity included.
 CHANNELS = ("measured", "desired", "external")
@@ -48,6 +51,8 @@ class Recording:
         source: where it comes from (a path), for messages and provenance.
         notes: what a reader did to the log that its user should know (rows dropped, say), one sentence each.
         epoch: time since 1970 at t = 0 [s], where the source has stamps that t is counted from; else 0.
+        gravity_of: the arm, with what its controller was set to carry, whose gravity was put back into tau
+            (`with_gravity`); None: tau is as the source has it.
 
     Raises:
         RecordingError: wrong shapes, a number that is not finite, times out of order; the message names row and column
@@ -63,6 +68,7 @@ class Recording:
     source: str = "recording"
     notes: tuple[str, ...] = ()
     epoch: float = 0.0
+    gravity_of: Arm | None = None
 
     def __post_init__(self) -> None:
         for name in ("t", "q", "dq", "tau"):

@@ -125,7 +125,7 @@ class SpooledRecording(Recording):
 
     def _in_memory(self, index: NDArray) -> Recording:
         q, dq, tau = (getattr(self, name)[index] for name in QUANTITIES)
-        return Recording(self.t[index], q, dq, tau, self.channel, self.joint_names, self.source, self.notes, self.epoch)
+        return Recording(self.t[index], q, dq, tau, **_about(self))
 
 
 def spooled(chunks: Iterable[Recording], where: str, folder: str | Path | None = None) -> Recording:
@@ -149,7 +149,12 @@ def spooled(chunks: Iterable[Recording], where: str, folder: str | Path | None =
     t, n = np.concatenate(times), last.n
     on_disk: list[Any] = [OnDisk(file, 3 * n, slice(k * n, (k + 1) * n), slice(0, len(t))) for k in range(3)]
     q, dq, tau = on_disk
-    return SpooledRecording(t, q, dq, tau, last.channel, last.joint_names, where, last.notes, last.epoch)
+    return SpooledRecording(t, q, dq, tau, **{**_about(last), "source": where})
+
+
+def _about(recording: Recording) -> dict[str, Any]:
+    """What a recording says beside its samples."""
+    return {name: value for name, value in vars(recording).items() if name not in ("t", *QUANTITIES)}
 
 
 def blocks(count: int) -> Iterator[slice]:

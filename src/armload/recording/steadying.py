@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from armload.recording.recording import GAP, Sample
 from armload.recording.steadied import AROUND, precision_of, told
+from armload.recording.turns import TURN
 
 _ROWS = 1024  # of the arrays that the last samples are in, at first; they grow where more come within `AROUND`
 _THIRD = np.array([-1.0, 3.0, -3.0, 1.0])  # differences of them: of white noise they have 20 times the power
@@ -59,6 +60,9 @@ class Steadying:
         out, step = [], t - self._t[self._stop - 1] if self._stop else 1.0
         if self._stop and not -GAP <= step <= GAP:
             out, step = self.flush(), 1.0
+        if both is not None and self._stop:  # angles of an endless joint are counted anew after each turn
+            q = both[: self._n]
+            q -= TURN * np.rint((q - self._both[self._stop - 1, : self._n]) / TURN)
         self._stuck = 0 if step > 0.0 else self._stuck + 1
         good = both is not None and step > 0.0
         self._held.append(_Held(sample, tag, t if good else None))

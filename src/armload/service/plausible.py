@@ -11,7 +11,7 @@ from armload.errors import ArmloadError
 from armload.identification import check_plausible
 from armload.identification.torque_scale import TorqueScale, torque_scale
 from armload.online import Health, OnlineEstimate
-from armload.recording import Recording, Sample, steadied
+from armload.recording import Recording, Sample, Turns, steadied
 from armload.service.recent import Recent
 
 _IMPLAUSIBLE = "the samples are not plausible, the answer is not to be trusted"
@@ -118,7 +118,8 @@ class Plausibility:
             return False
         try:
             # a source puts its joints in order, and to look for another order would keep the stream waiting
-            check_plausible(replace(log, source=self._name, joint_names=self._arm.joint_names), self._arm)
+            log = Turns(self._arm).of(replace(log, source=self._name, joint_names=self._arm.joint_names))
+            check_plausible(log, self._arm)
         except ArmloadError as error:
             self.doubt = f"{_IMPLAUSIBLE}: {error}"
             self._doubted, self._rests_on = self._moved, min(self._since, _LOOKED_AT)

@@ -21,7 +21,7 @@ from armload.inertia import Z95, InertialParameters
 from armload.online import OnlineEstimate, OnlineIdentifier
 from armload.posterior import Known, Profile
 from armload.posterior.map import PUBLISH
-from armload.recording import Recording, Sample
+from armload.recording import Recording, Sample, Turns
 from armload.service.history import History
 from armload.service.plausible import Plausibility
 from armload.service.recent import Recent
@@ -251,7 +251,7 @@ class Session:
                 changed, or the method can use no tare.
         """
         self._running()
-        log = tare_log(self._recent, self.estimate)
+        log = Turns(self.arm).of(tare_log(self._recent, self.estimate))
         tare = Tare(log, held=self.source.truth(float(log.t[-1])), taken=True)
         self._exchange(tare, self._ordered[1], f"tared with the last {log.duration:.0f} s")
 

@@ -17,7 +17,7 @@ from armload.app.cli.arguments import (
     output_file,
 )
 from armload.app.cli.export import FORMS, write
-from armload.app.cli.named import arm_of, columns_of, payload_named, read_logs, with_gravity_put_back
+from armload.app.cli.named import arm_of, payload_named, read_logs, with_gravity_put_back
 from armload.app.cli.printing import print_json, print_note, working, write_json
 
 _EXAMPLES = """\
@@ -96,8 +96,6 @@ def run(options: argparse.Namespace) -> None:
         log, tare = read_logs(options, arm, options.log, options.tare, topics=topics)
         assert log is not None
         if options.compensated is not None:
-            if any(columns_of(options, of_tare).compensated for of_tare in (False, True)):
-                raise UsageError("--compensated and --columns compensated=… put gravity back twice: leave one out")
             log, tare = with_gravity_put_back(log, tare, arm, options.compensated)
         result = identify(
             log,

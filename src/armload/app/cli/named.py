@@ -115,12 +115,11 @@ def with_gravity_put_back(
     log: Recording, tare: Recording | None, arm: Arm, payload: str
 ) -> tuple[Recording, Recording | None]:
     """Logs with the gravity that their controller took out of the torque: the arm's, and a payload's or `nothing`'s."""
-    from armload.identification import uncompensated
     from armload.payloads import NOTHING
+    from armload.recording import with_gravity
 
     held = None if payload == NOTHING else payload_of(payload, arm)  # once: it may be a pipe
-    log, *rest = uncompensated([log] if tare is None else [log, tare], arm, held)
-    return log, next(iter(rest), None)
+    return with_gravity(log, arm, held), None if tare is None else with_gravity(tare, arm, held)
 
 
 def arm_of(options: argparse.Namespace) -> Arm:
