@@ -13,6 +13,7 @@ is left out. Sources, in the order of the tables:
   `timestamp` in seconds since the controller was started, actual_current in amperes.
 - LeRobot data sets: `observation.state`, `timestamp` in seconds, `episode_index`. ALOHA: `observations/qpos`.
 - Kinova's Kortex, `BaseCyclic.Feedback`: actuators[0].position, .velocity, .torque; degrees.
+- Simulink: `tout` beside what a model logs; signals.values of a structure with time.
 - NIST's robot measurements: ROBOT_ACTUAL_JOINT_POSITIONS (J1) …
 - polymetis (DROID), `franka_torque_control_client.cpp`: motor_torques_measured is libfranka's tau_J.
 """
@@ -64,7 +65,7 @@ WANTED = ("target_moment", "target_current")
 MOMENTS = frozenset(("moment", "moments"))  # what RTDE calls the torque that is wanted
 
 TIMES = frozenset(
-    ("t", "time", "timestamp", "timestamps", "stamp", "header_stamp", "time_stamp", "elapsed", "elapsed_time")
+    ("t", "time", "timestamp", "timestamps", "stamp", "header_stamp", "time_stamp", "elapsed", "elapsed_time", "tout")
 )
 NAMES = frozenset({"name", "names"})
 EPISODE = "episode_index"

@@ -1,4 +1,4 @@
-"""Named arrays as a table: what Parquet, NPZ and HDF5 hold."""
+"""Named arrays as a table: what Parquet, NPZ, HDF5 and MATLAB hold."""
 
 from __future__ import annotations
 

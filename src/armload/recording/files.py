@@ -13,6 +13,7 @@ from armload.recording.column_spec import ColumnSpec
 from armload.recording.csv_file import read_csv, write_csv
 from armload.recording.hdf5_file import read_hdf5
 from armload.recording.lerobot import is_data_set, read_data_set
+from armload.recording.mat_file import read_mat
 from armload.recording.npz_file import read_npz, write_npz
 from armload.recording.of_arm import OfArm
 from armload.recording.parquet_file import read_parquet, write_parquet
@@ -27,10 +28,11 @@ _READERS = {
     ".parquet": read_parquet,
     ".npz": read_npz,
     **dict.fromkeys((".hdf5", ".h5"), read_hdf5),
+    ".mat": read_mat,
 }
 LOG_SUFFIXES = tuple(suffix for suffix in (*_READERS, *BAG_SUFFIXES) if suffix not in _NAMED)
 PACKED_SUFFIXES = (".gz", ".bz2", ".xz", ".zst", ".zip")
-_FORMS = "CSV, Parquet, NPZ, HDF5, ROS bag or LeRobot folder"
+_FORMS = "CSV, Parquet, NPZ, HDF5, MATLAB, ROS bag or LeRobot folder"
 _WRITERS = {".csv": write_csv, ".parquet": write_parquet, ".npz": write_npz}
 _PACKED = {  # how a file begins that a program has packed
     b"\x1f\x8b": "gzip",
@@ -40,8 +42,10 @@ _PACKED = {  # how a file begins that a program has packed
 }
 _HEAD = 2048  # bytes by which a file is known; HDF5 may leave up to so many to others before it begins
 _ZIP = b"PK\x03\x04"
+_OCTAVE = b"# Created by Octave"
 _SIGNATURES = {
     b"PAR1": (".parquet",),
+    b"MATLAB ": (".mat",),
     _ZIP: (".npz",),
     b"\x89HDF\r\n\x1a\n": (".hdf5", ".h5"),
     b"SQLite format 3\x00": (".db3",),
@@ -59,7 +63,7 @@ def read_recording(
     rate: float | None = None,
     episode: int | None = None,
 ) -> Recording:
-    """Read the log of an arm: a table (CSV, Parquet, NPZ, HDF5), a ROS bag, or an episode of a LeRobot data set.
+    """Read the log of an arm: a table (CSV, Parquet, NPZ, HDF5, MATLAB), a ROS bag, an episode of a LeRobot data set.
 
     Args:
         path: the file, or the folder of a ROS 2 bag or of a LeRobot data set. Columns of a table are known by the names
@@ -164,6 +168,8 @@ def _looks_like(path: Path, suffix: str) -> str:
     for signature, suffixes in _SIGNATURES.items():
         if head.startswith(signature):
             return "" if suffix in suffixes else f": it starts like a {suffixes[0]} file; rename it"
+    if head.startswith(_OCTAVE):
+        return ": it is Octave's own text; save it with -v7"
     if suffix not in TABLES and _is_text(head) and not any(signature in head for signature in _SIGNATURES):
         return ": it is text; if it is a table, its name should end in .csv"
     return ""

@@ -17,7 +17,7 @@ from armload.runtime.extras import install
 
 def read_hdf5(path: Path, where: str, arm: Arm | None = None, spec: ColumnSpec | None = None) -> Recording:
     """Read an HDF5 log; see `read_recording` for what it raises."""
-    h5py = _h5py_for(where)
+    h5py = h5py_for(where)
     try:
         with h5py.File(path, "r") as file:
             columns = {name: Column(width, lambda data=data: data[()]) for name, width, data in _arrays(h5py, file)}
@@ -30,7 +30,7 @@ def read_hdf5(path: Path, where: str, arm: Arm | None = None, spec: ColumnSpec |
 
 def hdf5_chunks(path: Path, where: str, arm: Arm | None, spec: ColumnSpec, size: int) -> Iterator[Recording]:
     """An HDF5 log, `size` rows at a time; see `table_chunks` for what it raises."""
-    h5py = _h5py_for(where)
+    h5py = h5py_for(where)
     with h5py.File(path, "r") as file:
         arrays = _arrays(h5py, file)
 
@@ -43,7 +43,12 @@ def hdf5_chunks(path: Path, where: str, arm: Arm | None, spec: ColumnSpec, size:
         yield from table_chunks(pieces(), where, arm, spec)
 
 
-def _h5py_for(where: str) -> Any:
+def h5py_for(where: str) -> Any:
+    """The module that reads HDF5.
+
+    Raises:
+        RecordingError: it is not installed.
+    """
     try:
         import h5py  # type: ignore[import-not-found]
     except ImportError:

@@ -82,7 +82,7 @@ def map_columns(
             given[key] = named_columns(template, key, names, where, arm)
     if not given and not any(family.quantity in QUANTITIES for family in families):
         raise RecordingError(
-            f"{where} has no columns named q1, dq1, tau1, …: found {abridged(names)}; name yours, such as "
+            f"{where} has no columns named q1, dq1, tau1, …: found {abridged(names) or 'none'}; name yours, such as "
             '--columns "t=TIME,q=POSITION{i},dq=VELOCITY{i},tau=TORQUE{i}"'
         )
     header = Header(names, families, times, form, _joint_count(families, given, where, arm), arm, where, dates)

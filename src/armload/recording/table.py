@@ -1,4 +1,4 @@
-"""From any table with a header to a Recording: what CSV, Parquet, NPZ and HDF5 have in common."""
+"""From any table with a header to a Recording: what CSV, Parquet, NPZ, HDF5 and MATLAB have in common."""
 
 from __future__ import annotations
 

@@ -36,8 +36,8 @@ examples:
 
   armload identify flight.csv --robot my_arm.urdf --columns "t=clock,q=enc_{i},dq=rate_{i},tau=load_{i},t_unit=ms"
 
-A log is a table (CSV, Parquet, NPZ, HDF5) with time, position, velocity and torque of each joint under the names that
-tools give them (docs/recordings.md), in seconds, radians, rad/s and N·m, or a ROS 1 or ROS 2 bag of
+A log is a table (CSV, Parquet, NPZ, HDF5, MATLAB) with time, position, velocity and torque of each joint under the
+names that tools give them (docs/recordings.md), in seconds, radians, rad/s and N·m, or a ROS 1 or ROS 2 bag of
 sensor_msgs/JointState. Torque is the measured joint torque, with gravity in it.
 """
 

@@ -33,7 +33,7 @@ examples:
 
 MOTION is taie2024, a JSON file, the table (CSV) that `export` wrote, or random:SEED. `check` says whether the arm may
 run a motion, exits with 3 if not, and says which parameters of a payload it can tell, and how well; it takes a log
-(CSV, Parquet, NPZ, HDF5, ROS bag) as well.
+(CSV, Parquet, NPZ, HDF5, MATLAB, ROS bag) as well.
 """
 
 
