@@ -270,6 +270,19 @@ def test_plotjugglers_rows_of_other_topics_are_left_out_with_a_note(tmp_path):
     assert any(f"left out {ROWS} row(s) without position" in note for note in found.notes)
 
 
+def test_the_log_of_panda_py_reads(tmp_path):
+    """`np.savez(path, **panda.get_log())`: lists of vectors, times in whole milliseconds, as doubles of one element."""
+    log = canonical(PANDA)
+    arrays = {name: np.zeros((len(log), k)) for name, k in (("O_T_EE", 16), ("elbow", 2), ("tau_ext_hat_filtered", 7))}
+    times = 5000.0 + np.round(1e3 * log.t)[:, None]
+    said = {"time": times, "q": log.q, "dq": log.dq, "tau_J": log.tau}
+    np.savez(tmp_path / "log.npz", **arrays, **said, control_command_success_rate=np.ones((len(log), 1)))
+    found = read_recording(tmp_path / "log.npz", PANDA)
+    np.testing.assert_allclose(found.t - found.t[0], (times - times[0])[:, 0] / 1e3, atol=1e-12)
+    for name in ("q", "dq", "tau"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(log, name))
+
+
 def test_the_log_of_libfranka_of_2017_reads(tmp_path):
     log, path = canonical(PANDA), tmp_path / "log.csv"
     state = {"duration": milliseconds(log)["time"], "success rate": [1.0] * len(log)}

@@ -12,6 +12,7 @@ is left out. Sources, in the order of the tables:
 - Universal Robots' RTDE client (`csv_writer.py`, separated by spaces) and ur_rtde (`startFileRecording`): actual_q_0 …,
   `timestamp` in seconds since the controller was started, actual_current in amperes.
 - LeRobot data sets: `observation.state`, `timestamp` in seconds, `episode_index`. ALOHA: `observations/qpos`.
+- panda-py, `Panda::getLog`: q, dq, tau_J, tau_ext_hat_filtered, and time in milliseconds, a list of one.
 - Kinova's Kortex, `BaseCyclic.Feedback`: actuators[0].position, .velocity, .torque; degrees.
 - Simulink: `tout` beside what a model logs; signals.values of a structure with time.
 - NIST's robot measurements: ROBOT_ACTUAL_JOINT_POSITIONS (J1) …
@@ -111,6 +112,7 @@ class Form(NamedTuple):
 FORMS = (
     Form("libfranka", ("state_q", "state_dq", "state_tau_j", "success_rate"), ("time",), "ms", torque="state_tau_j"),
     Form("libfranka", ("q", "dq", "tau_j", "success_rate", "sent_commands"), ("duration",), "ms", torque="tau_j"),
+    Form("panda-py", ("q", "dq", "tau_j", "control_command_success_rate"), ("time",), "ms", torque="tau_j"),
     Form("rostopic echo -p", ("field_q", "field_tau_j"), _STAMPS, "ns", r"field\..*", "field_tau_j"),
     Form("rostopic echo -p", ("field_position",), _STAMPS, "ns", r"field\..*"),
     Form("PlotJuggler", ("__time",), ("__time",), "s", r"/.*/header/stamp(/\w+)?"),

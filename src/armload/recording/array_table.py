@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from armload.errors import RecordingError
 from armload.recording.dates import nanoseconds_of
+from armload.recording.header import is_time
 
+_EXACT = 2.0**53  # below which a double tells whole numbers apart
 WIDEST = 64  # elements a row; a longer one is no list of joints but an image, or lies across
 
 
@@ -30,6 +32,8 @@ class Column(NamedTuple):
 class ArrayTable:
     """Arrays by name (`table.Table`); elements of a list-valued one are columns `name[0]`, … or `name/joint`.
 
+    A list of times, of one element, is the time itself.
+
     Args:
         columns: the arrays that could be columns.
         where: the file.
@@ -42,7 +46,8 @@ class ArrayTable:
         self._columns = columns
         self._elements: list[tuple[str, int | None]] = []
         for name, column in columns.items():
-            self._elements += [(name, k) for k in (range(column.width) if column.width is not None else (None,))]
+            counted = column.width is not None and not (column.width == 1 and is_time(name))
+            self._elements += [(name, k) for k in (range(column.width or 0) if counted else (None,))]
         self.names: Sequence[str] = [_called(name, k, columns[name].elements) for name, k in self._elements]
         self.dates: Sequence[int] = [k for k, (name, _) in enumerate(self._elements) if columns[name].dates]
         self._load = cache(lambda name: columns[name].load())
@@ -59,9 +64,11 @@ class ArrayTable:
         return np.column_stack(found).astype(float)
 
     def whole_numbers(self, place: int) -> NDArray[np.int64] | None:
-        """A column of integers (N,), exactly; None: it holds other numbers."""
+        """A column of whole numbers (N,), exactly; None: it holds others."""
         column = self._column(place)
-        return column.astype(np.int64) if column.dtype.kind in "iu" else None
+        if column.dtype.kind == "f" and not np.all((np.abs(column) < _EXACT) & (column == np.rint(column))):
+            return None
+        return column.astype(np.int64)
 
     def text(self, place: int) -> str | None:
         """The one text that a column holds in all rows."""
@@ -77,6 +84,7 @@ class ArrayTable:
     def _column(self, place: int) -> NDArray:
         name, element = self._elements[place]
         array = self._load(name)
+        array = array[:, 0] if element is None and array.ndim == 2 else array
         if array.dtype.kind == "M":
             array = nanoseconds_of(array)
         if array.dtype.kind not in "iuf":

@@ -184,6 +184,15 @@ def _time(words: list[str], unit: str | None) -> Reading | None:
     return None
 
 
+def is_time(name: str) -> bool:
+    """Whether a column's name is one of time.
+
+    >>> is_time("time"), is_time("header.stamp"), is_time("q")
+    (True, True, False)
+    """
+    return _time(words_of(name), None) is not None
+
+
 def families_of(names: Sequence[str], joints: tuple[str, ...]) -> tuple[list[Family], list[tuple[int, Reading]]]:
     """The families of position, velocity, torque and joint names in a header, and the columns that may be time."""
     families: dict[tuple[str, str, bool], Family] = {}

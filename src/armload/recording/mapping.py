@@ -116,7 +116,7 @@ def map_columns(
 def _form_of(names: Sequence[str], families: Sequence[Family]) -> Form | None:
     """The tool that wrote the header, if all its marks are there."""
     there = {family.stem for family in families}
-    there.update(name.lower() for name in names)
+    there.update(name.lower().removesuffix("[0]") for name in names)
     there.update("_".join(words_of(name)) for name in names)
     return next((form for form in FORMS if there.issuperset(form.marks)), None)
 
