@@ -84,6 +84,30 @@ def test_parquet_knows_the_names_that_csv_knows(tmp_path, names):
     same(read_recording(tmp_path / "log.parquet", PANDA), one)
 
 
+def test_one_array_is_read_by_the_numbers_of_its_columns_or_the_names_of_its_fields(tmp_path):
+    one = log()
+    np.save(tmp_path / "table.npy", np.column_stack([one.t, one.q, one.dq, one.tau]))
+    same(read_recording(tmp_path / "table.npy", PANDA, columns="t=1,q={2..8},dq={9..15},tau={16..22}"), one)
+    fields = [("t", float), ("q", float, 7), ("dq", float, 7), ("tau", float, 7)]
+    np.save(tmp_path / "fields.npy", np.array([tuple(sample) for sample in one], dtype=fields))
+    same(read_recording(tmp_path / "fields.npy", PANDA), one)
+
+
+@pytest.mark.parametrize(
+    ("array", "says"),
+    [
+        (np.zeros((3, 4, 5)), r"shape \(3, 4, 5\)"),
+        (np.zeros((9, 3), complex), "complex128"),
+        (np.array([{"q": 1.0}], dtype=object), "Python objects"),
+        (np.zeros((50, 22)), "no columns named .*found 1, 2"),
+    ],
+)
+def test_one_array_that_is_no_log_is_refused(tmp_path, array, says):
+    np.save(tmp_path / "log.npy", array, allow_pickle=True)
+    with pytest.raises(RecordingError, match=says):
+        read_recording(tmp_path / "log.npy", PANDA)
+
+
 def test_npz_knows_the_names_that_csv_knows(tmp_path):
     one = log()
     arrays = {"timestamps": one.t, "joint_positions": one.q, "joint_velocities": one.dq, "joint_torques": one.tau}

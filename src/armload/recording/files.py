@@ -14,19 +14,20 @@ from armload.recording.csv_file import read_csv, write_csv
 from armload.recording.hdf5_file import read_hdf5
 from armload.recording.lerobot import is_data_set, read_data_set
 from armload.recording.mat_file import read_mat
-from armload.recording.npz_file import read_npz, write_npz
+from armload.recording.npz_file import read_npy, read_npz, write_npz
 from armload.recording.of_arm import OfArm
 from armload.recording.parquet_file import read_parquet, write_parquet
 from armload.recording.recording import Recording
 from armload.recording.ros_bag import BAG_SUFFIXES, read_bag
 from armload.runtime.atomic import replacing
 
-_NAMED = (".dat", ".log", ".asc")  # text that is read where it is named; in a folder it is mostly something else
-TABLES = (".csv", ".tsv", ".txt", *_NAMED)
+_NAMED = (".dat", ".log", ".asc", ".npy")  # read where it is named; in a folder it is mostly something else
+TABLES = (".csv", ".tsv", ".txt", ".dat", ".log", ".asc")
 _READERS = {
     **dict.fromkeys(TABLES, read_csv),
     ".parquet": read_parquet,
     ".npz": read_npz,
+    ".npy": read_npy,
     **dict.fromkeys((".hdf5", ".h5"), read_hdf5),
     ".mat": read_mat,
 }
@@ -47,6 +48,7 @@ _SIGNATURES = {
     b"PAR1": (".parquet",),
     b"MATLAB ": (".mat",),
     _ZIP: (".npz",),
+    b"\x93NUMPY": (".npy",),
     b"\x89HDF\r\n\x1a\n": (".hdf5", ".h5"),
     b"SQLite format 3\x00": (".db3",),
     b"\x89MCAP0\r\n": (".mcap",),

@@ -1,4 +1,4 @@
-"""Logs as NumPy archives, such as one with the arrays t (N,), q, dq, tau (N, n); never with pickled objects."""
+"""Logs as NumPy archives, such as one with the arrays t (N,), q, dq, tau (N, n), or as one array; never pickled."""
 
 from __future__ import annotations
 
@@ -44,12 +44,38 @@ def read_npz(path: Path, where: str, arm: Arm | None = None, spec: ColumnSpec | 
         raise RecordingError(f"{where}: channel is {channel[:24]!r}: expected one of {', '.join(CHANNELS)}")
     joints = tuple(str(name) for name in np.ravel(arrays["joint_names"])) if "joint_names" in arrays else None
     columns = {
-        name: Column(array.shape[1] if array.ndim == 2 else None, lambda array=array: array, array.dtype.kind == "M")
+        name: _column(array)
         for name, array in arrays.items()
         if name not in _LABELS and (array.ndim == 1 or (array.ndim == 2 and 0 < array.shape[1] <= WIDEST))
     }
     log = read_table(ArrayTable(columns, where), where, arm, spec or ColumnSpec(), channel=channel)
     return log if joints is None or len(joints) != log.n else replace(log, joint_names=joints)
+
+
+def read_npy(path: Path, where: str, arm: Arm | None = None, spec: ColumnSpec | None = None) -> Recording:
+    """Read one array (N, k) of numbers, whose columns are called by their numbers, the first being 1, or with fields.
+
+    See `read_recording` for what it raises.
+    """
+    try:
+        array = np.load(path, allow_pickle=False)
+    except Exception as error:
+        raise RecordingError(f"{where} is not a NumPy array that can be read: {_reason(error)}") from None
+    if array.dtype.names is not None and array.ndim == 1:
+        columns = {name: array[name] for name in array.dtype.names}
+    elif array.ndim == 2 and array.dtype.kind in "iuf":
+        columns = {str(k + 1): array[:, k] for k in range(array.shape[1])}
+    else:
+        raise RecordingError(
+            f"{where} holds an array of shape {array.shape} of {array.dtype}: expected (N, k) numbers, a row for each "
+            "time, or (N,) with named fields"
+        )
+    table = ArrayTable({name: _column(column) for name, column in columns.items()}, where)
+    return read_table(table, where, arm, spec or ColumnSpec())
+
+
+def _column(array: NDArray) -> Column:
+    return Column(array.shape[1] if array.ndim == 2 else None, lambda: array, array.dtype.kind == "M")
 
 
 def _reason(error: Exception) -> str:
