@@ -72,9 +72,16 @@ def test_the_forms_of_the_command_are_those_of_the_room():
 
 @pytest.mark.parametrize("form", NAMED)
 def test_every_form_is_printed_without_a_word_beside_it(export, form):
-    out, err = export(
-        of_arm("ur10e") if form in ("ur", "ur-payload") else result_of(HELD, relative_to="tare"), "--to", form
+    of_maker = {"ur": "ur10e", "ur-payload": "ur10e", "kinova": "gen3", "xarm": "xarm7"}
+    of_kuka = of_arm("iiwa14", relative_to="tare")
+    result = (
+        of_arm(of_maker[form])
+        if form in of_maker
+        else of_kuka
+        if form == "kuka"
+        else result_of(HELD, relative_to="tare")
     )
+    out, err = export(result, "--to", form)
     assert "1.2" in out
     assert err == ""
 
@@ -91,8 +98,11 @@ def of_arm(name, **changes):
         ("ur10e", "franka-desk"),
         ("ur5e", "franka"),
         ("fr3", "ur-payload"),
-        ("iiwa14", "ur"),  # of makers whose forms are not written
+        ("iiwa14", "ur"),
         ("gen3", "franka"),
+        ("xarm7", "kuka"),
+        ("panda", "kinova"),
+        ("ur5e", "xarm"),
     ],
 )
 def test_a_load_for_another_maker_s_arm_is_said_to_be_one(export, name, to):
@@ -320,8 +330,9 @@ def test_what_the_log_did_not_determine_is_said_on_both_streams(export):
     out, err = export(result, "--to", "sdf")
     assert "not determined by the log: Ixx, Ixy, Ixz, Iyy, Iyz, Izz" in out
     assert "not determined by the log: Ixx, Ixy, Ixz, Iyy, Iyz, Izz" in err
-    _, err = export(result, "--to", "ur-payload")
-    assert "written as known beforehand" not in err  # it has no inertia
+    for form in ("ur-payload", "kinova", "xarm"):  # they have no inertia
+        out, err = export(result, "--to", form)
+        assert "not determined" not in out + err
     out, err = export(result, "--to", "franka-desk")  # JSON has no comments
     json.loads(out)
     assert "not determined" in err
@@ -346,10 +357,15 @@ def test_moments_that_are_hardly_known_are_said_beside_the_notes_of_an_identific
         ("ur", "tool", "--plus"),
         ("ur-payload", "tare", "at the tare, if any, with --plus"),
         ("ur", "arm", ""),
+        ("xarm", "tool", "everything on the flange: add the tool with --plus"),
+        ("kinova", "profile", "in the profile's logs, if any, with --plus"),
+        ("kinova", "arm", ""),
+        ("kuka", "arm", "--minus"),
+        ("kuka", "tare", ""),
     ],
 )
 def test_what_the_controller_counts_itself_is_said(export, to, relative_to, says):
-    robot = "panda" if to == "franka" else "ur5e"
+    robot = {"franka": "panda", "kuka": "iiwa7", "kinova": "gen3", "xarm": "xarm7"}.get(to, "ur5e")
     err = export(of_arm(robot, relative_to=relative_to), "--to", to)[1]
     assert says in err
     assert (err == "") == (says == "")

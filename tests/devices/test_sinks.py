@@ -30,12 +30,14 @@ from armload.devices import (
 )
 from armload.devices.franka import writer as franka_robot
 from armload.devices.franka.form import desk_text
+from armload.devices.kuka.form import kuka_load
+from armload.devices.load import HARDLY_KNOWN
 from armload.devices.ur import writer as ur_robot
 from armload.errors import ArmError, ArmloadError, InertiaError, PayloadError, SinkError
 from armload.identification import Identification
 from armload.identification.intervals import intervals
 from armload.inertia import InertialParameters, is_consistent
-from armload.payloads import franka_hand, hand_on, random_payload, test_payload, write_payload
+from armload.payloads import INERTIA_ASSUMED, franka_hand, hand_on, random_payload, test_payload, write_payload
 
 FLANGES = {
     "panda": "panda_link8",
@@ -178,6 +180,43 @@ def test_set_target_payload_has_the_order_of_the_manual():
 def test_set_payload_has_mass_and_centre():
     m, cog = read_script(export_load(Load(skew_body("tool0")), "ur-payload"), "set_payload")
     assert_is_the_body(m, cog, INERTIA)
+
+
+def test_an_iiwa_s_load_data_are_in_millimetres_and_about_the_principal_axes():
+    text = export_load(Load(skew_body("lbr_link_ee")), "kuka")
+    numbers = {
+        name: [float(x) for x in re.findall(r"-?[0-9.]+(?:e-?[0-9]+)?", re.search(rf"{where}", text)[1])]
+        for name, where in {
+            "mass": r"setMass\((.*)\);",
+            "com": r"setCenterOfMass\((.*)\);",
+            "axes": r"axes (A .*) \[deg\]",
+            "moments": r"moments (JX .*) \[kg",
+        }.items()
+    }
+    a, b, c = (np.radians(x) for x in numbers["axes"])
+    R = rotation_of((0, 0, 1), a) @ rotation_of((0, 1, 0), b) @ rotation_of((1, 0, 0), c)  # each about the new axis
+    inertia = R @ np.diag(numbers["moments"]) @ R.T
+    assert_is_the_body(numbers["mass"][0], np.array(numbers["com"]) / 1e3, inertia, atol=1e-9)
+
+
+def test_the_principal_axes_of_an_iiwa_s_load_are_those_nearest_to_the_flange_s():
+    straight = InertialParameters.from_com(1.0, (0.0, 0.0, 0.1), np.diag([3e-3, 1e-3, 2.5e-3]))
+    assert kuka_load(straight).axes == [0.0, 0.0, 0.0]
+    assert kuka_load(straight).moments == [3e-3, 1e-3, 2.5e-3]
+    for seed in range(50):
+        turned = np.abs(kuka_load(random_payload(seed).parameters).axes)
+        assert turned.max() < 90.0
+
+
+def test_a_gen3_s_tool_and_an_xarm_s_load_are_everything_on_the_flange():
+    tool, sent = SimpleNamespace(tool_mass_center=SimpleNamespace()), []
+    config = SimpleNamespace(GetToolConfiguration=lambda: tool, SetToolConfiguration=sent.append)
+    exec(export_load(Load(skew_body("end_effector_link")), "kinova"), {"control_config": config})
+    assert sent == [tool]
+    assert_is_the_body(tool.tool_mass, [getattr(tool.tool_mass_center, axis) for axis in "xyz"], INERTIA)
+    xarm = SimpleNamespace(set_tcp_load=lambda mass, com: sent.append((mass, np.array(com) / 1e3)))
+    exec(export_load(Load(skew_body("link_eef")), "xarm"), {"arm": xarm})
+    assert_is_the_body(*sent[-1], INERTIA)
 
 
 def test_urscript_has_no_exponents():
@@ -372,7 +411,17 @@ def test_malformed_results_are_refused(tmp_path, change, says):
         read_load(path)
 
 
-@pytest.mark.parametrize("form", [f for f in FORMS if f != "franka-desk"])
+@pytest.mark.parametrize("form", [name for name, form in FORMS.items() if not form.inertia])
+def test_a_text_without_inertia_says_nothing_of_it(form):
+    leaning = "rests on what payloads are usually like more than on the log"
+    remarks = (f"{leaning}: m·rz, Ixy", f"{HARDLY_KNOWN}: Ixx", INERTIA_ASSUMED, "weighed")
+    text = export_load(Load(skew_body(), (True,) * 4 + (False,) * 6, "ur5e", "arm", remarks=remarks), form)
+    assert f"{leaning}: m·rz\n" in text
+    assert "weighed" in text
+    assert not any(word in text for word in ("Ixx", "Ixy", "inertia", "not determined"))
+
+
+@pytest.mark.parametrize("form", [name for name, form in FORMS.items() if form.inertia and name != "franka-desk"])
 def test_every_text_says_what_was_not_determined(form):
     load = Load(skew_body(), (True,) * 4 + (False,) * 6, "panda", "arm")
     text = export_load(load, form)

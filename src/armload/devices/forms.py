@@ -8,18 +8,26 @@ from typing import NamedTuple
 
 from armload.devices.files.form import mjcf_text, sdf_text, urdf_text
 from armload.devices.franka.form import desk_text, set_load_text
+from armload.devices.kinova.form import tool_configuration_text
+from armload.devices.kuka.form import sunrise_text
 from armload.devices.load import Load
 from armload.devices.ros2.form import inertia_stamped_text
 from armload.devices.ur.form import set_payload_text, set_target_payload_text
+from armload.devices.xarm.form import set_tcp_load_text
 from armload.errors import SinkError
 from armload.runtime.atomic import replacing
 
 
 class Form(NamedTuple):
-    """One form: what it is, and the text of a load in it, given the load and the name of its link."""
+    """One form: what it is, the text of a load in it, given the load and the name of its link, and what it holds."""
 
     what: str
     text: Callable[[Load, str], str]
+    inertia: bool = True
+
+    def held_of(self, load: Load) -> Load:
+        """What the form holds of a load: nothing is said of what it does not."""
+        return load if self.inertia else load.without_inertia()
 
 
 # What `export_load` can write, by name.
@@ -27,13 +35,16 @@ FORMS = {
     "franka": Form("Python for libfranka's setLoad, on top of Desk's end effector", lambda a, _: set_load_text(a)),
     "franka-desk": Form("end effector for Franka's Desk (JSON)", lambda a, _: desk_text(a)),
     "ur": Form("URScript set_target_payload, everything on the flange", lambda a, _: set_target_payload_text(a)),
-    "ur-payload": Form("URScript set_payload (before 5.10), no inertia", lambda a, _: set_payload_text(a)),
+    "ur-payload": Form("URScript set_payload (before 5.10), no inertia", lambda a, _: set_payload_text(a), False),
+    "kuka": Form("Java and object template for KUKA Sunrise", lambda a, _: sunrise_text(a)),
+    "kinova": Form("Python for Kinova's Kortex, no inertia", lambda a, _: tool_configuration_text(a), False),
+    "xarm": Form("Python for UFACTORY's set_tcp_load, no inertia", lambda a, _: set_tcp_load_text(a), False),
     "urdf": Form("URDF: a link and a fixed joint to the frame", urdf_text),
     "mjcf": Form("MuJoCo: a body", mjcf_text),
     "sdf": Form("SDF: a model with one link", sdf_text),
     "ros2": Form("ROS 2 geometry_msgs/msg/InertiaStamped (YAML)", lambda a, _: inertia_stamped_text(a)),
 }
-CONTROLLERS = ("franka", "franka-desk", "ur", "ur-payload")  # their forms are about the flange
+CONTROLLERS = ("franka", "franka-desk", "ur", "ur-payload", "kuka", "kinova", "xarm")  # about the flange
 
 
 def export_load(load: Load, to: str, path: str | Path | None = None, name: str = "payload") -> str:
@@ -59,7 +70,7 @@ def export_load(load: Load, to: str, path: str | Path | None = None, name: str =
         raise SinkError(
             "no body can have these parameters: take the nearest one, load.as_body(), or identify on a faster motion"
         )
-    text = FORMS[to].text(load, name)
+    text = FORMS[to].text(FORMS[to].held_of(load), name)
     if path is not None:
         try:
             with replacing(path) as temporary:

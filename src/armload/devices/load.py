@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 _KNOWN = (True,) * 10
 _MOMENTS = (4, 7, 9)  # places of Ixx, Iyy, Izz
+_LEANING = "rests on what payloads are usually like more than on the log"
 HARDLY_KNOWN = "moments of inertia uncertain by more than half of their value"
 _RELATIVE = {"before": "empty arm before"}  # what reads otherwise than it is called
 _MISFIT = 3.0  # standard deviations between what is left and the nearest body, beyond which too much was taken off
@@ -141,6 +142,12 @@ class Load:
             return self
         return replace(self, parameters=InertialParameters(self._nearest(), self.frame))
 
+    def without_inertia(self) -> Load:
+        """The same for who does not ask for an inertia: nothing is said of that."""
+        determined = tuple(known or name[0] == "I" for known, name in zip(self.determined, NAMES, strict=True))
+        remarks = (_without_moments(remark) for remark in self.remarks)
+        return replace(self, determined=determined, remarks=tuple(remark for remark in remarks if remark))
+
     def description(self) -> tuple[str, ...]:
         """Lines to write above the numbers: whose load, about which frame, and what was not measured."""
         what = f"payload of {self.robot}" if self.robot else "payload"
@@ -241,10 +248,21 @@ def assumed(payload: Payload) -> tuple[str, ...]:
     return () if payload.inertia_known else (INERTIA_ASSUMED,)
 
 
+def _without_moments(remark: str) -> str:
+    """A remark without the moments of inertia that it names; empty: it is of nothing else."""
+    from armload.payloads import INERTIA_ASSUMED
+
+    said, _, names = remark.partition(": ")
+    if said not in (_LEANING, HARDLY_KNOWN):
+        return "" if remark == INERTIA_ASSUMED else remark
+    left = [name for name in names.split(", ") if name[0] != "I"]
+    return f"{said}: {', '.join(left)}" if left else ""
+
+
 def _leaning(determined: Sequence[bool], rests_on_prior: Sequence[bool]) -> tuple[str, ...]:
     """A remark on parameters that the log determines, though less than what payloads are usually like does."""
     names = [n for n, known, prior in zip(NAMES, determined, rests_on_prior, strict=True) if known and prior]
-    return (f"rests on what payloads are usually like more than on the log: {', '.join(names)}",) if names else ()
+    return (f"{_LEANING}: {', '.join(names)}",) if names else ()
 
 
 def _loose(value: NDArray, low: NDArray, high: NDArray, known: Sequence[bool]) -> tuple[str, ...]:

@@ -17,9 +17,15 @@ if TYPE_CHECKING:
     from armload.inertia import InertialParameters
 
 # when what is not in a load was mounted, by what it is relative to
+_EVERYTHING = {  # what is counted from the flange on, whatever was mounted when
+    "ur": "a UR's payload",
+    "ur-payload": "a UR's payload",
+    "kinova": "Kinova's tool",
+    "xarm": "an xArm's load",
+}
 _SINCE = {"tare": "at the tare", "before": "at the tare", "profile": "in the profile's logs"}
 # the names of armload.devices.FORMS, so that --help need not import them; a test compares
-FORMS = ("franka", "franka-desk", "ur", "ur-payload", "urdf", "mjcf", "sdf", "ros2")
+FORMS = ("franka", "franka-desk", "ur", "ur-payload", "kuka", "kinova", "xarm", "urdf", "mjcf", "sdf", "ros2")
 _EXAMPLES = """\
 examples:
   armload identify run.csv --robot panda --json > held.json
@@ -33,6 +39,9 @@ forms:
   franka-desk  end effector for Franka's Desk (JSON)
   ur           URScript set_target_payload, everything on the flange
   ur-payload   URScript set_payload (before software 5.10), without inertia
+  kuka         Java and object template for an LBR iiwa's Sunrise
+  kinova       Python for a Gen3's Kortex: everything on the interface module, without inertia
+  xarm         Python for UFACTORY's set_tcp_load: everything on the flange, without inertia
   urdf, mjcf, sdf   a link, body or model
   ros2         geometry_msgs/msg/InertiaStamped as YAML
 
@@ -125,6 +134,7 @@ def write(
         SinkError: the form's frame is not known, or no body has the load's parameters and a mass above 0.
     """
     from armload.devices import CONTROLLERS, export_load
+    from armload.devices import FORMS as FORMS_OF
     from armload.devices.load import HARDLY_KNOWN
     from armload.inertia import held
 
@@ -150,7 +160,7 @@ def write(
         print_note("nothing seems to be held: the mass is within three standard deviations of zero")
     if elsewhere:
         print_note(f"a controller counts from its flange; these numbers are about {load.frame}, as was asked for")
-    numbers = [note for note in _on_numbers(body, to) if not earlier or note.startswith(HARDLY_KNOWN)]
+    numbers = [note for note in _on_numbers(FORMS_OF[to].held_of(body)) if not earlier or note.startswith(HARDLY_KNOWN)]
     for note in (*earlier, *doubts, *numbers, *_on_use(body, to, added)):
         print_note(note)
     if out is None:
@@ -219,10 +229,9 @@ def _doubts(parts: list[str], load: Load) -> list[str]:
     return doubts
 
 
-def _on_numbers(load: Load, to: str) -> list[str]:
+def _on_numbers(load: Load) -> list[str]:
     """What the numbers that are written rest on."""
-    written = (name for name in load.undetermined if to != "ur-payload" or name[0] != "I")  # it has no inertia
-    missing = ", ".join(written)
+    missing = ", ".join(load.undetermined)
     return [*([f"not determined by the log: {missing}; written as known beforehand"] if missing else []), *load.remarks]
 
 
@@ -241,11 +250,13 @@ def _on_use(load: Load, to: str, added: bool) -> list[str]:
         notes.append(f"it was identified on a {load.robot}: another maker's flange may have other axes")
     if to == "franka" and load.relative_to == "arm" and not added:
         notes.append("this contains any hand that is mounted: take off what Desk counts already with --minus")
-    if to in ("ur", "ur-payload") and load.relative_to == "tool":
-        notes.append("a UR's payload is everything on the flange: add the tool with --plus")
-    if to in ("ur", "ur-payload") and load.relative_to in _SINCE:
+    if to == "kuka" and load.relative_to == "arm" and not added:
+        notes.append("this contains any tool that is mounted: take off what has load data already with --minus")
+    if to in _EVERYTHING and load.relative_to == "tool":
+        notes.append(f"{_EVERYTHING[to]} is everything on the flange: add the tool with --plus")
+    if to in _EVERYTHING and load.relative_to in _SINCE:
         then = _SINCE[load.relative_to]
-        notes.append(f"a UR's payload is everything on the flange: add what was mounted {then}, if any, with --plus")
+        notes.append(f"{_EVERYTHING[to]} is everything on the flange: add what was mounted {then}, if any, with --plus")
     if to in CONTROLLERS and load.frame is None:
         notes.append("the payload names no frame: it is taken to be about the flange")
     return notes

@@ -1,0 +1,1 @@
+"""Kinova Gen3: the form of a payload."""

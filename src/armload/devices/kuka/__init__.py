@@ -1,0 +1,1 @@
+"""KUKA LBR iiwa: the form of a payload."""

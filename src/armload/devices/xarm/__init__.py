@@ -1,0 +1,1 @@
+"""UFACTORY xArm: the form of a payload."""
