@@ -201,6 +201,18 @@ def test_a_phone_shows_mass_and_its_curve_without_scrolling(holding):
         assert box["y"] + box["height"] <= height
 
 
+@pytest.mark.parametrize("tab", [PHONE], indirect=True, ids=["phone"])
+def test_on_a_phone_nothing_of_the_table_is_cut_off(holding):
+    until(lambda: mass(holding))
+    width, _ = PHONE
+    for k in range(10):
+        for cell in holding.locator(f"[data-armload=phi{k}] td").all():
+            box = cell.bounding_box()
+            assert box["x"] >= 0.0
+            assert box["x"] + box["width"] <= width
+            assert cell.evaluate("cell => cell.scrollWidth <= cell.clientWidth")
+
+
 def test_downloads_read_back(holding, tmp_path):
     tab = holding
     with tab.expect_download() as started:

@@ -19,6 +19,7 @@ from armload.service.settings import is_loopback
 # [length of all links] from what is looked at to the eye: the whole arm is seen, or the payload and the wrist
 _FROM_AFAR, _FROM_CLOSE = (0.7, -0.7, 0.28), (0.3, -0.3, 0.12)
 _PHONE = 576  # [px] of width below which viser shows all panels as one sheet, over the lower 60 % of the picture
+_FARTHER = 1.6  # times as far on a phone, whose picture is narrow and whose sheet hides the lower part
 _HIGHER = 0.3  # of the picture's height above its middle: the middle of what the sheet leaves
 
 
@@ -98,7 +99,9 @@ def look_from(camera: Any, reach: float, close: bool) -> None:
 
     On a phone, whose lower part shows the numbers, at a point below: what is at the origin is in the upper part then.
     """
-    x, y, z = (reach * x for x in (_FROM_CLOSE if close else _FROM_AFAR))
+    phone = camera.image_width < _PHONE
+    far = reach * (_FARTHER if phone else 1.0)
+    x, y, z = (far * x for x in (_FROM_CLOSE if close else _FROM_AFAR))
     seen = 2.0 * math.hypot(x, y, z) * math.tan(0.5 * camera.fov)  # [m] from the lower edge to the upper one
-    below = _HIGHER * seen if camera.image_width < _PHONE else 0.0
+    below = _HIGHER * seen if phone else 0.0
     camera.position, camera.look_at = (x, y, z - below), (0.0, 0.0, -below)
