@@ -770,9 +770,9 @@ def test_numbers_have_units_and_what_is_not_determined_says_so(held):
     table = parameters(estimate, HELD)
     assert table.count("<tr") == 11
     assert "kg·m²" in table
-    assert table.count("undetermined") == np.count_nonzero(~estimate.determined)
+    assert table.count("unknown") == np.count_nonzero(~estimate.determined)
     at_first = OnlineIdentifier(held.arm).update(0.0, np.zeros(7), np.zeros(7), np.zeros(7))
-    assert parameters(at_first).count("undetermined") == 10
+    assert parameters(at_first).count("unknown") == 10
     assert "kg</div>" not in headline(at_first)
     assert "nothing has happened" in events([])
 

@@ -72,7 +72,7 @@ def legend_of(group: Group) -> str:
         f"&nbsp;{NAMES[place]}</span>"
         for colour, place in zip(COLOURS, group.places, strict=False)
     )
-    return f"<b>{group.title}</b> [{group.unit}]{keys}"
+    return f'<b>{group.title}</b> <span style="white-space:nowrap">[{group.unit}]</span>{keys}'
 
 
 def data_of(group: Group, t: NDArray[np.float64], rows: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:

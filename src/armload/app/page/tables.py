@@ -21,7 +21,8 @@ _DECIMALS = (3, 4, 4, 4, 5, 5, 5, 5, 5, 5)
 _LARGE = "font-size:22px"
 _LINES = 4  # of the status: what is below it stays where it is while it says more or less
 # widths of the table's columns, so that none moves while a number becomes known: name, value, ± 95 %, truth, unit
-_WIDTHS = ("3.4em", "auto", "7.6em", "auto", "3.8em")
+_WIDTHS = ("3.1em", "auto", "5.2em", "auto", "3.7em")
+_NARROW = 300  # [px] that the table needs; viser's narrowest panel leaves 302
 # answers that are not of now, though they come: they are grey, with their age before them
 _OLD = (Unknown.BEHIND, Unknown.UNUSABLE)
 
@@ -151,14 +152,14 @@ def parameters(estimate: OnlineEstimate | None, truth: InertialParameters | None
         cells = [
             ("left", name),
             ("right", _signed(estimate.phi[k], digits)),
-            ("right", f"{half:.{digits}f}" if known and np.isfinite(half) else "undetermined"),
+            ("right", f"{half:.{digits}f}" if known and np.isfinite(half) else "unknown"),
             *([] if truth is None else [("right", _signed(truth.phi[k], digits))]),
             ("left", UNITS[k]),
         ]
         row = "".join(f'<td style="text-align:{side};padding:0 4px">{text}</td>' for side, text in cells)
         rows.append(f'<tr data-armload="phi{k}" style="{"" if known else SOFT}">{row}</tr>')
     return (
-        f'<div style="{TEXT};overflow-x:auto"><table style="width:100%;min-width:330px;table-layout:fixed;'
+        f'<div style="{TEXT};overflow-x:auto"><table style="width:100%;min-width:{_NARROW}px;table-layout:fixed;'
         f'border-collapse:collapse;white-space:nowrap"><tr>{head}</tr>{"".join(rows)}</table></div>'
     )
 
