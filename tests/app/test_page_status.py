@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from html import escape
 from time import monotonic, sleep
 
 import numpy as np
@@ -182,6 +183,9 @@ def test_torque_of_the_wrong_sign_does_not_fit_and_is_said_once(panda, analytic_
     headline = tables.headline(session.estimate, None, status)
     assert session.doubt[:40] not in headline
     assert "not to be trusted: see below" in headline
+    for note in session.estimate.notes:  # each once, below: the headline stays short
+        assert escape(note) not in headline
+        assert tables.status(session.estimate, status).count(escape(note)) == 1
     assert "nothing is held</div>" not in headline.split('data-armload="state"')[1]
     assert "font-weight:600" not in headline  # no large black number of what cannot be so
     assert "font-weight:600" in tables.headline(session.estimate)

@@ -77,9 +77,15 @@ class PageServer:
 
 def look_at_arm(server: Any, reach: float) -> None:
     """Where whoever opens the page looks from: at an arm of a length [m], without the maker's logo."""
+    middle = (0.15 * reach, 0.0, 0.32 * reach)
     server.initial_camera.position = (0.85 * reach, -0.7 * reach, 0.6 * reach)
-    server.initial_camera.look_at = (0.15 * reach, 0.0, 0.32 * reach)
+    server.initial_camera.look_at = middle
     server.gui.configure_theme(show_logo=False, show_share_button=False)
+
+    @server.on_client_connect
+    def _(client: Any) -> None:
+        if client.camera.image_width < _PHONE:
+            _look(client.camera, middle, (reach * _FROM_AFAR[0], reach * _FROM_AFAR[1], reach * _FROM_AFAR[2]))
 
 
 def look_at_middle(server: Any, reach: float) -> None:
@@ -95,13 +101,20 @@ def look_at_middle(server: Any, reach: float) -> None:
 
 
 def look_from(camera: Any, reach: float, close: bool) -> None:
-    """Look at the origin: close if the payload is there, or else from as far as the whole arm of a length [m] needs.
+    """Look at the origin: close if the payload is there, or else from as far as the whole arm of a length [m] needs."""
+    x, y, z = (reach * x for x in (_FROM_CLOSE if close else _FROM_AFAR))
+    _look(camera, (0.0, 0.0, 0.0), (x, y, z))
 
-    On a phone, whose lower part shows the numbers, at a point below: what is at the origin is in the upper part then.
+
+def _look(camera: Any, at: tuple[float, float, float], away: tuple[float, float, float]) -> None:
+    """Look at a point [m] from another, so far away from it.
+
+    On a phone, whose lower part shows the numbers, from farther and at a point below: what is looked at is in the upper
+    part then.
     """
     phone = camera.image_width < _PHONE
-    far = reach * (_FARTHER if phone else 1.0)
-    x, y, z = (far * x for x in (_FROM_CLOSE if close else _FROM_AFAR))
+    x, y, z = ((_FARTHER if phone else 1.0) * d for d in away)
     seen = 2.0 * math.hypot(x, y, z) * math.tan(0.5 * camera.fov)  # [m] from the lower edge to the upper one
     below = _HIGHER * seen if phone else 0.0
-    camera.position, camera.look_at = (x, y, z - below), (0.0, 0.0, -below)
+    camera.position = (at[0] + x, at[1] + y, at[2] + z - below)
+    camera.look_at = (at[0], at[1], at[2] - below)

@@ -42,8 +42,11 @@ def headline(
     if estimate.determined[0]:
         mass = f"{_signed(estimate.phi[0], 3).removeprefix('+')} ± {Z95 * estimate.std[0]:.3f} kg"
     doubted = _doubted(estimate, misfit)
-    remarks = [note for note in _remarks(estimate, misfit) if not note.startswith("standing")]  # a rest is no doubt
-    sure = (why is None or why.reason is Unknown.SOURCE_ENDED) and not remarks
+    remarks = _remarks(estimate, misfit)
+    sure = (why is None or why.reason is Unknown.SOURCE_ENDED) and not any(
+        not note.startswith("standing")  # a rest is no doubt
+        for note in remarks
+    )
     colour = BAD if doubted else GOOD if sure else WAIT
     state = state_of(estimate, misfit)
     if why is not None and why.reason in _OLD and status is not None and status.age is not None:
@@ -54,7 +57,8 @@ def headline(
     size = f"{_LARGE};{SOFT}" if old else f"{_LARGE};font-weight:600"
     lines = [
         f'<div style="{size}" data-armload="mass">{mass}</div>',
-        f'<div style="font-size:15px" data-armload="state">{dot(colour)}{escape(state)}</div>',
+        f'<div data-armload="state"><span style="font-size:15px">{dot(colour)}{escape(state)}</span>'
+        f"{'' if doubted else _lines(remarks)}</div>",
         f'<div style="{SOFT if old else ""}" data-armload="com">{_com(estimate, doubted)}</div>',
         f'<div style="{SOFT}" data-armload="truth">{_truth(truth)}</div>' if truth is not None else "",
         f'<div style="{SOFT}">{escape(rests_on(estimate))}</div>',
@@ -76,15 +80,19 @@ def gone(status: Status) -> str:
     )
 
 
+def _lines(sentences: Iterable[str]) -> str:
+    return "".join(f"<div>{escape(sentence)}</div>" for sentence in sentences)
+
+
 def state_of(estimate: OnlineEstimate, misfit: str | None = None) -> str:
-    """In a few words: whether anything is held, and what keeps it from being known better.
+    """In a few words: whether anything is held, or what keeps it from being known.
 
     Args:
         misfit: a note that is shown elsewhere.
     """
     if _doubted(estimate, misfit):
-        words = ["not to be trusted: see below"]
-    elif estimate.settling:
+        return "not to be trusted: see below"
+    if estimate.settling:
         words = ["the payload has just changed"]
     elif estimate.determined[0]:
         words = ["a payload is held" if estimate.held else "nothing is held"]
@@ -94,7 +102,7 @@ def state_of(estimate: OnlineEstimate, misfit: str | None = None) -> str:
     noted = any(note.startswith((UNUSED, "standing")) for note in estimate.notes)
     if estimate.determined[0] and not (estimate.moving or noted):
         words.append("the arm stands still")
-    return "; ".join(words + _remarks(estimate, misfit))
+    return "; ".join(words)
 
 
 def _remarks(estimate: OnlineEstimate, misfit: str | None) -> list[str]:
@@ -115,6 +123,8 @@ def status(estimate: OnlineEstimate | None, status: Status) -> str:
         lines.append(f'<div data-armload="waits"><b>waits for</b> {escape(status.waits)}</div>')
     if status.misfit is not None:
         lines.append(f'<div data-armload="misfit"{WARNING}><b>does not fit:</b> {escape(status.misfit)}</div>')
+        if estimate is not None and _doubted(estimate, status.misfit):
+            lines.append(_lines(_remarks(estimate, status.misfit)))
     ages = [] if status.age is None else [f"answer {in_words(status.age)} old"]
     ages += [status.why.text] if status.why is not None and status.why.reason is Unknown.SOURCE_ENDED else []
     ages += [] if status.tare is None else [f"tare {status.tare}"]
