@@ -1,14 +1,12 @@
 """The page of a motion: the arm stands where the motion says, among what stands around."""
 
 import urllib.request
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from armload.app.cli import main
 from armload.app.page.motion_page import MotionPage
-from armload.app.page.server import look_from
 from armload.arms import arm
 from armload.errors import MotionError
 from armload.excitation import Obstacle, Surroundings
@@ -58,21 +56,6 @@ def test_the_page_is_served_and_a_motion_of_another_arm_is_refused(page):
         assert b"<html" in answer.read(2000).lower()
     with pytest.raises(MotionError, match="moves 7 joints: ur10e has 6"):
         MotionPage(taie2024(), arm("ur10e"), port=0)
-
-
-@pytest.mark.parametrize("width", [390, 1280])
-def test_what_is_looked_at_is_in_the_middle_of_what_a_phones_sheet_leaves_of_the_picture(width):
-    """From farther on a phone, whose picture is narrow; along the same line, so that left and right stay so."""
-    camera = SimpleNamespace(image_width=width, fov=1.3)
-    look_from(camera, 1.0, True)
-    eye, at = np.array(camera.position), np.array(camera.look_at)
-    along = (at - eye) / np.linalg.norm(at - eye)
-    assert np.linalg.norm(eye - at) == pytest.approx((1.6 if width < 576 else 1.0) * np.sqrt(0.3**2 + 0.3**2 + 0.12**2))
-    right = np.cross(along, [0.0, 0.0, 1.0]) / np.linalg.norm(np.cross(along, [0.0, 0.0, 1.0]))
-    up = np.cross(right, along)
-    share = (-eye @ up) / (-eye @ along) / np.tan(0.5 * camera.fov)  # of the origin: 0 the middle, 1 the upper edge
-    assert -eye @ right == pytest.approx(0.0, abs=1e-12)
-    assert (0.3 < share < 0.9) if width < 576 else share == pytest.approx(0.0, abs=1e-12)
 
 
 def test_what_is_of_the_page_is_refused_without_it(capsys):
