@@ -26,7 +26,7 @@ from armload.arms import arm as arm_named
 from armload.devices import FORMS, Detached, Recorded, Replay, Simulator, Source, open_source, read_load
 from armload.errors import ArmloadError, SinkError, SourceError, UsageError
 from armload.identification import check_plausible
-from armload.inertia import InertialParameters
+from armload.inertia import UNITS, InertialParameters
 from armload.online import OnlineIdentifier
 from armload.payloads import random_payload, solids, test_payload
 from armload.recording import Recording, Sample, read_recording, write_recording
@@ -220,18 +220,33 @@ def test_curves_hold_the_estimates_within_their_intervals(held, group):
         high, low, truth, value = data[1 + 4 * k : 5 + 4 * k]
         assert np.all(low <= value)
         assert np.all(value <= high)
-        assert value[-1] == rows[-1, place]
-        assert truth[-1] == HELD.phi[place]
-        assert high[-1] - value[-1] == pytest.approx(rows[-1, 10 + place])  # the present interval is not cut
+        assert value[-1] == group.scale * rows[-1, place]
+        assert truth[-1] == group.scale * HELD.phi[place]
+        half = high[-1] - value[-1]
+        assert half == pytest.approx(group.scale * rows[-1, 10 + place])  # the present interval is not cut
     assert np.all(np.isfinite(np.array(data)))
 
 
 def ticks(low, high, axis):
     """How many ticks uPlot puts on a y axis: at the least of its increments that leaves `space` px (its own: 30)."""
+    step = increment(low, high, axis)
+    return math.floor(high / step) - math.ceil(low / step) + 1
+
+
+def increment(low, high, axis):
+    """From tick to tick."""
     pixels = HEIGHT - PADDING[0] - PADDING[2] - AXES[0]["size"]
     increments = [m * 10.0**e for e in range(-12, 12) for m in (1.0, 2.0, 2.5, 5.0)]
-    step = next(i for i in increments if pixels * i / (high - low) >= axis.get("space", 30))
-    return math.floor(high / step) - math.ceil(low / step) + 1
+    return next(i for i in increments if pixels * i / (high - low) >= axis.get("space", 30))
+
+
+@pytest.mark.parametrize("group", GROUPS, ids=lambda g: g.title)
+def test_ticks_differ_in_the_three_decimals_that_uplot_writes(group):
+    rows = np.zeros((50, 30))
+    rows[:, 10:20] = np.where(np.arange(10) == 0, 2e-3, 2e-6)  # better known than arms can tell
+    data = data_of(group, np.arange(50.0), rows)
+    assert increment(min(x.min() for x in data[1:]), max(x.max() for x in data[1:]), AXES[1]) >= 0.001
+    assert group.unit == {1.0: "kg", 1e3: "10⁻³ " + UNITS[group.places[0]]}[group.scale]
 
 
 def test_a_source_that_knows_no_truth_is_drawn_like_any_other(panda, log):
@@ -247,10 +262,10 @@ def test_a_source_that_knows_no_truth_is_drawn_like_any_other(panda, log):
         assert np.isfinite(np.array(data)).all()
         low, high = min(x.min() for x in data[1:]), max(x.max() for x in data[1:])
         for k, place in enumerate(group.places):
-            assert data[4 + 4 * k][-1] == rows[-1, place]
+            assert data[4 + 4 * k][-1] == group.scale * rows[-1, place]
             assert np.array_equal(data[3 + 4 * k], data[4 + 4 * k])  # hidden under the line of the value, drawn later
             assert ["dash" in each for each in series_of(group)[3 + 4 * k : 5 + 4 * k]] == [True, False]
-        ends = rows[-1, :10] + np.array([[-1.0], [1.0]]) * rows[-1, 10:20]
+        ends = group.scale * (rows[-1, :10] + np.array([[-1.0], [1.0]]) * rows[-1, 10:20])
         assert low <= ends[0, list(group.places)].min()
         assert high >= ends[1, list(group.places)].max()
         assert high - low < 10.0 * np.ptp(ends[:, list(group.places)])
@@ -266,7 +281,7 @@ def test_a_truth_that_is_known_late_is_drawn_from_then_on(held):
         data = np.array(data_of(group, t, rows))
         assert np.isfinite(data).all()
         for k, place in enumerate(group.places):
-            assert np.all(data[3 + 4 * k, len(t) // 2 :] == HELD.phi[place])
+            assert np.all(data[3 + 4 * k, len(t) // 2 :] == group.scale * HELD.phi[place])
 
 
 def test_nothing_yet_and_no_interval_yet_can_be_drawn():
@@ -755,9 +770,9 @@ def test_numbers_have_units_and_what_is_not_determined_says_so(held):
     table = parameters(estimate, HELD)
     assert table.count("<tr") == 11
     assert "kg·m²" in table
-    assert table.count("undetermined") == np.count_nonzero(~estimate.determined)
+    assert table.count("unknown") == np.count_nonzero(~estimate.determined)
     at_first = OnlineIdentifier(held.arm).update(0.0, np.zeros(7), np.zeros(7), np.zeros(7))
-    assert parameters(at_first).count("undetermined") == 10
+    assert parameters(at_first).count("unknown") == 10
     assert "kg</div>" not in headline(at_first)
     assert "nothing has happened" in events([])
 

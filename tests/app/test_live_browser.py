@@ -46,7 +46,7 @@ FLAGS = (
 )
 PATIENCE = 120_000  # [ms] drawing without a GPU is slow
 LARGE, SMALL = (1360, 860), (960, 600)  # [px] of the picture to keep, and where nothing but text is looked at
-PHONE = (390, 844)  # [px]
+PHONE, TABLET = (390, 844), (768, 1024)  # [px]
 
 
 @pytest.fixture(scope="module")
@@ -199,6 +199,18 @@ def test_a_phone_shows_mass_and_its_curve_without_scrolling(holding):
         assert box["x"] >= 0.0
         assert box["x"] + box["width"] <= width
         assert box["y"] + box["height"] <= height
+
+
+@pytest.mark.parametrize("tab", [PHONE, TABLET], indirect=True, ids=["phone", "tablet"])
+def test_on_a_narrow_screen_nothing_of_the_table_is_cut_off(holding):
+    until(lambda: mass(holding))
+    width = holding.viewport_size["width"]
+    for k in range(10):
+        for cell in holding.locator(f"[data-armload=phi{k}] td").all():
+            box = cell.bounding_box()
+            assert box["x"] >= 0.0
+            assert box["x"] + box["width"] <= width
+            assert cell.evaluate("cell => cell.scrollWidth <= cell.clientWidth")
 
 
 def test_downloads_read_back(holding, tmp_path):

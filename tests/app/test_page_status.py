@@ -1,6 +1,8 @@
 """Beside the numbers of the page: what it waits for and why, what does not fit, how old answer and tare are."""
 
+import re
 from dataclasses import replace
+from html import escape
 from time import monotonic, sleep
 
 import numpy as np
@@ -9,11 +11,15 @@ import pytest
 from armload.app.page import tables
 from armload.app.page.page import Page
 from armload.app.page.status import Watcher, waits_for
+from armload.app.page.style import GOOD, SHEET, WAIT
 from armload.devices import Replay, Simulator, Source, open_source
 from armload.errors import SourceError
+from armload.online import Event
 from armload.payloads import test_payload
 from armload.service import Session, Unknown
+from armload.service.session_log import Entry
 from armload.service.tare import Tare
+from armload.service.unknown import Why
 
 HELD = test_payload().parameters
 
@@ -93,6 +99,63 @@ def test_a_log_that_has_ended_is_not_lost_and_waits_for_nothing(seen):
     assert "the source has ended" in tables.status(seen.estimate, status)
 
 
+def test_the_headline_says_of_when_an_answer_is_that_is_not_of_now(seen):
+    status = Watcher(seen).look()
+    ended = tables.headline(seen.estimate, None, status)
+    assert "at the end of the source: a payload is held" in ended
+    assert GOOD in ended
+    for reason in (Unknown.BEHIND, Unknown.UNUSABLE):
+        old = tables.headline(seen.estimate, None, status._replace(why=Why(reason, "why"), age=2.2))
+        assert "2.2 s ago: a payload is held" in old
+        assert WAIT in old
+        assert GOOD not in old
+        assert "font-weight:600" not in old  # no large black number of what was
+    maybe = replace(seen.estimate, notes=("the payload may be changing",))
+    assert WAIT in tables.headline(maybe, None, status._replace(why=None))
+    now = tables.headline(seen.estimate, None, status._replace(why=None))
+    assert "ago" not in now
+    assert GOOD in now
+    assert "font-weight:600" in now
+
+
+def test_what_is_below_does_not_move_while_the_answer_becomes_known(seen):
+    """As many lines of the centre of mass, columns of given width, and no sign of a zero that comes and goes."""
+    unknown = replace(seen.estimate, determined=np.zeros(10, dtype=bool))
+    for estimate in (seen.estimate, unknown, replace(seen.estimate, held=False)):
+        com = tables.headline(estimate).split('data-armload="com"')[1].split('data-armload="truth"')[0]
+        assert com.count("centre of mass [mm] from") == 1
+        assert "table-layout:fixed" in tables.parameters(estimate)
+    tiny = replace(seen.estimate, phi=np.array([-1e-9, 1e-9, -1e-9, *seen.estimate.phi[3:]]))
+    table = tables.parameters(tiny)
+    assert "-0.0000<" not in table
+    assert "+0.0000<" not in table
+    assert table.count(">0.0000<") == 2
+    assert ">0.000 ± " in tables.headline(tiny)
+
+
+def test_a_change_of_payload_is_listed_with_its_mass_once_that_is_known():
+    log = [Entry(1.0, "", Event("change", 1.0, 0.9, None)), Entry(2.0, "", Event("grasp", 2.0, 1.9, 1.48))]
+    text = tables.events(log)
+    assert "grasp, +1.48 kg" in text
+    assert "change</div>" in text
+
+
+def _luminance(colour):
+    """Relative luminance of `#rrggbb` (WCAG 2.2)."""
+    parts = np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)]) / 255.0
+    return np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4) @ [0.2126, 0.7152, 0.0722]
+
+
+@pytest.mark.parametrize(("scheme", "ground"), [("light", "#ffffff"), ("dark", "#242424")])
+def test_grey_and_coloured_words_can_be_read(scheme, ground):
+    rules = SHEET.split(f'scheme="{scheme}"] {{')[1].split("}")[0]
+    colours = re.findall(r"#[0-9a-f]{6}", rules)
+    assert len(colours) == 4
+    for colour in colours:
+        light, dark = sorted((_luminance(colour), _luminance(ground)), reverse=True)
+        assert (light + 0.05) / (dark + 0.05) >= 4.5, colour
+
+
 def test_a_robot_that_is_lost_is_waited_for_and_why_is_said(lost):
     status = Watcher(lost).look()
     assert status.why.reason is Unknown.SOURCE_LOST
@@ -117,9 +180,12 @@ def test_torque_of_the_wrong_sign_does_not_fit_and_is_said_once(panda, analytic_
     assert session.doubt is not None
     assert status.misfit == session.doubt
     assert "does not fit:" in tables.status(session.estimate, status)
-    headline = tables.headline(session.estimate, None, status.misfit)
+    headline = tables.headline(session.estimate, None, status)
     assert session.doubt[:40] not in headline
     assert "not to be trusted: see below" in headline
+    for note in session.estimate.notes:  # each once, below: the headline stays short
+        assert escape(note) not in headline
+        assert tables.status(session.estimate, status).count(escape(note)) == 1
     assert "nothing is held</div>" not in headline.split('data-armload="state"')[1]
     assert "font-weight:600" not in headline  # no large black number of what cannot be so
     assert "font-weight:600" in tables.headline(session.estimate)
@@ -183,8 +249,8 @@ def test_a_payload_is_drawn_only_where_its_centre_of_mass_is_determined(seen, pa
         page.scene.show(seen.sample, estimate, None)
         assert not page.scene._payload.visible
         assert not page.scene._region.visible
-        assert " mm<" not in tables.headline(estimate)
-    assert "no centre of mass: nothing is held" in tables.headline(replace(seen.estimate, held=False))
+        assert ">x " not in tables.headline(estimate)
+    assert "none: nothing is held" in tables.headline(replace(seen.estimate, held=False))
 
 
 def test_the_flange_stays_in_the_middle_of_the_picture_or_the_base_where_it_is(seen, page_of):

@@ -308,20 +308,36 @@ def test_the_answer_comes_first_and_says_what_the_answer_says(panda):
     assert "nothing seems to be held" in nothing.text
 
 
-@pytest.mark.full
-def test_no_table_of_a_report_is_wider_than_a_page_of_1280_pixels(tmp_path):
+def beyond_the_edge(sections, width, tmp_path):
+    """By how many pixels each table is wider than the place it has in a window of some width."""
     browser = shutil.which("chromium-headless-shell") or shutil.which("chromium")
     if browser is None:
         pytest.skip("no Chromium is installed: expected chromium-headless-shell")
-    ask = "document.title=[...document.querySelectorAll('div.wide')].map(d=>d.scrollWidth-d.clientWidth).join(' ')"
-    page = render(default_report(made_up(runs=24, off=6000.0)), "wide").replace(
-        "</body>", f"<script>{ask}</script></body>"
+    ask = (
+        "document.title=innerWidth+' '+"
+        "[...document.querySelectorAll('div.wide')].map(d=>d.scrollWidth-d.clientWidth).join(' ')"
     )
+    page = render(sections, "wide").replace("</body>", f"<script>{ask}</script></body>")
     (tmp_path / "r.html").write_text(page)
-    flags = ["--no-sandbox", "--headless", "--disable-gpu", "--window-size=1280,2000", "--dump-dom"]
+    flags = ["--no-sandbox", "--headless", "--disable-gpu", f"--window-size={width},2000", "--dump-dom"]
     dom = subprocess.run(
         [browser, *flags, f"file://{tmp_path}/r.html"], capture_output=True, text=True, timeout=120
     ).stdout
-    beyond = [float(x) for x in re.search("<title>(.*)</title>", dom)[1].split()]
+    seen, *beyond = (float(x) for x in re.search("<title>(.*)</title>", dom)[1].split())
+    assert seen == width
+    return beyond
+
+
+@pytest.mark.full
+def test_no_table_of_a_report_is_wider_than_a_page_of_1280_pixels(tmp_path):
+    beyond = beyond_the_edge(default_report(made_up(runs=24, off=6000.0)), 1280, tmp_path)
     assert len(beyond) >= 8
     assert max(beyond) <= 0
+
+
+@pytest.mark.full
+def test_an_answer_is_read_on_a_phone_without_moving_its_table_aside(panda, tmp_path):
+    found = identify(simulate(panda, taie2024(), BODY, rate=200.0), panda)
+    widest = ("inertia about it Ixx", "+0.0072 [+0.0000, +0.0180]", "kg·m²", "rests on the prior")
+    without = Section("Found", "", (Table("The answer", ("quantity", "value", "unit", ""), (widest,), ""),))
+    assert max(beyond_the_edge([without, answer_section(found, BODY)], 390, tmp_path)) <= 0

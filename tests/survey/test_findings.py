@@ -11,6 +11,7 @@ from armload.app.cli import main
 from armload.survey import write_rows
 from armload.survey.findings import arm_findings, doubtful
 from armload.survey.learning import empty_stretches
+from armload.survey.report import survey_sections
 from armload.survey.rows import columns
 from armload.survey.shift import shifts
 
@@ -125,6 +126,18 @@ def test_a_survey_without_dates_has_its_page_too(rows, tmp_path):
     assert main(["survey", "report", str(tmp_path / "survey.csv"), "--out", str(tmp_path / "r.html")]) == 0
     assert "do not say when" not in (tmp_path / "r.html").read_text(encoding="utf-8")  # it is in a figure
     assert np.all([f.since is None or isinstance(f.since, str) for f in arm_findings(rows)])
+
+
+def test_logs_without_dates_are_counted_from_one_and_nothing_has_half_a_log_or_payload(rows):
+    few = [one | {"date": None} for one in rows if one["arm"] == "sound"][:3]
+    few[0]["mass"] = 2.0
+    sections = survey_sections(few, arm_findings(few), 7)
+    over_time, histogram = (figure for figure, _ in sections[1].figures)
+    (ax,) = over_time.axes
+    assert sorted(ax.lines[0].get_xdata()) == [1.0, 2.0, 3.0]
+    for axis in (ax.xaxis, histogram.axes[0].yaxis):
+        ticks = axis.get_ticklocs()
+        assert np.array_equal(ticks, np.round(ticks))
 
 
 @pytest.mark.parametrize(

@@ -59,8 +59,8 @@ class Health:
 
     def __str__(self) -> str:
         counts = [f"{count} {reason}" for reason, count in self.left_out.items() if count]
-        counts += [f"{self.pauses} pauses"] if self.pauses else []
-        counts += [f"{self.clock_jumps} clock jumps"] if self.clock_jumps else []
+        counts += [f"{self.pauses} pause{'s' * (self.pauses > 1)}"] if self.pauses else []
+        counts += [f"{self.clock_jumps} clock jump{'s' * (self.clock_jumps > 1)}"] if self.clock_jumps else []
         return f"{self.used} samples" + (f", left out: {', '.join(counts)}" if counts else "")
 
 

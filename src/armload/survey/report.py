@@ -129,6 +129,7 @@ def _payloads(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) ->
         ax.hist([row["mass"] for row in held], bins="auto", color=COLOURS[0], edgecolor="white")
         ax.set_xlabel("mass [kg]")
         ax.set_ylabel("payloads")
+        _whole(ax.yaxis)
     return Section(
         "Payloads",
         "",
@@ -251,17 +252,26 @@ def _folder(logs: Sequence[str]) -> str:
 def _days(rows: Sequence[dict[str, Any]]) -> np.ndarray:
     """When rows were recorded: days since the first of January 1970, or their number where no log has a date."""
     if any(row["date"] is None for row in rows):
-        return np.arange(len(rows), dtype=float)
+        return np.arange(1.0, len(rows) + 1.0)
     return np.array([np.datetime64(int(1e3 * row["date"]), "ms") for row in rows])
 
 
 def _dated(ax: Any, x: np.ndarray, most: int) -> None:
-    """Few dates on an axis, and short ones."""
+    """Few dates on an axis, and short ones; of logs without dates, whole numbers."""
     if x.dtype.kind == "M":
         from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 
         ax.xaxis.set_major_locator(locator := AutoDateLocator(minticks=3, maxticks=most))
         ax.xaxis.set_major_formatter(ConciseDateFormatter(locator, show_offset=False))
+    else:
+        _whole(ax.xaxis, most)
+
+
+def _whole(axis: Any, most: int = 9) -> None:
+    """Ticks at whole numbers: there is no half of a log, nor of a payload."""
+    from matplotlib.ticker import MaxNLocator
+
+    axis.set_major_locator(MaxNLocator(most, integer=True))
 
 
 def _time_label(rows: Sequence[dict[str, Any]]) -> str:

@@ -94,6 +94,11 @@ def _of_log(options: argparse.Namespace, say: Callable[[str], None]) -> tuple[li
     about = f"The log `{options.log}`" + (
         f", relative to what was mounted in the tare `{options.tare}`." if tare else ", without a tare."
     )
+    if len(found.segments) > 1:
+        about += (
+            " Each method takes the whole log as one payload, though the payload changes within it: what was found is "
+            "of the last part alone, and may be far from these numbers."
+        )
     if truth is None:
         traces = {}
         for k, (name, make) in enumerate(methods.items(), start=1):

@@ -23,17 +23,26 @@ AXES = ({"size": 24, "gap": 2, "ticks": {"size": 4}}, {"size": 58, "gap": 3, "ti
 
 
 class Group(NamedTuple):
-    """Parameters of one plot: their places in phi."""
+    """Parameters of one plot: their places in phi, and how many of the unit it shows are one in SI.
+
+    uPlot writes no more than three decimals beside a tick: moments, which are small, are shown in thousandths.
+    """
 
     title: str
     places: tuple[int, ...]
+    scale: float = 1.0
+
+    @property
+    def unit(self) -> str:
+        """That the plot shows."""
+        return ("" if self.scale == 1.0 else "10⁻³ ") + UNITS[self.places[0]]
 
 
 GROUPS = (
     Group("mass", (0,)),
-    Group("first moments", (1, 2, 3)),
-    Group("moments of inertia", (4, 7, 9)),
-    Group("products of inertia", (5, 6, 8)),
+    Group("first moments", (1, 2, 3), 1e3),
+    Group("moments of inertia", (4, 7, 9), 1e3),
+    Group("products of inertia", (5, 6, 8), 1e3),
 )
 
 
@@ -41,7 +50,7 @@ def series_of(group: Group) -> tuple[dict[str, Any], ...]:
     """uPlot's series: time, then for each parameter the ends of its interval, the truth and, above it, the value."""
     out: list[dict[str, Any]] = [{"label": "t [s]"}]
     for colour, place in zip(COLOURS, group.places, strict=False):
-        stroke, name = _css(colour), f"{NAMES[place]} [{UNITS[place]}]"
+        stroke, name = _css(colour), f"{NAMES[place]} [{group.unit}]"
         out += [
             {"label": f"{name} high", "width": 0, "stroke": _css(colour, 0.0), "points": {"show": False}},
             {"label": f"{name} low", "width": 0, "stroke": _css(colour, 0.0), "points": {"show": False}},
@@ -59,14 +68,15 @@ def bands_of(group: Group) -> tuple[dict[str, Any], ...]:
 def legend_of(group: Group) -> str:
     """One line of HTML that says what the colours are, with units."""
     keys = "".join(
-        f'<span style="color:{_css(colour)};margin-left:0.7em">&#9632;&nbsp;{NAMES[place]}</span>'
+        f'<span style="margin-left:0.7em;white-space:nowrap"><span style="color:{_css(colour)}">&#9632;</span>'
+        f"&nbsp;{NAMES[place]}</span>"
         for colour, place in zip(COLOURS, group.places, strict=False)
     )
-    return f"<b>{group.title}</b> [{UNITS[group.places[0]]}]{keys}"
+    return f'<b>{group.title}</b> <span style="white-space:nowrap">[{group.unit}]</span>{keys}'
 
 
 def data_of(group: Group, t: NDArray[np.float64], rows: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
-    """uPlot's data for `series_of`, from a history of phi, half-widths and truth.
+    """uPlot's data for `series_of`, in the group's unit, from a history of phi, half-widths and truth.
 
     Intervals are cut to what leaves the curves readable: the range of the values and of the truth, and somewhat more
     than the present intervals. Every number is finite, as one that is not would leave uPlot without a scale: where
@@ -81,7 +91,7 @@ def data_of(group: Group, t: NDArray[np.float64], rows: NDArray[np.float64]) -> 
     elif len(t) == 1:  # a scale needs two
         t, rows = np.array([t[0] - 0.1, t[0]]), np.repeat(rows, 2, axis=0)
     places = list(group.places)
-    phi, half, truth = rows[:, :10][:, places], rows[:, 10:20][:, places], rows[:, 20:][:, places]
+    phi, half, truth = (group.scale * part[:, places] for part in (rows[:, :10], rows[:, 10:20], rows[:, 20:]))
     phi, half = np.where(np.isfinite(phi), phi, 0.0), np.where(np.isfinite(half), half, _UNKNOWN)
     lowest, highest = _range(phi, half[-1], truth)
     out = [t]

@@ -14,6 +14,7 @@ import numpy as np
 
 from armload.app.page.scene import HELD, REGION, TRUTH, DrawnArm
 from armload.app.page.server import PageServer, look_at_arm
+from armload.app.page.style import SHEET, TEXT
 from armload.arms import PAYLOAD_REACH, Arm
 from armload.excitation import Surroundings
 from armload.motion import Motion, check_joints
@@ -22,7 +23,6 @@ SPEEDS = {"real time": 1.0, "half": 0.5, "a quarter": 0.25, "a tenth": 0.1}
 _REST = 0.7  # [s] at the end, before the motion begins again
 _PATH = 200.0  # [Hz] of points on the line that the payload frame draws
 _STEP = 1e-3  # [s] of the slider
-_TEXT = "font-size:13px;line-height:1.45;font-variant-numeric:tabular-nums;padding:2px 8px"
 
 
 class MotionPage:
@@ -117,7 +117,8 @@ class MotionPage:
 
     def _build_panel(self, gui: Any) -> None:
         motion = self._motion
-        gui.add_html(f'<div style="{_TEXT}"><b>{escape(motion.name)}</b>, {motion.duration:g} s</div>')
+        gui.add_html(SHEET)
+        gui.add_html(f'<div style="{TEXT}"><b>{escape(motion.name)}</b>, {motion.duration:g} s</div>')
         self._runs = gui.add_checkbox("Run", initial_value=True)
         self._speed = gui.add_dropdown("Speed", tuple(SPEEDS), initial_value="real time")
         last = max(_STEP, round(motion.duration / _STEP) * _STEP)
@@ -149,7 +150,7 @@ class MotionPage:
         distances = zip(("floor", "itself", "boxes"), self._around.clearance(q[None])[0], strict=True)
         near = ", ".join(f"{what} {1000 * far:.0f} mm" for what, far in distances if np.isfinite(far))
         return (
-            f'<div style="{_TEXT}"><div data-armload="state">t = {t:.2f} s</div>'
+            f'<div style="{TEXT}"><div data-armload="state">t = {t:.2f} s</div>'
             f'<table style="width:100%;border-collapse:collapse"><tr>{head}</tr>{"".join(rows)}</table>'
             f'<div data-armload="near">distances: {near}</div></div>'
         )

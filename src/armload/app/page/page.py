@@ -17,6 +17,7 @@ from armload.app.page.download import ENDINGS, file_of
 from armload.app.page.scene import Scene
 from armload.app.page.server import PageServer, look_at_middle, look_from
 from armload.app.page.status import Status, Watcher
+from armload.app.page.style import SHEET, SOFT, TEXT
 from armload.arms import Arm, rated_mass
 from armload.errors import ArmloadError, ModelError
 from armload.identification import METHODS, default_for
@@ -28,9 +29,9 @@ SPANS = {"last 30 s": 30.0, "last 2 min": 120.0, "last 10 min": 600.0, "last hou
 _BALL = 0.05  # [m] radius of what a simulated arm takes up by hand
 _VIEWS = ("payload", "whole arm")
 _KEY = (
-    '<div style="font-size:12px;padding:2px 8px;color:var(--mantine-color-dimmed)">line: estimate, shaded: 95 % '
-    "interval, dashed: truth where it is known. In the picture: box of the same mass and inertia (grey: not all "
-    "determined), red: 95 % region of the centre of mass, green outline: truth.</div>"
+    f'<div style="{TEXT};{SOFT}">line: estimate over time [s], shaded: 95 % interval, dashed: truth where it is known. '
+    "In the picture: box of the same mass and inertia (grey: not all determined), red: 95 % region of the centre of "
+    "mass, green outline: truth.</div>"
 )
 
 
@@ -97,9 +98,7 @@ class Page:
             if sample is not None:
                 self.scene.show(sample, now, truth)
             if numbers:
-                self._headline.content = (
-                    tables.gone(status) if status.gone else tables.headline(now, truth, status.misfit)
-                )
+                self._headline.content = tables.gone(status) if status.gone else tables.headline(now, truth, status)
                 self._status.content = tables.status(estimate, status)
                 self._table.content = tables.parameters(now, truth)
                 self._events.content = tables.events(session.log)
@@ -119,8 +118,8 @@ class Page:
 
     def _build_curves(self, gui: Any) -> None:
         panel = gui.add_panel()
-        with panel.add_tab("Parameters over time"):
-            self._span = gui.add_dropdown("Time [s]", tuple(SPANS), initial_value="last 30 s")
+        with panel.add_tab("Curves"):
+            self._span = gui.add_dropdown("Time span", tuple(SPANS), initial_value="last 30 s")
             for group in GROUPS[1:]:
                 self._add_curves(gui, group)
             gui.add_html(_KEY)
@@ -129,7 +128,7 @@ class Page:
         panel.expand()  # on a phone panels are sections of one sheet, closed at first
 
     def _add_curves(self, gui: Any, group: Group) -> None:
-        gui.add_html(f'<div style="font-size:13px;padding:2px 8px 0">{legend_of(group)}</div>')
+        gui.add_html(f'<div style="{TEXT};padding-bottom:0">{legend_of(group)}</div>')
         plot = gui.add_uplot(
             data_of(group, *self.session.history.last(1.0)),
             series_of(group),
@@ -164,6 +163,7 @@ class Page:
 
     def _build_panel(self, gui: Any) -> None:
         session = self.session
+        gui.add_html(SHEET)
         self._headline = gui.add_html(tables.headline(None))
         self._add_curves(gui, GROUPS[0])  # where a phone shows it without scrolling
         self._status = gui.add_html("")

@@ -8,6 +8,7 @@ import io
 import math
 import secrets
 import socket
+from collections.abc import Callable
 from typing import Any
 from urllib.parse import quote
 
@@ -19,7 +20,9 @@ from armload.service.settings import is_loopback
 # [length of all links] from what is looked at to the eye: the whole arm is seen, or the payload and the wrist
 _FROM_AFAR, _FROM_CLOSE = (0.7, -0.7, 0.28), (0.3, -0.3, 0.12)
 _PHONE = 576  # [px] of width below which viser shows all panels as one sheet, over the lower 60 % of the picture
-_HIGHER = 0.3  # of the picture's height above its middle: the middle of what the sheet leaves
+_FARTHER = 1.6  # times as far on a phone, whose picture is narrow and whose sheet hides the lower part
+_SAME = 1e-3  # [m] between two places of the eye that are the same one
+_HIGHER, _A_LITTLE_HIGHER = 0.3, 0.2  # of the picture's height above its middle: the middle of what a sheet leaves
 
 
 class PageServer:
@@ -76,9 +79,13 @@ class PageServer:
 
 def look_at_arm(server: Any, reach: float) -> None:
     """Where whoever opens the page looks from: at an arm of a length [m], without the maker's logo."""
+    middle = (0.15 * reach, 0.0, 0.32 * reach)
     server.initial_camera.position = (0.85 * reach, -0.7 * reach, 0.6 * reach)
-    server.initial_camera.look_at = (0.15 * reach, 0.0, 0.32 * reach)
+    server.initial_camera.look_at = middle
     server.gui.configure_theme(show_logo=False, show_share_button=False)
+    _on_phones(
+        server, lambda camera: _look(camera, middle, (0.85 * reach, -0.7 * reach, 0.28 * reach), _A_LITTLE_HIGHER)
+    )
 
 
 def look_at_middle(server: Any, reach: float) -> None:
@@ -86,19 +93,43 @@ def look_at_middle(server: Any, reach: float) -> None:
     server.initial_camera.position = tuple(reach * x for x in _FROM_CLOSE)
     server.initial_camera.look_at = (0.0, 0.0, 0.0)
     server.gui.configure_theme(show_logo=False, show_share_button=False)
+    _on_phones(server, lambda camera: look_from(camera, reach, True))
+
+
+def _on_phones(server: Any, look: Callable[[Any], None]) -> None:
+    """How a phone looks at first, and whenever it is sent back to where others begin.
+
+    A browser goes there when it has drawn its first picture, which may be after it was told to look otherwise.
+    """
 
     @server.on_client_connect
     def _(client: Any) -> None:
         if client.camera.image_width < _PHONE:
-            look_from(client.camera, reach, True)
+            look(client.camera)
+
+            @client.camera.on_update
+            def _(camera: Any) -> None:
+                if math.dist(camera.position, server.initial_camera.position) < _SAME:
+                    look(client.camera)
 
 
 def look_from(camera: Any, reach: float, close: bool) -> None:
-    """Look at the origin: close if the payload is there, or else from as far as the whole arm of a length [m] needs.
-
-    On a phone, whose lower part shows the numbers, at a point below: what is at the origin is in the upper part then.
-    """
+    """Look at the origin: close if the payload is there, or else from as far as the whole arm of a length [m] needs."""
     x, y, z = (reach * x for x in (_FROM_CLOSE if close else _FROM_AFAR))
+    _look(camera, (0.0, 0.0, 0.0), (x, y, z))
+
+
+def _look(
+    camera: Any, at: tuple[float, float, float], away: tuple[float, float, float], higher: float = _HIGHER
+) -> None:
+    """Look at a point [m] from another, so far away from it.
+
+    On a phone, whose lower part shows the numbers, from farther and at a point below: what is looked at is in the upper
+    part then.
+    """
+    phone = camera.image_width < _PHONE
+    x, y, z = ((_FARTHER if phone else 1.0) * d for d in away)
     seen = 2.0 * math.hypot(x, y, z) * math.tan(0.5 * camera.fov)  # [m] from the lower edge to the upper one
-    below = _HIGHER * seen if camera.image_width < _PHONE else 0.0
-    camera.position, camera.look_at = (x, y, z - below), (0.0, 0.0, -below)
+    below = higher * seen if phone else 0.0
+    camera.position = (at[0] + x, at[1] + y, at[2] + z - below)
+    camera.look_at = (at[0], at[1], at[2] - below)

@@ -9,41 +9,61 @@ import numpy as np
 
 from armload.app.page.drawing import CHI2_95, com_region, has_com
 from armload.app.page.status import Status, in_words
+from armload.app.page.style import BAD, GOOD, SOFT, TEXT, WAIT, WARNING, dot
 from armload.inertia import NAMES, UNITS, Z95, InertialParameters
-from armload.online import OnlineEstimate
+from armload.online import Event, OnlineEstimate
 from armload.online.listening import UNUSED
 from armload.recording import GAP
 from armload.service.session_log import Entry
 from armload.service.unknown import Unknown
 
-_DIM = "color:var(--mantine-color-dimmed)"
-_TEXT = "font-size:13px;line-height:1.45;font-variant-numeric:tabular-nums;padding:2px 8px"
-_WARNING = ' style="color:var(--mantine-color-red-text)"'
 _DECIMALS = (3, 4, 4, 4, 5, 5, 5, 5, 5, 5)
+_LARGE = "font-size:22px"
+_LINES = 4  # of the status: what is below it stays where it is while it says more or less
+# widths of the table's columns, so that none moves while a number becomes known: name, value, ± 95 %, truth, unit
+_WIDTHS = ("3.1em", "auto", "5.2em", "auto", "3.7em")
+_NARROW = 300  # [px] that the table needs; viser's narrowest panel leaves 302
+# answers that are not of now, though they come: they are grey, with their age before them
+_OLD = (Unknown.BEHIND, Unknown.UNUSABLE)
 
 
 def headline(
-    estimate: OnlineEstimate | None, truth: InertialParameters | None = None, misfit: str | None = None
+    estimate: OnlineEstimate | None, truth: InertialParameters | None = None, status: Status | None = None
 ) -> str:
-    """Mass and centre of mass, large, and the state of the identification; grey where the samples are doubted.
+    """Mass, large, whether it can be taken as it is, and centre of mass; grey where it is doubted or of earlier.
 
     Args:
-        misfit: a note that is shown elsewhere.
+        status: how the answer is to be taken; None: as it is.
     """
     if estimate is None:
-        return f'<div style="{_TEXT}" data-armload="state">waiting for the first sample</div>'
+        return f'<div style="{TEXT}" data-armload="state">{dot(WAIT)}waiting for the first sample</div>'
+    why, misfit = (None, None) if status is None else (status.why, status.misfit)
     mass = "—"
     if estimate.determined[0]:
-        mass = f"{estimate.phi[0]:.3f} ± {Z95 * estimate.std[0]:.3f} kg"
-    size = f"font-size:22px;{_DIM}" if _doubted(estimate, misfit) else "font-size:22px;font-weight:600"
+        mass = f"{_signed(estimate.phi[0], 3).removeprefix('+')} ± {Z95 * estimate.std[0]:.3f} kg"
+    doubted = _doubted(estimate, misfit)
+    remarks = _remarks(estimate, misfit)
+    sure = (why is None or why.reason is Unknown.SOURCE_ENDED) and not any(
+        not note.startswith("standing")  # a rest is no doubt
+        for note in remarks
+    )
+    colour = BAD if doubted else GOOD if sure else WAIT
+    state = state_of(estimate, misfit)
+    if why is not None and why.reason in _OLD and status is not None and status.age is not None:
+        state = f"{in_words(status.age)} ago: {state}"
+    elif why is not None and why.reason is Unknown.SOURCE_ENDED:
+        state = f"at the end of the source: {state}"
+    old = doubted or (why is not None and why.reason in _OLD)
+    size = f"{_LARGE};{SOFT}" if old else f"{_LARGE};font-weight:600"
     lines = [
         f'<div style="{size}" data-armload="mass">{mass}</div>',
-        f'<div data-armload="com">{_com(estimate)}</div>',
-        f'<div style="{_DIM}" data-armload="truth">{_truth(truth)}</div>' if truth is not None else "",
-        f'<div data-armload="state">{escape(state_of(estimate, misfit))}</div>',
-        f'<div style="{_DIM}">{escape(rests_on(estimate))}</div>',
+        f'<div data-armload="state"><span style="font-size:15px">{dot(colour)}{escape(state)}</span>'
+        f"{'' if doubted else _lines(remarks)}</div>",
+        f'<div style="{SOFT if old else ""}" data-armload="com">{_com(estimate, doubted)}</div>',
+        f'<div style="{SOFT}" data-armload="truth">{_truth(truth)}</div>' if truth is not None else "",
+        f'<div style="{SOFT}">{escape(rests_on(estimate))}</div>',
     ]
-    return f'<div style="{_TEXT}">{"".join(lines)}</div>'
+    return f'<div style="{TEXT}">{"".join(lines)}</div>'
 
 
 def _doubted(estimate: OnlineEstimate, misfit: str | None) -> bool:
@@ -55,20 +75,24 @@ def gone(status: Status) -> str:
     """In the place of the headline while the last answer says nothing of the present."""
     why = "" if status.why is None else status.why.text
     return (
-        f'<div style="{_TEXT}"><div style="font-size:22px;font-weight:600" data-armload="mass">—</div>'
-        f'<div data-armload="state"{_WARNING}>{escape(why)}</div></div>'
+        f'<div style="{TEXT}"><div style="{_LARGE};font-weight:600" data-armload="mass">—</div>'
+        f'<div data-armload="state"{WARNING}>{dot(BAD)}{escape(why)}</div></div>'
     )
 
 
+def _lines(sentences: Iterable[str]) -> str:
+    return "".join(f"<div>{escape(sentence)}</div>" for sentence in sentences)
+
+
 def state_of(estimate: OnlineEstimate, misfit: str | None = None) -> str:
-    """In a few words: whether anything is held, and what keeps it from being known better.
+    """In a few words: whether anything is held, or what keeps it from being known.
 
     Args:
         misfit: a note that is shown elsewhere.
     """
     if _doubted(estimate, misfit):
-        words = ["not to be trusted: see below"]
-    elif estimate.settling:
+        return "not to be trusted: see below"
+    if estimate.settling:
         words = ["the payload has just changed"]
     elif estimate.determined[0]:
         words = ["a payload is held" if estimate.held else "nothing is held"]
@@ -78,8 +102,12 @@ def state_of(estimate: OnlineEstimate, misfit: str | None = None) -> str:
     noted = any(note.startswith((UNUSED, "standing")) for note in estimate.notes)
     if estimate.determined[0] and not (estimate.moving or noted):
         words.append("the arm stands still")
-    words += [n for n in estimate.notes if "moving" not in n and "has changed" not in n and n != misfit]
     return "; ".join(words)
+
+
+def _remarks(estimate: OnlineEstimate, misfit: str | None) -> list[str]:
+    """Notes that nothing else on the page says."""
+    return [n for n in estimate.notes if "moving" not in n and "has changed" not in n and n != misfit]
 
 
 def status(estimate: OnlineEstimate | None, status: Status) -> str:
@@ -94,12 +122,14 @@ def status(estimate: OnlineEstimate | None, status: Status) -> str:
     if status.waits is not None:
         lines.append(f'<div data-armload="waits"><b>waits for</b> {escape(status.waits)}</div>')
     if status.misfit is not None:
-        lines.append(f'<div data-armload="misfit"{_WARNING}><b>does not fit:</b> {escape(status.misfit)}</div>')
+        lines.append(f'<div data-armload="misfit"{WARNING}><b>does not fit:</b> {escape(status.misfit)}</div>')
+        if estimate is not None and _doubted(estimate, status.misfit):
+            lines.append(_lines(_remarks(estimate, status.misfit)))
     ages = [] if status.age is None else [f"answer {in_words(status.age)} old"]
     ages += [status.why.text] if status.why is not None and status.why.reason is Unknown.SOURCE_ENDED else []
     ages += [] if status.tare is None else [f"tare {status.tare}"]
-    lines.append(f'<div style="{_DIM}" data-armload="age">{escape("; ".join(ages))}</div>')
-    return f'<div style="{_TEXT}">{"".join(lines)}</div>'
+    lines.append(f'<div style="{SOFT}" data-armload="age">{escape("; ".join(ages))}</div>')
+    return f'<div style="{TEXT};min-height:{1.45 * _LINES:g}em">{"".join(lines)}</div>'
 
 
 def _probability(p: float) -> str:
@@ -122,8 +152,8 @@ def parameters(estimate: OnlineEstimate | None, truth: InertialParameters | None
         return ""
     heads = [("", "left"), ("value", "right"), ("± 95 %", "right"), ("truth", "right"), ("unit", "left")]
     head = "".join(
-        f'<th style="text-align:{side};font-weight:600;padding:0 4px">{text}</th>'
-        for text, side in heads
+        f'<th style="text-align:{side};font-weight:600;padding:0 4px;width:{width}">{text}</th>'
+        for (text, side), width in zip(heads, _WIDTHS, strict=True)
         if truth is not None or text != "truth"
     )
     rows = []
@@ -131,53 +161,67 @@ def parameters(estimate: OnlineEstimate | None, truth: InertialParameters | None
         known, digits, half = bool(estimate.determined[k]), _DECIMALS[k], Z95 * float(estimate.std[k])
         cells = [
             ("left", name),
-            ("right", f"{estimate.phi[k]:+.{digits}f}"),
-            ("right", f"{half:.{digits}f}" if known and np.isfinite(half) else "undetermined"),
-            *([] if truth is None else [("right", f"{truth.phi[k]:+.{digits}f}")]),
+            ("right", _signed(estimate.phi[k], digits)),
+            ("right", f"{half:.{digits}f}" if known and np.isfinite(half) else "unknown"),
+            *([] if truth is None else [("right", _signed(truth.phi[k], digits))]),
             ("left", UNITS[k]),
         ]
         row = "".join(f'<td style="text-align:{side};padding:0 4px">{text}</td>' for side, text in cells)
-        rows.append(f'<tr data-armload="phi{k}" style="{"" if known else _DIM}">{row}</tr>')
+        rows.append(f'<tr data-armload="phi{k}" style="{"" if known else SOFT}">{row}</tr>')
     return (
-        f'<div style="{_TEXT};overflow-x:auto"><table style="width:100%;border-collapse:collapse;white-space:nowrap">'
-        f"<tr>{head}</tr>{''.join(rows)}</table></div>"
+        f'<div style="{TEXT};overflow-x:auto"><table style="width:100%;min-width:{_NARROW}px;table-layout:fixed;'
+        f'border-collapse:collapse;white-space:nowrap"><tr>{head}</tr>{"".join(rows)}</table></div>'
     )
+
+
+def _signed(value: float, digits: int) -> str:
+    """With its sign, but for a zero: there it would only flicker."""
+    text = f"{value:+.{digits}f}"
+    return text if float(text) else text[1:]
 
 
 def events(log: Iterable[Entry], most: int = 6) -> str:
     """The last lines of the log, the newest first."""
     last = list(log)[-most:][::-1]
     if not last:
-        return f'<div style="{_TEXT};{_DIM}" data-armload="log">nothing has happened yet</div>'
+        return f'<div style="{TEXT};{SOFT}" data-armload="log">nothing has happened yet</div>'
     lines = "".join(
-        f'<div{_WARNING if entry.warning else ""}><span style="{_DIM}">{entry.t:.1f} s</span>&ensp;'
-        f"{escape(entry.text if entry.event is None else entry.event.kind)}</div>"
+        f'<div{WARNING if entry.warning else ""}><span style="{SOFT}">{entry.t:.1f} s</span>&ensp;'
+        f"{escape(entry.text if entry.event is None else _event(entry.event))}</div>"
         for entry in last
     )
-    return f'<div style="{_TEXT}" data-armload="log">{lines}</div>'
+    return f'<div style="{TEXT}" data-armload="log">{lines}</div>'
+
+
+def _event(event: Event) -> str:
+    return event.kind + ("" if event.mass is None else f", {event.mass:+.2f} kg")
 
 
 def stream(name: str, estimate: OnlineEstimate | None, lost: int = 0) -> str:
     """Where samples come from, how many counted, why others were left out, and whether this machine keeps up."""
     if estimate is None:
-        return f'<div style="{_TEXT};{_DIM}" data-armload="health">{escape(name)}</div>'
+        return f'<div style="{TEXT};{SOFT}" data-armload="health">{escape(name)}</div>'
     text = f"{name}: t = {estimate.t:.1f} s, {estimate.health}"
-    if estimate.lag >= GAP:
-        text += f"; answered {estimate.lag:.1f} s after it arrived: this machine is too busy"
-    if lost:
-        text += f"; {lost} lost: this machine is too busy"
-    return f'<div style="{_TEXT};{_DIM}" data-armload="health">{escape(text)}</div>'
+    busy = [f"answers come {estimate.lag:.1f} s after their samples"] if estimate.lag >= GAP else []
+    busy += [f"{lost} sample{'s were' if lost > 1 else ' was'} lost"] if lost else []
+    if busy:
+        text += f"; this machine is too busy: {' and '.join(busy)}"
+    return f'<div style="{TEXT};{SOFT}" data-armload="health">{escape(text)}</div>'
 
 
-def _com(estimate: OnlineEstimate) -> str:
-    if estimate.determined[0] and not estimate.held:
-        return f'<span style="{_DIM}">no centre of mass: nothing is held</span>'
+def _com(estimate: OnlineEstimate, doubted: bool) -> str:
+    """Two lines, whatever is known: what is below stays where it is. A number keeps its place while it changes."""
+    title = f'<div style="{SOFT}">centre of mass [mm] from {escape(estimate.frame)}</div>'
     if not has_com(estimate):
-        return f'<span style="{_DIM}">centre of mass undetermined</span>'
+        nothing = estimate.determined[0] and not (estimate.held or doubted)
+        return f'{title}<div style="{SOFT}">{"none: nothing is held" if nothing else "undetermined"}</div>'
     r = 1000 * estimate.phi[1:4] / estimate.phi[0]
     half = 1000 * com_std(estimate) * Z95
-    values = ", ".join(f"{x:+.1f}&#8239;±&#8239;{h:.1f}" for x, h in zip(r, half, strict=True))
-    return f"centre of mass ({values}) mm"
+    parts = "".join(
+        f'<span style="white-space:nowrap">{axis} {_signed(x, 1)}&#8239;±&#8239;{h:.1f}</span>'
+        for axis, x, h in zip("xyz", r, half, strict=True)
+    )
+    return f'{title}<div style="display:grid;grid-template-columns:1fr 1fr 1fr">{parts}</div>'
 
 
 def com_std(estimate: OnlineEstimate) -> np.ndarray:
@@ -189,5 +233,5 @@ def com_std(estimate: OnlineEstimate) -> np.ndarray:
 def _truth(truth: InertialParameters) -> str:
     if truth.mass == 0.0:
         return "truth: nothing is held"
-    r = ", ".join(f"{1000 * x:+.1f}" for x in truth.com)
+    r = ", ".join(_signed(1000 * x, 1) for x in truth.com)
     return f"truth: {truth.mass:.3f} kg, ({r}) mm"
