@@ -93,8 +93,8 @@ def _check_mounted_as_given(recording: Recording, arm: Arm, better: Callable[[To
     way = max(found, key=lambda pair: pair[0])[1]
     raise RecordingError(
         f"{recording.source}: tau fits {arm.name} far better with gravity about {_written(way)} m/s² in the axes of "
-        f"the base than with {_written(arm.gravity)}: expected the base mounted as given; say how it is (--gravity), or "
-        "check the order of the joints"
+        f"the base than with {_written(arm.gravity)}: expected the base mounted as given; say how it is (--gravity), "
+        "or check the order of the joints"
     )
 
 
