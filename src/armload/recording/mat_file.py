@@ -8,6 +8,7 @@ reverse and the class of each in an attribute. A field of a struct is called `ru
 from __future__ import annotations
 
 import warnings
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -126,19 +127,23 @@ def _called(arrays: Mapping[str, NDArray]) -> dict[str, NDArray]:
                 continue
             clocks.append(array)
         kept[name] = array
-    ends = {name: _end(name, kept) for name in kept}
-    return {ends[name]: array for name, array in kept.items()} if len(set(ends.values())) == len(kept) else kept
+    count = Counter(end for name in kept for end, _ in _ends(name))
+    short = {name: _end(name, count) for name in kept}
+    return {short[name]: array for name, array in kept.items()} if len(set(short.values())) == len(kept) else kept
 
 
-def _end(name: str, names: Mapping[str, NDArray]) -> str:
+def _end(name: str, count: Mapping[str, int]) -> str:
     """A name without the structs that it is in, unless they say something, or another name ends so too."""
-    parts = _bare(name).split("/")
-    for k in range(len(parts) - 1, 0, -1):
-        end, left_out = "/".join(parts[k:]), parts[:k]
-        alone = sum(_bare(other) == end or _bare(other).endswith(f"/{end}") for other in names) == 1
-        if alone and _TELLING.isdisjoint(word for part in left_out for word in words_of(part)):
+    for end, left_out in _ends(name):
+        if count[end] == 1 and _TELLING.isdisjoint(words_of(left_out)):
             return end
     return _bare(name)
+
+
+def _ends(name: str) -> Iterator[tuple[str, str]]:
+    """The ends of a name, the shortest first, each with what is left out in front of it."""
+    parts = _bare(name).split("/")
+    return (("/".join(parts[k:]), " ".join(parts[:k])) for k in range(len(parts) - 1, -1, -1))
 
 
 def _bare(name: str) -> str:
