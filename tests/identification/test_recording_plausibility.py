@@ -320,6 +320,21 @@ def test_a_base_that_leans_is_not_taken_for_exchanged_columns(sound, name, tilt)
         check_for_exchanged_torques(log, leaning, torque_scale(log, leaning))
 
 
+@pytest.mark.parametrize(
+    ("name", "seed", "gravity"),
+    [("panda", 5, "0,-9.81,0"), ("fr3", 0, "0,0,9.81"), ("gen3", 1, "0,-9.81,0"), ("iiwa14", 0, "0,9.81,0")],
+)
+def test_a_base_on_a_wall_or_a_ceiling_is_not_taken_for_exchanged_joints(name, seed, gravity):
+    robot = arm(name)
+    hung = replace(robot, gravity=np.array([float(x) for x in gravity.split(",")]))
+    t = np.arange(0.0, 3.0, 0.02)
+    q, dq, ddq = random_motion(robot, seed)(t)
+    log = Recording(t, q, dq, hung.with_payload(heavy(0.3 * robot.rated_payload, seed)).torque(q, dq, ddq))
+    check_plausible(log, hung)
+    with pytest.raises(RecordingError, match=rf"far better with gravity about {gravity} m/s² .*--gravity"):
+        check_plausible(log, robot)
+
+
 def test_a_payload_that_is_put_down_within_a_log_is_not_taken_for_exchanged_columns(panda):
     """A motion in which 2.8 kg that are put down after 1.5 s look like the torques of joints 1 and 5 exchanged."""
     episode = draw_episodes(panda, "reference", 16, 300, motions=6)[11]

@@ -1,11 +1,15 @@
-"""Torque columns, or joints, in each other's place: found by the fit of the arm's own torque, before and after."""
+"""Torque columns, or joints, in each other's place: found by the fit of the arm's own torque, before and after.
+
+Gravity that pulls another way than given, as on a wall, takes joints for each other, too. So no exchange is named where
+the base mounted otherwise explains the log better.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import partial
-from itertools import combinations, pairwise
+from itertools import combinations, pairwise, product
 
 import numpy as np
 
@@ -35,6 +39,7 @@ def check_for_exchanged_torques(recording: Recording, arm: Arm, seen: TorqueScal
     misfit, i, j = min((fit.misfit, i, j) for fit, i, j in fits)
     enough = misfit < min(SWAPPED_MISFIT, SWAPPED_SHARE * seen.misfit)
     if enough and all(b.misfit < a.misfit for a, b in _in_parts(recording, _torques_exchanged(recording, i, j), arm)):
+        _check_mounted_as_given(recording, arm, lambda fit: fit.misfit < misfit)
         raise RecordingError(
             f"{recording.source}: tau{i + 1} and tau{j + 1} seem to be exchanged (misfit {seen.misfit:.1f} times a "
             f"sound robot's, {misfit:.1f} with these two columns the other way round): expected the torques in the "
@@ -63,11 +68,39 @@ def check_for_exchanged_joints(recording: Recording, arm: Arm) -> None:
     if evidence < seen.evidence + JOINTS_EXCHANGED:
         return
     if all(b.evidence > a.evidence for a, b in _in_parts(recording, _joints_exchanged(recording, i, j), arm)):
+        _check_mounted_as_given(recording, arm, lambda fit: fit.evidence > evidence)
         raise RecordingError(
             f"{recording.source}: joints {i + 1} and {j + 1} seem to be exchanged, in q, dq and tau: expected the "
             f"order of {arm.name}'s joints ({', '.join(arm.joint_names)}); a ROS driver may give that of the alphabet; "
             "name the columns, or exchange them"
         )
+
+
+def _check_mounted_as_given(recording: Recording, arm: Arm, better: Callable[[TorqueScale], bool]) -> None:
+    """Refuse a log that the base mounted another way explains better than an exchange.
+
+    better: whether such a fit, of as many windows as joints are asked of, is.
+
+    Raises:
+        RecordingError: so it is; the sentence says about which gravity that is.
+    """
+    size = float(np.linalg.norm(arm.gravity))
+    ways = [size * np.array(way) / np.linalg.norm(way) for way in product((-1, 0, 1), repeat=3) if any(way)]
+    fits = [(torque_scale(recording, replace(arm, gravity=way), most=_WINDOWS), way) for way in ways]
+    found = [(fit.evidence, way) for fit, way in fits if fit is not None and not fit.is_wrong and better(fit)]
+    if not found:
+        return
+    way = max(found, key=lambda pair: pair[0])[1]
+    raise RecordingError(
+        f"{recording.source}: tau fits {arm.name} far better with gravity about {_written(way)} m/s² in the axes of "
+        f"the base than with {_written(arm.gravity)}: expected the base mounted as given; say how it is (--gravity), "
+        "or check the order of the joints"
+    )
+
+
+def _written(gravity: Iterable[float]) -> str:
+    """As `--gravity` takes it."""
+    return ",".join(f"{round(x, 2) + 0.0:g}" for x in gravity)
 
 
 def _fits(
