@@ -495,6 +495,10 @@ def test_gravity_that_was_never_taken_out_is_not_put_back(real_data):
     for logs in ([loaded], [loaded, empty]):
         with pytest.raises(RecordingError, match=r"ur10e_\w+\.csv: tau seems to have gravity in it already"):
             check_gravity_was_missing([with_gravity(log, robot) for log in logs], robot)
+        with pytest.raises(RecordingError, match="gravity in it already"):  # whoever checks any log
+            check_plausible(
+                read_recording(real_data / "ur10e_loaded_2805g.csv", robot, columns="compensated=nothing"), robot
+            )
         taken = [with_gravity(replace(log, tau=log.tau - robot.torque(log.q)), robot) for log in logs]
         check_gravity_was_missing(taken, robot)
         for log, restored in zip(logs, taken, strict=True):
