@@ -9,6 +9,7 @@ import pytest
 
 from armload import arm
 from armload.identification import identify
+from armload.identification.reporting import doubt_of
 from armload.inertia import Z95, InertialParameters
 from armload.lab.episodes import draw_episodes, simulate_episodes
 from armload.payloads import draw_payload, franka_hand
@@ -120,3 +121,10 @@ def test_a_payload_on_a_bare_arm_is_not_called_an_exchange(panda, exchanged):
         identifier = HybridIdentifier(panda, log.tare)
         identifier.run(log.run)
         assert not identifier.exchanged
+
+
+@pytest.mark.parametrize(("since", "other"), [("tare", "profile"), ("profile", "since the tare")])
+def test_an_exchange_is_said_to_be_since_what_was_given(since, other):
+    said = doubt_of(True, True, None, 0.0, since=since)
+    assert f"taken off since the {since}" in said
+    assert other not in said

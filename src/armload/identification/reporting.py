@@ -34,11 +34,6 @@ from armload.regression.prior import REACH
 
 _CHECK = "check the robot, the base (--gravity), what is mounted, the torques' signs, and that gravity is in them"
 NO_BODY = f"no body fits within the error bars: {_CHECK}"
-EXCHANGED = (
-    "something seems to have been taken off since the tare, and something else put on: the answer is the difference of "
-    "the two, which need be no body; record a tare with what is mounted now, or believe --method map-gp if nothing was "
-    "taken off"
-)
 
 
 def answered(
@@ -137,7 +132,8 @@ def _doubt(found: Found, arm: Arm, mass_determined: bool, relative_to: str) -> s
         return removal(relative_to)
     changed = arm_changed(found.drift, found.another, relative_to)
     sound = found.exchanged or found.explained
-    doubt = doubt_of(found.exchanged, sound, changed, found.restlessness, found.restless_joint)
+    since = "profile" if relative_to == "profile" else "tare"
+    doubt = doubt_of(found.exchanged, sound, changed, found.restlessness, found.restless_joint, since)
     if doubt is not None:
         return doubt
     if (denied := denied_by(found.known, found.log_only)) is not None:
@@ -160,7 +156,19 @@ def removal(relative_to: str) -> str:
     return f"the mass is negative: {less}, or the torque's sign is turned"
 
 
-def doubt_of(exchanged: bool, explained: bool, changed: str | None, restlessness: float, joint: int = 0) -> str | None:
+def exchanged_since(since: str) -> str:
+    """That the answer is the difference of two bodies, one put on for another since the "tare" or the "profile"."""
+    instead = "" if since == "tare" else f" and give it in place of the {since}"
+    return (
+        f"something seems to have been taken off since the {since}, and something else put on: the answer is the "
+        f"difference of the two, which need be no body; record a tare with what is mounted now{instead}, or believe "
+        "--method map-gp if nothing was taken off"
+    )
+
+
+def doubt_of(
+    exchanged: bool, explained: bool, changed: str | None, restlessness: float, joint: int = 0, since: str = "tare"
+) -> str | None:
     """What the answer of a log, or of a stream that has ended, shows against itself, most telling first.
 
     Args:
@@ -168,7 +176,7 @@ def doubt_of(exchanged: bool, explained: bool, changed: str | None, restlessness
         restlessness: of the torques (`posterior.restless`). joint: that has most of it, from 1; 0: not known.
     """
     if exchanged:
-        return EXCHANGED
+        return exchanged_since(since)
     if not explained:
         return NO_BODY
     if changed is not None:
