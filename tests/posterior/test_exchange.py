@@ -125,6 +125,6 @@ def test_a_payload_on_a_bare_arm_is_not_called_an_exchange(panda, exchanged):
 
 @pytest.mark.parametrize(("since", "other"), [("tare", "profile"), ("profile", "since the tare")])
 def test_an_exchange_is_said_to_be_since_what_was_given(since, other):
-    said = doubt_of(True, True, None, 0.0, since=since)
+    said = doubt_of(True, True, None, 0.0, relative_to=since)
     assert f"taken off since the {since}" in said
     assert other not in said

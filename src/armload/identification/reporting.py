@@ -132,8 +132,7 @@ def _doubt(found: Found, arm: Arm, mass_determined: bool, relative_to: str) -> s
         return removal(relative_to)
     changed = arm_changed(found.drift, found.another, relative_to)
     sound = found.exchanged or found.explained
-    since = "profile" if relative_to == "profile" else "tare"
-    doubt = doubt_of(found.exchanged, sound, changed, found.restlessness, found.restless_joint, since)
+    doubt = doubt_of(found.exchanged, sound, changed, found.restlessness, found.restless_joint, relative_to)
     if doubt is not None:
         return doubt
     if (denied := denied_by(found.known, found.log_only)) is not None:
@@ -156,8 +155,9 @@ def removal(relative_to: str) -> str:
     return f"the mass is negative: {less}, or the torque's sign is turned"
 
 
-def exchanged_since(since: str) -> str:
-    """That the answer is the difference of two bodies, one put on for another since the "tare" or the "profile"."""
+def exchanged_since(relative_to: str) -> str:
+    """That the answer is the difference of two bodies, one put on for another since then; as of `removal`."""
+    since = "profile" if relative_to == "profile" else "tare"
     instead = "" if since == "tare" else f" and give it in place of the {since}"
     return (
         f"something seems to have been taken off since the {since}, and something else put on: the answer is the "
@@ -167,16 +167,22 @@ def exchanged_since(since: str) -> str:
 
 
 def doubt_of(
-    exchanged: bool, explained: bool, changed: str | None, restlessness: float, joint: int = 0, since: str = "tare"
+    exchanged: bool,
+    explained: bool,
+    changed: str | None,
+    restlessness: float,
+    joint: int = 0,
+    relative_to: str = "tare",
 ) -> str | None:
     """What the answer of a log, or of a stream that has ended, shows against itself, most telling first.
 
     Args:
         exchanged: see `PosteriorLeastSquares`. explained: whether a body explains it. changed: that the arm has.
         restlessness: of the torques (`posterior.restless`). joint: that has most of it, from 1; 0: not known.
+        relative_to: as of `removal`.
     """
     if exchanged:
-        return exchanged_since(since)
+        return exchanged_since(relative_to)
     if not explained:
         return NO_BODY
     if changed is not None:

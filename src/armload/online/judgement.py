@@ -140,10 +140,15 @@ class Judgement:
             notes += (_SLOW_MOTOR if moving else _STANDING_MOTOR,)
         return notes
 
-    def conclude(self, estimate: Estimate, run: Identifier, t: float) -> None:
-        """The last answer of a stream, at t [s], already judged: it becomes a body, and is doubted as of a log."""
+    def conclude(self, estimate: Estimate, run: Identifier, relative_to: str, t: float) -> None:
+        """The last answer of a stream, at t [s], already judged: it becomes a body, and is doubted as of a log.
+
+        Args:
+            estimate, run, relative_to: as of `judge`.
+        """
         exchanged = run.exchanged if isinstance(run, PosteriorLeastSquares) else False
-        doubt = doubt_of(exchanged, exchanged or explained(estimate, run.unprojected), None, 0.0)
+        sound = exchanged or explained(estimate, run.unprojected)
+        doubt = doubt_of(exchanged, sound, None, 0.0, relative_to=relative_to)
         self._take(estimate, run)
         self.estimate = replace(estimate, phi=body_of(estimate, bool(self.determined[0]), exchanged))
         self.newest = t

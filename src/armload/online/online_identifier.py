@@ -163,7 +163,7 @@ class OnlineIdentifier:
             if all_finite(estimate.phi):
                 self._judgement.doubts.look(self.engine, self.relative_to)
                 self._judge(estimate, self.engine)
-                self._judgement.conclude(estimate, self.engine, self._stream.now)
+                self._judgement.conclude(estimate, self.engine, self.relative_to, self._stream.now)
         return self._present()
 
     def learned(self, name: str = "stream") -> Profile | None:
