@@ -272,6 +272,12 @@ def rows_of_speed(result):
     return out
 
 
+def test_the_readme_s_bars_are_those_of_the_committed_benchmark():
+    found = json.loads((RESULTS / "long_bars.json").read_text())["lengths"]
+    shares = [after["inside"] for cell in found for after in cell["after"].values()]
+    assert f"of a bar's {100 * min(shares):.0f}–{100 * max(shares):.0f} %" in README
+
+
 def test_the_readme_s_changes_are_those_of_the_committed_benchmark():
     parts, words = json.loads((RESULTS / "events.json").read_text())["parts"], " ".join(README.split())
     harder = {"early", "light", "shift", "standing", "real", "real_tared", "real_motor"}
