@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from armload.errors import SinkError
     from armload.inertia import InertialParameters
 
-# when what is not in a load was mounted, by what it is relative to
 _EVERYTHING = {  # what is counted from the flange on, whatever was mounted when
     "ur": "a UR's payload",
     "ur-payload": "a UR's payload",
     "kinova": "Kinova's tool",
     "xarm": "an xArm's load",
 }
+# when what is not in a load was mounted, by what it is relative to
 _SINCE = {"tare": "at the tare", "before": "at the tare", "profile": "in the profile's logs"}
 # the names of armload.devices.FORMS, so that --help need not import them; a test compares
 FORMS = ("franka", "franka-desk", "ur", "ur-payload", "kuka", "kinova", "xarm", "urdf", "mjcf", "sdf", "ros2")
