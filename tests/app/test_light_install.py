@@ -227,6 +227,8 @@ def test_each_extra_and_each_package_of_it_is_known_and_named_as_in_pyproject():
         ("trimesh", "live"),
         ("pyarrow", "lab"),
         ("joblib", "cluster"),
+        ("scipy", "matlab"),
+        ("h5py", "matlab"),
     }
     assert all(package in of[extra] for package, extra in stated)
 

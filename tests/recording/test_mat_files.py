@@ -6,6 +6,7 @@ itself are SciPy's own test data, where they are installed.
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -140,6 +141,14 @@ def test_a_file_that_was_cut_off_is_refused(log, tmp_path, version, share):
     whole = path.read_bytes()
     path.write_bytes(whole[: int(share * len(whole))])
     with pytest.raises(RecordingError, match=r"log\.mat"):
+        read_recording(path, PANDA)
+
+
+def test_without_scipy_it_is_said_how_to_install_it(log, tmp_path, monkeypatch):
+    path = tmp_path / "log.mat"
+    WRITERS["7"](path, arrays_of(log, False))
+    monkeypatch.setitem(sys.modules, "scipy.io", None)
+    with pytest.raises(RecordingError, match=r"read through SciPy, which is missing: pip install .*h5py"):
         read_recording(path, PANDA)
 
 

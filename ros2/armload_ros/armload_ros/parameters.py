@@ -10,12 +10,12 @@ from armload import Recording, arm, read_payload, read_recording
 from armload.arms import Arm
 from armload.devices.ros2 import Effort
 from armload.errors import UsageError
-from armload.identification import check_usable, plausible_tool, uncompensated
+from armload.identification import check_usable, plausible_tool
 from armload.identification.tare_age import age_of, seconds_of
 from armload.inertia import InertialParameters
 from armload.payloads import NOTHING
 from armload.posterior import Profile, load_profile
-from armload.recording import arm_as_set, has_topics
+from armload.recording import has_topics
 
 DEFAULTS: dict[str, Any] = {
     "robot": "panda",
@@ -76,12 +76,8 @@ class Parameters:
         """The log of the arm before the payload was mounted."""
         if not (path := self.value("tare")):
             return None
-        said = self._of_effort() if has_topics(path) else {}
-        carries = said.pop("compensated", None)
-        tare = read_recording(path, robot, columns=said)
-        if carries is not None:  # what armload has recorded of such a topic has gravity in it
-            (tare,) = uncompensated([tare], arm_as_set(robot, carries))
-        check_usable(tare, robot)
+        tare = read_recording(path, robot, columns=self._of_effort() if has_topics(path) else None)
+        check_usable(tare, robot)  # also whether gravity was in it, as in what armload has recorded of such a topic
         return tare
 
     def tare_age(self, tare: Recording | None) -> tuple[float, tuple[str, ...]]:

@@ -25,6 +25,7 @@ from armload.recording.hdf5_file import h5py_for
 from armload.recording.header import words_of
 from armload.recording.recording import Recording
 from armload.recording.table import read_table
+from armload.runtime.extras import install
 
 _HDF5, _USER_BLOCK = b"\x89HDF\r\n\x1a\n", 512  # how it begins, after so many bytes of MATLAB's own header
 _CLASS = "MATLAB_class"
@@ -57,8 +58,12 @@ def read_mat(path: Path, where: str, arm: Arm | None = None, spec: ColumnSpec | 
 
 def _of_4_to_7(path: Path, where: str) -> dict[str, NDArray | None]:
     """What a file of an earlier version holds: arrays by name; None: an object."""
-    from scipy.io import loadmat
-    from scipy.io.matlab import MatlabFunction, MatlabOpaque
+    try:
+        from scipy.io import loadmat
+        from scipy.io.matlab import MatlabFunction, MatlabOpaque
+    except ImportError:
+        how = install("scipy", "matlab")
+        raise RecordingError(f"{where}: MATLAB files are read through SciPy, which is missing: {how}") from None
 
     def flat(value: Any, name: str) -> Iterator[tuple[str, NDArray | None]]:
         if isinstance(value, dict):

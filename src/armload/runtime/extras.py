@@ -40,14 +40,14 @@ _NAME = re.compile(r"[A-Za-z0-9._-]+")
 _BELOW = re.compile(r"python_version\s*<\s*[\"'](\d+)\.(\d+)[\"']")
 
 
-def install(module: str) -> str:
-    """How to install the extra that a module belongs to, as words of a sentence.
+def install(module: str, extra: str | None = None) -> str:
+    """How to install the extra that a module belongs to, or the one of several that is named, as words of a sentence.
 
     >>> install("viser").startswith("pip install ")
     True
     """
-    package, extra = MODULES[module.partition(".")[0]]
-    wanted = _required(extra) or {package: ""}
+    package, its = MODULES[module.partition(".")[0]]
+    wanted = _required(extra or its) or {package: ""}
     below = _BELOW.search(wanted.get(package, ""))
     command = "pip install " + " ".join(shlex.quote(name) for name in _specifiers(wanted))
     if below is not None and sys.version_info >= (limit := tuple(map(int, below.groups()))):

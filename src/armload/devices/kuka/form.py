@@ -8,12 +8,11 @@ center of gravity and mass moment of inertia (A, B, C and the units).
 
 from __future__ import annotations
 
+from itertools import permutations
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
-from scipy.spatial.transform import Rotation
 
 from armload.devices.load import Load
 from armload.inertia import InertialParameters, phi_to_com
@@ -44,8 +43,7 @@ def kuka_load(parameters: InertialParameters) -> KukaLoad:
         return KukaLoad(0.0, [0.0] * 3, [0.0] * 3, [0.0] * 3)
     mass, com, inertia = phi_to_com(parameters.phi)
     moments, axes = _principal(inertia)
-    angles = Rotation.from_matrix(axes).as_euler("ZYX", degrees=True)
-    return KukaLoad(float(mass), _rounded(1e3 * com), _rounded(angles), _rounded(moments, 12))
+    return KukaLoad(float(mass), _rounded(1e3 * com), _rounded(_turned(axes)), _rounded(moments, 12))
 
 
 def sunrise_text(load: Load) -> str:
@@ -68,12 +66,18 @@ def sunrise_text(load: Load) -> str:
 def _principal(inertia: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Principal moments (3,) and axes, the columns of a rotation (3, 3), in the order nearest to the given axes."""
     moments, axes = np.linalg.eigh(inertia)
-    order = linear_sum_assignment(-np.abs(axes))[1]  # of the axis nearest to x, to y, to z
-    moments, axes = moments[order], axes[:, order]
+    order = max(permutations(range(3)), key=lambda order: np.abs(axes[range(3), order]).sum())  # nearest to x, y, z
+    moments, axes = moments[list(order)], axes[:, order]
     axes = axes * np.where(np.diag(axes) < 0.0, -1.0, 1.0)
     if np.linalg.det(axes) < 0.0:
         axes[:, np.argmin(np.diag(axes))] *= -1.0
     return moments, axes
+
+
+def _turned(R: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A, B and C (3,) [°] of a rotation R = Rz(A)·Ry(B)·Rx(C) that turns by less than a quarter."""
+    b = -np.arcsin(np.clip(R[2, 0], -1.0, 1.0))
+    return np.degrees([np.arctan2(R[1, 0], R[0, 0]), b, np.arctan2(R[2, 1], R[2, 2])])
 
 
 def _rounded(values: NDArray[np.float64], decimals: int = _DECIMALS) -> list[float]:
