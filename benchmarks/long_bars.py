@@ -11,6 +11,7 @@ a rating of 3 kg. What a log does not determine does not count.
 determined  share of the moments and products of inertia that the log is said to determine
 inside      share of those inside their 95 % interval, after 1 and 6 s
 width       mean half-width over mean error of those, after 1 and 6 s
+log alone   inside and width of the same under the weak prior of `map-gp`, the log trusted as the hybrid trusts it
 rest        share of those inside of masses · first moments, after 6 s
 
 Writes benchmarks/results/long_bars.json and a table of docs/hybrid.md. Goes on from --work; three minutes of one core.
@@ -23,12 +24,13 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from script import ROOT, markdown_table, options, say, write, write_table
 from wide_and_light import Answered, answered, records_of
 
 from armload import arm
 from armload.arms import rated_mass
-from armload.inertia import InertialParameters
+from armload.inertia import Z95, InertialParameters
 from armload.payloads import solids
 from armload.posterior import shipped_model
 from armload.regression import payload_prior_std
@@ -37,6 +39,7 @@ ARMS = ("panda", "gen3", "ur10e")
 LENGTHS = (0.2, 0.45, 0.6, 0.8, 1.0)  # [m] for an arm rated for 3 kg; the first bin is within the prior
 MASSES, BREADTH, OFF = (0.05, 0.6), (0.02, 0.05), 0.015  # [rating], [m], [m]
 WHEN = (1.0, 6.0)  # [s]
+Alone = tuple[NDArray[np.float64], NDArray[np.float64]]  # error and half-width (10,) of the log alone
 
 
 def bar(rng: np.random.Generator, lengths: tuple[float, float], rated: float) -> InertialParameters:
@@ -49,12 +52,12 @@ def bar(rng: np.random.Generator, lengths: tuple[float, float], rated: float) ->
     return solids.box(size, mass=rated * rng.uniform(*MASSES), rotation=turn, translation=scale * centre)
 
 
-def measured(name: str, asked: Any) -> dict[tuple[float, float, float], list[Answered]]:
-    """The answers of one arm by bin of lengths and time."""
+def measured(name: str, asked: Any) -> dict[tuple[float, float, float], list[tuple[Answered, Alone]]]:
+    """The answers of one arm by bin of lengths and time, with the prior and without."""
     robot = arm(name)
     model, rated, weak = shipped_model(robot), rated_mass(robot), payload_prior_std(robot)
     records, rng = records_of(robot, name, asked), np.random.default_rng([asked.seed, 9])
-    found: dict[tuple[float, float, float], list[Answered]] = {}
+    found: dict[tuple[float, float, float], list[tuple[Answered, Alone]]] = {}
     for k in range(len(records)):
         log = records.evidence(k)
         for lengths in pairwise(LENGTHS):
@@ -63,22 +66,30 @@ def measured(name: str, asked: Any) -> dict[tuple[float, float, float], list[Ans
             if when is None:
                 continue
             shifted = log.vector + log.information @ (truth - records.truth[k])
-            answer = answered(model.prior, model.calibration, replace(log, vector=shifted), truth, weak)
-            found.setdefault((*lengths, when), []).append(answer)
+            with_bar = replace(log, vector=shifted)
+            answer = answered(model.prior, model.calibration, with_bar, truth, weak)
+            trusted = model.calibration.trusted(with_bar)
+            P = np.linalg.inv(trusted.information + np.diag(weak**-2))
+            alone = np.abs(P @ trusted.vector - truth), Z95 * np.sqrt(np.diag(P))
+            found.setdefault((*lengths, when), []).append((answer, alone))
     return found
 
 
-def counted(answers: list[Answered]) -> dict[str, float | None]:
+def counted(both: list[tuple[Answered, Alone]]) -> dict[str, float | None]:
     """What the docstring says of some answers."""
+    answers = [answer for answer, _ in both]
     error, half = (np.array([getattr(one, part) for one in answers]) for part in ("error", "half"))
     told = np.array([one.told for one in answers], dtype=bool)
     e, h, known = error[:, 4:], half[:, 4:], told[:, 4:]
     inside = (error <= half) & told
+    e_alone, h_alone = (np.array(part)[:, 4:][known] for part in zip(*(alone for _, alone in both), strict=True))
     return {
         "answers": len(answers),
         "determined": round(float(known.mean()), 3),
         "inside": round(float((e <= h)[known].mean()), 3) if known.any() else None,
         "width": round(float(h[known].mean() / e[known].mean()), 2) if known.any() else None,
+        "log alone, inside": round(float((e_alone <= h_alone).mean()), 3) if known.any() else None,
+        "log alone, width": round(float(h_alone.mean() / e_alone.mean()), 2) if known.any() else None,
         "masses inside": round(float(inside[:, 0].sum() / told[:, 0].sum()), 3),
         "first moments inside": round(float(inside[:, 1:4].sum() / told[:, 1:4].sum()), 3),
     }
@@ -95,11 +106,14 @@ def table(cells: list[dict[str, Any]]) -> str:
                 " · ".join(f"{100 * x['determined']:.0f}" for x in (first, last)),
                 " · ".join(f"{100 * x['inside']:.0f}" for x in (first, last)),
                 " · ".join(f"{x['width']:.1f}" for x in (first, last)),
+                " · ".join(f"{100 * x['log alone, inside']:.0f}" for x in (first, last)),
+                " · ".join(f"{x['log alone, width']:.1f}" for x in (first, last)),
                 f"{100 * last['masses inside']:.0f} · {100 * last['first moments inside']:.0f}",
             ]
         )
-    heads = ["length [m]", "determined [%]", "inside [%]", "half-width over error", "masses · first moments inside [%]"]
-    return markdown_table(heads, "lrrrr", rows)
+    heads = ["length [m]", "determined [%]", "inside [%]", "half-width over error"]
+    heads += ["the log alone: inside [%]", "half-width over error", "masses · first moments inside [%]"]
+    return markdown_table(heads, "lrrrrrr", rows)
 
 
 def main() -> None:

@@ -123,7 +123,7 @@ def test_objects_of_matlab_are_refused_by_name_with_what_to_do():
         read_recording(BY_MATLAB / "parabola.mat", PANDA)
 
 
-def test_whatever_matlab_wrote_is_read_or_refused():
+def test_what_matlab_wrote_that_is_no_log_is_refused():
     files = sorted(BY_MATLAB.glob("*.mat"))
     if not files:
         pytest.skip("SciPy is installed without its test data")

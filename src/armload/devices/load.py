@@ -207,6 +207,13 @@ def numbers_of(parameters: InertialParameters, order: str) -> list[float]:
     return [round(float(x), 14) + 0.0 for x in to_order(parameters, order)]
 
 
+def counted_numbers(parameters: InertialParameters, order: str) -> list[float]:
+    """The same for a controller, which may be told that nothing is held: zeros, though that has no centre of mass."""
+    if parameters.phi.any():
+        return numbers_of(parameters, order)
+    return [0.0] * len(to_order(InertialParameters(np.eye(10)[0]), order))
+
+
 def read_load(path: str | Path) -> Load:
     """The load in a file: what `armload identify --json` printed, or a payload file (which is known, not measured).
 

@@ -28,6 +28,11 @@ class Column(NamedTuple):
     dates: bool = False
     elements: Sequence[str] | None = None
 
+    @classmethod
+    def of(cls, array: NDArray) -> Column:
+        """An array (N,) or (N, width) that is in memory."""
+        return cls(array.shape[1] if array.ndim == 2 else None, lambda: array, array.dtype.kind == "M")
+
 
 class ArrayTable:
     """Arrays by name (`table.Table`); elements of a list-valued one are columns `name[0]`, … or `name/joint`.

@@ -40,10 +40,7 @@ def read_mat(path: Path, where: str, arm: Arm | None = None, spec: ColumnSpec | 
         in_hdf5 = _HDF5 in file.read(_USER_BLOCK + len(_HDF5))
     held = _of_7_3(path, where) if in_hdf5 else _of_4_to_7(path, where)
     arrays = _called({name: array for name, value in held.items() if (array := _upright(value)) is not None})
-    columns = {
-        name: Column(array.shape[1] if array.ndim == 2 else None, lambda array=array: array)
-        for name, array in arrays.items()
-    }
+    columns = {name: Column.of(array) for name, array in arrays.items()}
     try:
         return read_table(ArrayTable(columns, where), where, arm, spec or ColumnSpec())
     except RecordingError as error:
@@ -81,11 +78,12 @@ def _of_4_to_7(path: Path, where: str) -> dict[str, NDArray | None]:
         with warnings.catch_warnings():  # of what is passed over
             warnings.simplefilter("ignore")
             held = loadmat(path, simplify_cells=True)
+        nameless = held.pop("None", None)  # SciPy's name of an object that has none in the file; it says its own
+        objects = {} if nameless is None else {str(nameless[0][0].decode()): None}
     except Exception as error:  # a damaged file can fail anywhere between its header and zlib
         raise RecordingError(f"{where} is not a MATLAB file that can be read: {one_line(error)[:160]}") from None
-    objects = held.pop("None", None)  # SciPy's name of an object that has none in the file
     named = {name: value for name, value in held.items() if not name.startswith("__")}
-    return dict(flat(named, "")) | ({} if objects is None else {str(objects[0][0].decode()): None})
+    return dict(flat(named, "")) | objects
 
 
 def _of_7_3(path: Path, where: str) -> dict[str, NDArray | None]:

@@ -44,7 +44,7 @@ def read_npz(path: Path, where: str, arm: Arm | None = None, spec: ColumnSpec | 
         raise RecordingError(f"{where}: channel is {channel[:24]!r}: expected one of {', '.join(CHANNELS)}")
     joints = tuple(str(name) for name in np.ravel(arrays["joint_names"])) if "joint_names" in arrays else None
     columns = {
-        name: _column(array)
+        name: Column.of(array)
         for name, array in arrays.items()
         if name not in _LABELS and (array.ndim == 1 or (array.ndim == 2 and 0 < array.shape[1] <= WIDEST))
     }
@@ -70,12 +70,8 @@ def read_npy(path: Path, where: str, arm: Arm | None = None, spec: ColumnSpec | 
             f"{where} holds an array of shape {array.shape} of {array.dtype}: expected (N, k) numbers, a row for each "
             "time, or (N,) with named fields"
         )
-    table = ArrayTable({name: _column(column) for name, column in columns.items()}, where)
+    table = ArrayTable({name: Column.of(column) for name, column in columns.items()}, where)
     return read_table(table, where, arm, spec or ColumnSpec())
-
-
-def _column(array: NDArray) -> Column:
-    return Column(array.shape[1] if array.ndim == 2 else None, lambda: array, array.dtype.kind == "M")
 
 
 def _reason(error: Exception) -> str:

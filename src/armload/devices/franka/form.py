@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armload.devices.load import Load, numbers_of
+from armload.devices.load import Load, counted_numbers
 from armload.errors import SinkError
 from armload.inertia import InertialParameters
 
@@ -35,9 +35,7 @@ def franka_load(parameters: InertialParameters) -> FrankaLoad:
     >>> franka_load(load).inertia
     [1.0, 0.2, 0.0, 0.2, 2.0, 0.0, 0.0, 0.0, 2.5]
     """
-    if not parameters.phi.any():  # nothing has no centre of mass
-        return FrankaLoad(0.0, [0.0] * 3, [0.0] * 9)
-    numbers = numbers_of(parameters, "franka")
+    numbers = counted_numbers(parameters, "franka")
     return FrankaLoad(numbers[0], numbers[1:4], numbers[4:])
 
 

@@ -7,13 +7,12 @@ is not known here. Source: Kinova, Kortex API: ControlConfig, ToolConfiguration 
 
 from __future__ import annotations
 
-from armload.devices.load import Load, numbers_of
+from armload.devices.load import Load, counted_numbers
 
 
 def tool_configuration_text(load: Load) -> str:
     """Python for `control_config`, a `ControlConfigClient` of the Kortex API; the tool's transform stays as it is."""
-    nothing = not load.parameters.phi.any()  # it has no centre of mass
-    mass, x, y, z, *_ = [0.0] * 4 if nothing else numbers_of(load.parameters, "ur")
+    mass, x, y, z = counted_numbers(load.parameters, "ur")[:4]
     return "\n".join(
         [
             *(f"# {line}" for line in load.description()),

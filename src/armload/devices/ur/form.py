@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armload.devices.load import Load, numbers_of
+from armload.devices.load import Load, counted_numbers
 from armload.inertia import InertialParameters
 
 
@@ -30,9 +30,7 @@ def ur_payload(parameters: InertialParameters) -> URPayload:
     >>> ur_payload(load).inertia
     [1.0, 2.0, 2.5, 0.2, 0.0, 0.0]
     """
-    if not parameters.phi.any():  # nothing has no centre of mass
-        return URPayload(0.0, [0.0] * 3, [0.0] * 6)
-    numbers = numbers_of(parameters, "ur")
+    numbers = counted_numbers(parameters, "ur")
     return URPayload(numbers[0], numbers[1:4], numbers[4:])
 
 

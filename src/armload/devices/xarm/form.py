@@ -7,13 +7,12 @@ UFACTORY, user manual: TCP payload.
 
 from __future__ import annotations
 
-from armload.devices.load import Load, numbers_of
+from armload.devices.load import Load, counted_numbers
 
 
 def set_tcp_load_text(load: Load) -> str:
     """Python for `arm`, an `XArmAPI`."""
-    nothing = not load.parameters.phi.any()  # it has no centre of mass
-    mass, *com = [0.0] * 4 if nothing else numbers_of(load.parameters, "ur")[:4]
+    mass, *com = counted_numbers(load.parameters, "ur")[:4]
     millimetres = [round(1e3 * x, 9) + 0.0 for x in com]
     return "\n".join(
         [
