@@ -358,5 +358,6 @@ def _random(call, folder):
 
 
 def text_of(path):
-    """The words of an HTML page."""
-    return html.unescape(re.sub(r"<[^>]*>", " ", re.sub(r'src="data:[^"]*"', "", path.read_text())))
+    """The words of an HTML page, without its style sheet."""
+    words = re.sub(r"<style>.*?</style>|src=\"data:[^\"]*\"", "", path.read_text(), flags=re.DOTALL)
+    return html.unescape(re.sub(r"<[^>]*>", " ", words))
