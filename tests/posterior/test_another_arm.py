@@ -10,12 +10,14 @@ from scipy.stats import multivariate_normal
 
 from armload import arm, identify
 from armload.arms import rated_effort
+from armload.identification.notes import arm_changed
 from armload.lab.episodes import draw_episodes, simulate_episodes
 from armload.motion import random_motion
 from armload.posterior import HybridIdentifier
 from armload.posterior.another_arm import SURPRISING, another_arm, apart
 from armload.posterior.problem import Problem
 from armload.posterior.profile_session import log_data
+from armload.posterior.scales import AnotherArm
 from armload.posterior.solve import solve
 from armload.regression import Correction, FilteredRegression, JointFeatures, solution_prior_std
 from armload.regression.information import SAME, Session
@@ -120,6 +122,14 @@ def test_the_tare_of_another_arm_is_said_and_the_intervals_hold_without_it(panda
         assert answer.interval == "approximate"
     assert sum(said) >= 2
     assert np.mean(inside) > 0.85
+
+
+def test_what_the_odds_do_not_say_is_not_said_flatly():
+    def said(log_odds):
+        return arm_changed(None, AnotherArm(log_odds, -30.0, 5.0, 5.0, found=True))
+
+    assert "it is another one" in said(3.1)
+    assert "it may be another one" in said(2.9)
 
 
 @pytest.mark.full  # some seconds

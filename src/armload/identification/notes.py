@@ -134,9 +134,10 @@ def arm_changed(drift: Drift | None, another: AnotherArm | None, what: str = "ta
     if another is not None and another.found:
         say = "learn a profile of this arm" if what == "profile" else "record a tare of this arm as it is now"
         rest = "do without" if another.left_out else "still rest on"
+        is_another = "it is another one, or was repaired" if another.sure else "it may be another one, or was repaired"
         return (
-            f"the arm is not as {then}: it is another one, or was repaired, as its links, gears or torque sensors "
-            f"differ; the intervals {rest} what was known of it; {say}"
+            f"the arm is not as {then}: {is_another}, as its links, gears or torque sensors differ; the intervals "
+            f"{rest} what was known of it; {say}"
         )
     if drift is None or not drift.changed:
         return None

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+_SURE = 3.0  # ln(20): the odds at which a stream is said to be of another arm, too
+
 
 @dataclass(frozen=True, eq=False)
 class Scales:
@@ -44,6 +46,11 @@ class AnotherArm:
     surprise: float
     found: bool
     left_out: bool = True
+
+    @property
+    def sure(self) -> bool:
+        """Whether another arm explains the run 20 times as well as the tare's; else it is found by its surprise."""
+        return self.log_odds > _SURE
 
 
 @dataclass(frozen=True, eq=False)
