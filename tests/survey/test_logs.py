@@ -35,13 +35,14 @@ def test_links_among_folders_lead_to_no_log_twice(folder):
     assert names(find_logs([str(folder)]), folder) == ["cell-1/a.csv", "cell-1/deep/b.npz", "cell-2/c.mcap"]
 
 
-def test_a_packed_log_is_a_log_that_its_row_says_to_unpack(folder):
+def test_a_packed_log_is_a_log_and_one_that_cannot_be_unpacked_here_says_so(folder):
     (folder / "cell-1" / "old.csv.gz").write_text("x")
+    (folder / "cell-1" / "older.csv.zst").write_text("x")
     (folder / "cell-1" / "notes.txt.md.gz").write_text("x")
     found = names(find_logs([str(folder)]), folder)
-    assert found == ["cell-1/a.csv", "cell-1/deep/b.npz", "cell-1/old.csv.gz", "cell-2/c.mcap"]
+    assert found == ["cell-1/a.csv", "cell-1/deep/b.npz", "cell-1/old.csv.gz", "cell-1/older.csv.zst", "cell-2/c.mcap"]
     with pytest.raises(ArmloadError, match="unpack it first"):
-        read_recording(folder / "cell-1" / "old.csv.gz")
+        read_recording(folder / "cell-1" / "older.csv.zst")
 
 
 def test_globs_lists_and_names_give_each_log_once(folder):

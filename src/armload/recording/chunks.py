@@ -11,7 +11,7 @@ from armload.arms import Arm
 from armload.errors import RecordingError
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.csv_file import csv_chunks
-from armload.recording.files import TABLES, has_topics, read_as_told, read_recording
+from armload.recording.files import TABLES, has_topics, log_in, read_as_told
 from armload.recording.hdf5_file import hdf5_chunks
 from armload.recording.npz_file import npz_chunks
 from armload.recording.of_arm import OfArm
@@ -52,28 +52,30 @@ def recording_chunks(
         RecordingError: as `read_recording`, but of a bag only once its flaw is reached.
     """
     spec = ColumnSpec.of(columns)
-    of_arm = OfArm(arm, spec, str(path))
-    yield from map(of_arm.of, _parts(Path(path), arm, topic, spec, size))
+    with log_in(path) as file:
+        yield from map(OfArm(arm, spec, str(path)).of, _parts(file, str(path), arm, topic, spec, size))
 
 
-def _parts(path: Path, arm: Arm | None, topic: str | None, spec: ColumnSpec, size: int) -> Iterator[Recording]:
+def _parts(
+    path: Path, where: str, arm: Arm | None, topic: str | None, spec: ColumnSpec, size: int
+) -> Iterator[Recording]:
     read = _TABLES.get(path.suffix.lower())
     if path.exists() and has_topics(path) and spec == spec.of_values:
-        yield from bag_chunks(path, str(path), arm, topic, size, spec)
+        yield from bag_chunks(path, where, arm, topic, size, spec)
         return
     if read is None or topic is not None or not path.is_file():
-        yield read_as_told(path, arm, topic, spec)
+        yield read_as_told(path, where, arm, topic, spec)
         return
     many = size * (_TEXT if read is csv_chunks else 1)
     begun = False
     try:
-        for chunk in read(path, str(path), arm, spec, many):
+        for chunk in read(path, where, arm, spec, many):
             begun = True
             yield chunk
     except Exception as error:  # a decoder may fail in any way; read whole, the log says in which
         if begun:
             raise _Begun from error
-        yield read_as_told(path, arm, None, spec)
+        yield read_as_told(path, where, arm, None, spec)
 
 
 class _Begun(RecordingError):
@@ -100,16 +102,16 @@ def read_long(
     Raises:
         RecordingError: as `read_recording`. OSError: there is no room for the samples.
     """
-    path = Path(path)
-    files = [path] if path.is_file() else list(path.iterdir()) if path.is_dir() and has_topics(path) else []
-    if sum(file.stat().st_size for file in files) < long:
-        return read_recording(path, arm, topic=topic, columns=columns)
-    chunks = recording_chunks(path, arm, topic=topic, columns=columns, size=size)
-    try:
-        first = next(chunks)
-        second = next(chunks, None)
-        if second is None:
-            return first
-        return spooled(chain([first, second], chunks), str(path))
-    except _Begun:
-        return read_recording(path, arm, columns=columns)
+    spec, where = ColumnSpec.of(columns), str(path)
+    of_arm = OfArm(arm, spec, where)
+    with log_in(path) as log:
+        files = [log] if log.is_file() else list(log.iterdir()) if log.is_dir() and has_topics(log) else []
+        if sum(file.stat().st_size for file in files) < long:
+            return of_arm.of(read_as_told(log, where, arm, topic, spec))
+        chunks = map(of_arm.of, _parts(log, where, arm, topic, spec, size))
+        try:
+            first = next(chunks)
+            second = next(chunks, None)
+            return first if second is None else spooled(chain([first, second], chunks), where)
+        except _Begun:
+            return OfArm(arm, spec, where).of(read_as_told(log, where, arm, None, spec))

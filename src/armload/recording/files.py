@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from armload.recording.lerobot import is_data_set, read_data_set
 from armload.recording.mat_file import read_mat
 from armload.recording.npz_file import read_npy, read_npz, write_npz
 from armload.recording.of_arm import OfArm
+from armload.recording.packed import UNPACKED, form_of, unpacked
 from armload.recording.parquet_file import read_parquet, write_parquet
 from armload.recording.recording import Recording
 from armload.recording.ros_bag import BAG_SUFFIXES, read_bag
@@ -31,15 +33,16 @@ _READERS = {
     **dict.fromkeys((".hdf5", ".h5"), read_hdf5),
     ".mat": read_mat,
 }
-LOG_SUFFIXES = tuple(suffix for suffix in (*_READERS, *BAG_SUFFIXES) if suffix not in _NAMED)
-PACKED_SUFFIXES = (".gz", ".bz2", ".xz", ".zst", ".zip")
+FORMS = (*_READERS, *BAG_SUFFIXES)
+LOG_SUFFIXES = tuple(suffix for suffix in FORMS if suffix not in _NAMED)
+_PACKED_SUFFIXES = (*UNPACKED, ".zst")
 _FORMS = "CSV, Parquet, NPZ, HDF5, MATLAB, ROS bag or LeRobot folder"
 _WRITERS = {".csv": write_csv, ".parquet": write_parquet, ".npz": write_npz}
 _PACKED = {  # how a file begins that a program has packed
-    b"\x1f\x8b": "gzip",
-    b"BZh91AY&SY": "bzip2",
-    b"\xfd7zXZ\x00": "xz",
-    b"\x28\xb5\x2f\xfd": "Zstandard",
+    b"\x1f\x8b": ("gzip", ".gz"),
+    b"BZh91AY&SY": ("bzip2", ".bz2"),
+    b"\xfd7zXZ\x00": ("xz", ".xz"),
+    b"\x28\xb5\x2f\xfd": ("Zstandard", ".zst"),
 }
 _HEAD = 2048  # bytes by which a file is known; HDF5 may leave up to so many to others before it begins
 _ZIP = b"PK\x03\x04"
@@ -68,8 +71,9 @@ def read_recording(
     """Read the log of an arm: a table (CSV, Parquet, NPZ, HDF5, MATLAB), a ROS bag, an episode of a LeRobot data set.
 
     Args:
-        path: the file, or the folder of a ROS 2 bag or of a LeRobot data set. Columns of a table are known by the names
-            that tools give them (docs/recordings.md); SI units, unless header, tool or `columns` say otherwise.
+        path: the file, packed or not (run.csv.gz, run.zip), or the folder of a ROS 2 bag or of a LeRobot data set.
+            Columns of a table are known by the names that tools give them (docs/recordings.md); SI units, unless
+            header, tool or `columns` say otherwise.
         arm: the arm that made the log, if known: the number of joints is checked, and joints that have names are taken
             by them, in the arm's order.
         topic: the JointState topic of a bag, where several have the arm's joints.
@@ -83,13 +87,17 @@ def read_recording(
             that names the place (for CSV the line of the file, the first being 1).
     """
     spec = ColumnSpec.of(columns).over(rate=rate, episode=episode)
-    of_arm = OfArm(arm, spec, str(path))
-    return of_arm.of(read_as_told(Path(path), arm, topic, spec))
+    with log_in(path) as file:
+        return OfArm(arm, spec, str(path)).of(read_as_told(file, str(path), arm, topic, spec))
 
 
-def read_as_told(path: Path, arm: Arm | None, topic: str | None, spec: ColumnSpec) -> Recording:
-    """What the file says; what else the log says of the arm is another matter (`OfArm`)."""
-    where = str(path)
+def log_in(path: str | Path) -> AbstractContextManager[Path]:
+    """The file or folder of a log; of a packed one what is in it, for as long as it is read (`unpacked`)."""
+    return unpacked(Path(path), FORMS)
+
+
+def read_as_told(path: Path, where: str, arm: Arm | None, topic: str | None, spec: ColumnSpec) -> Recording:
+    """What an unpacked file says; what else the log says of the arm is another matter (`OfArm`)."""
     try:
         if not path.exists():
             raise RecordingError(f"{where} does not exist: expected the path of a log ({_FORMS})")
@@ -111,7 +119,7 @@ def read_as_told(path: Path, arm: Arm | None, topic: str | None, spec: ColumnSpe
         elif suffix not in _READERS:
             raise RecordingError(
                 f"{where}: unsupported suffix {path.suffix!r}: expected {', '.join(LOG_SUFFIXES)}"
-                f"{'; unpack it first' if suffix in PACKED_SUFFIXES else _looks_like(path, suffix)}"
+                f"{'; unpack it first' if suffix in _PACKED_SUFFIXES else _looks_like(path, suffix)}"
             )
         if path.stat().st_size == 0:
             raise RecordingError(f"{where} is empty: expected a log of at least 2 samples")
@@ -124,10 +132,16 @@ def read_as_told(path: Path, arm: Arm | None, topic: str | None, spec: ColumnSpe
         raise RecordingError(f"{where} cannot be read: {error.strerror or error}") from None
 
 
+def is_log(path: str | Path) -> bool:
+    """Whether a file's name is that of a log, packed or not."""
+    path = Path(path)
+    return (path.with_suffix("") if path.suffix.lower() in _PACKED_SUFFIXES else path).suffix.lower() in LOG_SUFFIXES
+
+
 def has_topics(path: str | Path) -> bool:
     """Whether a file or folder is a ROS bag, by its name."""
     path = Path(path)
-    return not is_data_set(path) if path.is_dir() else path.suffix.lower() in BAG_SUFFIXES
+    return not is_data_set(path) if path.is_dir() else form_of(path, FORMS) in BAG_SUFFIXES
 
 
 def _without_topics(where: str, topic: str) -> str:
@@ -162,9 +176,10 @@ def _looks_like(path: Path, suffix: str) -> str:
     """A hint, if the file starts like one of another suffix, or was packed."""
     with path.open("rb") as file:
         head = file.read(_HEAD)
-    for signature, packer in _PACKED.items():
+    for signature, (packer, packed) in _PACKED.items():
         if head.startswith(signature):
-            return f": it is packed with {packer}; unpack it first"
+            say = f"let its name end in {suffix}{packed}" if packed in UNPACKED else "unpack it first"
+            return f": it is packed with {packer}; {say}"
     if head.startswith(_ZIP) and (inside := _in_zip(path)):
         return inside
     for signature, suffixes in _SIGNATURES.items():
@@ -186,7 +201,7 @@ def _in_zip(path: Path) -> str:
         return ""
     if any(name.startswith("xl/") for name in names):
         return ": it is a spreadsheet; save it as CSV"
-    return "" if any(name.endswith(".npy") for name in names) else ": it is packed with zip; unpack it first"
+    return "" if any(name.endswith(".npy") for name in names) else ": it is packed with zip; let its name end in .zip"
 
 
 def _is_text(head: bytes) -> bool:

@@ -18,7 +18,7 @@ from functools import lru_cache
 from pathlib import Path, PurePosixPath
 
 from armload.errors import ArmloadError, UsageError
-from armload.recording import LOG_SUFFIXES, PACKED_SUFFIXES, data_set_episodes, is_data_set
+from armload.recording import LOG_SUFFIXES, data_set_episodes, is_data_set, is_log
 from armload.survey.stores import WILD, is_url, logs_in, stamp_of
 
 NO_FILE = "it is a pipe, a socket or a device: expected a regular file; copy what it gives into one"
@@ -212,12 +212,6 @@ def is_special(path: Path) -> bool:
 
 def _special(mode: int) -> bool:
     return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
-
-
-def is_log(file: Path) -> bool:
-    """Whether a file is a log by its name; a packed one is, too: its row says that it has to be unpacked."""
-    name = file.with_suffix("") if file.suffix.lower() in PACKED_SUFFIXES else file
-    return name.suffix.lower() in LOG_SUFFIXES
 
 
 def of_survey(path: Path) -> bool:

@@ -9,7 +9,7 @@ from contextlib import suppress
 from typing import Any
 
 from armload.errors import UsageError
-from armload.recording import LOG_SUFFIXES
+from armload.recording import is_log
 
 WILD = re.compile(r"[*?\[]")  # what makes a path a pattern
 _URL = re.compile(r"[a-z][a-z0-9+.-]*://")
@@ -66,11 +66,10 @@ def _of_web(fs: Any, url: str) -> str:
 def logs_in(url: str) -> Iterator[str]:
     """The URLs of the logs that a URL names: itself, what fits its pattern, or what is below it as a folder."""
     fs, inside = filesystem(url)
-    suffixes = tuple(LOG_SUFFIXES)
     there = [inside]
     if WILD.search(inside):
         there = fs.glob(inside)
-    elif not inside.lower().endswith(suffixes):  # to ask a web server whether it is a folder fetches it
+    elif not is_log(inside):  # to ask a web server whether it is a folder fetches it
         with suppress(Exception):  # of the store's package: the row of what is named will say why
             there = fs.find(inside) if fs.isdir(inside) else there
-    yield from (fs.unstrip_protocol(one) for one in there if one == inside or one.lower().endswith(suffixes))
+    yield from (fs.unstrip_protocol(one) for one in there if one == inside or is_log(one))

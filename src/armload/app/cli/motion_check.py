@@ -22,10 +22,10 @@ def run_of(options: argparse.Namespace, name: str, arm: Arm, is_tare: bool = Fal
     from armload.app.cli.named import motion_of, read_logs
     from armload.identification import check_plausible
     from armload.motion import PathMotion
-    from armload.recording import LOG_SUFFIXES
+    from armload.recording import is_log
 
     path = Path(name)
-    if not path.is_dir() and (path.suffix.lower() not in LOG_SUFFIXES or PathMotion.is_table(path)):
+    if not path.is_dir() and (not is_log(path) or PathMotion.is_table(path)):
         return motion_of(name, arm)
     log = read_logs(options, arm, None, name)[1] if is_tare else read_logs(options, arm, name)[0]
     assert log is not None

@@ -148,7 +148,8 @@ def _reads(path: Path, out: Path) -> bool:
     inside = Path(os.path.realpath(out)), Path(os.path.realpath(path))
     if not inside[0].is_relative_to(inside[1]):
         return False
-    from armload.survey.logs import is_log, of_survey
+    from armload.recording import is_log
+    from armload.survey.logs import of_survey
 
     parts = inside[0].relative_to(inside[1]).parts
     return (is_log(out) and not of_survey(out)) or out.name in _OF_FOLDERS or _META in parts[:-1]
