@@ -48,7 +48,8 @@ def logs_of(robot, k, share, rate, coarse, changed=0.0):
 
 
 @pytest.mark.parametrize(
-    ("name", "share", "rate", "coarse"), [("panda", 0.02, 200.0, False), ("gen3", 0.01, 100.0, True)]
+    ("name", "share", "rate", "coarse"),
+    [pytest.param("panda", 0.02, 200.0, False, marks=pytest.mark.full), ("gen3", 0.01, 100.0, True)],
 )
 def test_sound_logs_of_rubbing_joints_and_noisy_velocities_are_not_called_changed(name, share, rate, coarse):
     robot, again = arm(name), 0

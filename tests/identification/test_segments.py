@@ -73,7 +73,7 @@ def test_a_payload_taken_up_within_a_log_is_found_and_each_part_answered(panda, 
     assert json.loads(json.dumps(found.to_dict()))["segments"][1]["mass"] == found.mass
 
 
-@pytest.mark.parametrize("when", [3.0, 6.0])
+@pytest.mark.parametrize("when", [3.0, pytest.param(6.0, marks=pytest.mark.full)])
 def test_what_was_on_at_the_tare_and_comes_off_within_a_log_is_found(panda, when):
     """No body has what is left then, which is no sign of one that swings."""
     body = draw_payload("boxes", 3, 0.8)
@@ -140,7 +140,7 @@ def drifting(log, robot, share, seed):
     return replace(log, tau=log.tau + np.outer(log.t / log.t[-1] - 0.5, share * way * robot.limits.effort))
 
 
-@pytest.mark.parametrize("name", ["panda", "ur10e"])
+@pytest.mark.parametrize("name", ["panda", pytest.param("ur10e", marks=pytest.mark.full)])
 @pytest.mark.parametrize("tared", [True, pytest.param(False, marks=pytest.mark.full)], ids=["tared", "untared"])
 def test_torques_that_drift_are_no_change_of_payload(name, tared):
     """And the joint that drifts most, of its effort limit, is named with what it drifts by."""
@@ -177,7 +177,7 @@ def test_a_payload_that_is_taken_up_while_torques_drift_a_little_is_a_change(nam
 
 @pytest.mark.parametrize(
     ("seed", "size", "held", "share"),
-    [(1, 0.3, (0.5, 1.0), 0.0), (3, 0.2, (1.0,), 0.02), (1, 1.0, (0.3,), 0.02)],
+    [pytest.param(1, 0.3, (0.5, 1.0), 0.0, marks=pytest.mark.full), (3, 0.2, (1.0,), 0.02), (1, 1.0, (0.3,), 0.02)],
     ids=["in two steps", "beside a drift", "beside a drift that is larger"],
 )
 def test_a_change_that_no_drift_alone_explains_is_found(panda, seed, size, held, share):
