@@ -33,11 +33,10 @@ from armload.identification.added_mass import MASS_MAY_CHANGE, of_mass
 from armload.identification.cut_scan import Unchanged, log_evidence, of_the_log
 from armload.identification.thresholds import DRIFT_SAID, LOSS_DIFFERS, PAYLOAD_MAY_CHANGE, TORQUE_DRIFT
 from armload.posterior import SmoothPosteriorLeastSquares
-from armload.posterior.drift import TESTED
 from armload.posterior.scales import Scales
 from armload.posterior.solve import solve
 from armload.regression import JointFeatures, payload_prior_std, solution_prior_std
-from armload.regression.information import RegressionData, Session
+from armload.regression.information import RegressionData
 from armload.regression.noise import SMOOTH, NoiseModel
 from armload.regression.prior import BODY_SIZES, body_root
 from armload.regression.rows_of_log import RowsOfLog
@@ -132,7 +131,6 @@ class Cuts:
         loss = LOSS_DIFFERS * max(held, 0.0) if physics.arm.motor_torque else 0.0  # [kg]
         self.lost = np.diag((loss * self.weak / self.weak[0]) ** 2)
         known = [_without_payload(tare, physics.arm, physics.start) for tare in physics.stream.tares]
-        self.session = Session(1, TESTED) if physics.profile is None and known else physics.session
         self.few = replace(physics.features, pose=min(_FEW, physics.features.pose))
         self.whole = _Model(known, physics.start)
         self.rough = self.whole.of_features(self.few)
@@ -142,7 +140,6 @@ class Cuts:
     def coulomb(self) -> NDArray[np.float64]:
         """Coulomb friction of the joints (n,) [N·m], as the log and what else is known show it."""
         data = self._data(slice(0, len(self.rows.t)))
-        data.session = self.session
         found = solve([*self.whole.known, data], self.weak, None, self.noise, _ITERATIONS, self.whole.start)
         return np.abs(self.physics.stream.correction.coulomb(found.eta))
 
@@ -205,10 +202,7 @@ class Cuts:
         return TorqueDrift(odds, change, both, joint + 1, float(mean[joint]))
 
     def _stretches(self, start: int, stop: int, cuts: np.ndarray) -> list[RegressionData]:
-        stretches = [self._data(slice(a, b)) for a, b in pairwise([start, *cuts.tolist(), stop])]
-        for stretch in stretches:
-            stretch.session = self.session
-        return stretches
+        return [self._data(slice(a, b)) for a, b in pairwise([start, *cuts.tolist(), stop])]
 
     def _data(self, part: slice) -> RegressionData:
         data = self.physics.empty_data()

@@ -33,6 +33,7 @@ from armload.identification.thresholds import (
 )
 from armload.posterior import Profile, SmoothPosteriorLeastSquares
 from armload.posterior.calibration import KAPPA_UNKNOWN
+from armload.posterior.drift import TESTED
 from armload.recording import Recording
 from armload.regression.lag import GAIN
 from armload.regression.noise import SMOOTH
@@ -124,6 +125,8 @@ class _Search:
         held: float,
     ) -> _Search:
         physics = SmoothPosteriorLeastSquares(arm, tare, profile=profile)
+        if profile is None:
+            physics.allow_for(TESTED)  # with more, as of an old tare, the same is found
         return cls(Cuts(physics, RowsOfLog(physics.stream.regression(), recording), kappa, held))
 
     def all(self) -> Changes:

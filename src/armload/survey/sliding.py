@@ -31,7 +31,7 @@ from armload.posterior.elimination import RunInformation, eliminated
 from armload.posterior.problem import Problem
 from armload.recording import Recording, blocks
 from armload.regression import solution_prior_std
-from armload.regression.information import Session, columns_of
+from armload.regression.information import columns_of
 from armload.regression.noise import SMOOTH, whole_noise
 from armload.regression.rows import Rows
 
@@ -60,6 +60,8 @@ def slides(
     if arm.motor_torque:  # friction that grows with the load hides so little
         return [None] * len(parts)
     physics = SmoothPosteriorLeastSquares(arm, tare, profile=profile)
+    if profile is None:
+        physics.allow_for(TESTED)
     known = _Known.of(physics)
     found: list[Slide | None] = []
     for start, stop in parts:
@@ -93,7 +95,6 @@ class _Known(NamedTuple):
     @classmethod
     def of(cls, physics: SmoothPosteriorLeastSquares) -> _Known:
         run, tares = physics.empty_data(), physics.stream.tares
-        run.session = Session(1, TESTED) if physics.profile is None and tares else physics.session
         problem = Problem([*tares, run], solution_prior_std(physics.arm), None, SMOOTH)
         selections = [np.hstack([E, np.zeros((len(E), WAYS))]) for E in problem.selections[:-1]]
         known = [RunInformation.of(one, E) for one, E in zip(tares, selections, strict=True)]
