@@ -65,7 +65,8 @@ class ArmProcess:
                 self._reader = reader
             else:
                 reader.end(0.0)
-        self.source = Reconnecting(self._opens, said=self.note, name=settings.source, n=self.arm.n)
+        comes = "://" in settings.source
+        self.source = Reconnecting(self._opens, said=self.note, name=settings.source, n=self.arm.n, comes=comes)
         self.session: Session | None = None
         self._feedback: Feedback | None = None
 
