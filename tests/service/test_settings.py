@@ -71,9 +71,12 @@ def test_the_page_has_a_row_for_every_setting():
     ("change", "said"),
     [
         (("rating = 2.5", "ratting = 2.5"), "unknown setting 'ratting'"),
-        (("rating = 2.5", 'rating = "2.5"'), "rating is '2.5': expected a float"),
+        (("rating = 2.5", 'rating = "2.5"'), 'rating is "2.5": expected a number'),
         (("rating = 2.5", 'record = "/dev/full"'), "ends in .csv or .mcap"),
-        (("every = 0.5", "every = true"), "every is True"),
+        (("every = 0.5", "every = true"), "every is true: expected a number"),
+        (("port = 0", 'port = "80"'), 'port is "80": expected a whole number'),
+        (("steady = true", 'steady = "yes"'), 'steady is "yes": expected true or false'),
+        (("steady = true", "port = 8090"), "port is of the service: write it above the first"),
         (("every = 0.5", "every = nan"), "every is nan: expected a time above 0 s"),
         (("every = 0.5", "every = -1.0"), "every is -1.0: expected a time above 0 s"),
         (("port = 0", "port = 70000"), "port is 70000: expected a port from 0 to 65535"),
@@ -123,3 +126,9 @@ def test_a_state_belongs_to_the_settings_it_was_made_with(tmp_path):
 def test_a_service_without_arms_is_refused():
     with pytest.raises(UsageError, match="no arm"):
         ServiceSettings(())
+
+
+def test_two_arms_are_not_recorded_in_one_file():
+    arms = [ArmSettings(name=name, source="sim", robot="panda", record="run.csv") for name in ("left", "right")]
+    with pytest.raises(UsageError, match=r"two arms are recorded in run\.csv"):
+        ServiceSettings(tuple(arms))

@@ -82,12 +82,7 @@ def open_source(
         RecordingError: the recording cannot be read, or the record not be written.
     """
     name = str(spec)
-    scheme = urlsplit(name).scheme if "://" in name else ""
-    if scheme and scheme not in SCHEMES:
-        raise SourceError(
-            f"{name}: unknown kind of source {scheme!r}: expected {', '.join(f'{s}://' for s in SCHEMES)}, sim, or the "
-            "path of a recording"
-        )
+    scheme = _scheme(name)
     timing = {"rate": rate, "speed": speed, "duration": duration, "seed": seed}
     simulator = partial(_simulator, arm, payloads, world, sensors, **timing)
     if detached or (detached is None and scheme in _DETACHED):
@@ -122,6 +117,27 @@ def open_source(
     except BaseException:
         source.close()
         raise
+
+
+def check_spec(spec: str) -> None:
+    """See that something is named that there can be, without looking for it.
+
+    Raises:
+        SourceError: no such kind of source, no address, or an option that there is not.
+    """
+    if _scheme(spec):
+        address_of(spec)
+
+
+def _scheme(name: str) -> str:
+    """That of a robot's address, "" of anything else."""
+    scheme = urlsplit(name).scheme if "://" in name else ""
+    if scheme and scheme not in SCHEMES:
+        raise SourceError(
+            f"{name}: unknown kind of source {scheme!r}: expected {', '.join(f'{s}://' for s in SCHEMES)}, sim, or the "
+            "path of a recording"
+        )
+    return scheme
 
 
 def prepare(spec: str) -> str | None:

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import inspect
 import json
-import logging
 import os
 import sys
 from collections.abc import Callable
@@ -27,7 +26,8 @@ from typing import Any
 
 import numpy as np
 
-COMPILING = "compiling for this machine, which is done once and takes a while"
+from armload.runtime.compiling import notice_compiling
+
 FOLDER = "ARMLOAD_KERNELS"  # the environment's: where else a library is looked for
 SIGNATURES = Path(__file__).with_name("kernels.json")  # of each kernel, what it is compiled for ahead
 LIBRARIES = {  # name: what the compiler calls the processor, and what /proc/cpuinfo must list for it; the best first
@@ -148,25 +148,5 @@ def _processor() -> frozenset[str]:
 def _just_in_time(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     from numba import njit
 
-    _log_compiling()
+    notice_compiling()
     return njit(**settings(options))(function)
-
-
-@cache
-def _log_compiling() -> None:
-    from numba.core import event
-
-    class Listener(event.Listener):
-        """Logs once in each process that something of armload is compiled; what is found on disk is not."""
-
-        logged = False
-
-        def on_start(self, event: Any) -> None:
-            if not self.logged and event.data["dispatcher"].py_func.__module__.startswith("armload."):
-                self.logged = True
-                logging.getLogger("armload").info(COMPILING)
-
-        def on_end(self, event: Any) -> None:
-            pass
-
-    event.register("numba:compile", Listener())

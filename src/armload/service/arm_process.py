@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import logging
 import os
 import signal
 import sys
@@ -30,7 +29,7 @@ from armload.online.state import saved_at
 from armload.posterior import Profile, load_profile
 from armload.posterior.drift import SESSION
 from armload.recording import Sample, read_recording
-from armload.runtime.kernels import COMPILING
+from armload.runtime.compiling import COMPILING, compiling
 from armload.service.feedback import Feedback
 from armload.service.finite import finite
 from armload.service.ready import ready
@@ -66,63 +65,71 @@ class ArmProcess:
                 self._reader = reader
             else:
                 reader.end(0.0)
-        self.source = Reconnecting(self._opens, said=self.note, name=settings.source, n=self.arm.n)
+        comes = "://" in settings.source
+        self.source = Reconnecting(self._opens, said=self.note, name=settings.source, n=self.arm.n, comes=comes)
         self.session: Session | None = None
         self._feedback: Feedback | None = None
 
     def run(self) -> None:
         """Until the source or standard input ends."""
-        self._say(None, Why(Unknown.STARTING, "the source is being opened"))
-        self.source.start()  # it is opened while the state is read
-        self.session = session = self._made_session()
-        self._saved = time.monotonic()
-        try:
-            if self.settings.apply is not None:
-                self._feedback = self._made_feedback()
-            for sample in self._ticks(session):
-                now = time.monotonic()
-                if now - self._told >= 0.999 * self.every:
-                    self._tell(session, now)
-                if sample and now - self._saved >= SAVE_EVERY:
+        with self._speaking():
+            self.source.start()  # it is opened while the state is read
+            self.session = session = self._made_session()
+            self._saved = time.monotonic()
+            try:
+                if self.settings.apply is not None:
+                    self._feedback = self._made_feedback()
+                for _ in session.estimates():
+                    now = time.monotonic()
+                    if now - self._told >= 0.999 * self.every:
+                        self._tell(session, now)
+                    if now - self._saved >= SAVE_EVERY:
+                        self._save(session)
+                if session.estimate is not None:
+                    self._tell(session, time.monotonic())
                     self._save(session)
-            if session.estimate is not None:
-                self._tell(session, time.monotonic())
-                self._save(session)
-        finally:
-            if self._feedback is not None:
-                self._feedback.close()
-            session.close()
+            finally:
+                if self._feedback is not None:
+                    self._feedback.close()
+                session.close()
 
     def note(self, text: str) -> None:
         """A sentence for whoever reads the log of the service."""
         self._write({"note": text})
 
-    def _ticks(self, session: Session) -> Iterator[bool]:
-        """True for each answer, False while there is none yet; ends with the source."""
-        waiting = threading.Event()
+    @contextlib.contextmanager
+    def _speaking(self) -> Iterator[None]:
+        """Within the block something is said while the loop says nothing: before the first answer, and compiling."""
+        ended = threading.Event()
 
-        def speak() -> None:  # until the first sample nothing of the session comes: compiling and connecting take long
-            while not waiting.wait(TICK):
-                if session.estimate is None:
-                    self._tell(session, time.monotonic())
+        def speak() -> None:
+            while not ended.wait(TICK):
+                now, session = time.monotonic(), self.session
+                if session is None:
+                    self._say(None, self._beginning())
+                elif session.estimate is None or (now - self._told > 2.0 * TICK and compiling()):
+                    self._tell(session, now)
 
+        self._say(None, self._beginning())
         threading.Thread(target=speak, daemon=True).start()
         try:
-            for estimate in session.estimates():
-                waiting.set()
-                yield estimate is not None
+            yield
         finally:
-            waiting.set()
+            ended.set()
+
+    def _beginning(self) -> Why:
+        """Why there is no answer before there is a session."""
+        if compiling():
+            return Why(Unknown.COMPILING, COMPILING)
+        return Why(Unknown.STARTING, "the source is being opened")
 
     def _tell(self, session: Session, now: float) -> None:
         self._told = now
-        source, estimate = self.source, session.estimate
+        source, estimate = self.source, session.as_of_now()
         link = source.link(before=self._continued)  # since it was saved the payload may have been exchanged
         if source.answering:  # how long that took is in its lag
             link = link._replace(heard=now)
-        why = why_unknown(estimate, link, now, session.identifier.trouble, session.doubt)
-        if estimate is None and _compiling.is_set() and source.state == "streaming":
-            why = Why(Unknown.COMPILING, COMPILING)
+        why = why_unknown(estimate, link, now, session.identifier.trouble, session.doubt, compiling())
         if self._feedback is not None and estimate is not None and session.sample is not None:
             self._feedback.offer(estimate, session.sample.q, why is None, session.identifier.doubts)
         self._say(estimate, why)
@@ -229,17 +236,6 @@ class ArmProcess:
             self._failed = str(error)
 
 
-_compiling = threading.Event()
-
-
-class _Compiling(logging.Handler):
-    """Hears that functions are compiled, which `armload.runtime.kernels` logs."""
-
-    def emit(self, record: logging.LogRecord) -> None:
-        if record.getMessage() == COMPILING:
-            _compiling.set()
-
-
 def next_free(record: str) -> str:
     """The record's name, or the first of run.again1.csv, run.again2.csv, … that does not exist yet."""
     path, k = Path(record), 0
@@ -253,9 +249,6 @@ def main() -> None:
     """Read the order, run, and end when standard input does."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # goes to the whole group; whoever started this decides
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    logger = logging.getLogger("armload")
-    logger.addHandler(_Compiling())
-    logger.setLevel(logging.INFO)
     readers: Sequence[Reader] = ()
     try:
         if not (line := _line()):

@@ -31,6 +31,7 @@ class Reconnecting(Source):
         first: the connection to begin with; None: it is opened when samples are asked for.
         said: called with a sentence whenever it is lost and whenever it is there again.
         name, n, rate: what is known of it before it is open.
+        comes: whether it may be there later, as a robot; a log that cannot be read at first never can.
 
     Attributes:
         state: "connecting", "streaming", "lost" or "ended". why: it was lost, one sentence; None while it streams.
@@ -48,6 +49,7 @@ class Reconnecting(Source):
         name: str = "",
         n: int = 0,
         rate: float = 0.0,
+        comes: bool = True,
     ) -> None:
         self.name, self.n, self.rate, self.speed = name, n, rate, 1.0
         self.state, self.connections = "connecting", 0
@@ -55,6 +57,7 @@ class Reconnecting(Source):
         self.resumed: float | None = None
         self.heard: float | None = None
         self.answering = False
+        self._comes = comes
         self._opens, self._said = opens, said or (lambda _: None)
         self._source: Detached | None = None
         self._arrived: float | None = None
@@ -103,7 +106,11 @@ class Reconnecting(Source):
         self._trial.start()
 
     def ticking(self, tick: float) -> Iterator[Sample | None]:
-        """The samples of all connections, and None every `tick` seconds while there is none."""
+        """The samples of all connections, and None every `tick` seconds while there is none.
+
+        Raises:
+            ArmloadError: it cannot be opened at first, and does not come later.
+        """
         while not self._gone.is_set():
             if self._source is None:
                 yield from self._opened(tick)
@@ -187,6 +194,8 @@ class Reconnecting(Source):
                 made.close()
             self._take(made)
             self._transit = Transit()
+        elif isinstance(made, ArmloadError) and not (self._comes or self.connections):
+            raise made
         else:
             self.state, self.why = "lost", str(made)
             wait = self._backoff.failed(0.0)

@@ -105,6 +105,10 @@ class Session:
         """Samples the source had to drop because the identifier was too slow."""
         return int(getattr(self.source, "lost", 0))
 
+    def as_of_now(self) -> OnlineEstimate | None:
+        """The newest estimate, as old as it is now, whatever the loop waits for."""
+        return None if self._answered is None else self._answered.behind(self.source.lag())
+
     # ------------------------------------------------------------------ the loop
 
     def estimates(self, duration: float | None = None) -> Iterator[OnlineEstimate]:
@@ -120,8 +124,8 @@ class Session:
             while not self._orders.empty():
                 self._orders.get()()
             if sample is None:
-                if self._answered is not None:
-                    self.estimate = self._answered.behind(self.source.lag())
+                self.estimate = self.as_of_now()
+                if self.estimate is not None:
                     yield self.estimate
                 if self._stop:
                     break
@@ -135,7 +139,8 @@ class Session:
             self._doubted()
         self._advise()
         if self.estimate is not None:
-            self.estimate = self._plausibility.qualified(self.identifier.conclude()).behind(self.source.lag())
+            self._answered = self._plausibility.qualified(self.identifier.conclude())
+            self.estimate = self._answered.behind(self.source.lag())
             self._keep(self.estimate, True)
         self._write("the source has ended")
         self.ended = True

@@ -31,6 +31,7 @@ TOOL_OR_TARE = (  # but for a tare that is taken on the stream itself
     "whether the tool was mounted at the tare, or in the profile's logs, cannot be found out on a stream: give the "
     "tool, or the tare or profile"
 )
+_OF_THE_SERVICE = ("every", "host", "port", "token_file", "webhook", "headers", "mqtt", "spare")
 _RANGES = {  # what numbers may be: in words, and between which two
     "every": ("a time above 0 s", 0.0, math.inf),
     "rating": ("a mass above 0 kg", 0.0, math.inf),
@@ -38,7 +39,14 @@ _RANGES = {  # what numbers may be: in words, and between which two
     "rate": ("a rate above 0 Hz", 0.0, math.inf),
     "port": ("a port from 0 to 65535", -1, 65536),
 }
-_KINDS = {"str": str, "float": (int, float), "bool": bool, "int": int, "tuple": list, "dict": dict}
+_KINDS = {  # of a field: what TOML may give for it, and in words
+    "str": (str, "a text"),
+    "float": ((int, float), "a number"),
+    "bool": (bool, "true or false"),
+    "int": (int, "a whole number"),
+    "tuple": (list, "a list"),
+    "dict": (dict, "a table"),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,6 +163,9 @@ class ServiceSettings:
             raise UsageError("no arm is named: expected a source, or a file with [[arm]] tables")
         if doubled := sorted({name for name in names if names.count(name) > 1}):
             raise UsageError(f"two arms are called {doubled[0]!r}: give each a name of its own")
+        records = [arm.record for arm in self.arms if arm.record is not None]
+        if doubled := sorted({record for record in records if records.count(record) > 1}):
+            raise UsageError(f"two arms are recorded in {doubled[0]}: give each a file of its own")
         if self.port is not None and self.token is None and not is_loopback(self.host):
             raise UsageError(
                 f"the endpoint at {self.host} can be reached from other machines: "
@@ -258,10 +269,12 @@ def _checked(
     for key, value in said.items():
         if key not in fields or key in without:
             known = ", ".join([*(name for name in fields if name not in without), *also])
+            if kind is ArmSettings and key in _OF_THE_SERVICE:  # TOML counts what follows [[arm]] to that arm
+                raise UsageError(f"{where}: {key} is of the service: write it above the first [[arm]]")
             raise UsageError(f"{where}: unknown setting {key!r}: expected some of {known}")
-        expected = _KINDS[fields[key]]
+        expected, words = _KINDS[fields[key]]
         if not isinstance(value, expected) or (isinstance(value, bool) and fields[key] != "bool"):
-            raise UsageError(f"{where}: {key} is {value!r}: expected a {fields[key].replace('tuple', 'list')}")
+            raise UsageError(f"{where}: {key} is {json.dumps(value, default=str)}: expected {words}")
         if key in _RANGES:
             words, below, above = _RANGES[key]
             if not below < value < above:

@@ -102,7 +102,9 @@ class Page:
                 self._status.content = tables.status(estimate, status)
                 self._table.content = tables.parameters(now, truth)
                 self._events.content = tables.events(session.log)
-                self._stream.content = tables.stream(session.source.name, estimate, session.lost)
+                self._stream.content = tables.stream(
+                    session.source.name, estimate, session.lost, None if status.why is None else status.why.reason
+                )
             if curves:
                 t, rows = session.history.last(SPANS[self._span.value])
                 for group, plot in zip(GROUPS, self._plots, strict=True):

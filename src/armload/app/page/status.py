@@ -8,15 +8,17 @@ from typing import NamedTuple
 from armload.devices import Steadied
 from armload.inertia import NAMES
 from armload.online import OnlineEstimate
+from armload.runtime.compiling import compiling
 from armload.service.reconnecting import Reconnecting
 from armload.service.session import Session
 from armload.service.tare import Tare
 from armload.service.unknown import Link, Unknown, Why, why_unknown
 
 # reasons for which the last answer says nothing of the present: it is shown as what it was, with its age
-_GONE = (Unknown.STARTING, Unknown.SOURCE_LOST, Unknown.SILENT, Unknown.UNCONFIRMED)
+_GONE = (Unknown.STARTING, Unknown.COMPILING, Unknown.SOURCE_LOST, Unknown.SILENT, Unknown.UNCONFIRMED)
 _WAITS = {
     Unknown.STARTING: "the first sample",
+    Unknown.COMPILING: "functions",
     Unknown.SOURCE_LOST: "the source",
     Unknown.SILENT: "samples",
     Unknown.BEHIND: "this machine, which is too busy",
@@ -71,8 +73,11 @@ class Watcher:
         estimate = session.estimate
         if estimate is not self._estimate:
             self._estimate, self._answered = estimate, now
-        why = why_unknown(estimate, _link(session, now), now, session.identifier.trouble, session.doubt)
-        age = None if estimate is None else estimate.age + now - self._answered
+        since = now - self._answered
+        age, compiles = None if estimate is None else estimate.age + since, compiling()
+        if estimate is not None and compiles:  # samples may wait for that alone
+            estimate = estimate.behind(estimate.lag + since)
+        why = why_unknown(estimate, _link(session, now), now, session.identifier.trouble, session.doubt, compiles)
         tare = None if session.tare is None else _tare_in_words(session.tare)
         return Status(why, waits_for(estimate, why), session.doubt or session.identifier.arm_changed, age, tare)
 

@@ -197,15 +197,20 @@ def _event(event: Event) -> str:
     return event.kind + ("" if event.mass is None else f", {event.mass:+.2f} kg")
 
 
-def stream(name: str, estimate: OnlineEstimate | None, lost: int = 0) -> str:
-    """Where samples come from, how many counted, why others were left out, and whether this machine keeps up."""
+def stream(name: str, estimate: OnlineEstimate | None, lost: int = 0, reason: Unknown | None = None) -> str:
+    """Where samples come from, how many counted, why others were left out, and whether this machine keeps up.
+
+    Args:
+        reason: why the answer is unknown, if it is.
+    """
     if estimate is None:
         return f'<div style="{TEXT};{SOFT}" data-armload="health">{escape(name)}</div>'
     text = f"{name}: t = {estimate.t:.1f} s, {estimate.health}"
     busy = [f"answers come {estimate.lag:.1f} s after their samples"] if estimate.lag >= GAP else []
     busy += [f"{lost} sample{'s were' if lost > 1 else ' was'} lost"] if lost else []
     if busy:
-        text += f"; this machine is too busy: {' and '.join(busy)}"
+        why = "functions are compiled, once" if reason is Unknown.COMPILING else "this machine is too busy"
+        text += f"; {why}: {' and '.join(busy)}"
     return f'<div style="{TEXT};{SOFT}" data-armload="health">{escape(text)}</div>'
 
 

@@ -1,0 +1,91 @@
+"""What can never be ends the service as it begins, with the reason; what may come is waited for."""
+
+import pytest
+
+from armload.app.cli import main
+from armload.devices import Detached
+from armload.errors import SourceError
+from armload.service import ArmSettings, Service, ServiceSettings
+from armload.service.reconnecting import Reconnecting
+
+
+@pytest.fixture
+def cell(tmp_path):
+    """Writes a service file of one arm with more settings than its name, robot and source."""
+
+    def write(source, *more):
+        lines = ["spare = false", "[[arm]]", 'name = "left"', 'robot = "panda"', f'source = "{source}"', *more]
+        (tmp_path / "cell.toml").write_text("\n".join(lines))
+        return str(tmp_path / "cell.toml")
+
+    return write
+
+
+def test_a_log_that_does_not_exist_is_not_waited_for(cell, capsys):
+    assert main(["serve", cell("none.csv"), "--quiet", "--duration", "60"]) == 2
+    (said,) = capsys.readouterr().err.splitlines()
+    assert "left: " in said
+    assert "none.csv does not exist: expected the path of a log" in said
+
+
+@pytest.mark.parametrize(
+    ("source", "more", "said"),
+    [
+        ("foo://1", "", "left: foo://1: unknown kind of source 'foo': expected fr3://"),
+        ("fr3://", "", "left: fr3:// names no robot: expected fr3://ADDRESS"),
+        ("ur://1.2.3.4?torque=3", "", "unknown option 'torque'"),
+        ("sim", 'save = "cell.toml"', "left: its state cannot be kept in"),
+        ("sim", 'save = "/proc/state"', "name a folder that can be written into"),
+        ("sim", 'record = "none/run.csv"', "left: its record cannot be kept in"),
+    ],
+)
+def test_an_address_or_a_folder_that_cannot_be_used_is_said_before_anything_begins(cell, capsys, source, more, said):
+    assert main(["serve", cell(source, more), "--quiet", "--duration", "60"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert said in line
+
+
+def test_a_state_s_folder_is_made(cell, tmp_path):
+    main(["serve", cell("sim", 'save = "a/b"'), "--quiet", "--duration", "0"])
+    assert (tmp_path / "a" / "b").is_dir()
+
+
+def test_a_log_ends_at_its_first_failure_and_a_robot_is_tried_again(panda, tmp_path):
+    missing = str(tmp_path / "none.csv")
+    log = Reconnecting(lambda: Detached(missing, panda), name="log", n=7, comes=False)
+    with pytest.raises(SourceError, match="does not exist"):
+        list(log)
+    tried = []
+
+    def off():
+        tried.append(1)
+        if len(tried) == 3:
+            robot.close()
+        raise SourceError("it is off")
+
+    robot = Reconnecting(off, name="robot", n=7)
+    assert list(robot) == []
+    assert len(tried) == 3
+
+
+def test_a_line_has_the_same_fields_before_the_process_speaks():
+    service = Service(ServiceSettings((ArmSettings(name="left", source="sim", robot="panda"),), spare=False))
+    answer = service.answer("left")
+    fields = [
+        "arm",
+        "known",
+        "unknown",
+        "why",
+        "age",
+        "lag",
+        "connection",
+        "connections",
+        "restarts",
+        "lost",
+        "saved",
+        "arm_changed",
+        "alarms",
+        "mass",
+    ]
+    assert set(fields) <= set(answer)
+    service.close()
