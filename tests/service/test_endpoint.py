@@ -5,6 +5,7 @@ import json
 import socket
 import threading
 import time
+import urllib.error
 import urllib.request
 
 import pytest
@@ -87,3 +88,45 @@ def test_an_address_that_cannot_be_read_is_a_bad_request(address, path, host, ca
     connection.close()
     assert line.endswith(b"400 Bad Request")
     assert capfd.readouterr().err == ""
+
+
+def request(endpoint_url, path, method="GET", headers=None):
+    """Status, type and text of an answer."""
+    asks = urllib.request.Request(f"{endpoint_url}{path}", method=method, headers=headers or {})
+    try:
+        with urllib.request.urlopen(asks, timeout=10.0) as response:
+            return response.status, response.headers["Content-Type"], response.read()
+    except urllib.error.HTTPError as error:
+        return error.code, error.headers["Content-Type"], error.read()
+
+
+def test_who_watches_over_services_may_ask_for_the_head_alone(address):
+    url = f"http://127.0.0.1:{address[1]}"
+    for path in ("/health", "/arms", "/stream/right"):
+        assert request(url, path, "HEAD")[::2] == (200, b"")
+    assert request(url, "/nothing", "HEAD")[::2] == (404, b"")
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "DELETE"])
+def test_what_would_change_something_is_refused_in_json(address, method):
+    status, kind, text = request(f"http://127.0.0.1:{address[1]}", "/arms", method)
+    assert (status, kind) == (501, "application/json")
+    assert json.loads(text) == {"error": "expected GET or HEAD"}
+
+
+def test_a_request_that_is_none_is_refused_in_json(address):
+    with socket.create_connection(address, timeout=10.0) as connection:
+        connection.sendall(b"no request at all\r\n\r\n")
+        assert b"error" in connection.makefile("rb").read()
+
+
+@pytest.mark.parametrize(
+    ("said", "status"),
+    [("Bearer secret", 200), ("bearer secret", 200), ("Bearer  secret", 200), ("Basic secret", 401), ("secret", 401)],
+)
+def test_the_word_before_the_token_may_be_written_in_any_case(said, status):
+    endpoint = Endpoint(Cell(), "127.0.0.1", 0, token="secret")
+    try:
+        assert request(endpoint.url, "/arms", headers={"Authorization": said})[0] == status
+    finally:
+        endpoint.close()

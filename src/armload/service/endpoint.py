@@ -119,10 +119,17 @@ class _Handler(BaseHTTPRequestHandler):
         else:
             self._answer(404, {"error": "expected /arms, /arms/NAME, /health, /stream or /stream/NAME"})
 
+    do_HEAD = do_GET  # the same without what it says, as who watches over services asks
+
+    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
+        """A request that is none, or of a kind that changes something."""
+        self.close_connection = True
+        self._answer(code, {"error": "expected GET or HEAD" if code == 501 else message or explain or "no request"})
+
     def _allowed(self, host: str | None) -> bool:
         if self.token is not None:
-            given = self.headers.get("Authorization", "")
-            if hmac.compare_digest(given.encode(), f"Bearer {self.token}".encode()):
+            scheme, _, given = self.headers.get("Authorization", "").partition(" ")  # RFC 9110, 11.1: in any case
+            if scheme.lower() == "bearer" and hmac.compare_digest(given.strip().encode(), self.token.encode()):
                 return True
             self._answer(401, {"error": "expected the header Authorization: Bearer TOKEN"})
             return False
@@ -138,13 +145,16 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_header("Content-Length", str(len(text)))
         self.send_header("Cache-Control", "no-store")
         self.end_headers()
-        self.wfile.write(text)
+        if self.command != "HEAD":
+            self.wfile.write(text)
 
     def _stream(self, name: str | None) -> None:
         self.send_response(200)
         self.send_header("Content-Type", "application/x-ndjson")
         self.send_header("Cache-Control", "no-store")
         self.end_headers()
+        if self.command == "HEAD":
+            return
         lines: queue.Queue[dict[str, Any]] = queue.Queue(100)
         with self.service.heard_by(_into(lines, name)):
             while True:
