@@ -17,12 +17,19 @@ from armload.regression import payload_prior_std
 
 
 def next_run(
-    run: PosteriorLeastSquares, reference: PosteriorLeastSquares | None, until: float
+    run: PosteriorLeastSquares, reference: PosteriorLeastSquares | None, until: float, sticks: float
 ) -> PosteriorLeastSquares:
-    """The run after one that ends: that one's rows from `until` [s] on are taken back, `reference` becomes a tare."""
+    """The run after one that ends: that one's rows from `until` [s] on are taken back, `reference` becomes a tare.
+
+    sticks: as of `Sticking.share`; 0 where torque is measured at the motors, whose rows allow for it anyway.
+    """
     run.stream.finish(until)
     following = run.another(reference)
-    following.prepare()
+    stream = following.stream
+    stream.prepare()
+    if sticks > 0.0:
+        coulomb = stream.correction.coulomb(stream.posterior.eta)
+        stream.allow_for_sticking(sticks * coulomb**2 / 3.0)
     return following
 
 

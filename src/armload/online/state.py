@@ -24,7 +24,7 @@ from armload.estimators import Identifier
 from armload.runtime.atomic import replacing
 from armload.runtime.packing import Packer, Unpacker
 
-FORMAT = 25
+FORMAT = 26
 
 
 def save_state(path: str | PathLike[str], state: dict[str, Any], arm: Arm, method: str, engine: Identifier) -> Path:

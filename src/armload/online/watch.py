@@ -192,7 +192,7 @@ class PayloadWatch:
         )
         self._naming.begin(sample.t, began, run, rest)
         reference = self.runs.reference_for_next()
-        following = self._background.submit(next_run, run, reference, until)
+        following = self._background.submit(next_run, run, reference, until, self._weighing.sticks)
         self._change, self._doubted_at = Change(sample.t, began, state, following), None
 
     def _settle(self, change: Change, sample: Sample) -> None:

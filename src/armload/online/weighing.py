@@ -7,7 +7,7 @@ all that is mounted keeps a mass then and it lasts for `CONTACT_LONGEST`.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from armload.arms.momentum_row import MomentumRow, wrench_row
 from armload.online.modes import Modes
 from armload.online.runs import Gaussian, can_be
+from armload.online.sticking import Sticking
 from armload.online.thresholds import (
     AFTER_CONTACT,
     CONTACT_LONGEST,
@@ -66,7 +67,8 @@ class Weighing:
         """Forget the stream; the next row is the first of a run."""
         self.modes = Modes(self._unit, run.stream.correction.effort)
         self._motor = False  # whether its torque is measured at the motors
-        # Coulomb friction there (n,) [N·m], as of the last row taken: a run that ends is solved anew beside
+        self._sticking = Sticking(len(run.stream.correction.effort))  # of joints behind whose gears it is measured
+        # Coulomb friction (n,) [N·m], as of the last row taken: a run that ends is solved anew beside
         self._coulomb = np.zeros(len(run.stream.correction.effort))
         self._touched = False  # whether something has touched the arm since it was steady
         self._sure_since = np.inf  # when the payload was first surely another one
@@ -98,6 +100,11 @@ class Weighing:
         as its size is known, while an arm does not jump.
         """
         return self.modes.steady - self.modes.drift if self._touched else self.modes.steady
+
+    @property
+    def sticks(self) -> float:
+        """By which share of the variance of Coulomb friction joints at rest are held beyond what any run expects."""
+        return 0.0 if self._motor else self._sticking.share
 
     @property
     def blind(self) -> bool:
@@ -146,8 +153,7 @@ class Weighing:
         if (state := stream.state) is None or (row := stream.row) is None:
             return False
         self._motor = stream.posterior.torque == "motor"
-        if self._motor:
-            self._coulomb = stream.correction.coulomb(stream.posterior.eta)
+        self._coulomb = stream.correction.coulomb(stream.posterior.eta)
         self._moved = 0.0 if row.h <= 0.0 else self._moved + row.h * float(row.weights.max())
         h, self.row_t = row.t - self.row_t, row.t
         first = FIRST_MOTOR if self._motor else FIRST_TARED if stream.tares else FIRST_UNTARED
@@ -185,17 +191,35 @@ class Weighing:
         if self._rests(row, state) and (self._seen_steady or self.modes.steady > LIKELY):
             self._seen_steady = True
             error = state.noise / (row.weights * run.stream.noise.block)
+            if self._learns(run):
+                error = error + self._sticking.share * self._coulomb**2 / 3.0
             row = row._replace(weights=np.ones_like(row.weights))
         seen, scale = state.predict(row._replace(h=h))
         self._take(h, row, seen, scale, run, False, error)
 
-    def _take(self, h: float, row: Row, seen: NDArray, scale: NDArray, run: PosteriorLeastSquares, *how: Any) -> None:
-        """Hand a row to the modes; `how`: whether the run took it, and the error of a standstill."""
+    def _take(
+        self,
+        h: float,
+        row: Row,
+        seen: NDArray,
+        scale: NDArray,
+        run: PosteriorLeastSquares,
+        taken: bool,
+        error: NDArray | None = None,
+    ) -> None:
+        """Hand a row to the modes; `error`: of a standstill."""
         modes = self.modes
-        if self._motor:
-            seen = _rubbing(h, row, seen, scale, run, self._coulomb)
+        before = self._before_row(run)
+        if self._motor or (error is None and self._learns(run)):
+            sticks, share = _sticking(row, run, self._coulomb), 1.0
+            if not self._motor:
+                share = self._sticking.share
+                if taken:
+                    self._sticking.take(h, scale, seen, before, sticks, modes)
+            seen = seen.copy()
+            seen[:, 11] += share * scale**2 * sticks * run.stream.noise.block / h
         modes.expect(early=not self._motor and row.t - self._began < EARLY)
-        modes.take(h, seen, row.X, wrench_row(*self._chain, row.q), scale, *self._before_row(run), *how)
+        modes.take(h, seen, row.X, wrench_row(*self._chain, row.q), scale, *before, taken, error)
         possible = self._possible(run) if modes.handing + modes.other > 0.5 else _Possible(True, True, True)
         lifted = not possible.added and possible.mounted
         self._impossible_since = np.inf if possible.added else min(self._impossible_since, row.t)
@@ -203,6 +227,10 @@ class Weighing:
         self._taken_off = lifted and (row.t - self._lifted_since > CONTACT_LONGEST or not possible.before)
         if row.t - self._impossible_since >= HOLDS and not self._taken_off:
             modes.no_payload(perhaps_taken_off=lifted)
+
+    def _learns(self, run: PosteriorLeastSquares) -> bool:
+        """Whether the rows of a run do not allow for joints that stick beyond what is expected of any arm."""
+        return bool((run.stream.presliding == run.stream.correction.presliding).all()) and not self._motor
 
     def _rests(self, row: Row, state: SequentialPosterior) -> bool:
         """Whether the arm stands, or has hardly moved since it stood; it is foreseen anew elsewhere."""
@@ -220,17 +248,11 @@ class Weighing:
         return np.zeros(10), np.diag(payload_prior_std(run.arm) ** 2)
 
 
-def _rubbing(
-    h: float, row: Row, seen: NDArray, scale: NDArray, run: PosteriorLeastSquares, coulomb: NDArray
-) -> NDArray[np.float64]:
-    """`seen` (n, 12) where gears' friction is in the torque: of a slow joint it is anything up to Coulomb's, f.
+def _sticking(row: Row, run: PosteriorLeastSquares, coulomb: NDArray) -> NDArray[np.float64]:
+    """Variance (n,) [N²·m²] of a slow joint's friction, anything up to Coulomb's, f: of a block of rows, not of each.
 
     The model has f·tanh(dq/w), what sticks has up to ±f at rest: the error is somewhere within ±f·(1 − |tanh|), whose
     variance is a third of the square, and about the same for a block of rows, so that many say no more than one.
     """
-    stream = run.stream
-    slow = (1.0 / row.weights - 1.0) / stream.correction.presliding  # 1 − tanh²
-    short = coulomb * (1.0 - np.sqrt(np.maximum(1.0 - slow, 0.0)))
-    out = seen.copy()
-    out[:, 11] += scale**2 * short**2 / 3.0 * stream.noise.block / h
-    return out
+    slow = (1.0 / row.weights - 1.0) / run.stream.presliding  # 1 − tanh²
+    return (coulomb * (1.0 - np.sqrt(np.maximum(1.0 - slow, 0.0)))) ** 2 / 3.0

@@ -112,6 +112,20 @@ class StreamingPosterior:
             return self._first
         return self._posterior
 
+    def allow_for_sticking(self, variance: NDArray[np.float64]) -> None:
+        """Joints at rest are held by friction of this variance (n,) [N²·m²]: the next rows weigh less while they are.
+
+        Of a block of rows, in units of the noise expected of one: never less than is expected of any arm.
+        """
+        self.prepare()
+        noise = self._first.scales.noise[-1] / self.noise.block
+        self._regression.presliding[:] = np.maximum(self.correction.presliding, variance / noise)
+
+    @property
+    def presliding(self) -> NDArray[np.float64]:
+        """By how much the variance (n,) of a joint's residual is larger at rest, as the rows have it."""
+        return self._regression.presliding
+
     def _empty(self) -> RegressionData:
         return RegressionData(self.correction, self.gain, self.features, self.noise.block, self._solver.session)
 

@@ -123,9 +123,9 @@ class Correction:
         return np.concatenate([fraction * larger.get(name, 1.0) * self.effort for name, fraction in DAILY.items()])
 
     @property
-    def presliding(self) -> float:
-        """By how much the variance of a joint's residual is larger at rest: friction is anything below stiction."""
-        return _MOTOR_PRESLIDING if self.arm.motor_torque else _PRESLIDING
+    def presliding(self) -> NDArray[np.float64]:
+        """By how much a joint's residual varies more at rest (n,): friction is anything below stiction."""
+        return np.full(self.arm.n, _MOTOR_PRESLIDING if self.arm.motor_torque else _PRESLIDING)
 
     @property
     def adaptive(self) -> NDArray[np.bool_]:

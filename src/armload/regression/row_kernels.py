@@ -86,18 +86,19 @@ def make_rows(
     velocity_lag,
 ):  # pragma: no cover - compiled
     """M rows from the samples that complete them: h, X, r and weights."""
-    gain, settling, excess = settings[0], settings[2], settings[3]
+    gain, settling = settings[0], settings[2]
     count, n = q.shape
+    excess = settings[3 : 3 + n]
     size = regressor.shape[2] + pose_lag.shape[1] + velocity_lag.shape[2]
     h, X, r, weights = np.empty(count), np.empty((count, n, size)), np.empty((count, n)), np.empty((count, n))
     for m in range(count):
         momentum, drift = momentum_rows(rotations, translations, axes, turning, gravity, q[m], dq[m])
         pose, velocity = features_of_sample(q[m], dq[m], waves, velocity_waves)
         leaning = leaning_row(rotations, translations, axes, turning, turned, links, q[m])
-        inputs = (momentum, drift, leaning, links, dq[m], torque[m], pose, velocity, settings[4:])
+        inputs = (momentum, drift, leaning, links, dq[m], torque[m], pose, velocity, settings[3 + n :])
         _lagged(inputs, gain, steps[m], fresh[m], joints, regressor, pose_lag, velocity_lag, X[m], r[m])
         for j in range(n):
-            weights[m, j] = 1.0 / (1.0 + excess * (1.0 - np.tanh(abs(dq[m, j]) / FRICTION_WIDTH) ** 2))
+            weights[m, j] = 1.0 / (1.0 + excess[j] * (1.0 - np.tanh(abs(dq[m, j]) / FRICTION_WIDTH) ** 2))
         moved = not np.isfinite(clock[2])
         for j in range(n):
             moved |= abs(q[m, j] - joints[4, j]) > STILL

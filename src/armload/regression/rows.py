@@ -104,8 +104,8 @@ class FilteredRegression:
             self._waves, self._velocity_waves = features.waves, features.velocity_waves
         self._wide = 10 + (0 if mismatch is None else mismatch.size)
         apart = -1.0 if rate is None else SPACING * REGRESSOR_RATE / rate
-        known = [0.0] if mismatch is None else [mismatch.presliding, *mismatch.least_friction]
-        self._settings = np.array([gain, apart, settling, *known])
+        known = np.zeros((2, arm.n)) if mismatch is None else np.array([mismatch.presliding, mismatch.least_friction])
+        self._settings = np.array([gain, apart, settling, *known.ravel()])
         self.reset()
 
     def reset(self) -> None:
@@ -116,6 +116,11 @@ class FilteredRegression:
         self._joints = np.full((5, n), np.nan)  # lagged torque, last torque; of the bare arm; the pose of rest
         self._regressor = np.zeros((2, n, self._wide))  # states of the lags, their last inputs
         self._pose, self._velocity = np.zeros((2, pose)), np.zeros((2, n, velocity))
+
+    @property
+    def presliding(self) -> NDArray[np.float64]:
+        """By how much the variance (n,) of each joint's residual is larger at rest; it may be set."""
+        return self._settings[3 : 3 + self.arm.n]
 
     @property
     def state(self) -> tuple[NDArray[np.float64], ...]:

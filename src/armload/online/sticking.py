@@ -1,0 +1,68 @@
+"""How friction behaves where joints hardly move: smooth in velocity, as the rows have it, or stuck at anything.
+
+The rows have Coulomb friction as f·tanh(dq/w). A joint that sticks, or has just turned round, is held by anything up to
+f: the rows are then wrong by a share s of it, of variance s²·f²·(1 − |tanh|)²/3, and about the same for a block of
+rows. Each s of a few is weighed by the innovations of the blocks of a steady arm,
+
+    ē_j ~ N(0, level·v_j + s²·f_j²·mean (1 − |tanh|)²/3)      joints j, independent,
+
+ē_j being the mean innovation of joint j over a block and v_j its variance by the run.
+
+Source: Dahl, "A solid friction model", Aerospace Corp. TOR-158, 1968; Canudas de Wit et al., IEEE T-AC 40(3), 1995.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.online.modes import Modes
+from armload.online.runs import Gaussian
+from armload.online.thresholds import LEVEL_BLOCK, LEVEL_OUTLIER
+
+# [Coulomb frictions] the shares s that are weighed, a factor of two apart, and how probable each is beforehand:
+# friction is smooth of the two Pandas that were measured, of other arms nobody knows
+_SHARES, _BEFORE = np.array([0.0, 0.25, 0.5, 1.0]), np.array([3.0, 1.0, 1.0, 1.0]) / 6.0
+# [log likelihood] that a share is behind at most: joints may begin to stick
+_BEHIND = 20.0
+
+
+class Sticking:
+    """What a stream shows of it.
+
+    Args:
+        n: number of joints.
+
+    Attributes:
+        share: E[s²], of the variance f²/3 of a joint that stands.
+    """
+
+    def __init__(self, n: int) -> None:
+        self._log, self._sums, self._h = np.log(_BEFORE), np.zeros((3, n)), 0.0
+        self.share = float(_BEFORE @ _SHARES**2)
+
+    def take(
+        self, h: float, scale: NDArray, seen: NDArray, before: Gaussian, sticks: NDArray[np.float64], modes: Modes
+    ) -> None:
+        """A row that a run has taken, for h [s]; of a steady arm only it counts.
+
+        Args:
+            scale: (n,) what it was multiplied by [1/(N·m)]. seen: (n, 12) as in `SequentialPosterior`. before: phi and
+                its covariance. sticks: (n,) f²·(1 − |tanh|)²/3 [N²·m²]. modes: what the rows before were.
+        """
+        if modes.steady < 0.5:
+            self._sums, self._h = np.zeros_like(self._sums), 0.0
+            return
+        w, (mean, P) = seen[:, :10], before
+        d, v = seen[:, 10] - w @ mean, seen[:, 11] + ((w @ P) * w).sum(axis=1)
+        self._sums += scale**2 / v, scale * d / v, h * sticks
+        self._h += h
+        if self._h < LEVEL_BLOCK:
+            return
+        N, B, more = self._sums
+        variance = modes.level / N + _SHARES[:, None] ** 2 * more / self._h  # (K, n)
+        log = self._log - 0.5 * (np.log(variance) + np.minimum((B / N) ** 2 / variance, LEVEL_OUTLIER)).sum(axis=1)
+        self._log = np.maximum(log - log.max(), -_BEHIND)
+        p = np.exp(self._log)
+        self.share = float(p @ _SHARES**2 / p.sum())
+        self._sums, self._h = np.zeros_like(self._sums), 0.0
