@@ -42,7 +42,7 @@ class Sticking:
 
     def __init__(self, n: int) -> None:
         self._log, self._sums, self._h = np.log(_BEFORE), np.zeros((3, n)), 0.0
-        self.share = float(_BEFORE @ _SHARES**2)
+        self.share = 0.0
 
     def take(
         self, h: float, scale: NDArray, seen: NDArray, before: Gaussian, sticks: NDArray[np.float64], modes: Modes
