@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import contextlib
-import errno
 import json
 import math
-import os
 import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 from armload.arms import arm, rated_mass
-from armload.errors import ArmloadError, UsageError
 from armload.service.alarms import Alarm, Alarms
 from armload.service.backoff import Backoff
 from armload.service.mqtt import Mqtt
@@ -262,40 +258,3 @@ def _starting(settings: ArmSettings) -> dict[str, Any]:
 
 def _unknown(why: str) -> dict[str, Any]:
     return {"known": False, "unknown": Unknown.STARTING.value, "why": why}
-
-
-def checked(settings: ServiceSettings) -> None:
-    """Make once what each process will make, so that what cannot be is said at once.
-
-    Raises:
-        ArmloadError: an arm, a frame, a rating or a kind of source that there is not, or a folder that cannot be
-            written into.
-    """
-    from armload.devices.opening import check_spec  # with what reads robots, of which the supervisor needs nothing
-
-    for each in settings.arms:
-        try:
-            gravity = {} if each.gravity is None else {"gravity": each.gravity}
-            arm(each.robot, each.frame, **gravity)
-            check_spec(each.source)
-        except ArmloadError as error:
-            raise type(error)(f"{each.name}: {error}") from None
-        if each.save is not None:
-            _check_folder(f"{each.name}: its state cannot be kept in", Path(each.save), made=True)
-        if each.record is not None:
-            _check_folder(f"{each.name}: its record cannot be kept in", Path(each.record).parent, made=False)
-
-
-def _check_folder(what: str, folder: Path, made: bool) -> None:
-    """See that files can be written into a folder, which is made if it is to be."""
-    try:
-        if made:
-            folder.mkdir(parents=True, exist_ok=True)
-        if not folder.is_dir():
-            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))
-        if not os.access(folder, os.W_OK | os.X_OK):
-            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-    except FileExistsError:
-        raise UsageError(f"{what} {folder}: it is no folder; name one") from None
-    except OSError as error:
-        raise UsageError(f"{what} {folder}: {error.strerror}; name a folder that can be written into") from None

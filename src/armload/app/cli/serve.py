@@ -92,7 +92,7 @@ def parser() -> Parser:
 def run(options: argparse.Namespace) -> int | None:
     """Serve until all sources end, or until SIGTERM; 2 where an arm cannot be begun with."""
     from armload.service import Endpoint, Service
-    from armload.service.service import checked
+    from armload.service.beginning import checked
 
     settings = settings_of(options)
     checked(settings)
