@@ -72,7 +72,7 @@ GROUPS = {  # home → constants, None: all; what they are tried on
     "posterior.drift": (r"(?m)(^#.*\n)*^(TESTED|ALLOWED|CHANGED|SESSION) = .*\n", ("tares",)),
 }
 PARTS = ("streams", "logs", "tares")
-PROBABILITIES = ("SURE", "LIKELY")
+PROBABILITIES = ("SURE", "LIKELY", "STICKS")
 NEAR = {"half": 0.5, "double": 2.0}
 FAR = {"thousandth": 1e-3, "thousand times": 1e3}
 # a word about a change that was noticed; words of advice and of a refusal; a bound on what does

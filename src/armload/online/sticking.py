@@ -18,15 +18,9 @@ from numpy.typing import NDArray
 
 from armload.online.modes import Modes
 from armload.online.runs import Gaussian
-from armload.online.thresholds import LEVEL_BLOCK, LEVEL_OUTLIER
+from armload.online.thresholds import LEVEL_BLOCK, LEVEL_OUTLIER, STICKING_SHARES, STICKS, STICKS_BEHIND
 
-# [Coulomb frictions] the shares s that are weighed, a factor of two apart, and how probable each is beforehand:
-# friction is smooth of the two Pandas that were measured, of other arms nobody knows. If one arm in twenty is taken to
-# stick, the first rows of one that does look like changes, and nothing is learned from them
-# (test_joints_that_stick_are_no_change_of_payload_and_hide_none)
-_SHARES, _BEFORE = np.array([0.0, 0.25, 0.5, 1.0]), np.array([3.0, 1.0, 1.0, 1.0]) / 6.0
-# [log likelihood] that a share is behind at most: joints may begin to stick
-_BEHIND = 20.0
+_SHARES = np.append(0.0, STICKING_SHARES)  # none sticks, or so far
 
 
 class Sticking:
@@ -41,7 +35,8 @@ class Sticking:
     """
 
     def __init__(self, n: int) -> None:
-        self._log, self._sums, self._h = np.log(_BEFORE), np.zeros((3, n)), 0.0
+        before = np.append(1.0 - STICKS, np.full(len(STICKING_SHARES), STICKS / len(STICKING_SHARES)))
+        self._log, self._sums, self._h = np.log(before), np.zeros((3, n)), 0.0
         self.share = 0.0
 
     def take(
@@ -65,7 +60,7 @@ class Sticking:
         N, B, more = self._sums
         variance = modes.level / N + _SHARES[:, None] ** 2 * more / self._h  # (K, n)
         log = self._log - 0.5 * (np.log(variance) + np.minimum((B / N) ** 2 / variance, LEVEL_OUTLIER)).sum(axis=1)
-        self._log = np.maximum(log - log.max(), -_BEHIND)
+        self._log = np.maximum(log - log.max(), -STICKS_BEHIND)
         p = np.exp(self._log)
         self.share = float(p @ _SHARES**2 / p.sum()) if p[0] < 0.5 * p.sum() else 0.0
         self._sums, self._h = np.zeros_like(self._sums), 0.0

@@ -78,6 +78,17 @@ LEVEL_SHARE = 0.05
 # streams of minutes, no scene or test depends on it
 LEVEL_OUTLIER = 8.0
 
+# ---------------------------------------------------------------------- joints that stick at rest, `sticking.py`
+
+# [Coulomb frictions] how far they may, a factor of two apart
+STICKING_SHARES = np.array([0.25, 0.5, 1.0])
+# probability beforehand that they do: friction is smooth of the two Pandas that were measured, of other arms nobody
+# knows. If one arm in twenty is taken to stick, the first rows of one that does look like changes, and nothing is
+# learned from them (test_joints_that_stick_are_no_change_of_payload_and_hide_none)
+STICKS = 0.5
+# [log likelihood] that an explanation is behind at most: joints may begin to stick
+STICKS_BEHIND = 20.0
+
 # --------------------------------------------------------------------- the phases of a run, `watch.py`; a change's name
 
 # probability of a payload that changes or has changed, from which it is an event: one in a thousand may be none, and
