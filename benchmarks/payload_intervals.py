@@ -71,7 +71,7 @@ def held(robot: Arm, model: HybridModel, records: Records) -> dict[str, NDArray[
     out = {name: np.empty((len(records), 10), dtype=bool) for name in ("hybrid", "log alone", "as identify reports")}
     for k in range(len(records)):
         trusted, truth = model.calibration.trusted(records.evidence(k)), records.truth[k]
-        found = prior.posterior(trusted.information, trusted.vector)
+        found = model.calibration.posterior(trusted, prior)
         covariance = model.calibration.widened(found, trusted)
         half = Z95 * np.sqrt(np.diag(holding(covariance, 0, found.mass_if_any - found.mean[0])))
         out["hybrid"][k] = np.abs(found.mean - truth) <= half

@@ -80,7 +80,7 @@ def answered(
 ) -> Answered:
     """One payload in one log, under one prior and calibration."""
     trusted = calibration.trusted(log)
-    found = prior.posterior(trusted.information, trusted.vector)
+    found = calibration.posterior(trusted, prior)
     std = np.sqrt(np.diag(calibration.widened(found, trusted)))
     told = determined(std, prior.std, std_under_weak_prior(trusted.information, weak), weak)
     scales = (trusted.gain_std * found.mean) ** 2 + np.diag(trusted.of_joints(found.mean, found.covariance))

@@ -22,7 +22,7 @@ DIAGONAL = [4, 7, 9]  # of the inertia within phi
 def model():
     """Of which evidence is taken as it is: what these tests draw claims no more than is true."""
     shipped = shipped_model(arm("panda"))
-    return replace(shipped, calibration=replace(shipped.calibration, bag=None, level=1.0))
+    return replace(shipped, calibration=replace(shipped.calibration, bag=None, level=1.0, left_open=0.0))
 
 
 def a_log(truth, std, rng):

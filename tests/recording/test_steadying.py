@@ -117,6 +117,6 @@ def test_a_sample_without_a_time_waits_for_nobody(t):
 
 def test_more_samples_than_were_made_room_for_are_kept():
     """At 20 kHz 75 ms are 1500 samples to either side."""
-    log, truth = swinging(20000.0, 0.4)
+    log, truth = swinging(20000.0, 0.25)
     dq = np.array([s.dq for _, _, s in through(list(log))])
     assert np.sqrt(np.mean((dq - truth) ** 2)) < 0.1 * NOISE

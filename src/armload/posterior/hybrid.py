@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -146,6 +147,7 @@ def answer(
     sign = 1.0
     if removed and removed[0].log_evidence + np.log(_REMOVED) > found.log_evidence:
         found, sign = removed[0], -1.0
+    found = calibration.posterior(replace(trusted, vector=sign * trusted.vector), payloads, found)
     differences, exchanged = None if quick or trusted.kind == 0 else payloads.differences, 0.0
     other = None
     if differences is not None:

@@ -64,6 +64,15 @@ class MixturePosterior(NamedTuple):
         mass = self.mass_if_any + share * (other.mass_if_any - self.mass_if_any)
         return MixturePosterior(self.mean + share * away, covariance, self.weights, log, mass), share
 
+    def among(self, each: list[MixturePosterior], p: NDArray[np.float64]) -> MixturePosterior:
+        """One of these with probabilities p (V,), moments matched; its log evidence is this one's."""
+        means = np.array([x.mean for x in each])
+        mean = p @ means
+        away = means - mean
+        covariance = np.einsum("v,vij->ij", p, [x.covariance for x in each]) + (away.T * p) @ away
+        mass = float(p @ [x.mass_if_any for x in each])
+        return self._replace(mean=mean, covariance=covariance, mass_if_any=mass)
+
 
 @dataclass(frozen=True, eq=False)
 class MixturePrior:

@@ -85,7 +85,7 @@ def scores(records: Records, prior: MixturePrior, calibration: Calibration) -> N
     out = np.empty((len(records), 10))
     for k in range(len(records)):
         trusted = calibration.trusted(records.evidence(k))
-        found = prior.posterior(trusted.information, trusted.vector)
+        found = calibration.posterior(trusted, prior)
         beyond = (found.mean - records.truth[k]) ** 2 - (Z95 * trusted.gain_std * found.mean) ** 2
         beyond -= Z95**2 * np.diag(trusted.of_joints(found.mean, found.covariance))
         out[k] = np.sqrt(np.maximum(beyond, 0.0) / np.diag(found.covariance))
