@@ -183,7 +183,7 @@ class Climb:
         """J and the bound of finished motions."""
         rows = []
         for motion in motions:
-            t = np.linspace(0.0, motion.duration, max(2, round(4 * _RATE * motion.duration) + 1))
+            t = motion.instants(4.0 * _RATE)
             rows.append(self.criterion.model.forward(motion(t)[0], motion.velocity(t), t[1]))
         return self.criterion(rows)
 

@@ -7,12 +7,6 @@ import re
 
 from armload.app.cli.arguments import add_arm_arguments, add_column_arguments, at_least, file_name, output_file
 
-_UNITS = {
-    "mass": {"g": 1e-3, "kg": 1.0, "": 1.0},
-    "moment": {"g.m": 1e-3, "kg.m": 1.0, "": 1.0},
-    "inertia": {"g.m2": 1e-3, "kg.m2": 1.0, "": 1.0},
-}
-
 
 def numbers(text: str) -> tuple[float, ...]:
     """Numbers separated by commas.
