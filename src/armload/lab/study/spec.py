@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, field, replace
 
 from armload.lab.cells import key_of
 
+SPLITS = ("row", "payload")  # the paper's, and the one that keeps whole payloads from the training
 FORMAT = 2  # of a cell's file; a change makes every cell unfinished
 
 
