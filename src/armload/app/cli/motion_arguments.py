@@ -39,8 +39,15 @@ def held(text: str) -> float | tuple[float, float, float]:
 
 
 def floor(text: str) -> float | None:
-    """A height, or none."""
-    return None if text == "none" else at_least(-1e3, float, 1e3)(text)
+    """A height [m], or none.
+
+    >>> floor("-0.5"), floor("none")
+    (-0.5, None)
+    """
+    try:
+        return None if text == "none" else at_least(-1e3, float, 1e3)(text)
+    except argparse.ArgumentTypeError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a height: expected metres, or none") from None
 
 
 def joints(text: str) -> tuple[int, ...]:
