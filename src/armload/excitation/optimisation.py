@@ -32,9 +32,8 @@ from armload.excitation.verification import Used, used
 from armload.motion import Motion
 from armload.motion.spline import SplineMotion
 
-_POINTS_PER_SECOND = (
-    4.0  # control points: motions up to about 2 Hz, below what joints' elasticity and the lag take away
-)
+# control points: motions up to about 2 Hz, below what joints' elasticity and the lag take away
+_POINTS_PER_SECOND = 4.0
 _FEWEST, _MOST = 4, 48
 _RATE = 50.0  # [Hz] of the samples while designing: the bound differs by less than 0.1 in J from that at 200 Hz
 STARTS = 4  # seeded

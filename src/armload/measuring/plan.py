@@ -16,9 +16,8 @@ from armload.excitation import Obstacle, PayloadRange, Surroundings
 from armload.inertia import InertialParameters
 from armload.motion import Motion, MotionCheck, StraightMotion, check_motion, rated_load
 
-APPROACH = (
-    1.0  # [rad] a joint may be from where the motion begins, unless more is allowed: further should be seen first
-)
+# [rad] a joint may be from where the motion begins, unless more is allowed: further should be seen first
+APPROACH = 1.0
 SHARES = (0.2, 0.1, 0.05)  # of the limits of velocity, acceleration and jerk that a straight way uses, fastest first
 _SAMPLES = 1000.0  # [Hz] at which a plan is checked, as fast as the fastest controller takes commands
 _CLEARANCES = 100.0  # [Hz] at which clearances are: at 2 m/s the tool goes 2 cm in between

@@ -15,8 +15,8 @@ from typing import Any
 
 from armload.inertia import NAMES
 from armload.lab.study.multiverse import AXES, LEVEL, USUAL, Improvement, Multiverse, percent
-from armload.lab.study.numbers import LEAST, SEMI_REAL, Cells, Ensemble, at_end, benchmark, matched, on_many_arms
-from armload.lab.study.spec import SPLITS
+from armload.lab.study.numbers import LEAST, Cells, Ensemble, at_end, benchmark, matched, on_many_arms
+from armload.lab.study.spec import SEMI_REAL, SPLITS
 from armload.lab.study.statements import RULES
 
 CONFIRMED, DIRECTION, UNDETERMINED = "confirmed", "direction only", "undetermined"
