@@ -24,14 +24,13 @@ docs/profiles.md.
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from bodies import body_of
 from life import OFFSET, empty_logs, motions_about, on_a_day
-from script import RESULTS, ROOT, markdown_table, options, say, write, write_table
+from script import ROOT, cases_of, markdown_table, options, say, write, write_table
 
 from armload import Recording, arm
 from armload.lab.episodes import Episode, draw_episodes
@@ -116,8 +115,8 @@ def followed(e: Episode, profile: Profile, log: Recording, held: np.ndarray) -> 
 
 def main() -> None:
     asked = options(__doc__, arms=4, streams=3, seed=3, cases="")
-    panda, file = arm("panda"), RESULTS / "alarms.json"
-    chosen = [case for case in CASES if not asked.cases or case in asked.cases.split(",")]
+    panda = arm("panda")
+    chosen, out = cases_of("alarms", CASES, asked.cases, between=",")
     found: dict[str, dict[str, Any]] = {case: {"learned": [], "said": [], "moved": [], "wrong": []} for case in chosen}
     for k, e in enumerate(draw_episodes(panda, "reference", asked.arms, asked.seed, motions=asked.arms)):
         profile = known(e, k)
@@ -132,7 +131,6 @@ def main() -> None:
                 now = now if learned is None else learned
             found[case]["moved"].append(1e3 * float(now.mounted(panda)[0][0] - before))
         say(f"arm {k + 1} of {asked.arms}: moved {[round(found[case]['moved'][-1], 1) for case in chosen]} g")
-    out = json.loads(file.read_text(encoding="utf-8"))["cases"] if asked.cases and file.exists() else {}
     for case, one in found.items():
         count, said = len(one["said"]), np.array(one["said"])
         told = int(np.isfinite(said).sum())

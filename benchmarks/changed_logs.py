@@ -15,14 +15,13 @@ docs/hybrid.md, after every case; half an hour of one core.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 from bodies import body_of
 from event_scenes import Resting
-from script import RESULTS, ROOT, markdown_table, options, say, write, write_table
+from script import ROOT, cases_of, markdown_table, options, say, write, write_table
 
 from armload import Arm, Recording, arm, identify
 from armload.devices import Simulator
@@ -127,9 +126,7 @@ CASES: dict[str, Callable[[int, int], dict[str, float]]] = {
 
 def main() -> None:
     asked = options(__doc__, logs=24, seed=0, cases="")
-    chosen = [name for name in CASES if not asked.cases or name in asked.cases.split(";")]
-    file = RESULTS / "changed_logs.json"
-    found = json.loads(file.read_text(encoding="utf-8"))["cases"] if asked.cases and file.exists() else {}
+    chosen, found = cases_of("changed_logs", CASES, asked.cases)
     for name in chosen:
         found[name] = CASES[name](asked.logs, asked.seed)
         say(f"{name}: {found[name]}")

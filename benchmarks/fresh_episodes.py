@@ -24,7 +24,8 @@ from script import ROOT, markdown_table, options, write, write_table
 
 from armload import Arm, arm
 from armload.app.cli.printing import console
-from armload.app.cli.train_hybrid import cells_table, episodes_shown, summary
+from armload.app.cli.progress import progress_shown
+from armload.app.cli.train_hybrid import LEARNING, cells_table, summary
 from armload.lab.training import Records
 from armload.lab.training.coverage import coverage_on
 from armload.lab.training.hybrid import CHUNK, draw_chunk, episode_records
@@ -123,7 +124,7 @@ def table(lines: list[dict]) -> str:
 def new_records(robot: Arm, asked: Namespace) -> Records:
     """Those of the episodes that nothing was trained on; both scripts that look at them go on from the same folder."""
     work = Path(asked.work or f"out/fresh-{robot.name}")
-    with episodes_shown() as progress:
+    with progress_shown("episode", LEARNING) as progress:
         return episode_records(
             robot, episodes=asked.episodes, seed=SEED, folder=work, jobs=asked.jobs, progress=progress
         )

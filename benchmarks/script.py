@@ -6,7 +6,7 @@ import argparse
 import json
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,17 @@ def options(about: str | None, **defaults: Any) -> argparse.Namespace:
         else:
             parser.add_argument(flag, type=type(default), default=default, help=f"(default: {default})")
     return parser.parse_args()
+
+
+def cases_of(name: str, every: Iterable[str], named: str, between: str = ";") -> tuple[list[str], dict[str, Any]]:
+    """The cases that are to be measured, and what results/NAME.json holds of those that are not.
+
+    Args:
+        every: case there is. named: some of them, `between` one and the next; empty: all, and nothing is kept.
+    """
+    chosen, file = set(named.split(between)), RESULTS / f"{name}.json"
+    kept = json.loads(file.read_text(encoding="utf-8"))["cases"] if named and file.exists() else {}
+    return [case for case in every if not named or case in chosen], kept
 
 
 PLACES = ("--out", "--cells", "--work")  # options that name a folder on this machine

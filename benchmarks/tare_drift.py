@@ -22,12 +22,11 @@ core.
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from script import RESULTS, ROOT, markdown_table, options, say, write, write_table
+from script import ROOT, cases_of, markdown_table, options, say, write, write_table
 
 from armload import Arm, arm
 from armload.arms import rated_effort
@@ -159,9 +158,7 @@ def table(found: dict[str, Any]) -> str:
 
 def main() -> None:
     asked = options(__doc__, episodes=24, seed=5, cases="")
-    chosen = [name for name in CASES if not asked.cases or name in asked.cases.split(";")]
-    file = RESULTS / "tare_drift.json"
-    found = json.loads(file.read_text(encoding="utf-8"))["cases"] if asked.cases and file.exists() else {}
+    chosen, found = cases_of("tare_drift", CASES, asked.cases)
     for name in chosen:
         robot, population, change = CASES[name]
         known = arm(robot)

@@ -34,7 +34,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import beta
-from script import RESULTS, ROOT, markdown_table, options, say, write, write_table
+from script import RESULTS, ROOT, cases_of, markdown_table, options, say, write, write_table
 from wrong_cases import CASES, CONTROLS, PANDAS, Wrong
 
 from armload import Arm, arm, identify
@@ -144,13 +144,11 @@ def several(asked: argparse.Namespace) -> None:
 def main() -> None:
     asked = options(__doc__, robot="panda", logs=24, seed=0, cases="", again="")
     known, result = arm(asked.robot), f"wrong_logs_{asked.robot}"
-    there = [name for name in CASES if asked.robot == "panda" or name not in PANDAS]
-    chosen = [name for name in there if not asked.cases or name in asked.cases.split(";")]
     if asked.again:
         several(asked)
         return
-    file = RESULTS / f"{result}.json"
-    found = json.loads(file.read_text(encoding="utf-8"))["cases"] if asked.cases and file.exists() else {}
+    there = [name for name in CASES if asked.robot == "panda" or name not in PANDAS]
+    chosen, found = cases_of(result, there, asked.cases)
     for name in chosen:
         count = asked.logs * (2 if name.startswith("nothing") else 1)
         found[name] = answered(known, CASES[name](asked.robot, count, asked.seed))

@@ -167,6 +167,17 @@ def test_every_module_says_what_it_is():
         assert more or first.rstrip().endswith((".", ":", ",", ";")), f"{name}: {first}"
 
 
+def test_a_test_that_the_code_cites_is_there():
+    there = set(re.findall(r"def (test_\w+)", "\n".join(p.read_text("utf-8") for p in ROOT.glob("tests/**/*.py"))))
+    cited = {  # sentences, which is what tests are called by: five words or more
+        (found[0], file.name)
+        for file in ROOT.glob("src/**/*.py")
+        for found in re.finditer(r"\btest(_[a-z0-9]+){4,}\b", file.read_text(encoding="utf-8"))
+    }
+    assert len(cited) > 10
+    assert sorted((test, file) for test, file in cited if test not in there) == []
+
+
 @pytest.mark.parametrize("name", PACKAGES)
 def test_all_is_importable_and_complete(name):
     package = importlib.import_module(name)

@@ -159,7 +159,7 @@ def test_a_tare_is_taken_off_before_the_answer_is_made_a_body(kind, panda, analy
 def test_a_reference_that_is_no_body_and_a_pull_of_nothing_are_refused(panda):
     with pytest.raises(InertiaError, match="not strictly physically consistent"):
         ConsistentLeastSquares(panda, reference=InertialParameters(np.r_[1.0, np.zeros(9)]))
-    with pytest.raises(ValueError, match="pull"):
+    with pytest.raises(IdentificationError, match="pull"):
         ConsistentLeastSquares(panda, reference=CAMERA, pull=0.0)
 
 
@@ -435,5 +435,5 @@ def test_the_filter_begins_the_joints_anew_after_a_gap(panda, analytic_log):
 
 
 def test_noise_that_is_not_positive_is_refused(panda):
-    with pytest.raises(ValueError, match="positive"):
+    with pytest.raises(IdentificationError, match="positive"):
         ExtendedKalmanFilter(panda, velocity_noise=0.0)

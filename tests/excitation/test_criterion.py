@@ -40,7 +40,7 @@ def test_what_is_maximised_is_the_bound(name, tare):
     # 32 waves of the pose in place of 128 are all that differs
     np.testing.assert_allclose(found.half_width, expected.half_width[-1], rtol=0.05)
     if tare == "same":
-        np.testing.assert_allclose(found.half_width, expected.half_width[-1], rtol=1e-4)
+        np.testing.assert_allclose(found.half_width, expected.half_width[-1], rtol=1e-5)
 
 
 @pytest.mark.parametrize(("name", "tare"), [("panda", "own"), ("ur10e", "same"), ("panda", None)])

@@ -34,7 +34,6 @@ from armload.inertia import (
 from armload.payloads import test_payload as make_payload
 
 SEEDS = range(8)
-PRINCIPAL = [7e-3, 8e-3, 11e-3]  # [kg·m²] obeys the triangle inequality with room to spare
 
 
 def a_cloud(seed, points=6):

@@ -18,6 +18,7 @@ from armload.lab.study.protocols import measure_learned, measure_stream
 from armload.lab.study.readings import reading_specs
 from armload.lab.study.rivals import rivals
 from armload.lab.study.study_page import pages, summary_json, write_pages
+from armload.lab.study.study_tables import LEAST_SQUARES
 from armload.recording import Recording
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -78,6 +79,11 @@ def test_the_plan_holds_what_the_paper_trains_on_both_splits_without_a_cap():
         for stages in (1, 2):
             for split in ("row", "payload"):
                 assert Spec(kind, stages=stages, split=split) in cells
+
+
+def test_every_method_of_least_squares_that_is_planned_has_its_row_on_the_page():
+    planned = {cell.method for cell in plan(FULL) if cell.kind == "benchmark"} - {"training-mean"}
+    assert planned == set(LEAST_SQUARES)
 
 
 def test_a_cell_reads_back_as_it_was_written_and_a_stranger_is_named(tmp_path):

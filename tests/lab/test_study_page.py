@@ -71,7 +71,9 @@ def test_the_page_reads_from_conclusion_to_protocol_with_five_pictures():
 
 @pytest.mark.parametrize("full", [True, False], ids=["full", "empty"])
 def test_tables_are_well_formed_markdown(full, tmp_path):
-    for block in re.findall(r"(?:^\|.*\n)+", page_of(study() if full else {}, tmp_path), re.MULTILINE):
+    blocks = re.findall(r"(?:^\|.*\n)+", page_of(study() if full else {}, tmp_path), re.MULTILINE)
+    assert blocks
+    for block in blocks:
         lines = block.splitlines()
         assert set(lines[1]) <= set("|- ")
         assert len({line.count("|") for line in lines}) == 1

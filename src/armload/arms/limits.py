@@ -21,6 +21,12 @@ class Limits:
     acceleration: NDArray[np.float64]  # [rad/s²]
     jerk: NDArray[np.float64]  # [rad/s³]
 
+    @property
+    def middle(self) -> NDArray[np.float64]:
+        """The middle of each joint's range (n,) [rad]; 0 where it has no limits."""
+        middle = 0.5 * (self.position_low + self.position_high)
+        return np.where(np.isfinite(middle), middle, 0.0)
+
     def as_degrees(self, q: ArrayLike) -> str:
         """A question to whoever named a pose (n,) [rad] that is beyond the limits, and would be within them in degrees.
 

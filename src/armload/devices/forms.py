@@ -19,11 +19,19 @@ from armload.runtime.atomic import replacing
 
 
 class Form(NamedTuple):
-    """One form: what it is, the text of a load in it, given the load and the name of its link, and what it holds."""
+    """One form a load can be written in.
+
+    what: it is, in a few words. text: of a load in it, given the load and the name of its link. inertia: whether it
+    holds one. maker: of the controller that reads it, as the sheets of arms name it (`ArmFacts.controller`), which
+    counts from its flange; None: a description, about any frame. counts_all: what that controller calls the number,
+    where that is everything on the flange, whatever was mounted when.
+    """
 
     what: str
     text: Callable[[Load, str], str]
     inertia: bool = True
+    maker: str | None = None
+    counts_all: str | None = None
 
     def held_of(self, load: Load) -> Load:
         """What the form holds of a load: nothing is said of what it does not."""
@@ -32,19 +40,45 @@ class Form(NamedTuple):
 
 # What `export_load` can write, by name.
 FORMS = {
-    "franka": Form("Python for libfranka's setLoad, on top of Desk's end effector", lambda a, _: set_load_text(a)),
-    "franka-desk": Form("end effector for Franka's Desk (JSON)", lambda a, _: desk_text(a)),
-    "ur": Form("URScript set_target_payload, everything on the flange", lambda a, _: set_target_payload_text(a)),
-    "ur-payload": Form("URScript set_payload (before 5.10), no inertia", lambda a, _: set_payload_text(a), False),
-    "kuka": Form("Java and object template for KUKA Sunrise", lambda a, _: sunrise_text(a)),
-    "kinova": Form("Python for Kinova's Kortex, no inertia", lambda a, _: tool_configuration_text(a), False),
-    "xarm": Form("Python for UFACTORY's set_tcp_load, no inertia", lambda a, _: set_tcp_load_text(a), False),
+    "franka": Form(
+        "Python for libfranka's setLoad, on top of Desk's end effector", lambda a, _: set_load_text(a), maker="franka"
+    ),
+    "franka-desk": Form("end effector for Franka's Desk (JSON)", lambda a, _: desk_text(a), maker="franka"),
+    "ur": Form(
+        "URScript set_target_payload, everything on the flange",
+        lambda a, _: set_target_payload_text(a),
+        maker="ur",
+        counts_all="a UR's payload",
+    ),
+    "ur-payload": Form(
+        "URScript set_payload (before 5.10), no inertia",
+        lambda a, _: set_payload_text(a),
+        inertia=False,
+        maker="ur",
+        counts_all="a UR's payload",
+    ),
+    "kuka": Form("Java and object template for KUKA Sunrise", lambda a, _: sunrise_text(a), maker="kuka"),
+    "kinova": Form(
+        "Python for Kinova's Kortex, no inertia",
+        lambda a, _: tool_configuration_text(a),
+        inertia=False,
+        maker="kinova",
+        counts_all="Kinova's tool",
+    ),
+    "xarm": Form(
+        "Python for UFACTORY's set_tcp_load, no inertia",
+        lambda a, _: set_tcp_load_text(a),
+        inertia=False,
+        maker="xarm",
+        counts_all="an xArm's load",
+    ),
     "urdf": Form("URDF: a link and a fixed joint to the frame", urdf_text),
     "mjcf": Form("MuJoCo: a body", mjcf_text),
     "sdf": Form("SDF: a model with one link", sdf_text),
     "ros2": Form("ROS 2 geometry_msgs/msg/InertiaStamped (YAML)", lambda a, _: inertia_stamped_text(a)),
 }
-CONTROLLERS = ("franka", "franka-desk", "ur", "ur-payload", "kuka", "kinova", "xarm")  # about the flange
+# Those that a controller reads: about its flange.
+CONTROLLERS = tuple(name for name, form in FORMS.items() if form.maker is not None)
 
 
 def export_load(load: Load, to: str, path: str | Path | None = None, name: str = "payload") -> str:

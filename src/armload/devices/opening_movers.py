@@ -9,14 +9,12 @@ from numpy.typing import ArrayLike
 
 from armload.arms import Arm
 from armload.devices.mover import Mover
-from armload.devices.opening import address_of
+from armload.devices.opening import SCHEMES, address_of
 from armload.devices.remote_mover import DetachedMover, RemoteMover
 from armload.devices.ros2.mover import CONTROLLER, Ros2Mover
 from armload.devices.simulator.mover import SimulatedMover
 from armload.errors import SourceError
 from armload.simulation import Sensors, World
-
-SCHEMES = ("fr3", "panda", "ur", "ros2")
 
 
 def open_mover(

@@ -42,13 +42,16 @@ class PolynomialLeastSquares(NormalLeastSquares):
         arm: the bare arm.
         half: half the window [s]; it holds at least 4 samples either side.
         weighted: as in `NormalLeastSquares`.
+
+    Raises:
+        IdentificationError: a window that is not positive.
     """
 
     name = "polynomial"
 
     def __init__(self, arm: Arm, half: float = 0.08, weighted: bool = False) -> None:
         if not half > 0:
-            raise ValueError(f"half the window is {half} s: expected a positive number of seconds")
+            raise IdentificationError(f"half the window is {half} s: expected a positive number of seconds")
         self.half = half
         super().__init__(arm, weighted)
 

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
+from armload.errors import IdentificationError
 from armload.estimators.contract import Estimate, Identifier, Tared
 from armload.estimators.normal import UNKNOWN, WeightedLeastSquares
 from armload.inertia import (
@@ -36,9 +37,8 @@ from armload.inertia import (
 from armload.recording import Recording
 from armload.regression.lag import GAIN
 
-_CORRELATION = (
-    1.0  # [s] after which the residual counts as new: sets the information against a pull or the chart's prior
-)
+# [s] after which the residual counts as new: sets the information against a pull or the chart's prior
+_CORRELATION = 1.0
 _MARGIN = 1e-5  # [kg] smallest eigenvalue of J (lengths in units of 0.1 m) that the program leaves
 _INSIDE = 1e-3  # [kg] the same, for a start well inside the cone
 _ITERATIONS = 200
@@ -108,7 +108,7 @@ class ConsistentLeastSquares(_ConsistentLeastSquares):
         pull: weight of the divergence.
 
     Raises:
-        ValueError: a pull that is not positive.
+        IdentificationError: a pull that is not positive.
         InertiaError: the reference is not strictly consistent.
     """
 
@@ -123,7 +123,9 @@ class ConsistentLeastSquares(_ConsistentLeastSquares):
         pull: float = 1.0,
     ) -> None:
         if not pull > 0:
-            raise ValueError(f"the pull is {pull}: expected a positive weight; for none, leave the reference out")
+            raise IdentificationError(
+                f"the pull is {pull}: expected a positive weight; for none, leave the reference out"
+            )
         if reference is not None:
             log_cholesky(reference.phi)  # strictly consistent, or a sentence
         self.reference, self.pull = reference, pull

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import FRICTION_WIDTH, Arm, ForwardDynamics, rated_effort
+from armload.errors import IdentificationError
 from armload.estimators.contract import Estimate, Identifier
 from armload.inertia import is_consistent, nearest_consistent
 from armload.recording import GAP, Sample
@@ -50,7 +51,7 @@ class ExtendedKalmanFilter(Identifier):
         position_noise, velocity_noise: standard deviations of measured q and q̇ [rad, rad/s].
 
     Raises:
-        ValueError: a noise that is not positive.
+        IdentificationError: a noise that is not positive.
     """
 
     name = "ekf"
@@ -63,7 +64,9 @@ class ExtendedKalmanFilter(Identifier):
         velocity_noise: float = 2e-3,
     ) -> None:
         if not (position_noise > 0 and velocity_noise > 0):
-            raise ValueError(f"noise of {position_noise} rad and {velocity_noise} rad/s: expected positive numbers")
+            raise IdentificationError(
+                f"noise of {position_noise} rad and {velocity_noise} rad/s: expected positive numbers"
+            )
         self.arm, self.torque_density = arm, torque_density
         self._dynamics = ForwardDynamics(arm)
         self._R = np.repeat([position_noise**2, velocity_noise**2], arm.n)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm, momentum_regressor
+from armload.errors import IdentificationError
 from armload.estimators.normal import NormalLeastSquares
 
 
@@ -30,13 +31,16 @@ class MomentumLeastSquares(NormalLeastSquares):
         arm: the bare arm.
         window: least length of a window [s].
         weighted: as in `NormalLeastSquares`.
+
+    Raises:
+        IdentificationError: a window that is not positive.
     """
 
     name = "momentum"
 
     def __init__(self, arm: Arm, window: float = 0.1, weighted: bool = False) -> None:
         if not window > 0:
-            raise ValueError(f"the window is {window} s: expected a positive number of seconds")
+            raise IdentificationError(f"the window is {window} s: expected a positive number of seconds")
         self.window = window
         super().__init__(arm, weighted)
 

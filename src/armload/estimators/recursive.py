@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm, payload_regressor
+from armload.errors import IdentificationError
 from armload.estimators.contract import Estimate, Identifier
 from armload.inertia.cholesky import factor, solve
 from armload.recording import GAP
@@ -44,7 +45,7 @@ class _Recursive(Identifier):
             forgetting: μ in (0, 1]; 1 remembers everything.
         """
         if not 0.0 < forgetting <= 1.0:
-            raise ValueError(f"forgetting is {forgetting}: expected a factor above 0 and at most 1")
+            raise IdentificationError(f"forgetting is {forgetting}: expected a factor above 0 and at most 1")
         self.arm, self.forgetting = arm, forgetting
         self.reset()
 
@@ -153,6 +154,13 @@ class RecursiveLeastSquares(_Recursive):
     >>> from armload.arms import arm
     >>> RecursiveLeastSquares(arm("panda")).name
     'rls'
+
+    Args:
+        arm: the bare arm.
+        forgetting: μ in (0, 1], the weight that a row keeps with each that follows; 1 remembers everything.
+
+    Raises:
+        IdentificationError: another forgetting.
     """
 
     name = "rls"
@@ -181,6 +189,9 @@ class FilteredRecursiveLeastSquares(_Recursive):
         arm: the bare arm.
         gain: λ of the observer and of the filter [1/s].
         forgetting: as in `RecursiveLeastSquares`.
+
+    Raises:
+        IdentificationError: another forgetting.
     """
 
     name = "rls-filter"

@@ -122,7 +122,7 @@ def _poses(path: Motion) -> NDArray[np.float64]:
 
 def moving_stretches(path: Motion) -> list[tuple[float, float, int]]:
     """From, to [s] and control points of the stretches between stops that are long enough to be changed."""
-    t = np.linspace(0.0, path.duration, max(2, round(path.duration * 200.0) + 1))
+    t = path.instants(200.0)
     moves = np.abs(path.velocity(t)).max(axis=1) > _STILL
     edges = np.flatnonzero(np.diff(np.concatenate([[False], moves, [False]]).astype(int)))
     out = []

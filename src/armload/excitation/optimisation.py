@@ -32,9 +32,8 @@ from armload.excitation.verification import Used, used
 from armload.motion import Motion
 from armload.motion.spline import SplineMotion
 
-_POINTS_PER_SECOND = (
-    4.0  # control points: motions up to about 2 Hz, below what joints' elasticity and the lag take away
-)
+# control points: motions up to about 2 Hz, below what joints' elasticity and the lag take away
+_POINTS_PER_SECOND = 4.0
 _FEWEST, _MOST = 4, 48
 _RATE = 50.0  # [Hz] of the samples while designing: the bound differs by less than 0.1 in J from that at 200 Hz
 STARTS = 4  # seeded
@@ -183,7 +182,7 @@ class Climb:
         """J and the bound of finished motions."""
         rows = []
         for motion in motions:
-            t = np.linspace(0.0, motion.duration, max(2, round(4 * _RATE * motion.duration) + 1))
+            t = motion.instants(4.0 * _RATE)
             rows.append(self.criterion.model.forward(motion(t)[0], motion.velocity(t), t[1]))
         return self.criterion(rows)
 

@@ -53,7 +53,7 @@ Poses = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 def poses(arm: Arm, motion: Motion, rate: float) -> Poses:
     """Rotations (N, 3, 3) and places (N, 3) [m] of the payload frame on a motion."""
-    return arm.frame_pose(motion(np.linspace(0.0, motion.duration, max(2, round(motion.duration * rate) + 1)))[0])
+    return arm.frame_pose(motion.position(motion.instants(rate)))
 
 
 def away(one: Poses, other: Poses) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

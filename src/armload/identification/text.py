@@ -30,10 +30,7 @@ class Quantity(NamedTuple):
 
 def quantities(result: Identification) -> dict[str, list[Quantity]]:
     """What is printed of an answer, by what it is; only the mass of what is not held."""
-    marks = [
-        "undetermined" if not known else "rests on the prior" if leaning else ""
-        for known, leaning in zip(result.determined, result.rests_on_prior, strict=True)
-    ]
+    marks = _marks(result)
     out = {"mass": [Quantity("", result.mass, result.phi_low[0], result.phi_high[0], "kg", marks[0])]}
     if not result.held:
         return out
@@ -53,11 +50,15 @@ def quantities(result: Identification) -> dict[str, list[Quantity]]:
 
 def ten(result: Identification) -> list[Quantity]:
     """The ten parameters about the frame's origin."""
-    marks = ["" if known else "undetermined" for known in result.determined]
-    for k in np.flatnonzero(result.determined & result.rests_on_prior):
-        marks[k] = "rests on the prior"
+    rows = zip(NAMES, result.phi, result.phi_low, result.phi_high, UNITS, _marks(result), strict=True)
+    return [Quantity(*row) for row in rows]
+
+
+def _marks(result: Identification) -> list[str]:
+    """What is to be said of each of the ten parameters."""
     return [
-        Quantity(*row) for row in zip(NAMES, result.phi, result.phi_low, result.phi_high, UNITS, marks, strict=True)
+        "undetermined" if not known else "rests on the prior" if leaning else ""
+        for known, leaning in zip(result.determined, result.rests_on_prior, strict=True)
     ]
 
 

@@ -16,9 +16,8 @@ from armload.excitation import Obstacle, PayloadRange, Surroundings
 from armload.inertia import InertialParameters
 from armload.motion import Motion, MotionCheck, StraightMotion, check_motion, rated_load
 
-APPROACH = (
-    1.0  # [rad] a joint may be from where the motion begins, unless more is allowed: further should be seen first
-)
+# [rad] a joint may be from where the motion begins, unless more is allowed: further should be seen first
+APPROACH = 1.0
 SHARES = (0.2, 0.1, 0.05)  # of the limits of velocity, acceleration and jerk that a straight way uses, fastest first
 _SAMPLES = 1000.0  # [Hz] at which a plan is checked, as fast as the fastest controller takes commands
 _CLEARANCES = 100.0  # [Hz] at which clearances are: at 2 m/s the tool goes 2 cm in between
@@ -73,7 +72,7 @@ class Plan:
     def __str__(self) -> str:
         lines = [f"{self.arm.name} will move for {self.duration:.1f} s:"]
         for k, leg in enumerate(self.legs, start=1):
-            q = leg.motion.position(_times(leg.motion, 100.0))
+            q = leg.motion.position(leg.motion.instants(100.0))
             far = np.ptp(q, axis=0)
             j = int(np.argmax(far))
             lines.append(
@@ -82,7 +81,7 @@ class Plan:
             )
         width = max(len("joint"), *map(len, self.arm.joint_names))
         lines.append(f"{'joint':<{width}}{'from [rad]':>12}{'to [rad]':>12}{'fastest [rad/s]':>17}{'of its limit':>14}")
-        every = [leg.motion(_times(leg.motion, 200.0)) for leg in self.legs]
+        every = [leg.motion(leg.motion.instants(200.0)) for leg in self.legs]
         q, dq = (np.concatenate([each[k] for each in every]) for k in (0, 1))
         fastest, limit = np.abs(dq).max(axis=0), self.arm.limits.velocity
         for j, joint in enumerate(self.arm.joint_names):
@@ -171,7 +170,7 @@ def plan_of(
     if empty_run:
         add(EMPTY, empty_motion or motion)
     add(LOADED, motion)
-    points = [arm.frame_pose(leg.motion.position(_times(leg.motion, 100.0)))[1] for leg in legs]
+    points = [arm.frame_pose(leg.motion.position(leg.motion.instants(100.0)))[1] for leg in legs]
     steps = [np.linalg.norm(np.diff(p, axis=0), axis=1).max() * (len(p) - 1) / leg.motion.duration
              for p, leg in zip(points, legs, strict=True)]  # fmt: skip
     every = np.concatenate(points)
@@ -194,7 +193,7 @@ class _Check:
         found = check_motion(self.arm, motion, self._load, floor=self._floor, rate=rate, collision_rate=seldom)
         if self._around is None:
             return Leg(purpose, motion, found)
-        t = _times(motion, seldom)
+        t = motion.instants(seldom)
         q = motion.position(t)
         distance = self._around.clearance(q)[:, 2]
         k = int(distance.argmin())
@@ -211,7 +210,3 @@ def _way(check: _Check, here: NDArray[np.float64], there: NDArray[np.float64], p
         if not leg.check.problems:
             break
     return leg
-
-
-def _times(motion: Motion, rate: float) -> NDArray[np.float64]:
-    return np.linspace(0.0, motion.duration, max(2, round(motion.duration * rate) + 1))

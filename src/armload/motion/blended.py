@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from armload.errors import MotionError
 from armload.motion.motion import Motion
 
-_QUINTIC = np.polynomial.Polynomial([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
+QUINTIC = np.polynomial.Polynomial([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])  # b
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +77,7 @@ class BlendedMotion(Motion):
             parts = [self.inner.derivative(at, k) for k in range(order + 1)]
             parts[0] = parts[0] - rest
             x, slope = sign * (at - edge) / self.blend, sign / self.blend
-            weights = [_QUINTIC.deriv(k)(x) * slope**k for k in range(order + 1)]
+            weights = [QUINTIC.deriv(k)(x) * slope**k for k in range(order + 1)]
             mixed = sum(comb(order, k) * weights[k][:, None] * parts[order - k] for k in range(order + 1))
             out[rows] = mixed + rest if order == 0 else mixed
         return out

@@ -98,7 +98,7 @@ def check_motion(
         MotionError: the motion has another number of joints than the arm.
     """
     check_joints(motion, arm)
-    t = np.linspace(0.0, motion.duration, max(2, round(motion.duration * rate) + 1))
+    t = motion.instants(rate)
     q, dq, ddq = motion(t)
     jerk = motion.jerk(t)
     loaded = arm if payload is None else arm.with_payload(payload)
@@ -134,7 +134,7 @@ def check_motion(
     problems += _jumps(arm, t, dq, ddq)
 
     model = capsule_arm(arm, payload_radius)
-    ticks = np.linspace(0.0, motion.duration, max(2, round(motion.duration * collision_rate) + 1))
+    ticks = motion.instants(collision_rate)
     clearances = nearest(model, motion(ticks)[0], ticks, floor)
     for (distance, what), threat in zip(clearances, ("the floor", "itself"), strict=True):
         if distance <= 0:

@@ -57,7 +57,7 @@ class MotionFingerprint:
     @classmethod
     def of(cls, motion: Motion) -> MotionFingerprint:
         """The fingerprint of a motion."""
-        t = np.linspace(0.0, motion.duration, max(2, round(motion.duration * _RATE) + 1))
+        t = motion.instants(_RATE)
         return cls(motion.name, motion.duration, motion(t)[0])
 
     @property

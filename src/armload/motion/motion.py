@@ -39,6 +39,15 @@ class Motion(ABC):
         """Position, velocity and acceleration at times t (N,) [s]; each (N, n) [rad, rad/s, rad/s²]."""
         return self._at(t, 0), self._at(t, 1), self._at(t, 2)
 
+    def instants(self, rate: float) -> NDArray[np.float64]:
+        """Evenly spaced times (N,) [s] from the start to the end, both among them, `rate` a second or nearly so [Hz].
+
+        >>> from armload.motion import taie2024
+        >>> taie2024().instants(0.5).tolist()
+        [0.0, 2.0, 4.0, 6.0]
+        """
+        return np.linspace(0.0, self.duration, max(2, round(self.duration * rate) + 1))
+
     def position(self, t: ArrayLike) -> NDArray[np.float64]:
         """q at times t (N,) [s]; (N, n) [rad]."""
         return self._at(t, 0)

@@ -76,7 +76,7 @@ class PathMotion(Motion):
     @classmethod
     def of(cls, motion: Motion, rate: float = 100.0, name: str | None = None, note: str = "") -> PathMotion:
         """Another motion at so many points per second [Hz]."""
-        t = np.linspace(0.0, motion.duration, max(2, round(motion.duration * rate) + 1))
+        t = motion.instants(rate)
         q, dq, ddq = (motion.derivative(t, order) for order in range(3))
         return cls(t, q, dq, ddq, motion.name if name is None else name, note)
 

@@ -16,10 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
 from armload.errors import MotionError
+from armload.motion.blended import QUINTIC
 from armload.motion.motion import Motion
 from armload.motion.random_fourier import filled_limits
 
-_QUINTIC = np.polynomial.Polynomial([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
 _FASTEST, _HARDEST, _SHARPEST = 15.0 / 8.0, 10.0 / np.sqrt(3.0), 60.0  # the largest |b'|, |b''| and |b'''|
 _SHORTEST = 1.0  # [s] also of a way of no length
 
@@ -85,5 +85,5 @@ class StraightMotion(Motion):
     def derivative(self, t: NDArray[np.float64], order: int) -> NDArray[np.float64]:
         """The derivative of q of the given order (0 to 3) at times t (N,); (N, n)."""
         way = np.asarray(self.stop) - np.asarray(self.start)
-        out = np.multiply.outer(_QUINTIC.deriv(order)(np.asarray(t) / self.lasting) / self.lasting**order, way)
+        out = np.multiply.outer(QUINTIC.deriv(order)(np.asarray(t) / self.lasting) / self.lasting**order, way)
         return out + np.asarray(self.start) if order == 0 else out

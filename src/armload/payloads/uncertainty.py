@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.errors import PayloadError
-from armload.inertia import InertialParameters, vech
+from armload.inertia import InertialParameters, com_to_phi, inertia_matrix, vech
 
 _STEP = 1e-6  # of a difference quotient: phi is of second degree in r, so that a central one is exact but for rounding
 
@@ -57,6 +57,4 @@ class Uncertainty:
 
 def _phi(x: NDArray[np.float64]) -> NDArray[np.float64]:
     """phi (10,) of mass, centre and inertia about it, (10,)."""
-    m, r, (xx, xy, xz, yy, yz, zz) = x[0], x[1:4], x[4:]
-    about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) + m * (r @ r * np.eye(3) - np.outer(r, r))
-    return np.r_[m, m * r, vech(about)]
+    return com_to_phi(x[0], x[1:4], inertia_matrix(x[4:]))

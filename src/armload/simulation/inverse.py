@@ -4,7 +4,7 @@
 
 q = q_desired + e(t), where e is a sum of drawn sine waves, so that dq and ddq are its exact derivatives. What MuJoCo
 adds, that friction and payload disturb the motion, is left out: identification sees only q, dq and tau, which satisfy
-the same equation (`tests/simulation/test_inverse.py`). The payload may change at any time, at once.
+the same equation (`tests/simulation/test_simulate_inverse.py`). The payload may change at any time, at once.
 """
 
 from __future__ import annotations

@@ -226,7 +226,7 @@ def coriolis_missed(
 
 
 def _knots(clock: Clock, steps: int) -> NDArray[np.intp]:
-    """Steps that are `_KNOTS` seconds apart, the last one among them."""
+    """Steps that are `slow_knots` of the clock's resolution apart [s], the last one among them."""
     return np.unique(np.append(np.arange(0, steps, max(1, int(clock.resolution.slow_knots / clock.step))), steps - 1))
 
 

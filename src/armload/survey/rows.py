@@ -19,6 +19,15 @@ SEPARATOR = " | "  # between notes, and between determined parameters: sentences
 TEXT, WHOLE, FLAG, NUMBER = "text", "whole", "flag", "number"
 
 
+def of_joints(n: int) -> list[str]:
+    """The columns (2n,) of the arm's own torque: each joint's offset, then each joint's friction.
+
+    >>> of_joints(2)
+    ['offset_1', 'offset_2', 'coulomb_1', 'coulomb_2']
+    """
+    return [f"{name}_{j}" for name in ("offset", "coulomb") for j in range(1, n + 1)]
+
+
 def columns(n: int) -> dict[str, str]:
     """Names and kinds of the columns, of arms with n joints.
 
@@ -26,7 +35,6 @@ def columns(n: int) -> dict[str, str]:
     ['held', 'consistent', 'moves', 'changed']
     """
     of_payload = ["mass", *(f"com_{a}" for a in _AXES), *(f"inertia_{p}" for p in _PRODUCTS)]
-    of_joints = [f"{name}_{j}" for name in ("offset", "coulomb") for j in range(1, n + 1)]
     of_ways = [f"{name}_{k}" for name in ("slide", "slide_std") for k in range(1, WAYS + 1)]
     return {
         **dict.fromkeys(("log", "arm"), TEXT),
@@ -42,7 +50,7 @@ def columns(n: int) -> dict[str, str]:
         **dict.fromkeys(("residual", "restlessness", "misfit"), NUMBER),
         "misfit_joint": WHOLE,
         "changed": FLAG,
-        **dict.fromkeys((*of_joints, *of_ways), NUMBER),
+        **dict.fromkeys((*of_joints(n), *of_ways), NUMBER),
         **dict.fromkeys(("version", "key"), TEXT),
     }
 
@@ -97,14 +105,14 @@ def _of_payload(found: Identification) -> dict[str, Any]:
 def _of_arm(health: ArmHealth | None) -> dict[str, Any]:
     if health is None:
         return {}
-    of_joints = {"offset": health.offset, "coulomb": health.coulomb}
+    torques = [*health.offset, *health.coulomb]
     return {
         "residual": _number(health.residual),
         "restlessness": _number(health.restlessness),
         "misfit": _number(health.misfit),
         "misfit_joint": health.joint,
         "changed": bool(health.changed),
-        **{f"{name}_{j}": _number(x) for name, xs in of_joints.items() for j, x in enumerate(xs, start=1)},
+        **{name: _number(x) for name, x in zip(of_joints(len(torques) // 2), torques, strict=True)},
     }
 
 

@@ -18,7 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-DAY = 86400.0  # [s]
+from armload.identification.tare_age import DAY
+from armload.survey.rows import of_joints
+
 # days on either side of a split, at least: fewer may be one odd day
 FEWEST = 2
 # z beyond which an arm is another one. Set on the smallest fleet of `benchmarks/fleet.py`: sound arms reach 6, the
@@ -67,7 +69,7 @@ def shifts(rows: Sequence[Mapping[str, Any]], n: int) -> dict[str, Shift]:
 
 def _by_day(rows: Sequence[Mapping[str, Any]], n: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """First time of each day (D,) and the medians of its rows (D, 2n)."""
-    names = [f"{name}_{j}" for name in ("offset", "coulomb") for j in range(1, n + 1)]
+    names = of_joints(n)
     of: dict[int, list[tuple[float, list[float]]]] = {}
     for row in rows:
         if row["date"] is not None and row[names[0]] is not None:

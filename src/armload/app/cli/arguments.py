@@ -10,7 +10,7 @@ from typing import NoReturn
 from armload.errors import IdentificationError, UsageError
 
 # options whose value may begin with a minus sign: argparse would take "-1,0,-9.7" for an option
-_SIGNED = ("--gravity", "--mass", "--from", "--box", "--floor", "--centre", "--com")
+_SIGNED = ("--gravity", "--mass", "--from", "--at", "--box", "--floor", "--centre", "--com")
 COLUMNS = 'names and units of columns, such as "t=time,q=joint_pos_{i},t_unit=ms", or a TOML file'
 AS_NAMED = "none"  # as SPEC: nothing is said of the columns
 

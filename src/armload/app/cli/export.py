@@ -16,12 +16,6 @@ if TYPE_CHECKING:
     from armload.errors import SinkError
     from armload.inertia import InertialParameters
 
-_EVERYTHING = {  # what is counted from the flange on, whatever was mounted when
-    "ur": "a UR's payload",
-    "ur-payload": "a UR's payload",
-    "kinova": "Kinova's tool",
-    "xarm": "an xArm's load",
-}
 # when what is not in a load was mounted, by what it is relative to
 _SINCE = {"tare": "at the tare", "before": "at the tare", "profile": "in the profile's logs"}
 # the names of armload.devices.FORMS, so that --help need not import them; a test compares
@@ -238,25 +232,25 @@ def _on_numbers(load: Load) -> list[str]:
 def _on_use(load: Load, to: str, added: bool) -> list[str]:
     """What to see to where they are used."""
     from armload.arms import ARMS
-    from armload.devices import CONTROLLERS
+    from armload.devices import FORMS as FORMS_OF
 
     notes = []
-    facts = ARMS.get(load.robot or "")
-    if facts is None and to in CONTROLLERS and load.frame in {each.flange for each in ARMS.values()}:
+    facts, form = ARMS.get(load.robot or ""), FORMS_OF[to]
+    if facts is None and form.maker and load.frame in {each.flange for each in ARMS.values()}:
         makers = {each.controller for each in ARMS.values() if each.flange == load.frame}
-        if not any(maker and to.startswith(maker) for maker in makers):
+        if form.maker not in makers:
             notes.append(f"it is about {load.frame}: another maker's flange may have other axes")
-    if facts is not None and to in CONTROLLERS and not (facts.controller and to.startswith(facts.controller)):
+    if facts is not None and form.maker and form.maker != facts.controller:
         notes.append(f"it was identified on a {load.robot}: another maker's flange may have other axes")
     if to == "franka" and load.relative_to == "arm" and not added:
         notes.append("this contains any hand that is mounted: take off what Desk counts already with --minus")
     if to == "kuka" and load.relative_to == "arm" and not added:
         notes.append("this contains any tool that is mounted: take off what has load data already with --minus")
-    if to in _EVERYTHING and load.relative_to == "tool":
-        notes.append(f"{_EVERYTHING[to]} is everything on the flange: add the tool with --plus")
-    if to in _EVERYTHING and load.relative_to in _SINCE:
+    if form.counts_all and load.relative_to == "tool":
+        notes.append(f"{form.counts_all} is everything on the flange: add the tool with --plus")
+    if form.counts_all and load.relative_to in _SINCE:
         then = _SINCE[load.relative_to]
-        notes.append(f"{_EVERYTHING[to]} is everything on the flange: add what was mounted {then}, if any, with --plus")
-    if to in CONTROLLERS and load.frame is None:
+        notes.append(f"{form.counts_all} is everything on the flange: add what was mounted {then}, if any, with --plus")
+    if form.maker and load.frame is None:
         notes.append("the payload names no frame: it is taken to be about the flange")
     return notes

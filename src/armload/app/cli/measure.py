@@ -11,7 +11,16 @@ from typing import TYPE_CHECKING, Any
 
 from armload.app.cli.arguments import check_tare_age
 from armload.app.cli.measure_arguments import parser
-from armload.app.cli.named import arm_of, motion_of, payload_of, read_logs, robot_of, world_of
+from armload.app.cli.named import (
+    arm_of,
+    boxes_of,
+    motion_of,
+    payload_of,
+    read_logs,
+    robot_of,
+    surroundings_of,
+    world_of,
+)
 from armload.app.cli.printing import print_json, print_note, working, write_json
 from armload.errors import SafetyError, SinkError, UsageError
 
@@ -22,7 +31,6 @@ if TYPE_CHECKING:
 
     from armload.arms import Arm
     from armload.devices import Mover
-    from armload.excitation import Obstacle
     from armload.inertia import InertialParameters
     from armload.measuring import Measurement, Plan
     from armload.motion import Motion
@@ -77,7 +85,7 @@ def run(options: argparse.Namespace) -> int | None:
             method=options.method,
             accuracy=accuracy,
             floor=options.floor,
-            boxes=_boxes(options),
+            boxes=boxes_of(options),
             approach=APPROACH if options.approach is None else options.approach,
             thresholds=Thresholds(options.off_path, options.push),
             say=print_note,
@@ -113,18 +121,12 @@ def _tool(options: argparse.Namespace, arm: Arm) -> InertialParameters:
     return plausible_tool(arm.in_frame(payload_of(options.tool, arm)), arm)
 
 
-def _boxes(options: argparse.Namespace) -> tuple[Obstacle, ...]:
-    from armload.excitation import Obstacle
-
-    return tuple(Obstacle((b[0], b[1], b[2]), (b[3], b[4], b[5])) for b in options.box)
-
-
 def _designed(arm: Arm, pose: NDArray, profile: Profile | None, options: argparse.Namespace) -> Motion:
     """The motion about the present pose that tells most, for who named none: after an empty run of it, or a tare."""
-    from armload.excitation import Constraints, Criterion, PayloadRange, Surroundings, design_motion
+    from armload.excitation import Constraints, Criterion, PayloadRange, design_motion
 
     heaviest = None if options.mass is None else PayloadRange(options.mass[0] + 3.0 * options.mass[1])
-    around = Surroundings(arm, options.floor, _boxes(options))
+    around = surroundings_of(options, arm)
     limits = Constraints(arm, pose, payload=heaviest, surroundings=around, speed=options.tool_speed)
     with working("designing a motion about the present pose"):
         return design_motion(limits, Criterion(arm, "same", profile), options.time, name="designed").motion
@@ -197,11 +199,8 @@ def _apply(found: Measurement, mover: Mover, mounted: Any, options: argparse.Nam
 
 
 def _simulated(options: argparse.Namespace, arm: Arm, motion: Motion | None, loaded: bool) -> dict[str, Any]:
-    import numpy as np
-
     payload = payload_of(options.payload, arm)
-    middle = 0.5 * (arm.limits.position_low + arm.limits.position_high)
-    stands = np.where(np.isfinite(middle), middle, 0.0) if motion is None else motion.position([0.0])[0]
+    stands = arm.limits.middle if motion is None else motion.position([0.0])[0]
     return {
         "at": stands if options.at is None else options.at,
         "payload": payload,

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
-
 from armload.app.cli.arguments import (
     Parser,
     add_arm_arguments,
@@ -15,7 +13,7 @@ from armload.app.cli.arguments import (
     output_file,
     output_folder,
 )
-from armload.app.cli.motion_arguments import box
+from armload.app.cli.motion_arguments import box, floor, numbers
 
 _EXAMPLES = """\
 examples:
@@ -80,9 +78,7 @@ def parser() -> Parser:
     add("--grip", metavar="COMMAND", help="a command that mounts the payload; else you are asked to")
     add_column_arguments(parser)
     safety = parser.add_argument_group("what is allowed").add_argument
-    safety(
-        "--floor", type=_floor, default=0.0, metavar="Z|none", help="height of the floor in the base's frame [m] (0)"
-    )
+    safety("--floor", type=floor, default=0.0, metavar="Z|none", help="height of the floor in the base's frame [m] (0)")
     safety(
         "--box",
         type=box,
@@ -116,29 +112,13 @@ def parser() -> Parser:
     )
     sim(
         "--at",
-        type=_pose,
+        type=numbers,
         metavar="Q1,…",
         help="where it stands [rad] (default: where the motion begins, else the middle of the joints)",
     )
     sim("--speed", type=_speed, default=1.0, metavar="X|max", help="1: real time")
     sim("--seed", type=at_least(0), default=0, metavar="N", help="of the sensors' noise (0)")
     return parser
-
-
-def _floor(text: str) -> float | None:
-    if text == "none":
-        return None
-    try:
-        return float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a height: expected metres, or none") from None
-
-
-def _pose(text: str) -> list[float]:
-    try:
-        return [float(x) for x in text.split(",")]
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a pose: expected radians, separated by commas") from None
 
 
 def _speed(text: str) -> float | None:

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
 
-from armload.app.cli import motion_arguments, motion_design, motion_enrich, motion_export, motion_show
-from armload.app.cli.arguments import Parser, add_arm_arguments, add_column_arguments, at_least, output_file
-from armload.app.cli.named import arm_of, payload_of
-from armload.app.cli.outputs import check_motion
-from armload.app.cli.printing import print_json, print_note, working
-from armload.errors import UsageError
-
-if TYPE_CHECKING:
-    from armload.arms import Arm
-    from armload.motion import Motion, MotionCheck
-
-NOT_ALLOWED = 3  # exit code of a check that says no
+from armload.app.cli import (
+    motion_arguments,
+    motion_check,
+    motion_design,
+    motion_enrich,
+    motion_export,
+    motion_show,
+)
+from armload.app.cli.arguments import Parser, add_arm_arguments, at_least, output_file
+from armload.app.cli.named import arm_of
+from armload.app.cli.outputs import check_motion_file
+from armload.app.cli.printing import print_note, working
 
 _EXAMPLES = """\
 examples:
@@ -78,21 +77,7 @@ def parser() -> Parser:
         "or a log against the limits; say which parameters of a payload it can tell, and how well: the Bayesian "
         "Cramér-Rao bound.",
     )
-    check.add_argument("motion", metavar="LOG|MOTION", help="a log, or taie2024, a JSON or CSV file, or random:SEED")
-    add_arm_arguments(check)
-    check.add_argument(
-        "--payload",
-        metavar="FILE",
-        help="what the arm carries: a JSON file, franka-hand, none, or rated (default: the maker's rated payload); "
-        "for motions only",
-    )
-    check.add_argument(
-        "--tare",
-        metavar="LOG|MOTION",
-        help="an earlier run of the arm, with anything mounted (default: of a motion the same again, of a log none)",
-    )
-    add_column_arguments(check)
-    check.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+    motion_check.add_check_arguments(check)
 
     export = actions.add_parser(
         "export",
@@ -123,75 +108,16 @@ def run(options: argparse.Namespace) -> int:
         "design": motion_design.run_design,
         "enrich": motion_enrich.run_enrich,
         "show": motion_show.run_show,
-        "check": _check,
+        "check": motion_check.run_check,
         "export": motion_export.run_export,
         "random": _random,
     }[options.action](options)
 
 
-def _check(options: argparse.Namespace) -> int:
-    from armload.app.cli import motion_check
-    from armload.inertia import NAMES, UNITS
-    from armload.posterior import advise, bound
-    from armload.recording import Recording
-
-    arm = arm_of(options)
-    run = motion_check.run_of(options, options.motion, arm)
-    tare = run if options.tare is None else motion_check.run_of(options, options.tare, arm, is_tare=True)
-    result, carried = None, ""
-    with working("checking"):
-        if isinstance(run, Recording):
-            if options.payload is not None:
-                raise UsageError("--payload is for motions: a log was made with whatever the arm carried; leave it out")
-            problems = motion_check.passed(run, arm)
-        else:
-            result, carried = _limits(options.payload or "rated", arm, run)
-            problems = result.problems
-        without_tare, tared = bound(arm, run), bound(arm, run, tare=tare)
-        advice = advise(arm, run, tare) if options.tare else advise(arm, run)
-    if options.json:
-        print_json(
-            {
-                **motion_check.check_fields(run, result, problems),
-                "robot": arm.name,
-                "frame": str(arm.frame),
-                "parameters": NAMES,
-                "units": UNITS,
-                "prior_half_width": without_tare.prior_half_width.tolist(),
-                "without_tare": motion_check.bound_fields(without_tare),
-                "with_tare": motion_check.bound_fields(tared),
-                "advice": None if advice is None else str(advice),
-            }
-        )
-        return NOT_ALLOWED if problems else 0
-    if isinstance(run, Recording):
-        motion_check.print_passed(run, arm, problems)
-    else:
-        print(f"{result}\ntorque with {carried}")
-    for found in (tared, without_tare) if options.tare else (without_tare, tared):
-        print()
-        motion_check.print_bound(found)
-    motion_check.print_advice(tared if options.tare else without_tare, advice)
-    return NOT_ALLOWED if problems else 0
-
-
-def _limits(payload_name: str, arm: Arm, motion: Motion) -> tuple[MotionCheck, str]:
-    """The check with a payload by name, and in words what is carried."""
-    from armload.motion import check_motion, rated_load
-
-    if payload_name == "rated":
-        payload = rated_load(arm)
-        carried = "the rated payload" if payload is not None else "nothing (its rated payload is not known)"
-    else:
-        payload = None if payload_name == "none" else arm.in_frame(payload_of(payload_name, arm))
-        carried = "nothing" if payload is None else payload_name
-    return check_motion(arm, motion, payload), carried
-
-
 def _random(options: argparse.Namespace) -> int:
     from armload.motion import random_motion, save_motion
 
-    check_motion(options.out)
+    check_motion_file(options.out)
     arm = arm_of(options)
     with working("looking for a motion"):
         motion = random_motion(arm, options.seed, duration=options.duration, harmonics=options.harmonics)

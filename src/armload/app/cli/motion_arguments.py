@@ -7,12 +7,6 @@ import re
 
 from armload.app.cli.arguments import add_arm_arguments, add_column_arguments, at_least, file_name, output_file
 
-_UNITS = {
-    "mass": {"g": 1e-3, "kg": 1.0, "": 1.0},
-    "moment": {"g.m": 1e-3, "kg.m": 1.0, "": 1.0},
-    "inertia": {"g.m2": 1e-3, "kg.m2": 1.0, "": 1.0},
-}
-
 
 def numbers(text: str) -> tuple[float, ...]:
     """Numbers separated by commas.
@@ -45,8 +39,15 @@ def held(text: str) -> float | tuple[float, float, float]:
 
 
 def floor(text: str) -> float | None:
-    """A height, or none."""
-    return None if text == "none" else at_least(-1e3, float, 1e3)(text)
+    """A height [m], or none.
+
+    >>> floor("-0.5"), floor("none")
+    (-0.5, None)
+    """
+    try:
+        return None if text == "none" else at_least(-1e3, float, 1e3)(text)
+    except argparse.ArgumentTypeError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a height: expected metres, or none") from None
 
 
 def joints(text: str) -> tuple[int, ...]:

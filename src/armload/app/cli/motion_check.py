@@ -7,7 +7,10 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from armload.app.cli.printing import console, table
+from armload.app.cli.arguments import add_arm_arguments, add_column_arguments
+from armload.app.cli.named import arm_of, motion_of, payload_of, read_logs
+from armload.app.cli.printing import console, print_json, table, working
+from armload.errors import UsageError
 from armload.service.finite import finite
 
 if TYPE_CHECKING:
@@ -16,10 +19,90 @@ if TYPE_CHECKING:
     from armload.posterior import Advice, Bound
     from armload.recording import Recording
 
+NOT_ALLOWED = 3  # exit code of a check that says no
+
+
+def add_check_arguments(parser: argparse.ArgumentParser) -> None:
+    """All of `armload motion check`."""
+    add = parser.add_argument
+    add("motion", metavar="LOG|MOTION", help="a log, or taie2024, a JSON or CSV file, or random:SEED")
+    add_arm_arguments(parser)
+    add(
+        "--payload",
+        metavar="FILE",
+        help="what the arm carries: a JSON file, franka-hand, none, or rated (default: the maker's rated payload); "
+        "for motions only",
+    )
+    add(
+        "--tare",
+        metavar="LOG|MOTION",
+        help="an earlier run of the arm, with anything mounted (default: of a motion the same again, of a log none)",
+    )
+    add_column_arguments(parser)
+    add("--json", action="store_true", help="print one JSON object and nothing else")
+
+
+def run_check(options: argparse.Namespace) -> int:
+    """Check, print; `NOT_ALLOWED` where a limit is passed."""
+    from armload.inertia import NAMES, UNITS
+    from armload.posterior import advise, bound
+    from armload.recording import Recording
+
+    arm = arm_of(options)
+    run = run_of(options, options.motion, arm)
+    tare = run if options.tare is None else run_of(options, options.tare, arm, is_tare=True)
+    result, carried = None, ""
+    with working("checking"):
+        if isinstance(run, Recording):
+            if options.payload is not None:
+                raise UsageError("--payload is for motions: a log was made with whatever the arm carried; leave it out")
+            problems = passed(run, arm)
+        else:
+            result, carried = _limits(options.payload or "rated", arm, run)
+            problems = result.problems
+        without_tare, tared = bound(arm, run), bound(arm, run, tare=tare)
+        advice = advise(arm, run, tare) if options.tare else advise(arm, run)
+    if options.json:
+        print_json(
+            {
+                **check_fields(run, result, problems),
+                "robot": arm.name,
+                "frame": str(arm.frame),
+                "parameters": NAMES,
+                "units": UNITS,
+                "prior_half_width": without_tare.prior_half_width.tolist(),
+                "without_tare": bound_fields(without_tare),
+                "with_tare": bound_fields(tared),
+                "advice": None if advice is None else str(advice),
+            }
+        )
+        return NOT_ALLOWED if problems else 0
+    if isinstance(run, Recording):
+        print_passed(run, arm, problems)
+    else:
+        print(f"{result}\ntorque with {carried}")
+    for found in (tared, without_tare) if options.tare else (without_tare, tared):
+        print()
+        print_bound(found)
+    print_advice(tared if options.tare else without_tare, advice)
+    return NOT_ALLOWED if problems else 0
+
+
+def _limits(payload_name: str, arm: Arm, motion: Motion) -> tuple[MotionCheck, str]:
+    """The check with a payload by name, and in words what is carried."""
+    from armload.motion import check_motion, rated_load
+
+    if payload_name == "rated":
+        payload = rated_load(arm)
+        carried = "the rated payload" if payload is not None else "nothing (its rated payload is not known)"
+    else:
+        payload = None if payload_name == "none" else arm.in_frame(payload_of(payload_name, arm))
+        carried = "nothing" if payload is None else payload_name
+    return check_motion(arm, motion, payload), carried
+
 
 def run_of(options: argparse.Namespace, name: str, arm: Arm, is_tare: bool = False) -> Recording | Motion:
     """A log by the suffix of its file (or the folder of one), else a motion; a motion's own table is one, too."""
-    from armload.app.cli.named import motion_of, read_logs
     from armload.identification import check_plausible
     from armload.motion import PathMotion
     from armload.recording import is_log

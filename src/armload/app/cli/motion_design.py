@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from armload.app.cli.arguments import OutputFile
-from armload.app.cli.named import arm_of
-from armload.app.cli.outputs import check_motion, check_outputs
+from armload.app.cli.named import arm_of, surroundings_of
+from armload.app.cli.outputs import check_motion_file, check_outputs
 from armload.app.cli.printing import console, print_json, print_note, table, working
 from armload.errors import UsageError
 
 if TYPE_CHECKING:
     from armload.arms import Arm
-    from armload.excitation import Constraints, Criterion, Design, Obstacle, Surroundings
+    from armload.excitation import Constraints, Criterion, Design
     from armload.motion import Motion
     from armload.recording import Recording
 
@@ -41,7 +41,7 @@ def constraints_of(options: argparse.Namespace, arm: Arm, start: Any, moving: tu
         start,
         share=SHARE if options.share is None else options.share,
         payload=PayloadRange(mass, centre),
-        surroundings=_surroundings(options, arm),
+        surroundings=surroundings_of(options, arm),
         travel=TRAVEL if options.travel is None else options.travel,
         speed=TOOL_SPEED if options.speed is None else options.speed,
         joints=allowed,
@@ -79,7 +79,7 @@ def run_design(options: argparse.Namespace) -> int:
 
     if options.until is not None and options.time is not None:
         raise UsageError("--time and --until exclude each other: give one of them")
-    check_motion(options.out)
+    check_motion_file(options.out)
     out = Path(options.out)
     empty = out.with_name(f"{out.stem}-empty{out.suffix}")
     if options.tare_time is not None:
@@ -104,14 +104,6 @@ def run_design(options: argparse.Namespace) -> int:
     _print(found, constraints, criterion, words)
     print_note(f"wrote {' and '.join(written)}; run it slowly first")
     return 0
-
-
-def _surroundings(options: argparse.Namespace, arm: Arm) -> Surroundings:
-    from armload.excitation import Obstacle, Surroundings
-    from armload.motion.collision import PAYLOAD_RADIUS
-
-    boxes: tuple[Obstacle, ...] = tuple(Obstacle((b[0], b[1], b[2]), (b[3], b[4], b[5])) for b in options.box)
-    return Surroundings(arm, options.floor, boxes, PAYLOAD_RADIUS if options.held is None else options.held)
 
 
 def _largest(found: Design) -> dict[str, Any]:

@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
-from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
 
 from armload.app.cli.arguments import add_arm_arguments, at_least, output_file
 from armload.app.cli.motion_arguments import add_constraint_arguments, add_knowledge_arguments
 from armload.app.cli.motion_design import constraints_of, criterion_of, print_widths
 from armload.app.cli.named import arm_of
 from armload.app.cli.printing import print_json, print_note, working
-from armload.errors import MotionError, UsageError
-
-if TYPE_CHECKING:
-    from armload.arms import Arm
-    from armload.motion import Motion
+from armload.errors import UsageError
 
 _FORMATS = {".json": None, ".csv": "csv", ".yaml": "ros2", ".yml": "ros2", ".script": "ur"}
 
@@ -53,6 +46,7 @@ def run_enrich(options: argparse.Namespace) -> int:
     """Enrich, write, and say what that is worth."""
     import numpy as np
 
+    from armload.devices.ros2.trajectory_file import read_path
     from armload.excitation import enrich, touched_by
     from armload.inertia import NAMES, UNITS
     from armload.motion import export_motion, save_motion
@@ -61,7 +55,7 @@ def run_enrich(options: argparse.Namespace) -> int:
     if out.suffix.lower() not in _FORMATS:
         raise UsageError(f"{out} has the ending {out.suffix!r}: expected one of {', '.join(_FORMATS)}")
     arm = arm_of(options)
-    path = path_of(options.path, arm)
+    path = read_path(options.path, arm)
     # a task's path keeps to the limits themselves, not to a share of them, unless one is asked for
     options.share = 1.0 if options.share is None else options.share
     options.travel = 1e3 if options.travel is None else options.travel
@@ -108,112 +102,3 @@ def run_enrich(options: argparse.Namespace) -> int:
     print_widths(["as it was, at best", "enriched, at best"], [found.before, found.after])
     print_note(f"wrote {out}; run it slowly first")
     return 0
-
-
-def path_of(name: str, arm: Arm) -> Motion:
-    """A task's path from a file.
-
-    Raises:
-        MotionError: it cannot be read, or it is none of the forms that are known.
-    """
-    from armload.motion import check_joints, load_motion
-
-    file = Path(name)
-    try:
-        text = file.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not text"
-        raise MotionError(f"the path {name} cannot be read: {reason}; give a YAML, JSON or CSV file") from None
-    if file.suffix.lower() == ".csv":
-        return _table(text, name, arm)
-    content = _content(text, name)
-    if "format" in content:
-        motion = load_motion(file)
-        check_joints(motion, arm)
-        return motion
-    content = content.get("trajectory", content)  # of a FollowJointTrajectory goal
-    if not isinstance(content, dict) or "points" not in content:
-        raise MotionError(f"{name} is no path: expected a JointTrajectory with joint_names and points, or a motion")
-    return _trajectory(content, name, arm)
-
-
-def _content(text: str, name: str) -> dict[str, Any]:
-    try:
-        found = json.loads(text)
-    except ValueError:
-        found = _yaml(text, name)
-    if not isinstance(found, dict):
-        raise MotionError(f"{name} is no path: expected a JointTrajectory with joint_names and points, or a motion")
-    return found
-
-
-def _yaml(text: str, name: str) -> Any:
-    """YAML by the reader that comes with rosbags (`armload[bags]`)."""
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import YAMLError
-
-    try:
-        return YAML(typ="safe", pure=True).load(text)
-    except YAMLError as error:
-        raise MotionError(f"{name} is neither JSON nor YAML: {' '.join(str(error).split())}") from None
-
-
-def _trajectory(content: dict[str, Any], name: str, arm: Arm) -> Motion:
-    """Its points from the first one on, whatever time it takes to get there."""
-    import numpy as np
-
-    from armload.devices.ros2.trajectory import read_trajectory
-
-    def seconds(point: dict[str, Any]) -> float:
-        at = point.get("time_from_start", {})
-        return float(at.get("sec", at.get("secs", 0))) + 1e-9 * float(at.get("nanosec", at.get("nsecs", 0)))
-
-    try:
-        points = content["points"]
-        first = seconds(points[0])
-        made = []
-        for point in points:
-            whole, rest = divmod(round((seconds(point) - first) * 1e9), 10**9)
-            columns = {key: list(point.get(key) or []) for key in ("positions", "velocities", "accelerations")}
-            made.append(SimpleNamespace(time_from_start=SimpleNamespace(sec=whole, nanosec=rest), **columns))
-        header = SimpleNamespace(stamp=SimpleNamespace(sec=0, nanosec=0))  # a file begins when it is run
-        message = SimpleNamespace(header=header, joint_names=list(content["joint_names"]), points=made)
-        order = [message.joint_names.index(joint) for joint in arm.joint_names]
-        start = np.array(made[0].positions, dtype=float)[order]
-    except (KeyError, IndexError, TypeError, AttributeError, ValueError):
-        raise MotionError(
-            f"{name} is no JointTrajectory of {arm.name}: expected joint_names with {', '.join(arm.joint_names)}, and "
-            "points with positions and time_from_start"
-        ) from None
-    rest = np.zeros(arm.n)
-    return read_trajectory(message, arm, (start, rest, rest))
-
-
-def _table(text: str, name: str, arm: Arm) -> Motion:
-    import numpy as np
-
-    from armload.devices.ros2.trajectory import TrajectoryMotion
-
-    header, *lines = [line for line in text.splitlines() if line.strip()] or [""]
-    names = [cell.strip() for cell in header.split(",")]
-    wanted = {kind: [f"{kind}{k + 1}" for k in range(arm.n)] for kind in ("q", "dq", "ddq")}
-    if "t" not in names or any(column not in names for column in wanted["q"]) or f"q{arm.n + 1}" in names:
-        raise MotionError(f"{name} has the columns {', '.join(names)}: expected t, q1 … q{arm.n} in s and rad")
-    try:
-        rows = np.array([[float(cell) for cell in line.split(",")] for line in lines]).reshape(-1, len(names))
-        t = rows[:, names.index("t")]
-    except ValueError:
-        raise MotionError(f"{name} has a row that is not {len(names)} numbers") from None
-    found: dict[str, Any] = {
-        kind: rows[:, [names.index(column) for column in columns]]
-        for kind, columns in wanted.items()
-        if all(column in names for column in columns)
-    }
-    velocities = found.get("dq")
-    return TrajectoryMotion(
-        t - t[0],
-        found["q"],
-        velocities,
-        None if velocities is None else found.get("ddq"),
-        name=Path(name).stem,
-    )

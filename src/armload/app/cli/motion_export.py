@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from armload.app.cli.arguments import add_arm_arguments, at_least, output_file
 from armload.app.cli.motion_arguments import box, floor, numbers
-from armload.app.cli.named import arm_of, motion_of
+from armload.app.cli.named import arm_of, boxes_of, motion_of
 from armload.app.cli.printing import print_note
 from armload.errors import MotionError, UsageError
 
@@ -73,7 +73,6 @@ def _led(motion: Motion, arm: Arm, options: argparse.Namespace) -> Motion:
     Raises:
         MotionError: another number of joints, or one of both is not allowed.
     """
-    from armload.excitation import Obstacle
     from armload.measuring.plan import APPROACH, plan_of
     from armload.motion import JoinedMotion
 
@@ -86,9 +85,8 @@ def _led(motion: Motion, arm: Arm, options: argparse.Namespace) -> Motion:
                 f"--from has {arm.joint_names[j]} at {at:.4g} rad: expected a position from {low:.4g} to {high:.4g} rad"
                 f"{arm.limits.as_degrees(options.start)}"
             )
-    boxes = tuple(Obstacle((b[0], b[1], b[2]), (b[3], b[4], b[5])) for b in options.box)
     approach = APPROACH if options.approach is None else options.approach
-    about = {"floor": options.floor, "boxes": boxes, "heaviest": options.payload, "approach": approach}
+    about = {"floor": options.floor, "boxes": boxes_of(options), "heaviest": options.payload, "approach": approach}
     plan = plan_of(arm, motion, options.start, empty_run=False, **about)
     for leg in plan.legs:
         if leg.check.problems:

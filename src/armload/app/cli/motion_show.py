@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from armload.app.cli.arguments import add_arm_arguments, at_least, output_file
 from armload.app.cli.motion_arguments import box, floor, held
-from armload.app.cli.named import arm_of, motion_of
+from armload.app.cli.named import arm_of, motion_of, surroundings_of
 from armload.app.cli.printing import console, print_note, table
 from armload.errors import UsageError
 from armload.runtime.interruption import held_back
@@ -33,7 +33,7 @@ def add_show_arguments(parser: argparse.ArgumentParser) -> None:
     add("--port", type=at_least(0, int, 65535), metavar="P", help="of the page (8080, or the next free one)")
     add("--floor", type=floor, default=0.0, metavar="Z", help="height of the floor [m], or none (0)")
     add("--box", type=box, action="append", default=[], metavar="X,Y,Z,SX,SY,SZ", help="an obstacle; repeat for more")
-    add("--held", type=held, default=0.15, metavar="R|SX,SY,SZ", help="what is held, as of `motion design` (0.15)")
+    add("--held", type=held, metavar="R|SX,SY,SZ", help="what is held, as of `motion design` (0.15)")
 
 
 def run_show(options: argparse.Namespace) -> int:
@@ -80,10 +80,8 @@ def run_show(options: argparse.Namespace) -> int:
 
 def _page(motion: Motion, arm: Arm, options: argparse.Namespace) -> MotionPage:
     from armload.app.page.motion_page import MotionPage
-    from armload.excitation import Obstacle, Surroundings
 
-    boxes = tuple(Obstacle((b[0], b[1], b[2]), (b[3], b[4], b[5])) for b in options.box)
-    around = Surroundings(arm, options.floor, boxes, options.held)
+    around = surroundings_of(options, arm)
     port = 8080 if options.port is None else options.port
     with held_back():  # what the page loads catches every exception: a Ctrl-C would be lost
         return MotionPage(motion, arm, around, options.host or "127.0.0.1", port)

@@ -1,4 +1,4 @@
-"""What the options of a command name: an arm, its logs, a payload, a motion, a world."""
+"""What the options of a command name: an arm, its logs and what stands around it, a payload, a motion, a world."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from armload.errors import RecordingError, UsageError
 
 if TYPE_CHECKING:
     from armload.arms import Arm
+    from armload.excitation import Obstacle, Surroundings
     from armload.inertia import InertialParameters
     from armload.lab.dataset import Dataset
     from armload.motion import Motion
@@ -190,6 +191,22 @@ def motion_of(name: str, arm: Arm, of_arm: bool = True) -> Motion:
     if of_arm:
         check_joints(motion, arm)
     return motion
+
+
+def boxes_of(options: argparse.Namespace) -> tuple[Obstacle, ...]:
+    """The obstacles that `--box` names."""
+    from armload.excitation import Obstacle
+
+    return tuple(Obstacle((x, y, z), (sx, sy, sz)) for x, y, z, sx, sy, sz in options.box)
+
+
+def surroundings_of(options: argparse.Namespace, arm: Arm) -> Surroundings:
+    """What `--floor`, `--box` and, of the commands that have it, `--held` say: what the arm stays clear of."""
+    from armload.excitation import Surroundings
+    from armload.motion.collision import PAYLOAD_RADIUS
+
+    held = getattr(options, "held", None)
+    return Surroundings(arm, options.floor, boxes_of(options), PAYLOAD_RADIUS if held is None else held)
 
 
 def world_of(name: str, arm: Arm) -> World:

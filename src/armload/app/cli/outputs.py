@@ -68,7 +68,7 @@ def check_page(out: str) -> None:
         raise UsageError(f"--out {out} is to be a page of HTML: expected a name that ends in .html")
 
 
-def check_motion(out: str) -> None:
+def check_motion_file(out: str) -> None:
     """See that a motion's file is named as one; what is no plain file, such as /dev/stdout, has any name.
 
     Raises:

@@ -153,19 +153,14 @@ def _node(options: argparse.Namespace) -> None:
 
 
 def _simulate(options: argparse.Namespace) -> None:
-    import numpy as np
-
     from armload.devices import Ros2Connection
     from armload.devices.ros2 import RobotNode
     from armload.simulation import Sensors
 
     arm = arm_of(options)
     world = world_of(options.world, arm)
-    limits = arm.limits
-    middle = 0.5 * (limits.position_low + limits.position_high)
-    stand = np.where(np.isfinite(middle), middle, 0.0)
     payload = None if options.payload is None else payload_of(options.payload, arm)
-    first = stand if options.motion is None else motion_of(options.motion, arm)
+    first = arm.limits.middle if options.motion is None else motion_of(options.motion, arm)
     connection = Ros2Connection("armload_robot")
     try:
         node = RobotNode(

@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from armload.app.cli.arguments import (
@@ -21,6 +17,7 @@ from armload.app.cli.arguments import (
 )
 from armload.app.cli.outputs import check_page
 from armload.app.cli.printing import counted, print_json, print_note, working
+from armload.app.cli.progress import progress_shown
 from armload.errors import UsageError
 
 if TYPE_CHECKING:
@@ -42,7 +39,6 @@ A PATH is a log, a folder, a glob, a URL that fsspec knows, or @FILE with one of
 where the payload changes: a row for each payload, and for each log that cannot be answered a row that says why. The
 same command goes on where it was stopped, and answers only logs that are new or changed (docs/survey.md).
 """
-_EVERY = 10.0  # [s] between two lines of progress where stderr is no terminal
 
 
 def parser() -> Parser:
@@ -100,7 +96,7 @@ def run(options: argparse.Namespace) -> None:
         tuple(ColumnSpec.of(options.columns).given().items()),
         options.topic,
     )
-    with _progress() as progress:
+    with progress_shown("log") as progress:
         found = survey(
             options.paths,
             settings,
@@ -145,25 +141,3 @@ def _report(options: argparse.Namespace) -> None:
     for line in findings:
         print(line)
     print(f"wrote {options.out}")
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[int, int], None]]:
-    """Called as show(done, total): a bar with the time that remains on a terminal, now and then a line elsewhere."""
-    if sys.stderr.isatty():
-        from armload.ensembles.progress import Progress, reporter
-
-        with reporter(True) as report:
-            yield lambda done, total: report(Progress("logs", done, total))
-        return
-    began = last = time.monotonic()
-
-    def line(done: int, total: int) -> None:
-        nonlocal last
-        now = time.monotonic()
-        if now - last >= _EVERY or done == total:
-            left = (now - began) * (total - done) / done
-            print_note(f"{done} of {total} logs" + (f", about {left / 60:.1f} min left" if done < total else ""))
-            last = now
-
-    yield line

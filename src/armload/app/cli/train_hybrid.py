@@ -5,14 +5,12 @@ from __future__ import annotations
 import argparse
 import json
 import shlex
-import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from armload.app.cli.printing import console, print_json, print_note, table
+from armload.app.cli.progress import progress_shown
 
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
@@ -20,7 +18,7 @@ if TYPE_CHECKING:
     from armload.arms import Arm
     from armload.lab.training import Coverage
 
-_EVERY = 20.0  # [s] between two lines of progress
+LEARNING = "learning from the episodes, and checking on those left out"
 _WORST, _FEWEST = 3, 20  # cells named; episodes that one must rest on
 
 
@@ -44,7 +42,7 @@ def run(options: argparse.Namespace) -> None:
         f"{'going on from' if resumed else 'kept in'} {work}"
     )
     began = time.perf_counter()
-    with episodes_shown() as progress, engine(jobs, options.cluster) as on:
+    with progress_shown("episode", LEARNING) as progress, engine(jobs, options.cluster) as on:
         model, coverage = train_hybrid(
             robot, episodes=episodes, seed=options.seed, folder=work, progress=progress, on=on
         )
@@ -156,42 +154,3 @@ def _cell(where: Any) -> str:
 
     kind, b, k = (int(x) for x in where)
     return f"({NAMES[k]}, {TIMES[b]:g} s, {KINDS[kind]})"
-
-
-@contextmanager
-def episodes_shown() -> Iterator[Callable[[int, int], None]]:
-    """Called as show(done, total): a bar with the time that remains on a terminal, now and then a line elsewhere."""
-    if not sys.stderr.isatty():
-        yield _Lines()
-        return
-    from armload.ensembles.progress import Progress, reporter
-
-    with reporter(True) as report:
-        yield lambda done, total: report(Progress("episodes", done, total, "" if done < total else "learning"))
-
-
-_LEARNING = "learning from the episodes, and checking on those left out"
-
-
-class _Lines:
-    """Progress as lines on stderr: at the beginning, at the end and every now and then."""
-
-    def __init__(self) -> None:
-        self._first: tuple[int, float] | None = None
-        self._last = 0.0
-
-    def __call__(self, done: int, total: int) -> None:
-        now = time.perf_counter()
-        if done == total:
-            print_note(f"{total} episodes; {_LEARNING}")
-        elif self._first is None or now - self._last >= _EVERY:
-            print_note(f"{done} of {total} episodes{self._left(done, total, now)}")
-            self._last = now
-        self._first = self._first or (done, now)
-
-    def _left(self, done: int, total: int, now: float) -> str:
-        """How long the rest takes at the pace since the first call: what was read back does not count."""
-        if self._first is None or done <= self._first[0]:
-            return ""
-        seconds = (now - self._first[1]) * (total - done) / (done - self._first[0])
-        return f", about {seconds / 60:.0f} min left" if seconds >= 90 else f", about {seconds:.0f} s left"

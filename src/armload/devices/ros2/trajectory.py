@@ -139,8 +139,8 @@ def read_trajectory(
     if times[0] > 0:  # from where the arm is
         times = np.append(0.0, times)
         positions, velocities, accelerations = (
-            None if column is None else np.vstack([now, column])
-            for column, now in zip((positions, velocities, accelerations), start, strict=True)
+            None if column is None else np.vstack([here, column])
+            for column, here in zip((positions, velocities, accelerations), start, strict=True)
         )
     elif (away := float(np.max(np.abs(positions[0] - start[0])))) > _SAME_PLACE:
         raise MotionError(

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from armload.arms import Arm
 from armload.devices.counted import Counted
 from armload.devices.guard import flange_of
@@ -17,7 +15,7 @@ from armload.devices.load import Load
 from armload.devices.ur.source import load_client, load_control, unreachable
 from armload.devices.ur.writer import set_load
 from armload.errors import SinkError, SourceError, one_line
-from armload.inertia import InertialParameters
+from armload.inertia import InertialParameters, inertia_matrix
 
 _FIELDS = ["timestamp", "actual_qd", "payload", "payload_cog", "payload_inertia"]
 _RATE = 125.0  # [Hz] of what is read
@@ -55,7 +53,7 @@ class URController:
         load = InertialParameters.zero(self._flange)
         if mass > 0.0:
             xx, yy, zz, xy, xz, yz = inertia
-            about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+            about = inertia_matrix([xx, xy, xz, yy, yz, zz])
             load = InertialParameters.from_com(mass, cog, about, self._flange)
         return Counted(dq, 0.0, load)
 

@@ -56,7 +56,7 @@ def compare(
 ) -> Comparison:
     """Feed the same runs through every method and collect the estimates over time.
 
-    Two baselines are always among the rows (`evaluate.baselines`), made from `training` unless `identifiers` holds
+    Two baselines are always among the rows (`evaluation.baselines`), made from `training` unless `identifiers` holds
     them: the mean of the training payloads, and least squares with them as prior.
 
     A run's tare reaches a method that is given as a function (recording or None → identifier), such as

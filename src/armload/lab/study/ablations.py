@@ -9,13 +9,12 @@ import numpy as np
 
 from armload.lab.report.shown import GROUPS, SHOWN_UNITS, Table
 from armload.lab.study.numbers import Cell, Cells, Ensemble, at_end, benchmark, cap, matched
+from armload.lab.study.spec import NOMINAL, REAL
 from armload.lab.study.study_tables import (
     COMMAND,
     MISSING,
-    NOMINAL,
     NOT_YET,
     PROTOCOLS,
-    REAL,
     SPLITS,
     SPREAD,
     TRAINING_MEAN,

@@ -13,6 +13,7 @@ from armload.arms import Arm, arm, payload_regressor
 from armload.inertia import InertialParameters
 from armload.lab.dataset import Dataset, build_dataset
 from armload.lab.evaluation import EvaluationRun
+from armload.lab.study.spec import NOMINAL, REAL, SEMI_REAL
 from armload.motion import Motion, excitation, random_motion
 from armload.payloads import Payload, container_loadings, draw_payload, random_payloads, test_payload
 from armload.recording import Recording, read_recording
@@ -143,8 +144,8 @@ class Basis:
         ]
         others = [random_motion(robot, MOTIONS + k) for k in range(size.motions)]
         plan: dict[str, list[tuple[str, Motion, InertialParameters, World]]] = {
-            "test_payload_nominal": [(f"noise {k}", self.motion, self.truth, nominal) for k in range(3)],
-            "test_payload_real_like": [(w.name, self.motion, self.truth, w) for w in worlds],
+            NOMINAL: [(f"noise {k}", self.motion, self.truth, nominal) for k in range(3)],
+            REAL: [(w.name, self.motion, self.truth, w) for w in worlds],
             "off_family": [(f"random payload {k}", self.motion, p, nominal) for k, p in enumerate(family)],
             "other_motion": [(m.name, m, self.truth, nominal) for m in others],
         }
@@ -168,7 +169,7 @@ class Basis:
         return out
 
     def _on_real_log(self) -> dict[str, list[EvaluationRun]]:
-        return {} if self.real_log is None else {"test_payload_semi_real": self._semi_real(self.real_log)}
+        return {} if self.real_log is None else {SEMI_REAL: self._semi_real(self.real_log)}
 
     def _semi_real(self, path: Path) -> list[EvaluationRun]:
         """Three 6 s windows of the real log with the payload's torque added; its first 10 s are the tare."""

@@ -15,14 +15,14 @@ from typing import Any
 
 from armload.inertia import NAMES
 from armload.lab.study.multiverse import AXES, LEVEL, USUAL, Improvement, Multiverse, percent
-from armload.lab.study.numbers import LEAST, SEMI_REAL, Cells, Ensemble, at_end, benchmark, matched, on_many_arms
+from armload.lab.study.numbers import LEAST, Cells, Ensemble, at_end, benchmark, matched, on_many_arms
+from armload.lab.study.spec import SEMI_REAL, SPLITS
 from armload.lab.study.statements import RULES
 
 CONFIRMED, DIRECTION, UNDETERMINED = "confirmed", "direction only", "undetermined"
 NOT_CONFIRMED, DEPENDS = "not confirmed", "depends on"
 NOT_COMPARABLE, NOT_MEASURED = "not comparable", "not measured"
 VERDICTS = (CONFIRMED, DIRECTION, UNDETERMINED, NOT_CONFIRMED, DEPENDS, NOT_COMPARABLE, NOT_MEASURED)
-SPLITS = ("row", "payload")  # the paper's, and the one that keeps whole payloads from the training
 BAND = 10.0  # [percentage points] within which a number counts as the paper's
 CONSTANT = "Ixy"  # zero in every loading of our container
 

@@ -8,17 +8,8 @@ from typing import Any
 
 from armload.lab.study.claims import CONFIRMED, DEPENDS, DIRECTION, NOT_CONFIRMED, NOT_MEASURED, UNDETERMINED
 from armload.lab.study.findings import Nearness, Turned, distinct, tally
-from armload.lab.study.numbers import (
-    REAL,
-    Cells,
-    Ensemble,
-    at_end,
-    benchmark,
-    both_stages,
-    held_out,
-    matched,
-    on_many_arms,
-)
+from armload.lab.study.numbers import Cells, Ensemble, at_end, benchmark, both_stages, held_out, matched, on_many_arms
+from armload.lab.study.spec import REAL
 from armload.lab.study.study_tables import COMMAND, LEARNERS, listing, mass_shown
 
 Claims = Sequence[Mapping[str, Any]]

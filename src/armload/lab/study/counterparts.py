@@ -21,16 +21,14 @@ from armload.lab.study.numbers import (
     matched,
     mean_ratio,
 )
+from armload.lab.study.spec import NOMINAL, REAL, SEMI_REAL
 from armload.lab.study.statements import izz
 from armload.lab.study.study_tables import (
     BASELINES,
     COMMAND,
     LEAST_SQUARES,
     MISSING,
-    NOMINAL,
     NOT_YET,
-    REAL,
-    SEMI_REAL,
     SPLITS,
     SPREAD,
     TRAINING_MEAN,

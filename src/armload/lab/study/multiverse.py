@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.inertia import NAMES
-from armload.lab.study.numbers import EXACT, PAPER_EPOCHS, READING, REAL, Cell, Cells, cap
+from armload.lab.study.numbers import EXACT, PAPER_EPOCHS, READING, Cell, Cells, cap
 from armload.lab.study.plan import CAP
 from armload.lab.study.readings import DEFAULT_STOP
 from armload.lab.study.rivals import DERIVATIVES, RATES
+from armload.lab.study.spec import REAL
 
 LEVEL, DRAWS = 0.95, 2000  # of the intervals; of the bootstrap
 

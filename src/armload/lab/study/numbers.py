@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armload.lab.study.spec import REAL
+
 Cell = Mapping[str, Any]
 Cells = Mapping[str, Cell]
 
@@ -19,9 +21,6 @@ LEAST = 1.0  # [%] an improvement below this is none
 EXACT = 1e-9  # [SI] errors below are rounding: a parameter that is the same in every payload is learned exactly
 # Judged by their mean over the second half, as in [7].
 AVERAGED = ("rls", "rls-filter", "rls-filter-calibrated", "rls-filter-calibrated-other")
-
-
-REAL, SEMI_REAL = "test_payload_real_like", "test_payload_semi_real"
 READING = "reading"  # the ablation of the cells of the readings
 RIVAL_OF = {  # the same method on the many arms of `rivals`
     "rls": "rival-difference-540-panda",

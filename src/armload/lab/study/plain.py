@@ -18,13 +18,13 @@ from armload.lab.study.numbers import (
     matched,
     mean_ratio,
 )
+from armload.lab.study.spec import REAL
 from armload.lab.study.study_tables import (
     COMMAND,
     LEARNERS,
     LEAST_SQUARES,
     MISSING,
     NOT_YET,
-    REAL,
     TRAINING_MEAN,
     listing,
     mass_shown,

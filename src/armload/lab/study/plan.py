@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 from armload.lab.study.basis import Size
-from armload.lab.study.spec import Spec
+from armload.lab.study.spec import SPLITS, Spec
 
 SEEDS = (0, 1, 2)
 CAP = 60  # epochs of the networks in further seeds and ablations
-SPLITS = ("row", "payload")
 BENCHMARKS = (
     "rls",
     "rls-filter",

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from armload.estimators import Identifier
 from armload.lab.evaluation import EvaluationRun
 from armload.lab.experiment import listed
+from armload.lab.study.spec import NOMINAL, REAL
 from armload.recording import Recording
 
 Predict = Callable[[NDArray[np.float64]], NDArray[np.float64]]  # rows of (t, q, dq, tau) → phi (N, 10)
-_SHOWN = ("test_payload_nominal", "test_payload_real_like")  # protocols whose Izz over time is kept (Fig. 8)
+_SHOWN = (NOMINAL, REAL)  # protocols whose Izz over time is kept (Fig. 8)
 _POINTS, _STREAM_POINTS = 120, 60  # of a curve; a stream's estimates cost more
 
 

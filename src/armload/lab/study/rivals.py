@@ -27,6 +27,7 @@ from armload.lab.experiment import Task, listed
 from armload.lab.study.basis import NOISE, WORLDS, Basis, Size, basis_of_process
 from armload.lab.study.numbers import EXACT
 from armload.lab.study.readings import basis_of_readings
+from armload.lab.study.spec import NOMINAL, REAL
 from armload.recording import Recording
 from armload.regression.lag import GAIN, Lag
 from armload.simulation import Run, Sensors, World, simulate_many
@@ -122,8 +123,8 @@ def simulated(basis: Basis, rate: int, sensors: str) -> dict[str, list[Evaluatio
     """The test payload on the nominal arm and on the real-like arms, the empty arm on the same motion beside each."""
     robot, size = basis.arm, basis.size
     worlds = {
-        "test_payload_nominal": [World.nominal(robot)] * 3,
-        "test_payload_real_like": [World.real_like(robot, WORLDS + k) for k in range(size.worlds)],
+        NOMINAL: [World.nominal(robot)] * 3,
+        REAL: [World.real_like(robot, WORLDS + k) for k in range(size.worlds)],
     }
     out = {}
     for protocol, members in worlds.items():

@@ -6,6 +6,9 @@ from dataclasses import asdict, dataclass, field, replace
 
 from armload.lab.cells import key_of
 
+SPLITS = ("row", "payload")  # the paper's, and the one that keeps whole payloads from the training
+# protocols of the test payload: on the nominal arm, on arms that differ from it as real ones do, on a real log
+NOMINAL, REAL, SEMI_REAL = "test_payload_nominal", "test_payload_real_like", "test_payload_semi_real"
 FORMAT = 2  # of a cell's file; a change makes every cell unfinished
 
 

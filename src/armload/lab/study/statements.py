@@ -28,9 +28,9 @@ from armload.lab.study.numbers import (
     matched,
     mean_ratio,
 )
+from armload.lab.study.spec import NOMINAL, REAL
 from armload.payloads import test_payload
 
-REAL, NOMINAL = "test_payload_real_like", "test_payload_nominal"
 FLAT_AFTER, SECOND_HALF = 2.85, 3.0  # [s] the paper's
 FLAT = 5.0  # [% of the truth] that a flat line may move, ours
 CLOSE = 2.0  # ratio of errors that still counts as close, ours

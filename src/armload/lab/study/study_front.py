@@ -13,8 +13,9 @@ from armload.lab.study.claims import BAND, CONFIRMED, CONSTANT, DEPENDS, NOT_COM
 from armload.lab.study.conclusion import conclusion
 from armload.lab.study.findings import SKLEARN, Nearness, distinct, in_band, nearness, tally, turned
 from armload.lab.study.multiverse import USUAL, Multiverse, Reading
-from armload.lab.study.numbers import REAL, Cells
+from armload.lab.study.numbers import Cells
 from armload.lab.study.rivals import DERIVATIVES, RATES
+from armload.lab.study.spec import REAL
 from armload.lab.study.statements import RULES
 from armload.lab.study.study_tables import COMMAND, MISSING, NOT_YET, listing
 

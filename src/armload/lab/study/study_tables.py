@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from armload.lab.report.shown import GROUPS, SHOWN_SCALE, SHOWN_UNITS, Table, parameter_columns, short
 from armload.lab.study.numbers import EXACT, PAPER_EPOCHS, Cell, Cells, Ensemble, at_end, benchmark, held_out, matched
+from armload.lab.study.spec import NOMINAL, REAL, SEMI_REAL
 
 COMMAND = "armload reproduce taie2024"
 MISSING = "–"
@@ -30,13 +31,12 @@ BASELINES = (TRAINING_MEAN, LEAST_SQUARES["same-prior"])
 SPLITS = {"row": "rows", "payload": "payloads"}
 PROTOCOLS = {
     "held_out": "test rows, single samples",
-    "test_payload_nominal": "test payload, nominal arm",
-    "test_payload_real_like": "test payload, real-like arms",
-    "test_payload_semi_real": "test payload on a real log",
+    NOMINAL: "test payload, nominal arm",
+    REAL: "test payload, real-like arms",
+    SEMI_REAL: "test payload on a real log",
     "off_family": "other payloads",
     "other_motion": "other motions",
 }
-REAL, NOMINAL, SEMI_REAL = "test_payload_real_like", "test_payload_nominal", "test_payload_semi_real"
 SPREAD = "± is the standard deviation over runs (test rows: over seeds)."
 
 Row = tuple[str, NDArray[np.float64] | None]  # a method and its errors (R, 10)

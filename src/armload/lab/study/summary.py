@@ -25,13 +25,12 @@ from armload.lab.study.numbers import (
     matched,
     mean_ratio,
 )
+from armload.lab.study.spec import NOMINAL, REAL
 from armload.lab.study.study_tables import (
     COMMAND,
     LEARNERS,
     LEAST_SQUARES,
-    NOMINAL,
     PROTOCOLS,
-    REAL,
     SPLITS,
     TRAINING_MEAN,
     capped,

@@ -1,0 +1,44 @@
+"""What holds of the options of every command."""
+
+import argparse
+import importlib
+
+import pytest
+
+from armload.app.cli.arguments import attach_values, centre, gravity, weighed
+from armload.app.cli.entry import COMMANDS
+from armload.app.cli.motion_arguments import box, floor, numbers
+
+OF_NUMBERS = (box, centre, floor, gravity, numbers, weighed)
+
+
+def options_of(parser):
+    """Every option of a command, those of its actions among them."""
+    for action in parser._actions:
+        for inner in action.choices.values() if isinstance(action, argparse._SubParsersAction) else ():
+            yield from options_of(inner)
+        if action.option_strings:
+            yield action
+
+
+def test_numbers_may_begin_with_a_minus_sign_wherever_they_are_asked_for():
+    seen = set()
+    for command in COMMANDS:
+        for option in options_of(importlib.import_module(f"armload.app.cli.{command}").parser()):
+            if option.type in OF_NUMBERS:
+                seen.add(option.type)
+                assert attach_values([option.option_strings[-1], "-1,0"]) == [f"{option.option_strings[-1]}=-1,0"], (
+                    command
+                )
+    assert seen == set(OF_NUMBERS)
+
+
+def test_a_pose_may_begin_with_a_negative_angle():
+    parser = importlib.import_module("armload.app.cli.measure").parser()
+    assert parser.parse_args(attach_values(["sim", "--at", "-0.1,-0.5"])).at == (-0.1, -0.5)
+
+
+@pytest.mark.parametrize("height", ["nan", "inf", "high", ""])
+def test_what_is_no_height_is_refused(height):
+    with pytest.raises(argparse.ArgumentTypeError, match="not a height"):
+        floor(height)
