@@ -11,6 +11,22 @@ import numpy as np
 
 from armload.runtime.kernels import kernel
 
+# How kinds follow one another, in units of how often they begin and end (`thresholds.py`). They are compiled in, and
+# docs/constants.md does not vary them; set with the thresholds, on seeds of `benchmarks/events.py` below 10 000.
+
+# [mean times between changes] in which the steady arm makes way: for what is handed over, another payload, a contact
+WAYS = 3.0
+# by how much likelier a hand-over begins where something has just changed: one that seemed to be over goes on
+GOES_ON = 10.0
+# share of hand-overs' ends at which nothing is there any more, if the rows say so
+FOR_NOTHING = 0.2
+# share of contacts' ends that leave another payload: a hand that puts something in
+LEAVES_ONE = 0.1
+# [mean times between drifts] that a drift lasts
+DRIFT_LASTS = 0.1
+# probability of another payload with which its moment is not begun anew, and the most that a new one begins with
+KEPT, AT_FIRST = 0.01, 0.1
+
 
 @kernel
 def take_row(
@@ -138,25 +154,26 @@ def _weigh(
         gone[k] = max(math.exp(-0.5 * far), rates[4])
     contact, handing, other = p[2:handing_from].sum(), p[handing_from:other_from].sum(), p[other_from:].sum()
     steady, begins, over, done = p[0] + p[1], h / rare, min(h / lasts, 0.5), min(h / handed, 0.5)
-    drifts, back = p[0] * h / drift_rare, p[1] * h * 10.0 / drift_rare
+    drifts, back = p[0] * h / drift_rare, p[1] * h / (DRIFT_LASTS * drift_rare)
     nothing = 0.0  # of what was handed over, as likely as its torque on the joint that tells most can be none
     for k in range(len(bodies)):
         nothing += gone[k] * p[handing_from + k]
-    p[0] += back - drifts - 3.0 * begins * p[0] + over * contact + 0.2 * done * nothing
-    p[1] += drifts - back - 3.0 * begins * p[1]
+    p[0] += back - drifts - WAYS * begins * p[0] + over * contact + FOR_NOTHING * done * nothing
+    p[1] += drifts - back - WAYS * begins * p[1]
     for k in range(2, handing_from):
         starts_now = touches if k < hand_from else pulls
         p[k] += starts_now * (steady + other) - over * p[k]
     for k in range(handing_from, other_from):
-        p[k] += begins * (steady + contact + 10.0 * other) / len(bodies) - 0.2 * done * gone[k - handing_from] * p[k]
+        ends = FOR_NOTHING * done * gone[k - handing_from]
+        p[k] += begins * (steady + contact + GOES_ON * other) / len(bodies) - ends * p[k]
     best = other_from + p[other_from:].argmax()
     for k in range(len(starts)):
-        p[other_from + k] *= 1.0 - 11.0 * begins
+        p[other_from + k] *= 1.0 - (1.0 + GOES_ON) * begins
         age[k] += h
-        if age[k] >= starts[k] and (other_from + k != best or p[best] < 0.01):  # begin it anew
+        if age[k] >= starts[k] and (other_from + k != best or p[best] < KEPT):  # begin it anew
             p[0] += p[other_from + k]
-            p[other_from + k] = age[k] * (steady / rare + 0.1 * contact / lasts + handing / handed) / len(starts)
-            p[other_from + k] = min(p[other_from + k], 0.1)
+            p[other_from + k] = age[k] * (steady / rare + LEAVES_ONE * contact / lasts + handing / handed) / len(starts)
+            p[other_from + k] = min(p[other_from + k], AT_FIRST)
             age[k], found[k] = 0.0, 0.0
             for i in range(10):
                 c[k, i] = 0.0

@@ -148,7 +148,7 @@ KIND_STD = 0.033
 # [payloads] the same to tell one payload from an earlier one: 15 g of a Panda
 RETURN_STD = 0.01
 
-# ---------------------------------------------------------------------- which run is which, `runs.py` and `step.py`
+# ---------------------------------------------------------------------------------- which run is which, `runs.py`
 
 # [squared standard deviations] of mass and first moments: nine of ten runs of the same payload lie within
 # (test_another_payload_of_another_mass_is_no_return)
