@@ -57,15 +57,15 @@ def records_of(robot: Arm, asked: Any) -> Records:
     return records
 
 
-def left(model: HybridModel, records: Records) -> float:
-    """Standard deviation of log10 kappa about what the traits tell; NaN where no row tells."""
+def left(model: HybridModel, records: Records) -> float | None:
+    """Standard deviation of log10 kappa about what the traits tell; None: no row tells a parameter well."""
     target, directions = overrating(records, model.prior)
     keep = np.isfinite(target)
     half = 0.5 * directions[keep]
     told = np.log10([model.calibration.kappa(traits) for traits in records.traits[keep]])
     off = np.log10(np.maximum(target[keep], LEAST)) - (digamma(half) - np.log(half)) / np.log(10.0) - told
     chance = np.mean(polygamma(1, half)) / np.log(10.0) ** 2
-    return float(np.sqrt(max(np.var(off) - chance, 0.0))) if keep.sum() > 1 else float("nan")
+    return round(float(np.sqrt(max(np.var(off) - chance, 0.0))), 2) if keep.sum() > 1 else None
 
 
 def answers(robot: Arm, model: HybridModel, records: Records) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -103,7 +103,7 @@ def measured(name: str, asked: Any) -> list[dict[str, Any]]:
     for t in TIMES:
         rows = np.abs(np.log(records.t / t)) < 0.2
         line: dict[str, Any] = {"arm": name, "t": t, "rows": int(rows.sum())}
-        line["left"] = round(left(alone, records.select(rows)), 2)
+        line["left"] = left(alone, records.select(rows))
         line |= {what: cell(error[rows], half[rows]) for what, (error, half) in found.items()}
         more = 1e3 * (found["summed"][0][rows] - found["by traits"][0][rows])
         each = [more[:, part].mean(axis=1) for part in GROUPS.values()]
@@ -123,7 +123,9 @@ def table(lines: list[dict[str, Any]]) -> str:
             " · ".join(f"{100 * x:.0f}" if key == "inside" else f"{x:.1f}" for x in line[what][key])
             for key, what in product(("inside", "width"), ("by traits", "summed"))
         ]
-        rows.append((line["arm"], f"{line['t']:g} s", f"{line['left']:.2f}", *shown, more, *of))
+        rows.append(
+            (line["arm"], f"{line['t']:g} s", "–" if line["left"] is None else f"{line['left']:.2f}", *shown, more, *of)
+        )
     head = ("arm", "after", "left", "error by traits", "summed", "more", "inside by traits [%]", "summed")
     return markdown_table((*head, "width by traits", "summed"), "lr" + 8 * "r", rows)
 

@@ -103,7 +103,8 @@ def test_half_a_kilo_is_noticed_in_a_third_of_a_second_and_its_mass_known_in_one
     assert not before.held
     assert covers(before, 0.0)[0]
     assert after.held
-    assert abs(after.phi[0] - 0.5) <= 1.96 * after.std[0] < 0.15
+    assert abs(after.phi[0] - 0.5) < 0.05  # how often intervals hold is a matter of many streams
+    assert 1.96 * after.std[0] < 0.15
     assert after.since > 5.0
 
 

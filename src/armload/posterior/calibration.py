@@ -39,12 +39,12 @@ LIGHT_MASS = 0.35
 _LEAST = 0.4  # of c: the least that 95 % of what was hardly more than nothing needed (`benchmarks/wide_and_light.py`)
 # range of the factor: a guard, where the bag is asked about traits unlike all it has seen
 _KAPPA = (0.01, 1e3)
-# [decades] standard deviation of log10 kappa about what the traits tell: 0.2 to 0.5 in episodes that the bag of their
-# arm has not seen (`benchmarks/trust.py`)
+# [decades] standard deviation of log10 kappa about what the traits tell: 0 to 0.44 by arm and time in episodes that the
+# bags have not seen, in the middle 0.3 (`benchmarks/trust.py`)
 LEFT_OPEN = 0.3
 # power with which it counts how well a factor goes with the payloads that are expected: the components are no more than
-# rough descriptions, as for `COARSENED`. With 1 and 0.7 errors are 1 to 3 % smaller, but 90 to 94 % of the masses'
-# intervals hold from 0.05 s on, with this 92 to 97 % (`benchmarks/trust.py`)
+# rough descriptions, as for `COARSENED`. By arm and time 93 to 99 % of the masses' intervals hold, with 0.7 91 to 98 %,
+# with 1 89 to 98 %, and inertias' errors would be 1 or 2 % smaller (`benchmarks/trust.py`)
 _COUNTS = 0.5
 _DIGITS = 1e-12  # of the largest eigenvalue: what is smaller is rounding
 # Gauss–Hermite quadrature of three nodes: of N(0, 1)
