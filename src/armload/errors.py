@@ -59,6 +59,10 @@ class SourceError(ArmloadError, ConnectionError):
     """A robot, topic or file that cannot be opened as a stream, or that was lost."""
 
 
+class SourceSetupError(SourceError):
+    """A source that can never be opened as it was asked for, whatever its robot does: waiting for it is of no use."""
+
+
 class SafetyError(ArmloadError, RuntimeError):
     """A movement that must not begin, or that was stopped."""
 

@@ -297,6 +297,75 @@ def test_beyond_this_machine_the_page_opens_with_its_token_and_not_without(panda
     assert complaints == []
 
 
+@contextlib.contextmanager
+def page_of(log, panda, port=0):
+    """The page of a log that has ended."""
+    session = Session(Replay(log, panda, speed=None), panda, method="map")
+    session.run()
+    page = Page(session, port=port, period=0.3)
+    server = threading.Thread(target=page.serve)
+    server.start()
+    try:
+        yield page
+    finally:
+        page.close()
+        server.join()
+        session.close()
+
+
+def test_a_page_that_hears_nothing_says_that_it_is_old_and_goes_on_by_itself(panda, analytic_log, open_browser):
+    pytest.importorskip("viser", reason="the page needs viser")
+    logs = [analytic_log(panda, held, duration=4.0) for held in (HELD, None)]
+    with contextlib.ExitStack() as stack:
+        first = stack.enter_context(contextlib.ExitStack())
+        page = first.enter_context(page_of(logs[0], panda))
+        tab = stack.enter_context(open_browser(page.url, [], []))
+        until(lambda: mass(tab) and mass(tab)[0] > 1.0)
+        port, unheard = int(page.url.rpartition(":")[2]), tab.locator("[data-armload=unheard]")
+        time.sleep(6.0)
+        assert not unheard.is_visible()  # nothing changes, and it is heard all the same
+        first.close()
+        until(unheard.is_visible, 30.0)
+        shade = "e => getComputedStyle(e.closest('[data-beat]')).opacity"
+        until(lambda: float(tab.locator("[data-armload=mass]").evaluate(shade)) < 0.5)
+        assert "what is shown is old" in unheard.inner_text()
+        assert tab.evaluate("document.hasFocus()")  # nobody has to click on a display on a wall
+        stack.enter_context(page_of(logs[1], panda, port))
+        until(lambda: (now := mass(tab)) is not None and now[0] < 0.5)
+        until(lambda: not unheard.is_visible())
+        assert float(tab.locator("[data-armload=mass]").evaluate(shade)) == 1.0
+
+
+def test_a_page_whose_browser_slept_shows_nothing_old_as_new(panda, analytic_log, open_browser):
+    pytest.importorskip("viser", reason="the page needs viser")
+    with page_of(analytic_log(panda, HELD, duration=4.0), panda) as page, open_browser(page.url, [], []) as tab:
+        until(lambda: mass(tab))
+        browser = tab.context.new_cdp_session(tab)
+        browser.send("Page.setWebLifecycleState", {"state": "frozen"})
+        time.sleep(6.0)
+        page.session.log.write(0.0, "it happened while the browser slept")
+        time.sleep(2.0)
+        browser.send("Page.setWebLifecycleState", {"state": "active"})
+        until(lambda: "while the browser slept" in text(tab, "log"), 30.0)
+        until(lambda: not tab.locator("[data-armload=unheard]").is_visible(), 30.0)
+
+
+@pytest.mark.parametrize("tab", [TABLET], indirect=True, ids=["tablet"])
+def test_on_a_tablet_the_picture_is_as_wide_as_the_screen_and_both_panels_are_below_it(holding):
+    until(lambda: mass(holding))
+    width, height = TABLET
+    picture = until(lambda: holding.locator("[data-dock-root] > :first-child").bounding_box())
+    assert picture["width"] == width
+    assert picture["height"] > 0.3 * height
+    for part in ("[data-armload=mass]", ".uplot"):
+        boxes = [holding.locator(part).nth(k).bounding_box() for k in range(holding.locator(part).count())]
+        assert all(box["y"] >= picture["y"] + picture["height"] for box in boxes)
+        assert all(0.0 <= box["x"] <= box["x"] + box["width"] <= width for box in boxes)
+    folder = os.environ.get("ARMLOAD_PICTURES")
+    if folder:
+        holding.screenshot(path=Path(folder) / "tablet.png")
+
+
 class Unplugged(Replay):
     """A log that ends as a robot does that is lost."""
 
@@ -333,7 +402,8 @@ def test_without_a_truth_the_picture_shows_what_is_known_and_nothing_old(
             elif kind == "robot that is lost":
                 assert orange < 100
                 assert text(tab, "mass") == "—"
-                assert "the robot was unplugged" in text(tab, "waits")
+                assert "the robot was unplugged" in text(tab, "state")
+                assert text(tab, "waits") == "waits for the source"  # the reason is said once
             else:
                 assert "sign" in text(tab, "misfit")
     finally:

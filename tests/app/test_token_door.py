@@ -1,13 +1,16 @@
-"""The door before a page: who brings the token gets what is behind it, byte for byte; nobody else does."""
+"""The door before a page: who may come in gets what is behind it, byte for byte; nobody else does."""
 
 import contextlib
 import http.client
+import importlib.metadata
 import socket
 import threading
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from urllib.parse import urlsplit
 
 import pytest
 
+from armload.app.page.server import PageServer
 from armload.app.page.token_door import TokenDoor
 from armload.errors import UsageError
 
@@ -79,6 +82,75 @@ def test_without_the_token_nothing_behind_the_door_answers(door, path, cookie):
     assert status == 401
     assert b"token" in said
     assert TOKEN.encode() not in said
+
+
+@pytest.fixture(scope="module")
+def open_door(door):
+    """A door of this machine's own, before the same server."""
+    other = TokenDoor("127.0.0.1", 0, door._behind, None)
+    yield other
+    other.close()
+
+
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [
+        ({"Host": "127.0.0.1:{port}"}, 200),
+        ({"Host": "localhost:{port}"}, 200),
+        ({"Host": "localhost:9000", "Origin": "http://localhost:9000"}, 200),  # through a tunnel
+        ({"Host": "127.0.0.1:{port}", "Origin": "http://127.0.0.1:{port}"}, 200),
+        ({"Host": "127.0.0.1:{port}", "Origin": "http://evil.example"}, 403),
+        ({"Host": "127.0.0.1:{port}", "Origin": "http://127.0.0.1:1"}, 403),
+        ({"Host": "127.0.0.1:{port}", "Origin": "null"}, 403),
+        ({"Host": "evil.example:{port}", "Origin": "http://evil.example:{port}"}, 403),  # whose name leads here
+        ({"Host": ""}, 403),
+    ],
+)
+def test_on_this_machine_no_page_but_its_own_gets_in(open_door, headers, status):
+    connection = http.client.HTTPConnection("127.0.0.1", open_door.port, timeout=10.0)
+    try:
+        connection.putrequest("GET", "/some/file", skip_host=True)
+        for name, value in headers.items():
+            connection.putheader(name, value.format(port=open_door.port))
+        connection.endheaders()
+        assert connection.getresponse().status == status
+    finally:
+        connection.close()
+
+
+def handshake(port, target="/", **headers):
+    """The status of an answer to a browser that asks for the page's websocket."""
+    version = importlib.metadata.version("viser")
+    lines = [f"GET {target} HTTP/1.1", "Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13"]
+    lines += ["Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==", f"Sec-WebSocket-Protocol: viser-v{version}"]
+    lines += [f"{name}: {value}" for name, value in {"Host": f"127.0.0.1:{port}", **headers}.items()]
+    with socket.create_connection(("127.0.0.1", port), timeout=30.0) as connection:
+        connection.sendall(("\r\n".join(lines) + "\r\n\r\n").encode())
+        return int(connection.recv(4096).split()[1])
+
+
+@pytest.mark.parametrize(
+    ("host", "token"), [("0.0.0.0", TOKEN), ("0.0.0.0", None), ("127.0.0.1", TOKEN), ("127.0.0.1", None)]
+)
+def test_the_websocket_of_a_page_has_the_same_door(host, token):
+    pytest.importorskip("viser", reason="the page needs viser")
+    server = PageServer(host, 0, "a page", token)
+    try:
+        address = urlsplit(server.url)
+        port = address.port
+        assert handshake(port, Origin="http://evil.example") in (401, 403)
+        if host == "127.0.0.1" and token is None:
+            assert not address.query
+            assert handshake(port) == 101
+            return
+        assert handshake(port) == 401
+        assert handshake(port, "/?token=another") == 401
+        assert handshake(port, Cookie=f"armload_{port}=another") == 401
+        brought = address.query.removeprefix("token=")
+        assert token is None or brought == QUOTED
+        assert handshake(port, Cookie=f"armload_{port}={brought}") == 101
+    finally:
+        server.stop()
 
 
 def test_what_is_no_http_is_dropped(door):

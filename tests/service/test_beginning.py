@@ -1,5 +1,7 @@
 """What can never be ends the service as it begins, with the reason; what may come is waited for."""
 
+import os
+
 import pytest
 
 from armload.app.cli import main
@@ -41,6 +43,26 @@ def test_a_log_that_does_not_exist_is_not_waited_for(cell, capsys):
 )
 def test_an_address_or_a_folder_that_cannot_be_used_is_said_before_anything_begins(cell, capsys, source, more, said):
     assert main(["serve", cell(source, more), "--quiet", "--duration", "60"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert said in line
+
+
+@pytest.mark.parametrize(
+    ("source", "robot", "module", "said"),
+    [
+        ("ur://127.0.0.1", "ur10e", "rtde_receive", "ur-rtde, which cannot be imported (not here): pip install"),
+        ("fr3://127.0.0.1", "fr3", "pylibfranka", "pylibfranka, which cannot be imported (not here): pip install"),
+        ("ros2:///joint_states", "panda", "rclpy", "ROS 2 is not there for this Python (not here)"),
+        ("fr3://127.0.0.1", "ur10e", "pylibfranka", "ur10e has 6 joints: a FR3 has 7"),
+        ("ur://127.0.0.1", "ur5", "rtde_receive", "no torque constants are known for it"),
+    ],
+)
+def test_a_robot_that_can_never_be_read_here_is_not_waited_for(
+    monkeypatch, tmp_path, capsys, source, robot, module, said
+):
+    (tmp_path / f"{module}.py").write_text('raise ImportError("not here")')
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")]))
+    assert main(["serve", source, "--robot", robot, "--quiet", "--duration", "120"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert said in line
 

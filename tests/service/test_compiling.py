@@ -1,5 +1,6 @@
 """An arm's process that compiles functions says so, as long as it takes, and is not taken for one that hangs."""
 
+import math
 import time
 from itertools import pairwise
 
@@ -14,6 +15,7 @@ from armload.recording import Sample, write_recording
 from armload.runtime import compiling
 from armload.service import ArmSettings, Session
 from armload.service.arm_process import ArmProcess
+from armload.service.catching_up import CATCHING_UP, CatchingUp
 from armload.service.unknown import Unknown
 
 LASTS = 1.5  # [s]
@@ -77,6 +79,24 @@ def test_a_process_that_compiles_after_its_first_answer_speaks_on(panda, analyti
     assert ages == sorted(ages)
     assert ages[-1] > 0.8
     assert told[-1][1]["unknown"] == "source ended"
+
+
+def test_what_waited_for_functions_is_caught_up_with_unless_it_comes_no_closer(compilations):
+    late = CatchingUp()
+    assert late.why(9.0, 0.0) is None  # nothing was compiled: the machine is too busy
+    compilations.begin()
+    assert late.why(None, 1.0) == compiling.COMPILING
+    compilations.end()
+    compilations._ended = -math.inf
+    assert [late.why(lag, 2.0 + k) for k, lag in enumerate((8.0, 6.0, 3.0, 1.0))] == [CATCHING_UP] * 4
+    assert late.why(0.1, 6.0) is None
+    assert late.why(9.0, 7.0) is None  # it had caught up: this has another reason
+    compilations.begin()
+    late.why(9.0, 8.0)
+    compilations.end()
+    compilations._ended = -math.inf
+    assert late.why(9.0, 9.0) == CATCHING_UP
+    assert late.why(9.5, 11.5) is None  # and stays behind
 
 
 class Stuck(Source):

@@ -4,7 +4,9 @@ import contextlib
 import json
 import os
 import queue
+import re
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -27,6 +29,15 @@ os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 end = time.monotonic() + 240.0
 while time.monotonic() < end:
     pass
+"""
+
+KILLED = """
+import os, signal, sys
+from armload.runtime.atomic import replacing
+with replacing(sys.argv[1]) as part:
+    part.write_text("half")
+    os.write(1, b"half")
+    os.kill(os.getpid(), signal.SIGKILL)
 """
 
 
@@ -292,3 +303,50 @@ def test_on_busy_cores_the_age_is_what_an_outsider_measures(serve, cell):
             process.kill()
         for process in busy:
             process.wait()
+
+
+@pytest.mark.parametrize("stream", ["stdout", "stderr"])
+def test_a_full_disk_under_its_output_ends_no_service(cell, stream):
+    """The endpoint, and who reads it, need neither."""
+    if not Path("/dev/full").exists():
+        pytest.skip("there is no /dev/full here")
+    other = {"stdout": "stderr", "stderr": "stdout"}[stream]
+    command = [sys.executable, "-m", "armload", "serve", str(cell("left", port=free_port())), "--duration", "300"]
+    port = int(re.search(r"port = (\d+)", Path(command[4]).read_text()).group(1))
+    with open("/dev/full", "w") as full:
+        process = subprocess.Popen(command, text=True, **{stream: full, other: subprocess.PIPE})
+        reader = threading.Thread(target=process.communicate, daemon=True)  # a pipe that fills would hold it up
+        reader.start()
+        try:
+            known, end = 0, time.monotonic() + 120.0
+            while known < 3:  # and it goes on
+                assert time.monotonic() < end
+                assert process.poll() is None
+                time.sleep(0.5)
+                with contextlib.suppress(OSError), urllib.request.urlopen(f"http://127.0.0.1:{port}/arms/left") as said:
+                    known += json.load(said)["known"]
+            process.send_signal(signal.SIGTERM)
+            reader.join(60.0)
+            assert not reader.is_alive()
+            assert process.returncode in ((0,) if stream == "stdout" else (0, 120))  # 120: of Python, as it ends
+        finally:
+            process.kill()
+
+
+def free_port():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return server.getsockname()[1]
+
+
+def test_what_a_killed_save_has_left_is_gone_once_the_next_service_answers(serve, cell, tmp_path):
+    path = cell("left")
+    first = serve(path)
+    first.until(lambda line: line.get("known"))
+    first.process.send_signal(signal.SIGTERM)
+    first.process.wait(60.0)
+    (state,) = (tmp_path / "state").iterdir()
+    left = subprocess.Popen([sys.executable, "-c", KILLED, str(state)], stdout=subprocess.PIPE)
+    assert left.communicate()[0] == b"half"
+    assert len(list((tmp_path / "state").iterdir())) == 2
+    serve(path).until(lambda line: line.get("known"))
+    assert list((tmp_path / "state").iterdir()) == [state]

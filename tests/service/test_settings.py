@@ -89,7 +89,23 @@ def test_the_page_has_a_row_for_every_setting():
         (('robot = "panda"\n', ""), "there is no robot"),
         (("[[arm]]", "[arm]"), "cannot|no TOML|list of tables"),
         (("gravity = [0, 0, -9.8]", "gravity = [0, 0]"), "expected three"),
-        (("https://", "mqtt://"), "expected an address"),
+        (("https://", "mqtt://"), "the webhook is 'mqtt://cell.example/alarms': expected an address"),
+        (("https://cell.example/alarms", ""), "the webhook is '': expected an address"),
+        (("cell.example", "cell.example:99999"), "99999/alarms': expected .* a port from 1 to 65535"),
+        (("cell.example", "cell.example:0"), "0/alarms': expected .* a port from 1 to 65535"),
+        (("cell.example/alarms", "cell.example/all alarms"), "without blanks"),
+        (("cell.example", "me:secret@cell.example"), "with a user in it: give a header Authorization"),
+        (("Bearer abc", "Bearer abc\\n"), "header Authorization has a line break"),
+        (("Authorization =", '"Auth orization" ='), "a header 'Auth orization': expected a name"),
+        (('"Bearer abc"', "3"), "header Authorization is a int: expected a text"),
+        (("every = 0.5", 'every = 0.5\nmqtt = "mqtt://a b/x"'), "the MQTT broker is 'mqtt://a b/x': expected"),
+        (('webhook = "https://cell.example/alarms"', ""), "headers are sent to the webhook, but there is none"),
+        (("port = 0", 'host = "127.0.0.1"'), "host is of the endpoint, but there is none: give a port"),
+        (("port = 0", 'token_file = "long"'), "token_file is of the endpoint, but there is none"),
+        (("steady = true", 'mounted = "nothing"'), "right: mounted says .* nothing is told to it: give apply"),
+        (("steady = true", "loop = true"), "right: loop replays a log .* the source is sim"),
+        (('tare = "empty.csv"', 'tare = "empty.csv"\nloop = true'), "left: loop replays a log"),
+        (('tare = "empty.csv"', 'tare = "empty.csv"\nrate = 100'), "left: rate is of the simulator"),
         (("every = 0.5", 'every = 0.5\nhost = "0.0.0.0"'), "give it a token"),
         (("steady = true", 'steady = true\nprofile = "arm.profile"'), "leave one out"),
         (("every = 0.5", 'token_file = "short"'), "expected 16 or more"),
@@ -102,6 +118,7 @@ def test_the_page_has_a_row_for_every_setting():
 )
 def test_what_cannot_be_meant_is_one_sentence(tmp_path, capsys, change, said):
     (tmp_path / "short").write_text("secret")
+    (tmp_path / "long").write_text("sixteen or more characters")
     (tmp_path / "cell.toml").write_text(CELL.replace(*change))
     with pytest.raises(UsageError, match=said):
         read_settings(tmp_path / "cell.toml")
@@ -118,6 +135,9 @@ def test_a_state_belongs_to_the_settings_it_was_made_with(tmp_path):
     assert settings.state == first
     (tmp_path / "empty.csv").write_text("2")
     assert settings.state != first
+    assert ArmSettings("panda", name="left", source="sim", save=str(tmp_path), rate=1000.0).state == (
+        ArmSettings("panda", name="left", source="sim", save=str(tmp_path)).state
+    )
     assert ArmSettings("panda", name="left", source="sim", save=str(tmp_path), rating=2.0).state == (
         ArmSettings("panda", name="left", source="sim", save=str(tmp_path), rating=3.0).state
     )

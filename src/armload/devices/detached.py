@@ -28,7 +28,7 @@ from armload.devices.order import arm_to_json, parameters_to_json, payloads_to_j
 from armload.devices.reader import Reader, columns_of
 from armload.devices.ring import RingReader
 from armload.devices.source import Source
-from armload.errors import SourceError
+from armload.errors import SourceError, SourceSetupError
 from armload.inertia import InertialParameters
 from armload.recording import Sample
 
@@ -62,7 +62,8 @@ class Detached(Source):
         process: the reader's process.
 
     Raises:
-        SourceError: the source cannot be opened; the message is the reader's.
+        SourceError: the source cannot be opened; the message is the reader's. SourceSetupError: and never can be, as
+            it was asked for.
     """
 
     _moves = False  # whether the process moves the arm, too
@@ -109,7 +110,8 @@ class Detached(Source):
             if connecting := event["event"] == "connecting":
                 event = self._event(_TO_CONNECT, event["message"])
             if event["event"] != "ready":
-                raise SourceError(event.get("message", f"{spec} ended before its first sample"))
+                kind = SourceSetupError if event.get("never") else SourceError
+                raise kind(event.get("message", f"{spec} ended before its first sample"))
         except BaseException:
             if connecting:  # the client holds the reader's interpreter: it cannot hear that it should end
                 self.process.kill()

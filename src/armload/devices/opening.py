@@ -20,7 +20,7 @@ from armload.devices.ros2.source import Ros2Source
 from armload.devices.source import Source
 from armload.devices.ur import source as ur
 from armload.devices.ur.source import URSource
-from armload.errors import SourceError
+from armload.errors import SourceError, SourceSetupError
 from armload.recording import ColumnSpec
 
 SCHEMES = ("fr3", "panda", "ur", "ros2")
@@ -133,7 +133,7 @@ def _scheme(name: str) -> str:
     """That of a robot's address, "" of anything else."""
     scheme = urlsplit(name).scheme if "://" in name else ""
     if scheme and scheme not in SCHEMES:
-        raise SourceError(
+        raise SourceSetupError(
             f"{name}: unknown kind of source {scheme!r}: expected {', '.join(f'{s}://' for s in SCHEMES)}, sim, or the "
             "path of a recording"
         )
@@ -177,12 +177,12 @@ def address_of(name: str) -> Address:
     """What a robot's address says.
 
     Raises:
-        SourceError: it names no robot, or has an option that there is not.
+        SourceSetupError: it names no robot, or has an option that there is not.
     """
     parts = urlsplit(name)
     host = parts.netloc + parts.path if parts.scheme == "ros2" else parts.hostname
     if not host:
-        raise SourceError(
+        raise SourceSetupError(
             f"{name} names no robot: expected {parts.scheme}://ADDRESS, such as {parts.scheme}://172.16.0.2"
         )
     asked = parse_qs(parts.query, keep_blank_values=True)
@@ -190,12 +190,14 @@ def address_of(name: str) -> Address:
     stray = [key for key in asked if key not in options]
     if stray:
         said = " or ".join(f"?{key}=…" for key in options)
-        raise SourceError(f"{name}: unknown option {stray[0]!r}: expected the address{said and f', with {said}'}")
+        raise SourceSetupError(f"{name}: unknown option {stray[0]!r}: expected the address{said and f', with {said}'}")
     given = asked.get("torque_constants", [""])[-1]
     try:
         constants = [float(x) for x in given.split(",")] if "torque_constants" in asked else None
     except ValueError:
-        raise SourceError(f"{name}: torque_constants are {given!r}: expected one in N·m/A for each joint") from None
+        raise SourceSetupError(
+            f"{name}: torque_constants are {given!r}: expected one in N·m/A for each joint"
+        ) from None
     of_ros2 = {key: values[-1] for key, values in asked.items() if key != "torque_constants"}
     return Address(parts.scheme, host, constants, **of_ros2)
 

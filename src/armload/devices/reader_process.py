@@ -36,12 +36,14 @@ from armload.devices.recorder import Recorder
 from armload.devices.remote_mover import RemoteMover
 from armload.devices.ring import Ring
 from armload.devices.source import Source
-from armload.errors import ArmloadError, SourceError
+from armload.errors import ArmloadError, PayloadError, SourceError, SourceSetupError
 from armload.runtime.extras import missing
 
 _CALLS = ("read_once", "set_load", "hold")  # what may be asked of a source from outside
 _WHO = {"read_once": "a Franka robot", "set_load": "a Franka robot", "hold": "a simulator"}
 _ORDERS = ("begin", "stop", "whereabouts", "put")  # and of a mover
+# what is wrong with an order itself, where an address names a file, too: no robot that comes later mends it
+_NEVER = (SourceSetupError, PayloadError)
 _PATIENCE = 1.0  # [s] a source may take to end before the process does
 _PR_SET_PDEATHSIG = 1  # of prctl(2): the signal this process gets when the thread that started it ends
 
@@ -87,9 +89,9 @@ class _Reader:
         except ModuleNotFoundError as error:
             if (sentence := missing(error)) is None:
                 raise
-            self.report(event="error", message=sentence)
+            self.report(event="error", message=sentence, never=True)
         except (ArmloadError, OSError) as error:
-            self.report(event="error", message=str(error))
+            self.report(event="error", message=str(error), never=isinstance(error, _NEVER))
 
     def pass_on(self, source: Source, recorder: Recorder | None) -> None:
         row = np.empty(self.ring.columns)

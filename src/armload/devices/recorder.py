@@ -179,7 +179,11 @@ class _CsvPart:
 
     def __init__(self, path: Path, n: int) -> None:
         self._lines = GrowingFile(path)
-        self._lines.append((",".join(column_names(n)) + "\n").encode())
+        try:
+            self._lines.append((",".join(column_names(n)) + "\n").encode())
+        except BaseException:
+            self._lines.discard()  # whoever tries again would leave one empty log after the other
+            raise
 
     def append(self, row: list[float]) -> None:
         self._lines.append((",".join(map(repr, row)) + "\n").encode())

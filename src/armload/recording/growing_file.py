@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from pathlib import Path
 
@@ -48,6 +49,12 @@ class GrowingFile:
         except OSError as error:
             raise RecordingError(f"{self.path} cannot be written: {error.strerror}") from None
         self.size += written
+
+    def discard(self) -> None:
+        """Remove it: it could not even be begun."""
+        self.close()
+        with contextlib.suppress(OSError):
+            self.path.unlink()
 
     def close(self) -> None:
         """Nothing happens the second time."""

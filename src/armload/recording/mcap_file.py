@@ -49,7 +49,11 @@ class McapFile:
         self._encode = store.serialize_cdr
         self._file = _Whole(path)
         self._writer = Writer(self._file, chunk_size=CHUNK_BYTES)  # type: ignore[arg-type]  # it writes, tells, flushes
-        self._writer.start(profile="ros2", library="armload")
+        try:
+            self._writer.start(profile="ros2", library="armload")
+        except BaseException:
+            self._file.discard()  # whoever tries again would leave one empty file after the other
+            raise
         self._channels = {}
         for topic, kind in self._types.items():
             text = store.generate_msgdef(kind, ros_version=2)[0].encode()

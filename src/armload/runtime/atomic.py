@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
+import fcntl
 import os
 import re
 import shutil
@@ -12,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 _STREAMS = re.compile(r"/proc/|/dev/(fd/|std(in|out|err)$)")  # open already, even where a plain file is behind it
+_WRITERS = 8  # of one file at once, each with a name of its own; there is no limit, but more have names by chance
 
 
 @contextmanager
@@ -19,9 +22,10 @@ def replacing(path: str | Path) -> Iterator[Path]:
     """A temporary file that takes the place of `path` when the block ends well, and vanishes when it does not.
 
     Whoever looks sees the old file or the new one, never a half-written one, even if the program is killed or the
-    machine stops: the bytes reach the disk before the rename. A link stays a link: what it points to is replaced. What
-    is no plain file (a pipe, a device, /dev/stdout) stays, too: the bytes are written into it when the block has ended
-    well.
+    machine stops: the bytes reach the disk before the rename. What a killed program leaves beside it is taken again by
+    the next that writes the same file (`clear_left_over` removes it before). A link stays a link: what it points to is
+    replaced. What is no plain file (a pipe, a device, /dev/stdout) stays, too: the bytes are written into it when the
+    block has ended well.
 
     Raises:
         OSError: the folder does not exist or cannot be written; it names `path`, not the temporary file.
@@ -29,13 +33,11 @@ def replacing(path: str | Path) -> Iterator[Path]:
     path = Path(path)
     stream = is_stream(path)
     target = path if stream else Path(os.path.realpath(path))
-    beside = {} if stream else {"prefix": f".{target.name}.", "dir": target.parent}
     try:
-        handle, name = tempfile.mkstemp(suffix=path.suffix, **beside)
+        handle, temporary = _anywhere(path.suffix) if stream else _beside(target, path.suffix)
     except OSError as error:
         raise _named(error, path) from None
-    os.close(handle)
-    temporary = Path(name)
+    left = True
     try:
         yield temporary
         if stream:
@@ -46,12 +48,80 @@ def replacing(path: str | Path) -> Iterator[Path]:
                 os.fsync(file.fileno())
             temporary.chmod(0o666 & ~_umask())
             temporary.replace(target)
+            left = False  # and the name is free for others
     except OSError as error:
-        if error.filename != name:
+        if error.filename != str(temporary):
             raise
         raise _named(error, path) from None
     finally:
-        temporary.unlink(missing_ok=True)
+        if left:
+            temporary.unlink(missing_ok=True)
+        os.close(handle)  # after that: until then nobody else takes it
+
+
+def clear_left_over(path: str | Path) -> None:
+    """Remove what programs that were killed while they wrote `path` have left beside it; not what one writes now."""
+    path = Path(path)
+    target = Path(os.path.realpath(path))
+    for k in range(_WRITERS):
+        part = _part(target, k, path.suffix)
+        with contextlib.suppress(OSError):  # there is none, somebody writes it, or it cannot be removed
+            handle = os.open(part, os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW)
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                if _is(handle, part):
+                    part.unlink()
+            finally:
+                os.close(handle)
+
+
+def _part(target: Path, k: int, suffix: str) -> Path:
+    """What a file is written into; k: while others write the same one."""
+    return target.with_name(f".{target.name}.part{k}{suffix}")
+
+
+def _beside(target: Path, suffix: str) -> tuple[int, Path]:
+    """An empty file beside the target that nobody else writes, locked as long as its descriptor is open.
+
+    The kernel lets go of the lock when its owner ends, however it does: so what was left by a kill is known.
+    """
+    k = 0
+    while k < _WRITERS:
+        part = _part(target, k, suffix)
+        try:
+            handle = os.open(part, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+        except OSError:  # another user's, or no file
+            k += 1
+            continue
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if _is(handle, part):
+                if os.fstat(handle).st_uid == os.geteuid():  # another user's would keep its owner
+                    os.ftruncate(handle, 0)
+                    return handle, part
+                k += 1
+            # else whoever held it has just finished, and it is the target by now: look again
+        except BlockingIOError:
+            k += 1
+        except OSError:  # a file system without locks, where nobody else can have it either
+            part.unlink(missing_ok=True)
+            os.close(handle)
+            break
+        os.close(handle)
+    handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=suffix, dir=target.parent)
+    return handle, Path(name)
+
+
+def _anywhere(suffix: str) -> tuple[int, Path]:
+    handle, name = tempfile.mkstemp(suffix=suffix)
+    return handle, Path(name)
+
+
+def _is(handle: int, path: Path) -> bool:
+    """Whether an open file still has this name."""
+    with contextlib.suppress(FileNotFoundError):
+        return os.path.samestat(os.fstat(handle), os.stat(path))
+    return False
 
 
 def is_stream(path: Path) -> bool:

@@ -29,7 +29,9 @@ from armload.online.state import saved_at
 from armload.posterior import Profile, load_profile
 from armload.posterior.drift import SESSION
 from armload.recording import Sample, read_recording
+from armload.runtime.atomic import clear_left_over
 from armload.runtime.compiling import COMPILING, compiling
+from armload.service.catching_up import CatchingUp
 from armload.service.feedback import Feedback
 from armload.service.finite import finite
 from armload.service.ready import ready
@@ -58,7 +60,7 @@ class ArmProcess:
         self._continued = False  # whether it goes on from a state
         self._failed: str | None = None  # why it could not be saved
         self._newest: Sample | None = None  # that the state saved last is of
-        self._line = threading.Lock()
+        self._line, self._late = threading.Lock(), CatchingUp()
         self.arm = self._made_arm()
         for reader in readers:
             if reader.ring.columns == columns_of(self.arm.n):
@@ -129,7 +131,8 @@ class ArmProcess:
         link = source.link(before=self._continued)  # since it was saved the payload may have been exchanged
         if source.answering:  # how long that took is in its lag
             link = link._replace(heard=now)
-        why = why_unknown(estimate, link, now, session.identifier.trouble, session.doubt, compiling())
+        compiles = self._late.why(None if estimate is None else estimate.lag, now)
+        why = why_unknown(estimate, link, now, session.identifier.trouble, session.doubt, compiles)
         if self._feedback is not None and estimate is not None and session.sample is not None:
             self._feedback.offer(estimate, session.sample.q, why is None, session.identifier.doubts)
         self._say(estimate, why)
@@ -166,7 +169,7 @@ class ArmProcess:
     def _opens(self) -> Detached:
         settings = self.settings
         record = None if settings.record is None else next_free(settings.record)
-        more: dict[str, Any] = {"rate": settings.rate} if settings.source == "sim" else {}
+        more: dict[str, Any] = {} if settings.rate is None else {"rate": settings.rate}
         reader, self._reader = self._reader, None
         return Detached(settings.source, self.arm, record=record, speed=1.0, loop=settings.loop, reader=reader, **more)
 
@@ -201,6 +204,8 @@ class ArmProcess:
     def _restored(self, profile: Profile | None) -> OnlineIdentifier | None:
         """What goes on from the saved state, unless that is of a time when the arm may have been another."""
         path = self._state
+        if path is not None:
+            clear_left_over(path)
         if path is None or not path.exists():
             return None
         try:
@@ -229,11 +234,14 @@ class ArmProcess:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             session.identifier.save(path)
+            if self._failed is not None:
+                self.note("the state is saved again")
             self._kept, self._failed, self._newest = time.time(), None, session.sample
         except (ArmloadError, OSError) as error:
-            if str(error) != self._failed:
-                self.note(f"the state cannot be saved: {error}")
-            self._failed = str(error)
+            why = error.strerror or str(error) if isinstance(error, OSError) else str(error)
+            if why != self._failed:
+                self.note(f"the state cannot be saved in {path}: {why}; the one saved before stays")
+            self._failed = why
 
 
 def next_free(record: str) -> str:

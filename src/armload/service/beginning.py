@@ -8,6 +8,7 @@ from pathlib import Path
 
 from armload.arms import arm
 from armload.errors import ArmloadError, UsageError
+from armload.runtime.extras import require
 from armload.service.settings import ServiceSettings
 
 
@@ -15,8 +16,8 @@ def checked(settings: ServiceSettings) -> None:
     """Make once what each process will make, so that what cannot be is said at once.
 
     Raises:
-        ArmloadError: an arm, a frame, a rating or a kind of source that there is not, or a folder that cannot be
-            written into.
+        ArmloadError: an arm, a frame, a rating or a kind of source that there is not, a folder that cannot be
+            written into, or a package that a record needs.
     """
     from armload.devices.opening import check_spec  # with what reads robots, of which the supervisor needs nothing
 
@@ -31,6 +32,15 @@ def checked(settings: ServiceSettings) -> None:
             _check_folder(f"{each.name}: its state cannot be kept in", Path(each.save), made=True)
         if each.record is not None:
             _check_folder(f"{each.name}: its record cannot be kept in", Path(each.record).parent, made=False)
+            if each.record.lower().endswith(".mcap"):
+                _check_mcap(each.name)
+
+
+def _check_mcap(name: str) -> None:
+    try:
+        require("mcap", "rosbags")
+    except ModuleNotFoundError as error:
+        raise UsageError(f"{name}: record: {error}") from None
 
 
 def _check_folder(what: str, folder: Path, made: bool) -> None:

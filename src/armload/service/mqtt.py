@@ -86,6 +86,7 @@ def checked(url: str) -> Any:
         parts.port  # noqa: B018 - raises where it is no number
     except ValueError:
         raise UsageError(f"the MQTT broker is {url!r}: {said}") from None
-    if parts.scheme not in _PORTS or not parts.hostname or any(x in url for x in "+#"):
+    wrong = parts.scheme not in _PORTS or not parts.hostname or parts.port == 0 or parts.query
+    if wrong or any(x in url for x in "+# ") or not url.isprintable():
         raise UsageError(f"the MQTT broker is {url!r}: {said}")
     return parts

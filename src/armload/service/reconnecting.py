@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 
 from armload.devices import Detached, Source
-from armload.errors import ArmloadError, SourceError
+from armload.errors import ArmloadError, SourceError, SourceSetupError
 from armload.inertia import InertialParameters
 from armload.recording import Sample
 from armload.service.backoff import Backoff
@@ -194,13 +194,17 @@ class Reconnecting(Source):
                 made.close()
             self._take(made)
             self._transit = Transit()
-        elif isinstance(made, ArmloadError) and not (self._comes or self.connections):
+        elif isinstance(made, ArmloadError) and not self.connections and self._never(made):
             raise made
         else:
             self.state, self.why = "lost", str(made)
             wait = self._backoff.failed(0.0)
             self._tell(self.why, wait, "tried")
             yield from self._waited(wait, tick)
+
+    def _never(self, error: ArmloadError) -> bool:
+        """Whether what could not be opened at first never can be: its client is not installed, or it is a log."""
+        return not self._comes or isinstance(error, SourceSetupError)
 
     def _tell(self, why: str, wait: float, what: str) -> None:
         """Say why it is lost, as often as the wait grows, and then every `REMINDED`."""

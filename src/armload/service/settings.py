@@ -12,13 +12,14 @@ import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from urllib.parse import urlsplit
 
 from armload.devices import WITH_CONTROLLER
 from armload.errors import IdentificationError, UsageError
 from armload.identification.arm_options import ArmOptions
 from armload.recording.growing_file import RECORDS
+from armload.service.idle import check_arm, check_service
 from armload.service.mqtt import checked
+from armload.service.webhook import check_webhook
 
 if TYPE_CHECKING:
     from armload.arms import Arm
@@ -31,6 +32,7 @@ TOOL_OR_TARE = (  # but for a tare that is taken on the stream itself
     "whether the tool was mounted at the tare, or in the profile's logs, cannot be found out on a stream: give the "
     "tool, or the tare or profile"
 )
+_RATE = 1000.0  # [Hz] of the simulator, as of `open_source`
 _OF_THE_SERVICE = ("every", "host", "port", "token_file", "webhook", "headers", "mqtt", "spare")
 _RANGES = {  # what numbers may be: in words, and between which two
     "every": ("a time above 0 s", 0.0, math.inf),
@@ -57,7 +59,8 @@ class ArmSettings(ArmOptions):
     record: a `.csv` or `.mcap` file that does not exist yet. rating: the most it may hold [kg]; None: what the arm is
     rated for.
     com_range: the farthest its payload's centre of mass may be [m]. loop: replay a log again and again.
-    rate: of the simulator [Hz]. apply: "auto": what is identified is told to the robot's controller (`Feedback`).
+    rate: of the simulator [Hz]; None: 1000.
+    apply: "auto": what is identified is told to the robot's controller (`Feedback`).
     mounted: path of what was on the flange at the tare or profile, or "nothing"; for `apply`.
     tare_age: [s], in a file also "1d"; None: by the tare's clock.
     steady: whether velocities are told by the positions, too (`devices.Steadied`).
@@ -70,7 +73,7 @@ class ArmSettings(ArmOptions):
     rating: float | None = None
     com_range: float | None = None
     loop: bool = False
-    rate: float = 1000.0
+    rate: float | None = None
     apply: str | None = None
     mounted: str | None = None
     steady: bool = False
@@ -91,6 +94,7 @@ class ArmSettings(ArmOptions):
             )
         if self.apply not in (None, "auto"):
             raise UsageError(f'{self.name}: apply is {self.apply!r}: expected "auto"')
+        check_arm(self)
         if self.apply is not None and not self._has_controller:
             raise UsageError(
                 f"{self.name}: no load can be written to {self.source}: expected fr3://, panda:// or ur://"
@@ -111,6 +115,7 @@ class ArmSettings(ArmOptions):
         for key, unsaid in (("steady", False), ("tare_age", None)):  # a state of a version without it goes on
             if asked[key] is unsaid:
                 del asked[key]
+        asked["rate"] = _RATE if self.rate is None else self.rate  # as versions wrote it that had no other word for it
         for key in ("tare", "profile", "tool"):
             if asked[key] is not None and (path := Path(asked[key])).is_file():
                 asked[key] = [asked[key], hashlib.sha256(path.read_bytes()).hexdigest()]
@@ -140,15 +145,15 @@ class ArmSettings(ArmOptions):
 class ServiceSettings:
     """The whole service.
 
-    arms: one process each. every: [s] between two lines of an arm. host, port: of the endpoint; port None: there is
-    none. token: what a request must bring; required beyond loopback. webhook: where alarms go. headers: sent with
-    them. mqtt: a broker they go to. duration: end after so long [s]. spare: whether a process is kept ready for the arm
-    whose process ends next.
+    arms: one process each. every: [s] between two lines of an arm. host, port: of the endpoint; host None: this
+    machine alone, port None: there is none. token: what a request must bring; required beyond loopback.
+    webhook: where alarms go. headers: sent with them. mqtt: a broker they go to. duration: end after so long [s].
+    spare: whether a process is kept ready for the arm whose process ends next.
     """
 
     arms: tuple[ArmSettings, ...]
     every: float = 0.1
-    host: str = "127.0.0.1"
+    host: str | None = None
     port: int | None = None
     token: str | None = None
     webhook: str | None = None
@@ -166,7 +171,12 @@ class ServiceSettings:
         records = [arm.record for arm in self.arms if arm.record is not None]
         if doubled := sorted({record for record in records if records.count(record) > 1}):
             raise UsageError(f"two arms are recorded in {doubled[0]}: give each a file of its own")
-        if self.port is not None and self.token is None and not is_loopback(self.host):
+        check_service(self)
+        if self.webhook is not None:
+            check_webhook(self.webhook, self.headers)
+        if self.mqtt is not None:
+            checked(self.mqtt)
+        if self.token is None and self.host is not None and not is_loopback(self.host):
             raise UsageError(
                 f"the endpoint at {self.host} can be reached from other machines: "
                 "give it a token, or the host 127.0.0.1"
@@ -279,8 +289,4 @@ def _checked(
             words, below, above = _RANGES[key]
             if not below < value < above:
                 raise UsageError(f"{where}: {key} is {value}: expected {words}")
-    if "webhook" in said and urlsplit(said["webhook"]).scheme not in ("http", "https"):
-        raise UsageError(f"{where}: the webhook is {said['webhook']!r}: expected an address such as https://HOST/PATH")
-    if "mqtt" in said:
-        checked(said["mqtt"])
     return dict(said)

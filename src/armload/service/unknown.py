@@ -5,8 +5,6 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import TYPE_CHECKING, NamedTuple
 
-from armload.runtime.compiling import COMPILING
-
 if TYPE_CHECKING:
     from armload.online import OnlineEstimate
 
@@ -54,21 +52,21 @@ def why_unknown(
     now: float,
     trouble: str | None = None,
     doubt: str | None = None,
-    compiling: bool = False,
+    compiling: str | None = None,
 ) -> Why | None:
     """The first reason that holds; None: the answer can be used.
 
     Args:
         estimate: the newest, its age and lag as of `now`. now: [s, monotonic].
         trouble: what keeps samples from being used. doubt: why they cannot come from this arm.
-        compiling: whether this process compiles functions, for which samples wait.
+        compiling: why samples wait for functions that are compiled (`CatchingUp`); None: they do not.
     """
     if link.state == "lost":
         return Why(Unknown.SOURCE_LOST, link.why or "the source was lost")
     if link.state == "ended":
         return Why(Unknown.SOURCE_ENDED, "the source has ended")
-    if compiling and link.state == "streaming" and (estimate is None or estimate.lag > SILENT):
-        return Why(Unknown.COMPILING, COMPILING)
+    if compiling is not None and link.state == "streaming" and (estimate is None or estimate.lag > SILENT):
+        return Why(Unknown.COMPILING, compiling)
     if estimate is None or link.heard is None:
         return Why(Unknown.STARTING, "no sample has come yet")
     if link.state == "connecting":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import re
 import threading
 import urllib.error
 import urllib.request
@@ -20,6 +21,10 @@ _ANSWERED = 5.0  # [s] a receiver may take
 _LONGEST = 60.0  # [s] between two trials
 _KEPT = 1000  # messages that wait; then the oldest give way: an hour of alarms every four seconds
 _WAIT_AT_END = 2.0  # [s] that `close` gives to what still waits
+_ADDRESS = re.compile(r"[!-~]+")  # what a request's first line can hold
+_NAME = re.compile(r"[!#$%&'*+.^_`|~0-9A-Za-z-]+")  # of a header: RFC 9110, 5.6.2
+_VALUE = re.compile(r"[\t -~\xa0-\xff]*")  # RFC 9110, 5.5: a line break in it would begin another header
+_OF_THE_POST = ("content-length", "host", "transfer-encoding")  # headers that say how the message itself is sent
 
 
 class Webhook:
@@ -36,16 +41,12 @@ class Webhook:
         sent, dropped: messages. failed: why the last trial failed; None: it did not.
 
     Raises:
-        UsageError: the address is none, or a header is no text.
+        UsageError: the address is none, or a header cannot be sent.
     """
 
     def __init__(self, url: str, headers: Mapping[str, str] | None = None) -> None:
-        if urlsplit(url).scheme not in ("http", "https") or not urlsplit(url).hostname:
-            raise UsageError(f"the webhook is {url!r}: expected an address such as https://HOST/PATH")
+        check_webhook(url, headers or {})
         self.url, self._headers = url, {"Content-Type": "application/json", **(headers or {})}
-        for name, value in self._headers.items():
-            if not isinstance(value, str):  # which is not shown: it may be a secret
-                raise UsageError(f"the webhook's header {name} is a {type(value).__name__}: expected a text")
         self.sent = self.dropped = 0
         self.failed: str | None = None
         self._waiting: deque[bytes] = deque()
@@ -104,3 +105,39 @@ class Webhook:
             self.failed = failed
             logging.getLogger("armload").warning("the webhook %s", failed or "takes alarms again")
         return taken
+
+
+def check_webhook(url: str, headers: Mapping[str, str], called: str = "the webhook") -> None:
+    """See that messages can be posted to an address at all: what cannot be sent would be tried for ever.
+
+    Args:
+        called: what the message calls the address.
+
+    Raises:
+        UsageError: no post can be sent to it, or with these headers.
+    """
+    said = f"{called} is {url!r}: expected an address such as https://HOST:PORT/PATH"
+    try:
+        parts = urlsplit(url)
+        port = parts.port
+    except ValueError:
+        raise UsageError(f"{said}, with a port from 1 to 65535") from None
+    if parts.scheme not in ("http", "https") or not parts.hostname:
+        raise UsageError(said)
+    if port == 0:
+        raise UsageError(f"{said}, with a port from 1 to 65535")
+    if not _ADDRESS.fullmatch(url):
+        raise UsageError(f"{said}, of ASCII without blanks (a blank is %20)")
+    if "@" in parts.netloc:
+        where = url.replace(parts.netloc, "…@" + parts.netloc.rpartition("@")[2], 1)  # without what may be a secret
+        raise UsageError(f"{called} is {where!r}, with a user in it: give a header Authorization instead")
+    for name, value in headers.items():  # whose value is not shown: it may be a secret
+        if not _NAME.fullmatch(name) or name.lower() in _OF_THE_POST:
+            raise UsageError(f"the webhook has a header {name!r}: expected a name such as Authorization")
+        if not isinstance(value, str):
+            raise UsageError(f"the webhook's header {name} is a {type(value).__name__}: expected a text")
+        if not _VALUE.fullmatch(value):
+            raise UsageError(
+                f"the webhook's header {name} has a line break or another character that no header can hold: "
+                "expected one line of ASCII"
+            )

@@ -28,6 +28,7 @@ from contextlib import contextmanager
 
 from armload.app.cli.arguments import Parser, attach_values
 from armload.app.cli.outputs import check_outputs
+from armload.app.cli.printing import print_note
 from armload.errors import ArmloadError, UsageError
 from armload.runtime.extras import missing
 from armload.runtime.version import __version__
@@ -143,7 +144,7 @@ class _Notes(logging.Handler):
     """What the library logs, each record as one line on stderr."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        print(f"armload: {record.getMessage()}", file=sys.stderr, flush=True)
+        print_note(record.getMessage())
 
 
 @contextmanager

@@ -135,6 +135,7 @@ def run(options: argparse.Namespace) -> int | None:
     from armload.identification.tare_age import age_of
     from armload.posterior import Known, load_profile
     from armload.recording import ColumnSpec, check_own_measurements
+    from armload.runtime.atomic import clear_left_over
     from armload.service.session import Session
 
     options.robot = options.robot or robot_of(options.source)
@@ -149,6 +150,7 @@ def run(options: argparse.Namespace) -> int | None:
         if options.profile is None:
             raise UsageError("--learn adds to a profile, but there is no --profile; make one with `armload profile`")
         check_output("--profile", options.profile)
+        clear_left_over(options.profile)
     profile = None if options.profile is None else load_profile(options.profile)
     of_log, columns = options.source != "sim" and "://" not in options.source, columns_of(options)
     if columns != ColumnSpec() and not of_log and options.tare is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -45,8 +45,9 @@ def counted(number: int, what: str) -> str:
 
 
 def print_note(text: str) -> None:
-    """One line on stderr, so that stdout holds the answer only."""
-    print(f"armload: {' '.join(text.split())}", file=sys.stderr)
+    """One line on stderr, so that stdout holds the answer only; where it cannot be written, nothing ends for that."""
+    with suppress(OSError):  # a log on a full disk
+        print(f"armload: {' '.join(text.split())}", file=sys.stderr, flush=True)
 
 
 @contextmanager

@@ -41,6 +41,9 @@ file says of the service. Lines of JSON come on stdout, what happens on stderr. 
 """
 
 
+_HERE = "127.0.0.1"  # where an endpoint without a host listens
+
+
 def parser() -> Parser:
     """The arguments of `armload serve`."""
     parser = Parser(
@@ -102,7 +105,7 @@ def run(options: argparse.Namespace) -> int | None:
     try:
         with service.heard_by(output.put):
             if settings.port is not None:
-                endpoint = Endpoint(service, settings.host, settings.port, settings.token)
+                endpoint = Endpoint(service, settings.host or _HERE, settings.port, settings.token)
                 count = len(settings.arms)
                 print_note(f"{count} arm{'s' if count > 1 else ''}: {endpoint.url}/arms")
             output.start(service.stop)
@@ -122,17 +125,12 @@ def run(options: argparse.Namespace) -> int | None:
 def settings_of(options: argparse.Namespace) -> ServiceSettings:
     """What a command line asks for."""
     from armload.service import ArmSettings, ServiceSettings, read_settings
-    from armload.service.mqtt import checked
     from armload.service.settings import read_token
 
     names = ("every", "host", "port", "webhook", "mqtt", "duration")
     over: dict[str, Any] = {name: value for name in names if (value := getattr(options, name)) is not None}
     if options.token_file is not None:
         over["token"] = read_token(options.token_file)
-    if options.webhook is not None and not options.webhook.startswith(("http://", "https://")):
-        raise UsageError(f"--webhook is {options.webhook!r}: expected an address such as https://HOST/PATH")
-    if options.mqtt is not None:
-        checked(options.mqtt)
     of_arms = ("frame", "gravity", "tare", "tare_age", "profile", "tool", "method")
     if options.sources[0].endswith(".toml"):
         given = [name for name in ("robot", *of_arms, "apply", "mounted") if getattr(options, name) is not None]
@@ -153,13 +151,17 @@ def settings_of(options: argparse.Namespace) -> ServiceSettings:
 
 
 class _Output:
-    """Lines on stdout from a thread of its own: who reads slowly loses the oldest lines, and delays nobody."""
+    """Lines on stdout from a thread of its own: who reads slowly loses the oldest lines, and delays nobody.
+
+    While they cannot be written they are lost, and the service goes on; where nobody reads them any more, it ends.
+    """
 
     def __init__(self, alarms_only: bool, most: int = 1000) -> None:
         self.broken = False
         self._alarms_only = alarms_only
         self._lines: queue.Queue[dict[str, Any] | None] = queue.Queue(most)
         self._thread: threading.Thread | None = None
+        self._failed: str | None = None  # why the last line could not be written
 
     def put(self, line: dict[str, Any]) -> None:
         if self._alarms_only and "alarm" not in line:
@@ -179,10 +181,16 @@ class _Output:
                 try:
                     sys.stdout.write(json.dumps(line, allow_nan=False) + "\n")
                     sys.stdout.flush()
-                except OSError:
+                    failed = None
+                except BrokenPipeError:
                     self.broken = True
                     stop()
                     return
+                except OSError as error:  # a full disk: what reads the endpoint, and alarms, go on
+                    failed = error.strerror or str(error)
+                if failed != self._failed:
+                    print_note("lines are written again" if failed is None else f"lines cannot be written: {failed}")
+                self._failed = failed
 
         self._thread = threading.Thread(target=write, daemon=True)
         self._thread.start()

@@ -17,7 +17,7 @@ from armload.app.page.download import ENDINGS, file_of
 from armload.app.page.scene import Scene
 from armload.app.page.server import PageServer, look_at_middle, look_from
 from armload.app.page.status import Status, Watcher
-from armload.app.page.style import SHEET, SOFT, TEXT
+from armload.app.page.style import AWAKE, SHEET, SOFT, TEXT, heard, unheard
 from armload.arms import Arm, rated_mass
 from armload.errors import ArmloadError, ModelError
 from armload.identification import METHODS, default_for
@@ -98,9 +98,11 @@ class Page:
             if sample is not None:
                 self.scene.show(sample, now, truth)
             if numbers:
-                self._headline.content = tables.gone(status) if status.gone else tables.headline(now, truth, status)
-                self._status.content = tables.status(estimate, status)
-                self._table.content = tables.parameters(now, truth)
+                beat = int(time.monotonic())
+                headline = tables.gone(status) if status.gone else tables.headline(now, truth, status)
+                self._headline.content = unheard(beat) + heard(headline, beat)
+                self._status.content = heard(tables.status(estimate, status), beat)
+                self._table.content = heard(tables.parameters(now, truth), beat)
                 self._events.content = tables.events(session.log)
                 self._stream.content = tables.stream(
                     session.source.name, estimate, session.lost, None if status.why is None else status.why.reason
@@ -165,7 +167,7 @@ class Page:
 
     def _build_panel(self, gui: Any) -> None:
         session = self.session
-        gui.add_html(SHEET)
+        gui.add_html(SHEET + AWAKE)
         self._headline = gui.add_html(tables.headline(None))
         self._add_curves(gui, GROUPS[0])  # where a phone shows it without scrolling
         self._status = gui.add_html("")

@@ -26,12 +26,12 @@ _HIGHER, _A_LITTLE_HIGHER = 0.3, 0.2  # of the picture's height above its middle
 
 
 class PageServer:
-    """A viser server that listens at once, beyond this machine only to who brings a token (`TokenDoor`).
+    """A viser server that listens at once, behind a `TokenDoor`: beyond this machine only to who brings a token.
 
     Args:
         host: the interface to listen on. port: if it is taken, the next free one; 0: any. label: title of the page.
-        token: of 16 characters or more, for a host beyond loopback; None: one is drawn. otherwise: what whoever has no
-            viser can do instead of installing it.
+        token: of 16 characters or more, that lets in; None: one is drawn for a host beyond loopback, none is asked for
+            on this machine. otherwise: what whoever has no viser can do instead of installing it.
 
     Attributes:
         viser: viser's own server. url: where to find the page, with the token that lets in.
@@ -52,22 +52,20 @@ class PageServer:
             socket.create_server((host, 0)).close()  # viser would try one port after another, for ever
         except OSError as error:
             raise UsageError(f"no page can be served at {host!r}: {error.strerror or error}; try 127.0.0.1") from None
-        alone = is_loopback(host)
         with contextlib.redirect_stdout(io.StringIO()):
-            self.viser = viser.ViserServer(*((host, port) if alone else ("127.0.0.1", 0)), label, verbose=False)
+            self.viser = viser.ViserServer("127.0.0.1", 0, label, verbose=False)
         # the page leaves this machine only if somebody forwards it
         self.viser.request_share_url = lambda *_, **__: None
+        if token is None and not is_loopback(host):
+            token = secrets.token_urlsafe(24)
         self._door: TokenDoor | None = None
-        self.url = f"http://{host}:{self.viser.get_port()}"
-        if not alone:
-            token = secrets.token_urlsafe(24) if token is None else token
-            try:
-                self._door = TokenDoor(host, port, self.viser.get_port(), token)
-            except UsageError:
-                self.stop()
-                raise
-            name = socket.gethostname() if host in ("", "0.0.0.0", "::") else host
-            self.url = f"http://{name}:{self._door.port}/?token={quote(token)}"
+        try:
+            self._door = TokenDoor(host, port, self.viser.get_port(), token)
+        except UsageError:
+            self.stop()
+            raise
+        name = socket.gethostname() if host in ("", "0.0.0.0", "::") else f"[{host}]" if ":" in host else host
+        self.url = f"http://{name}:{self._door.port}" + ("" if token is None else f"/?token={quote(token)}")
 
     def stop(self) -> None:
         """Stop serving."""

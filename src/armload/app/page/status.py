@@ -9,6 +9,7 @@ from armload.devices import Steadied
 from armload.inertia import NAMES
 from armload.online import OnlineEstimate
 from armload.runtime.compiling import compiling
+from armload.service.catching_up import CatchingUp
 from armload.service.reconnecting import Reconnecting
 from armload.service.session import Session
 from armload.service.tare import Tare
@@ -61,6 +62,7 @@ class Watcher:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._estimate: OnlineEstimate | None = None
+        self._late = CatchingUp()
         self._answered = 0.0  # when the newest answer was first seen [s, monotonic]
 
     def look(self, now: float | None = None) -> Status:
@@ -74,9 +76,10 @@ class Watcher:
         if estimate is not self._estimate:
             self._estimate, self._answered = estimate, now
         since = now - self._answered
-        age, compiles = None if estimate is None else estimate.age + since, compiling()
-        if estimate is not None and compiles:  # samples may wait for that alone
+        age = None if estimate is None else estimate.age + since
+        if estimate is not None and compiling():  # samples may wait for that alone
             estimate = estimate.behind(estimate.lag + since)
+        compiles = self._late.why(None if estimate is None else estimate.lag, now)
         why = why_unknown(estimate, _link(session, now), now, session.identifier.trouble, session.doubt, compiles)
         tare = None if session.tare is None else _tare_in_words(session.tare)
         return Status(why, waits_for(estimate, why), session.doubt or session.identifier.arm_changed, age, tare)

@@ -120,7 +120,8 @@ def status(estimate: OnlineEstimate | None, status: Status) -> str:
             words = "&ensp;".join(f"P({what}) {_probability(p)}" for what, p in judged)
             lines.append(f'<div data-armload="probabilities">{words}</div>')
     if status.waits is not None:
-        lines.append(f'<div data-armload="waits"><b>waits for</b> {escape(status.waits)}</div>')
+        said = f" ({status.why.text})" if status.gone and status.why is not None else ""  # in the headline's place
+        lines.append(f'<div data-armload="waits"><b>waits for</b> {escape(status.waits.removesuffix(said))}</div>')
     if status.misfit is not None:
         lines.append(f'<div data-armload="misfit"{WARNING}><b>does not fit:</b> {escape(status.misfit)}</div>')
         if estimate is not None and _doubted(estimate, status.misfit):
@@ -198,7 +199,7 @@ def _event(event: Event) -> str:
 
 
 def stream(name: str, estimate: OnlineEstimate | None, lost: int = 0, reason: Unknown | None = None) -> str:
-    """Where samples come from, how many counted, why others were left out, and whether this machine keeps up.
+    """Where samples come from, how many counted, why others were left out, and whether this machine keeps up now.
 
     Args:
         reason: why the answer is unknown, if it is.
@@ -206,11 +207,11 @@ def stream(name: str, estimate: OnlineEstimate | None, lost: int = 0, reason: Un
     if estimate is None:
         return f'<div style="{TEXT};{SOFT}" data-armload="health">{escape(name)}</div>'
     text = f"{name}: t = {estimate.t:.1f} s, {estimate.health}"
-    busy = [f"answers come {estimate.lag:.1f} s after their samples"] if estimate.lag >= GAP else []
-    busy += [f"{lost} sample{'s were' if lost > 1 else ' was'} lost"] if lost else []
-    if busy:
+    if estimate.lag >= GAP:
         why = "functions are compiled, once" if reason is Unknown.COMPILING else "this machine is too busy"
-        text += f"; {why}: {' and '.join(busy)}"
+        text += f"; {why}: answers come {estimate.lag:.1f} s after their samples"
+    if lost:  # perhaps long ago
+        text += f"; {lost} sample{'s were' if lost > 1 else ' was'} lost so far"
     return f'<div style="{TEXT};{SOFT}" data-armload="health">{escape(text)}</div>'
 
 

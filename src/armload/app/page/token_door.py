@@ -1,7 +1,10 @@
-"""Who may open a page from another machine: whoever brings the token, in the address once and then in a cookie.
+"""Who may open a page: whoever brings the token, in the address once and then in a cookie; without one, this machine.
 
 viser asks nobody who they are. So it listens to this machine alone, and this stands before it: it reads the first
-request of each connection, and hands the connection on only if it brings the token. Nothing is encrypted.
+request of each connection, and hands the connection on only if it may pass. Nothing is encrypted.
+
+Without a token there is still somebody to keep out: any page of the web that is open on this machine may have its
+browser connect to 127.0.0.1. So a request must ask for a name of this machine, and come from a page of the same one.
 """
 
 from __future__ import annotations
@@ -12,9 +15,10 @@ import hmac
 import threading
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
-from urllib.parse import parse_qs, quote, unquote, urlsplit
+from urllib.parse import SplitResult, parse_qs, quote, unquote, urlsplit
 
 from armload.errors import UsageError
+from armload.service.settings import is_loopback
 
 _PATIENCE = 10.0  # [s] for a request's head
 _MOST = 64  # connections at once: a page takes a few for each who looks on
@@ -26,11 +30,12 @@ class TokenDoor:
     """A door before a server of this machine, in a thread of its own.
 
     `http://HOST:PORT/?token=TOKEN` lets a browser in: it answers with a cookie, which no script can read and no other
-    site can have sent along, and sends the browser on to `/`. A request without either is answered 401.
+    site can have sent along, and sends the browser on to `/`. A request without either is answered 401. Where no token
+    is asked for, a request for another machine's name, or from another page, is answered 403.
 
     Args:
         host: the interface to listen on. port: if it is taken, the next free one; 0: any.
-        behind: port of the server, on 127.0.0.1. token: of ASCII.
+        behind: port of the server, on 127.0.0.1. token: of ASCII; None: for a host of this machine alone.
 
     Attributes:
         port: that it listens on.
@@ -39,8 +44,8 @@ class TokenDoor:
         UsageError: there is no such interface, or no port is free.
     """
 
-    def __init__(self, host: str, port: int, behind: int, token: str) -> None:
-        self._behind, self._token = behind, token.encode("ascii")
+    def __init__(self, host: str, port: int, behind: int, token: str | None) -> None:
+        self._behind, self._token = behind, None if token is None else token.encode("ascii")
         self._tasks: set[asyncio.Task] = set()
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="token door", daemon=True)
@@ -91,14 +96,9 @@ class TokenDoor:
 
     async def _let_in(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), _PATIENCE)
-        target, cookies = _read(head)
-        brought = parse_qs(urlsplit(target).query).get("token", [""])[0]
-        if self._right(brought):
-            cookie = f"{self._cookie}={quote(brought, safe='')}; Path=/; HttpOnly; SameSite=Lax"
-            writer.write(_response(HTTPStatus.SEE_OTHER, "", f"Location: /\r\nSet-Cookie: {cookie}\r\n"))
-            return
-        if not any(self._right(unquote(cookie)) for cookie in cookies.get(self._cookie, ())):
-            writer.write(_response(HTTPStatus.UNAUTHORIZED, "This page asks for the address with ?token=…\n"))
+        answer = _of_this_machine(head) if self._token is None else self._of_the_token(head, self._token)
+        if answer is not None:
+            writer.write(answer)
             return
         to, through = await asyncio.open_connection("127.0.0.1", self._behind)
         try:
@@ -107,25 +107,64 @@ class TokenDoor:
         finally:
             await _closed(through)
 
+    def _of_the_token(self, head: bytes, token: bytes) -> bytes | None:
+        """The answer to a request that is not handed on; None: it brings the cookie."""
+        target, headers = _read(head)
+        brought = parse_qs(_split(target).query).get("token", [""])[0]
+        if _same(brought, token):
+            cookie = f"{self._cookie}={quote(brought, safe='')}; Path=/; HttpOnly; SameSite=Lax"
+            return _response(HTTPStatus.SEE_OTHER, "", f"Location: /\r\nSet-Cookie: {cookie}\r\n")
+        if any(_same(unquote(cookie), token) for cookie in _cookies(headers, self._cookie)):
+            return None
+        return _response(HTTPStatus.UNAUTHORIZED, "This page asks for the address with ?token=…\n")
+
     @property
     def _cookie(self) -> str:
         return f"armload_{self.port}"  # a browser sends a machine's cookies to all of its ports
 
-    def _right(self, token: str) -> bool:
-        return hmac.compare_digest(token.encode("utf-8", "replace"), self._token)
+
+def _of_this_machine(head: bytes) -> bytes | None:
+    """The answer to a request that is not handed on; None: it is for this machine, and from its own page or none."""
+    _, headers = _read(head)
+    asked = headers.get("host", [""])
+    if len(asked) != 1 or not is_loopback(
+        _split(f"//{asked[0]}").hostname or ""
+    ):  # a name that leads here may be anyone's
+        said = "This page is at 127.0.0.1 and localhost; for another name give armload live a --token-file.\n"
+        return _response(HTTPStatus.FORBIDDEN, said)
+    if any(_split(origin).netloc.lower() != asked[0].lower() for origin in headers.get("origin", ())):
+        return _response(HTTPStatus.FORBIDDEN, "This page answers no other page.\n")
+    return None
+
+
+def _same(brought: str, token: bytes) -> bool:
+    return hmac.compare_digest(brought.encode("utf-8", "replace"), token)
 
 
 def _read(head: bytes) -> tuple[str, dict[str, list[str]]]:
-    """What a request asks for, and the cookies that it brings, by name."""
+    """What a request asks for, and its headers, by their names in small letters."""
     first, *lines = head.decode("latin-1").split("\r\n")
-    cookies: dict[str, list[str]] = {}
+    headers: dict[str, list[str]] = {}
     for line in lines:
         name, _, value = line.partition(":")
-        if name.strip().lower() == "cookie":
-            with contextlib.suppress(CookieError):
-                for key, morsel in SimpleCookie(value).items():
-                    cookies.setdefault(key, []).append(morsel.value)
-    return [*first.split(" "), ""][1], cookies
+        headers.setdefault(name.strip().lower(), []).append(value.strip())
+    return [*first.split(" "), ""][1], headers
+
+
+def _cookies(headers: dict[str, list[str]], name: str) -> list[str]:
+    found: list[str] = []
+    for value in headers.get("cookie", ()):
+        with contextlib.suppress(CookieError):
+            found += [morsel.value for key, morsel in SimpleCookie(value).items() if key == name]
+    return found
+
+
+def _split(address: str) -> SplitResult:
+    """The parts of an address; of none, none."""
+    try:
+        return urlsplit(address)
+    except ValueError:
+        return urlsplit("")
 
 
 def _response(status: HTTPStatus, text: str, more: str = "") -> bytes:

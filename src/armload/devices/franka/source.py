@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from armload.arms import Arm
 from armload.devices.source import Source
-from armload.errors import SourceError, one_line
+from armload.errors import SourceError, SourceSetupError, one_line
 from armload.recording import Sample
 from armload.runtime.extras import install
 
@@ -76,7 +76,7 @@ class FrankaSource(Source):
     def __init__(self, address: str, arm: Arm, system: str = "fr3", *, realtime: bool = False) -> None:
         facts = SYSTEMS[system]
         if arm.n != 7:
-            raise SourceError(f"{arm.name} has {arm.n} joints: a {facts.called} has 7; name the arm that is there")
+            raise SourceSetupError(f"{arm.name} has {arm.n} joints: a {facts.called} has 7; name the arm that is there")
         self.name, self.n = f"{system}://{address}", arm.n
         self._closed = False
         self._arrived: float | None = None
@@ -157,13 +157,13 @@ def load_client(system: str) -> Any:
     """The maker's client for "fr3" or "panda".
 
     Raises:
-        SourceError: it is not installed.
+        SourceSetupError: it is not installed.
     """
     facts = SYSTEMS[system]
     try:
         return importlib.import_module(facts.module)
     except ImportError as error:
-        raise SourceError(
+        raise SourceSetupError(
             f"a {facts.called} is read through {facts.package}, which cannot be imported ({error}): "
             f"{install(facts.module)}"
         ) from None

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from armload.errors import SourceError
+from armload.errors import SourceError, SourceSetupError
 
 # Samples wait in the reader's history while an identifier computes: one second at 1 kHz.
 SENSOR_DEPTH = 1000
@@ -45,7 +45,7 @@ class Ros2Connection:
             from sensor_msgs.msg import JointState  # type: ignore[import-not-found]
             from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # type: ignore[import-not-found]
         except ImportError as error:
-            raise SourceError(f"ROS 2 is not there for this Python ({error}): {INSTALL}") from None
+            raise SourceSetupError(f"ROS 2 is not there for this Python ({error}): {INSTALL}") from None
         self.JointState, self.InertiaStamped, self.JointTrajectory = JointState, InertiaStamped, JointTrajectory
         self.JointTrajectoryPoint = JointTrajectoryPoint
         self._publishers: dict[Callable[[Any], None], Any] = {}

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
-from armload.errors import SourceError
+from armload.errors import SourceSetupError
 from armload.recording import arm_as_set
 
 
@@ -33,18 +33,20 @@ class Effort:
             gravity is in the efforts.
 
     Raises:
-        SourceError: both are given, or the constants are not one positive number for each joint. PayloadError: the file
-            cannot be read.
+        SourceSetupError: both are given, or the constants are not one positive number for each joint. PayloadError: the
+            file cannot be read.
     """
 
     def __init__(
         self, arm: Arm, torque_constants: Sequence[float] | None = None, compensated: str | None = None
     ) -> None:
         if torque_constants is not None and compensated is not None:
-            raise SourceError("torque_constants and compensated: efforts are motor currents or torque; leave one out")
+            raise SourceSetupError(
+                "torque_constants and compensated: efforts are motor currents or torque; leave one out"
+            )
         self._constants = np.ones(arm.n) if torque_constants is None else np.asarray(torque_constants, dtype=float)
         if self._constants.shape != (arm.n,) or not (np.isfinite(self._constants) & (self._constants > 0.0)).all():
-            raise SourceError(
+            raise SourceSetupError(
                 f"torque_constants are {torque_constants}: expected {arm.n} positive numbers in N·m/A, one per joint"
             )
         self._set = None if compensated is None else arm_as_set(arm, compensated)

@@ -22,7 +22,7 @@ import numpy as np
 
 from armload.arms import ARMS, Arm
 from armload.devices.source import Source
-from armload.errors import SourceError, one_line
+from armload.errors import SourceError, SourceSetupError, one_line
 from armload.recording import Sample
 from armload.runtime.extras import install
 
@@ -54,18 +54,20 @@ class URSource(Source):
     ) -> None:
         self.name, self.n = f"ur://{address}", arm.n
         if arm.n != 6:
-            raise SourceError(f"{arm.name} has {arm.n} joints: a UR arm has 6; name the arm that is there")
+            raise SourceSetupError(f"{arm.name} has {arm.n} joints: a UR arm has 6; name the arm that is there")
         if torque_constants is None:
             facts = ARMS.get(arm.known_as or arm.name)
             torque_constants = None if facts is None else facts.torque_constants
         if torque_constants is None:
-            raise SourceError(
+            raise SourceSetupError(
                 f"{arm.name} measures motor currents, and no torque constants are known for it: give six numbers in "
                 "N·m/A (torque_constants), from a scale test with a known load"
             )
         self._constants = np.array(torque_constants, dtype=float)
         if self._constants.shape != (6,) or not np.all(np.isfinite(self._constants)):
-            raise SourceError(f"torque constants are {list(torque_constants)}: expected six finite numbers in N·m/A")
+            raise SourceSetupError(
+                f"torque constants are {list(torque_constants)}: expected six finite numbers in N·m/A"
+            )
         self._arrived: float | None = None
         self._stop = threading.Event()
         client = load_client()
@@ -108,12 +110,12 @@ def load_client() -> Any:
     """The receiving side of ur-rtde.
 
     Raises:
-        SourceError: it is not installed.
+        SourceSetupError: it is not installed.
     """
     try:
         from rtde_receive import RTDEReceiveInterface  # type: ignore[import-not-found]
     except ImportError as error:
-        raise SourceError(
+        raise SourceSetupError(
             f"a UR arm is read through ur-rtde, which cannot be imported ({error}): {install('rtde_receive')}"
         ) from None
     return RTDEReceiveInterface
@@ -123,12 +125,12 @@ def load_control() -> Any:
     """The commanding side of ur-rtde.
 
     Raises:
-        SourceError: it is not installed.
+        SourceSetupError: it is not installed.
     """
     try:
         from rtde_control import RTDEControlInterface  # type: ignore[import-not-found]
     except ImportError as error:
-        raise SourceError(
+        raise SourceSetupError(
             f"a UR arm is moved through ur-rtde, which cannot be imported ({error}): {install('rtde_control')}"
         ) from None
     return RTDEControlInterface
