@@ -215,3 +215,20 @@ def test_a_log_with_the_wrong_gravity_is_refused(refused, log_text, tmp_path):
     path = tmp_path / "log.csv"
     path.write_text(log_text)
     assert "--gravity" in refused(path, *ROBOT, "--gravity", "0,0,9.81")
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--headless", "--port", "8081"], "--port is of the page"),
+        (["--headless", "--host", "0.0.0.0"], "--host is of the page"),
+        (["--headless", "--token-file", "token"], "--token-file is of the page"),
+        (["--every", "0.5"], "--every is of --headless"),
+        (["--loop"], "--loop replays a log again and again, but sim is none"),
+        (["fr3://172.16.0.2", "--speed", "2"], "--speed is of a log or the simulator, but the source is fr3://"),
+    ],
+)
+def test_an_option_of_live_that_would_change_nothing_is_refused(capsys, options, said):
+    assert main(["live", *options]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert said in line

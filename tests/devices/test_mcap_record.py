@@ -2,6 +2,7 @@
 
 import json
 import re
+import resource
 import signal
 import subprocess
 import sys
@@ -234,3 +235,16 @@ def test_what_cannot_be_recorded_is_refused_before_the_first_sample(tmp_path, pa
         Recorder(tmp_path / "other.mcap", 7)
     with pytest.raises(RecordingError, match=r"ends in \.csv or \.mcap"):
         Recorder(tmp_path / "run.npz", 7)
+
+
+@pytest.mark.parametrize("suffix", ["csv", "mcap"])
+def test_a_record_that_cannot_be_begun_leaves_no_file(tmp_path, suffix):
+    """A service that tries again every five seconds would leave one empty file after the other."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (0, before[1]))  # as a full disk: no file can grow
+    try:
+        with pytest.raises(RecordingError):
+            Recorder(tmp_path / f"run.{suffix}", 7, [f"joint{k}" for k in range(7)])
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert list(tmp_path.iterdir()) == []

@@ -1,6 +1,7 @@
 """A process that goes on from a saved state: what was held then may have been exchanged since."""
 
 import json
+import resource
 import select
 import time
 
@@ -91,3 +92,39 @@ def test_a_state_is_of_the_tare_that_the_stream_goes_by_whatever_its_file_says_s
     assert before.exists()
     assert settings.state != before
     assert ArmProcess(settings, 0.1)._restored(None) is None  # its state is none of the new tare's
+
+
+def test_while_the_disk_is_full_the_last_state_stays_and_it_is_saved_again_once_there_is_room(
+    panda, analytic_log, tmp_path, monkeypatch
+):
+    path = tmp_path / "run.csv"
+    write_recording(path, analytic_log(panda, test_payload().parameters, duration=4.0))
+    folder = tmp_path / "state"
+    settings = ArmSettings(name="left", source=str(path), robot="panda", method="map", loop=True, save=str(folder))
+    process, said, states = ArmProcess(settings, 0.1), [], []
+    monkeypatch.setattr(process, "_write", lambda fields: said.append(fields.get("note")))
+    monkeypatch.setattr("armload.service.arm_process.SAVE_EVERY", 0.3)
+    save, before = process._save, resource.getrlimit(resource.RLIMIT_FSIZE)
+
+    def saved(session):
+        full = 2 <= len(states) < 4  # no file can grow beyond what a disk has left
+        resource.setrlimit(resource.RLIMIT_FSIZE, (100_000 if full else before[0], before[1]))
+        try:
+            save(session)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        (state,) = folder.iterdir()  # and nothing half written beside it
+        states.append(state.read_bytes())
+        if len(states) == 6:
+            process.source.close()
+
+    monkeypatch.setattr(process, "_save", saved)
+    process.run()
+    assert len(states) >= 6
+    assert states[1] == states[2] == states[3]
+    assert states[4] != states[3]
+    about = [note for note in said if note is not None and "saved" in note]
+    assert len(about) == 2
+    assert "cannot be saved" in about[0]
+    assert "File too large" in about[0]
+    assert about[1] == "the state is saved again"

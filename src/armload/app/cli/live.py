@@ -51,6 +51,9 @@ robot.
 """
 
 
+_UNSAID = object()  # of --speed, for which None is one: as fast as possible
+
+
 def _speed(text: str) -> float | None:
     return None if text == "max" else at_least(0.01, float)(text)
 
@@ -86,7 +89,6 @@ def parser() -> Parser:
     add(
         "--every",
         type=at_least(0.0, float),
-        default=0.1,
         metavar="S",
         help="with --headless: seconds between lines (0.1)",
     )
@@ -103,8 +105,8 @@ def parser() -> Parser:
     )
     add(
         "--speed",
-        type=lambda text: None if text == "max" else at_least(0.01, float)(text),
-        default=1.0,
+        type=_speed,
+        default=_UNSAID,
         metavar="X|max",
         help="of a log or the simulator (1: real time)",
     )
@@ -115,12 +117,16 @@ def parser() -> Parser:
         metavar="S",
         help="take so many seconds of samples (a page stays open)",
     )
-    add("--host", default="127.0.0.1", metavar="H", help="interface of the page (127.0.0.1); others ask for a token")
-    add("--token-file", type=file_name, metavar="F", help="holds that token (without it, one is drawn for this run)")
+    add("--host", metavar="H", help="interface of the page (127.0.0.1); others ask for a token")
+    add(
+        "--token-file",
+        type=file_name,
+        metavar="F",
+        help="holds that token, which is then asked for on this machine, too (without it, one is drawn for this run)",
+    )
     add(
         "--port",
         type=at_least(0, int, 65535),
-        default=8080,
         metavar="P",
         help="of the page (8080, or the next free one)",
     )
@@ -138,6 +144,7 @@ def run(options: argparse.Namespace) -> int | None:
     from armload.runtime.atomic import clear_left_over
     from armload.service.session import Session
 
+    _check_effect(options)
     options.robot = options.robot or robot_of(options.source)
     check_tare_age(options)
     arm = _arm_of(options)
@@ -158,8 +165,9 @@ def run(options: argparse.Namespace) -> int | None:
     log, tare = read_logs(options, arm, options.source if of_log and options.tare is not None else None, options.tare)
     if log is not None and tare is not None:
         check_own_measurements(log, tare)
+    speed = 1.0 if options.speed is _UNSAID else options.speed
     # the page takes time from its own process: what runs on the clock is read in another one
-    detached = True if not options.headless and options.speed is not None and options.speed <= 1.0 else None
+    detached = True if not options.headless and speed is not None and speed <= 1.0 else None
     written = options.record or ""
     mcap = written if written.lower().endswith(".mcap") else None  # with the answers, too
     source = open_source(
@@ -167,7 +175,7 @@ def run(options: argparse.Namespace) -> int | None:
         arm,
         record=None if mcap else options.record,
         detached=detached,
-        speed=options.speed,
+        speed=speed,
         loop=options.loop,
         topic=options.topic,
         columns=columns_for(options, options.source, options.tare, False) if of_log else None,
@@ -185,13 +193,26 @@ def run(options: argparse.Namespace) -> int | None:
         try:
             if not options.headless:
                 return _serve(session, options)
-            for line in lines(session, options.every, options.duration):
+            for line in lines(session, 0.1 if options.every is None else options.every, options.duration):
                 print(line, flush=True)
             return None
         finally:
             session.close()
             if options.learn and options.profile is not None and session.error is None:
                 _learn(session, options.profile)
+
+
+def _check_effect(options: argparse.Namespace) -> None:
+    """Refuse options that would change nothing: whoever gave one believes that it does."""
+    robot, sim = "://" in options.source, options.source == "sim"
+    for name in ("host", "port", "token_file") if options.headless else ("every",):
+        if getattr(options, name) is not None:
+            what = "of the page, which --headless has none of" if options.headless else "of --headless, not of the page"
+            raise UsageError(f"--{name.replace('_', '-')} is {what}: leave one of them out")
+    if options.loop and (robot or sim):
+        raise UsageError(f"--loop replays a log again and again, but {options.source} is none: leave it out")
+    if robot and options.speed is not _UNSAID:
+        raise UsageError(f"--speed is of a log or the simulator, but the source is {options.source}: leave it out")
 
 
 def _reopened(first: Detached, options: argparse.Namespace, arm: Arm, kept: str | None) -> Reconnecting:
@@ -251,7 +272,9 @@ def _serve(session, options: argparse.Namespace) -> int | None:
     page = None
     try:
         with held_back():  # what the page loads catches every exception: a Ctrl-C would be lost
-            page = Page(session, options.host, options.port, token=token)
+            page = Page(
+                session, options.host or "127.0.0.1", 8080 if options.port is None else options.port, token=token
+            )
         session.start(options.duration)
         print_note(f"{session.source.name}: {page.url} (Ctrl-C ends it)")
         page.serve()
