@@ -144,7 +144,8 @@ def run(options: argparse.Namespace) -> int | None:
     from armload.runtime.atomic import clear_left_over
     from armload.service.session import Session
 
-    _check_effect(options)
+    for said in without_effect(options):
+        print_note(said)
     options.robot = options.robot or robot_of(options.source)
     check_tare_age(options)
     arm = _arm_of(options)
@@ -202,17 +203,18 @@ def run(options: argparse.Namespace) -> int | None:
                 _learn(session, options.profile)
 
 
-def _check_effect(options: argparse.Namespace) -> None:
-    """Refuse options that would change nothing: whoever gave one believes that it does."""
-    robot, sim = "://" in options.source, options.source == "sim"
+def without_effect(options: argparse.Namespace) -> list[str]:
+    """What is to be said of options that change nothing: whoever gave one believes that it does."""
+    robot, sim, out = "://" in options.source, options.source == "sim", []
     for name in ("host", "port", "token_file") if options.headless else ("every",):
         if getattr(options, name) is not None:
             what = "of the page, which --headless has none of" if options.headless else "of --headless, not of the page"
-            raise UsageError(f"--{name.replace('_', '-')} is {what}: leave one of them out")
+            out.append(f"--{name.replace('_', '-')} is {what}: it changes nothing")
     if options.loop and (robot or sim):
-        raise UsageError(f"--loop replays a log again and again, but {options.source} is none: leave it out")
+        out.append(f"--loop replays a log again and again, but {options.source} is none: it changes nothing")
     if robot and options.speed is not _UNSAID:
-        raise UsageError(f"--speed is of a log or the simulator, but the source is {options.source}: leave it out")
+        out.append(f"--speed is of a log or the simulator, but the source is {options.source}: it changes nothing")
+    return out
 
 
 def _reopened(first: Detached, options: argparse.Namespace, arm: Arm, kept: str | None) -> Reconnecting:
