@@ -1,8 +1,8 @@
 """Error bars that hold: how far evidence can be trusted, learned, and a factor on every width, calibrated.
 
     1. a bag of decision trees reads from the traits of a log by which factor kappa the physics overrates its evidence;
-       the evidence is taken as Λ/kappa, h/kappa. What the traits leave open is told by how well Λ/f·kappa, h/f·kappa go
-       with the payloads that are expected, and the answer is the mean over f (`Calibration.posterior`)
+       the evidence is taken as Λ/kappa, h/kappa. What the traits leave open, a factor f, is told by how well
+       Λ/(f·kappa), h/(f·kappa) go with the payloads that are expected: the answer is the mean over f (`posterior`)
     2. the half-width h_i of parameter i has h_i² = (c_i(t)·std_i)² + (1.96·gain·phi_i)², gain being how well the
        torque's scale is known; c_i is such that 95 % of the episodes lie inside, each answered by a bag that has not
        seen it (cross-conformal prediction), one per time and with or without a tare. Where joints have scales of their
@@ -100,7 +100,7 @@ class Calibration:
     ) -> MixturePosterior:
         """phi given evidence as far as it can be trusted, the factor f that is left open summed over.
 
-            p(phi | h) = Σ_f p(f | h)·p(phi | h/f),        ln f ~ N(0, (ln 10·left_open)²) before,
+            p(phi | h) = Σ_f p(f | h)·p(phi | Λ/f, h/f),        ln f ~ N(0, (ln 10·left_open)²) before,
             ln p(f | h) = ln p(f) + `_COUNTS`·(log_evidence(Λ/f, h/f) − ½·d·ln f − ½·hᵀ·Λ⁺·h/f) + const
 
         with f at three nodes and moments matched; d is the rank of Λ. The brackets hold the likelihood of phi_ML, which
@@ -115,7 +115,7 @@ class Calibration:
         known = prior.posterior(Λ, h) if found is None else found
         if self.left_open == 0.0:
             return known
-        unit = prior.std
+        unit = prior.std  # kg and kg·m² are of unlike size: rounding would hide the smaller
         values, V = np.linalg.eigh(Λ * np.outer(unit, unit))
         seen = values > _DIGITS * max(values[-1], 0.0)
         squares = float(((V[:, seen].T @ (h * unit)) ** 2 / values[seen]).sum())
