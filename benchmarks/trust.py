@@ -22,18 +22,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import digamma, polygamma
 from script import ROOT, markdown_table, options, say, write, write_table
+from wide_and_light import records_of
 
 from armload import Arm, arm
 from armload.inertia import Z95
-from armload.lab.episodes import draw_episodes
-from armload.lab.training import Records, measure_episodes
+from armload.lab.training import Records
 from armload.lab.training.calibrating import overrating
 from armload.posterior import HybridModel, calibration, shipped_model
 
@@ -42,19 +41,6 @@ SHOWN = (0.02, 0.1, 0.5, 1.0, 6.0)
 POWERS = (0.5, 0.7, 1.0)
 GROUPS = {"mass": slice(0, 1), "moment": slice(1, 4), "inertia": slice(4, 10)}
 LEAST = 1e-3  # of a mean square: as in training
-
-
-def records_of(robot: Arm, asked: Any) -> Records:
-    """Evidence of the arm's episodes, from --work or new."""
-    path = Path(asked.work) / f"trust-{robot.name}-{asked.episodes}-{asked.seed}.npz" if asked.work else None
-    if path is not None and path.is_file():
-        return Records.load(path)
-    drawn = draw_episodes(robot, "broad", asked.episodes, asked.seed, motions=max(6, asked.episodes // 3))
-    records = measure_episodes(drawn, times=TIMES)
-    if path is not None:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        records.save(path)
-    return records
 
 
 def left(model: HybridModel, records: Records) -> float | None:
@@ -91,7 +77,7 @@ def cell(error: NDArray[np.float64], half: NDArray[np.float64]) -> dict[str, lis
 def measured(name: str, asked: Any) -> list[dict[str, Any]]:
     """A line for each time."""
     robot = arm(name)
-    model, records = shipped_model(robot), records_of(arm(name), asked)
+    model, records = shipped_model(robot), records_of(robot, f"trust-{name}", asked, TIMES)
     alone = replace(model, calibration=replace(model.calibration, left_open=0.0))
     found, shipped = {"by traits": answers(robot, alone, records)}, calibration._COUNTS
     for power in POWERS:

@@ -19,6 +19,7 @@ core.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -63,14 +64,15 @@ def before(prior: MixturePrior) -> MixturePrior:
     return MixturePrior(w / w.sum(), prior.means[:count], prior.covariances[:count], prior.families[:count])
 
 
-def records_of(robot: Arm, name: str, asked: Any) -> Records:
-    """Evidence of the arm's episodes, from --work or new."""
+def records_of(robot: Arm, name: str, asked: Any, times: Sequence[float] = TIMES) -> Records:
+    """Evidence of the arm's episodes after so many seconds each, from --work, where it has this name, or new."""
     path = Path(asked.work) / f"{name}-{asked.episodes}-{asked.seed}.npz" if asked.work else None
     if path is not None and path.is_file():
         return Records.load(path)
     drawn = draw_episodes(robot, "broad", asked.episodes, asked.seed, motions=max(6, asked.episodes // 3))
-    records = measure_episodes(drawn, times=TIMES)
+    records = measure_episodes(drawn, times=times)
     if path is not None:
+        path.parent.mkdir(parents=True, exist_ok=True)
         records.save(path)
     return records
 
