@@ -10,7 +10,7 @@ changes   a payload of 0.1, 0.2, 0.5 and 1.5 kg taken up or put down somewhere i
 
 Pandas that differ from their model as real ones do; and UR5e and UR10e, a tenth and a third of what each is rated for.
 Cases that are named replace their own among the results. Written to benchmarks/results/changed_logs.json and a table of
-docs/hybrid.md, after every case; half an hour of one core.
+docs/hybrid_measured.md, after every case; half an hour of one core.
 """
 
 from __future__ import annotations
@@ -132,7 +132,7 @@ def main() -> None:
         say(f"{name}: {found[name]}")
         found = {name: found[name] for name in CASES if name in found}
         write("changed_logs", {"seed": asked.seed, "cases": found})
-        write_table(ROOT / "docs" / "hybrid.md", "changed logs", table(found))
+        write_table(ROOT / "docs" / "hybrid_measured.md", "changed logs", table(found))
 
 
 if __name__ == "__main__":

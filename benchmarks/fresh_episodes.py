@@ -8,7 +8,7 @@ seed. Errors: beside those of its own physics with the weak prior (`map-gp`), of
 one Gaussian, and of the mean of all payloads; for all episodes, for each kind of world, for a known family of payloads
 and by weight; the differences are paired, ± their standard error, an episode being one observation.
 
-Writes benchmarks/results/fresh_episodes_ROBOT.json and, of the Panda, a table of docs/hybrid.md. About a second of one
+Writes benchmarks/results/fresh_episodes_ROBOT.json and, of the Panda, a table of docs/hybrid_measured.md. About a second of one
 core for each episode; goes on from --work.
 """
 
@@ -107,7 +107,7 @@ def sentence(verdict: dict[str, int]) -> str:
 
 
 def table(lines: list[dict]) -> str:
-    """Mean errors [g · g·m · g·m²] of the rows that docs/hybrid.md shows, as Markdown."""
+    """Mean errors [g · g·m · g·m²] of the rows that docs/hybrid_measured.md shows, as Markdown."""
     out = []
     for what, subset, title in SHOWN:
         cells = [
@@ -153,7 +153,7 @@ def main() -> None:
     }
     write(f"fresh_episodes_{robot.name}", result, indent=None)
     if robot.name == "panda":
-        write_table(ROOT / "docs" / "hybrid.md", "new episodes", table(lines) + "\n\n" + sentence(verdict))
+        write_table(ROOT / "docs" / "hybrid_measured.md", "new episodes", table(lines) + "\n\n" + sentence(verdict))
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ width       mean half-width over mean error of those, after 1 and 6 s
 log alone   inside and width of the same under the weak prior of `map-gp`, the log trusted as the hybrid trusts it
 rest        share of those inside of masses · first moments, after 6 s
 
-Writes benchmarks/results/long_bars.json and a table of docs/hybrid.md. Goes on from --work; three minutes of one core.
+Writes benchmarks/results/long_bars.json and a table of docs/hybrid_measured.md. Goes on from --work; three minutes of one core.
 """
 
 from __future__ import annotations
@@ -129,7 +129,7 @@ def main() -> None:
         cells.append({"length [m]": list(lengths), "after": after})
         say(str(cells[-1]))
     write("long_bars", {"episodes": asked.episodes, "seed": asked.seed, "arms": list(ARMS), "lengths": cells})
-    write_table(ROOT / "docs" / "hybrid.md", "long bars", table(cells))
+    write_table(ROOT / "docs" / "hybrid_measured.md", "long bars", table(cells))
 
 
 if __name__ == "__main__":

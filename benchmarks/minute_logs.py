@@ -5,7 +5,7 @@
 The shipped models' widths were calibrated up to 6 s after a run began. Here runs last 60 s: each log is another arm,
 payload and motion (a Fourier motion that repeats, a slow one that does not, stops at ever new poses, pick and place),
 at 200 Hz, without a tare and with one of 20 s on another motion, answered by the hybrid at several times of one run.
-Goes on from out/minute_logs. Written to benchmarks/results/minute_logs.json and a table of docs/hybrid.md: share of the
+Goes on from out/minute_logs. Written to benchmarks/results/minute_logs.json and a table of docs/hybrid_measured.md: share of the
 95 % intervals that hold the truth, ± the standard error if a log's ten count as one answer, and mean half-width over
 mean error of mass · first moments · inertia. In the results stand the errors, too, and d ln(error) / d ln(t) from 6 to
 60 s: −0.5 where errors average out, 0 where more of the log tells no more. Five minutes of one core.
@@ -104,7 +104,7 @@ def main() -> None:
         of = {what: [np.array([cell[what][x] for cell in cells]) for x in ("error", "half")] for what in TARES}
         found[robot] = {what: summary(*both) for what, both in of.items()}
     write("minute_logs", {"first seed": FIRST_SEED, "logs": count, "times [s]": list(TIMES), "robots": found})
-    write_table(ROOT / "docs" / "hybrid.md", "minute logs", table(found))
+    write_table(ROOT / "docs" / "hybrid_measured.md", "minute logs", table(found))
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ follows the motion, and an estimator that believes the bound's model does worse 
 Also with the arm known to be bare at the tare, and of the payload all but the mass told.
 
 mass: mean absolute error ± its standard error over the arms, and mean half-width [g]. inside: of the masses. Printed,
-and written to benchmarks/results/old_tares.json and a table of docs/hybrid.md; ten minutes of one core.
+and written to benchmarks/results/old_tares.json and a table of docs/hybrid_measured.md; ten minutes of one core.
 """
 
 from __future__ import annotations
@@ -259,7 +259,7 @@ def main() -> None:
         "bound [g]": {name: mean([one[name] for one in bounds]) for name in bounds[0]},
     }
     write("old_tares", result)
-    write_table(ROOT / "docs" / "hybrid.md", "old tares", table(result))
+    write_table(ROOT / "docs" / "hybrid_measured.md", "old tares", table(result))
 
 
 if __name__ == "__main__":

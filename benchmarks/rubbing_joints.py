@@ -17,7 +17,7 @@ calibrated         share of the answers
 inside             share of the true values inside their intervals: mass · first moments · inertia
 covered or said    share that lie inside, or whose answer is not called calibrated
 
-Written to benchmarks/results/rubbing_joints.json and a table of docs/hybrid.md, after every case; a quarter of an hour
+Written to benchmarks/results/rubbing_joints.json and a table of docs/hybrid_measured.md, after every case; a quarter of an hour
 of one core.
 """
 
@@ -174,7 +174,7 @@ def main() -> None:
             found.setdefault(robot, {})[name] = seen
             say(f"{robot}, {name}: {seen}")
             write("rubbing_joints", {"seed": asked.seed, "robots": found})
-            write_table(ROOT / "docs" / "hybrid.md", "rubbing joints", table(found))
+            write_table(ROOT / "docs" / "hybrid_measured.md", "rubbing joints", table(found))
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
     python benchmarks/shipped_models.py
 
 Reads the reports that `armload train --report` wrote (benchmarks/results/hybrid_NAME.json) and writes a table of
-docs/hybrid.md. Trains nothing.
+docs/hybrid_measured.md. Trains nothing.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def row(name: str) -> list[str]:
 
 def main() -> None:
     columns = ["arm", "measures", "episodes", "intervals that held", "by parameter and time", "half-width over error"]
-    write_table(ROOT / "docs" / "hybrid.md", "shipped models", markdown_table(columns, "llrrrr", [*map(row, SHIPPED)]))
+    write_table(ROOT / "docs" / "hybrid_measured.md", "shipped models", markdown_table(columns, "llrrrr", [*map(row, SHIPPED)]))
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ error       mean absolute error of mass [g] · first moments [g·m] · inertia [
 more        paired difference of the errors, summed less by traits, ± its standard error
 inside      share of the true values inside the 95 % intervals [%]; width: mean half-width over mean error
 
-Written to benchmarks/results/trust.json and a table of docs/hybrid.md. A second of one core for each episode; --work
+Written to benchmarks/results/trust.json and a table of docs/hybrid_measured.md. A second of one core for each episode; --work
 keeps what was measured.
 """
 
@@ -120,7 +120,7 @@ def main() -> None:
     asked = options(__doc__, arms="panda,gen3,ur10e", episodes=240, seed=3000, work="")
     lines = [line for name in asked.arms.split(",") for line in measured(name, asked)]
     write("trust", {"population": "broad", "seed": asked.seed, "episodes": asked.episodes, "lines": lines}, indent=None)
-    write_table(ROOT / "docs" / "hybrid.md", "trust", table(lines))
+    write_table(ROOT / "docs" / "hybrid_measured.md", "trust", table(lines))
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ error      mean error after over before: mass · first moments · inertia of the
 needed     share of c within which 95 % of the inertias lie where up to so much of the rated mass is found: of all, of
            wide bodies (as it is, before c is narrowed)
 
-Writes benchmarks/results/wide_and_light.json and a table of docs/hybrid.md. Goes on from --work; ten minutes of one
+Writes benchmarks/results/wide_and_light.json and a table of docs/hybrid_measured.md. Goes on from --work; ten minutes of one
 core.
 """
 
@@ -162,7 +162,7 @@ def main() -> None:
         say(str(found[-1]))
     facts = {"episodes": asked.episodes, "seed": asked.seed, "found in": list(FOUND), "arms": found}
     write("wide_and_light", facts)
-    write_table(ROOT / "docs" / "hybrid.md", "wide and light", table(found))
+    write_table(ROOT / "docs" / "hybrid_measured.md", "wide and light", table(found))
 
 
 if __name__ == "__main__":

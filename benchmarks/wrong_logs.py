@@ -15,7 +15,7 @@ covered or said   share of the true values that lie inside, or whose answer is n
 no word       share of the answers that are not called calibrated, and have no note that says why
 
 Cases that are named replace their own among the results. Written to benchmarks/results/wrong_logs_<robot>.json and a
-table of docs/hybrid.md, after every case; half an hour of one core.
+table of docs/hybrid_measured.md, after every case; half an hour of one core.
 
 With --again, cases are answered with other seeds, to tell chance from fault: how many values are covered or said, with
 Clopper–Pearson intervals (95 %) that take each value, or each log only, for an answer of its own, as the values of a
@@ -156,7 +156,7 @@ def main() -> None:
         found = {name: found[name] for name in CASES if name in found}
         write(result, {"seed": asked.seed, "cases": found})
         marker = "wrong logs" if asked.robot == "panda" else f"wrong logs of {asked.robot}"
-        write_table(ROOT / "docs" / "hybrid.md", marker, table(found))
+        write_table(ROOT / "docs" / "hybrid_measured.md", marker, table(found))
 
 
 if __name__ == "__main__":
