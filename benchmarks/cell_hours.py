@@ -12,7 +12,7 @@ standing   the arm stands from 2 s before to 2 s after, as at a gripper; each ta
 What is handed over is added to the sensors' torque, as in the scenes of `events.py` that take time; what counts as
 noticed, late, false and inside is said there. Streams are cells in out/cell-hours, and are not measured again while
 `armload.online`, `armload.posterior`, `armload.regression` and the scenes stay as they are. Constants were set on other
-seeds. Printed, and written to benchmarks/results/cell_hours.json and a table of docs/online.md; printed only with
+seeds. Printed, and written to benchmarks/results/cell_hours.json and a table of docs/online_measured.md; printed only with
 another seed than 70000.
 """
 
@@ -85,7 +85,7 @@ def measured(scene: Hours) -> dict[str, Any]:
 
 
 def show(parts: dict[str, Any]) -> None:
-    """The table of docs/online.md."""
+    """The table of docs/online_measured.md."""
     rows = []
     for kind, part in parts.items():
         missed, false = part["missed"], part["false"]

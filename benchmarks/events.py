@@ -36,7 +36,7 @@ probability was right; event_truth.py says what was true.
 Scenes are cells in out/events: a scene measured once is not measured again while `armload.online`, `armload.posterior`,
 `armload.regression`, the streams and what is true of them stay as they are. They are measured one of each part in turn;
 --minutes: begin none after so many minutes, and tell of those that are there. Written to benchmarks/results/events.json
-and from there to docs/online.md; printed only: --quick, two of each part; some --parts; another --seed to begin with
+and from there to docs/online_measured.md; printed only: --quick, two of each part; some --parts; another --seed to begin with
 than 90000. Constants were set on others.
 """
 
@@ -61,7 +61,7 @@ from armload.lab.experiment import Task, run_tasks, source_key
 from armload.online import OnlineIdentifier
 
 SEED = 90_000
-PAGE = ROOT / "docs" / "online.md"
+PAGE = ROOT / "docs" / "online_measured.md"
 LATE = 5.0  # [s]
 LOOK = 0.02  # [s] between two looks at what is said
 MORE = {"ramps_5": 3, "early": 6, "pushes": 6}  # times as many streams: 16 do not tell a share of 5 % from 10 %

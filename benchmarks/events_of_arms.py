@@ -9,7 +9,7 @@ the arm is rated for. Each arm has as many streams of each as are asked for, wit
 
 What counts as noticed, late, false and inside is said in events.py. calibrated, and out: the share of all moments
 whose answer is called calibrated and leaves the mass out. Printed, and written to
-benchmarks/results/events_of_arms.json and a table of docs/online.md; printed only with another seed than 60000 or some
+benchmarks/results/events_of_arms.json and a table of docs/online_measured.md; printed only with another seed than 60000 or some
 arms.
 """
 
@@ -72,7 +72,7 @@ def measured(scene: Scene) -> dict[str, Any]:
 
 
 def show(parts: dict[str, dict[str, Any]]) -> None:
-    """The table of docs/online.md."""
+    """The table of docs/online_measured.md."""
     rows = []
     for part in parts.values():
         told, missed = [part[f"after_{s:g}_s"] for s in LOOKED], part["missed"]["count"]

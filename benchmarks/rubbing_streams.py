@@ -10,7 +10,7 @@ doubted    share of the streams that end with an answer that is not called calib
 inside     share of the true values inside their intervals at the end: mass · first moments · inertia
 noticed    changes noticed within a second, and how long after: median [s] until the sample came by which it was
 
-Written to benchmarks/results/rubbing_streams.json and a table of docs/online.md; twenty minutes of one core.
+Written to benchmarks/results/rubbing_streams.json and a table of docs/online_measured.md; twenty minutes of one core.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def main() -> None:
                 found.setdefault(robot, {}).setdefault(name, {})[way] = seen
                 say(f"{robot}, {name}, {way}: {seen}")
             write("rubbing_streams", {"seed": asked.seed, "robots": found})
-            write_table(ROOT / "docs" / "online.md", "rubbing streams", table(found))
+            write_table(ROOT / "docs" / "online_measured.md", "rubbing streams", table(found))
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ false      all other events
 inside     share of the masses in their 95 % interval 0.5, 1 and 2 s after a change
 calibrated share of the time in which answers are called so; and wrong: that leave the mass out, too
 
-Written to benchmarks/results/sticking_streams.json and a table of docs/online.md; ten minutes of one core.
+Written to benchmarks/results/sticking_streams.json and a table of docs/online_measured.md; ten minutes of one core.
 
 Source: Dahl, "A solid friction model", Aerospace Corp. TOR-158, 1968.
 """
@@ -169,7 +169,7 @@ def main() -> None:
                 found[f"{name}; {friction}; {way}"] = seen
                 say(f"{name}, {friction}, {way}: {[(one['noticed'], one['false']) for one in seen]}")
             write("sticking_streams", {"seed": asked.seed, "streams": found}, None)
-            write_table(ROOT / "docs" / "online.md", "sticking streams", table(found))
+            write_table(ROOT / "docs" / "online_measured.md", "sticking streams", table(found))
 
 
 if __name__ == "__main__":

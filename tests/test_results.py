@@ -290,7 +290,7 @@ def test_the_readme_s_changes_are_those_of_the_committed_benchmark():
     assert f"No event in {hours:.1f} hours was false" in words
     assert f"of {number} simulated changes of 0.2 kg and more on moving arms" in words
     assert "one was noticed late and one was missed" in words
-    assert f"Of the {number} changes of simulated moving arms" in (ROOT / "docs" / "online.md").read_text("utf-8")
+    assert f"Of the {number} changes of simulated moving arms" in (ROOT / "docs" / "online_measured.md").read_text("utf-8")
     assert f"the median delay of a step is {parts['steps']['delay_s']['50 %']:.2f} s." in words
 
 
@@ -305,7 +305,7 @@ def test_hours_of_a_cell_s_work_are_those_of_the_committed_measurement():
     assert (
         f"in ten hours of a cell's work none of {count} hand-overs was missed or late, and no event was false" in words
     )
-    page = " ".join((ROOT / "docs" / "online.md").read_text(encoding="utf-8").split())
+    page = " ".join((ROOT / "docs" / "online_measured.md").read_text(encoding="utf-8").split())
     assert f"{count} hand-overs, none late or missed, no event false" in page
 
 
@@ -402,7 +402,7 @@ def test_the_built_in_arms_on_the_page_are_those_of_the_committed_measurement():
 def test_the_events_on_the_page_are_those_of_the_committed_measurement(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(ROOT / "benchmarks")
     events = importlib.import_module("events")
-    page = tmp_path / "online.md"
+    page = tmp_path / "online_measured.md"
     page.write_text(events.PAGE.read_text(encoding="utf-8"), encoding="utf-8")
     events.show(json.loads((RESULTS / "events.json").read_text()), page)
     assert page.read_text(encoding="utf-8") == events.PAGE.read_text(encoding="utf-8")
