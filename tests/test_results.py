@@ -290,8 +290,58 @@ def test_the_readme_s_changes_are_those_of_the_committed_benchmark():
     assert f"No event in {hours:.1f} hours was false" in words
     assert f"of {number} simulated changes of 0.2 kg and more on moving arms" in words
     assert "one was noticed late and one was missed" in words
-    assert f"Of the {number} changes of simulated moving arms" in (ROOT / "docs" / "online_measured.md").read_text("utf-8")
+    assert f"Of the {number} changes of simulated moving arms" in (ROOT / "docs" / "online_measured.md").read_text(
+        "utf-8"
+    )
     assert f"the median delay of a step is {parts['steps']['delay_s']['50 %']:.2f} s." in words
+
+
+def test_the_short_table_of_streams_is_that_of_the_committed_benchmark():
+    parts = json.loads((RESULTS / "events.json").read_text())["parts"]
+    page = " ".join((ROOT / "docs" / "online.md").read_text(encoding="utf-8").split())
+    plain = [part for name, part in parts.items() if name.startswith(("steps", "ramps", "standing", "swaps"))]
+    number, missed = sum(part["changes"] for part in plain), sum(part["missed"]["count"] for part in plain)
+    delay = [f"{parts[name]['delay_s']['50 %']:.{digits}f} s" for name, digits in (("steps", 2), ("ramps_5", 1))]
+    assert f"| {number - missed} of {number} | {delay[0]} at once, {delay[1]} within 5 s |" in page
+    for name, row in (("light", "30 to 200 g"), ("early", "anything within the first 2 s of a stream")):
+        changes, missed, late = parts[name]["changes"], parts[name]["missed"]["count"], parts[name]["late"]
+        seen = f"{changes - missed} of {changes}, after 5 s {changes - missed + late}"
+        assert f"| {row} | {seen} | {parts[name]['delay_s']['50 %']:.2f} s |" in page
+    called = parts["pushes"]["pushes"]["called_a_change"]
+    assert f"Of pushes by a hand {100 * called['count'] / called['of']:.1f} % are called a change" in page
+    real = parts["real_motor"]
+    assert f"{real['changes'] - real['missed']['count']} of {real['changes']} are noticed in time" in page
+
+
+def test_the_short_summaries_of_the_hybrid_are_those_of_the_committed_tables():
+    page = " ".join((ROOT / "docs" / "hybrid.md").read_text(encoding="utf-8").split())
+
+    def cases(name):
+        return json.loads((RESULTS / f"{name}.json").read_text())["cases"]
+
+    tares = cases("tare_drift")
+    assert [tares[name]["doubted"] for name in ("old", "other arm")] == [1.0, 1.0]
+    assert tares["a day"]["doubted"] == pytest.approx(3 / 4, abs=0.05)
+    assert tares["a third"]["doubted"] == pytest.approx(2 / 5, abs=0.05)
+    changed = cases("changed_logs")
+    sound = [case for name, case in changed.items() if name.startswith("sound")]
+    assert f"no sound log of {sum(case['logs'] for case in sound)} is called changed" in page
+    assert {case["found"] for case in sound} == {0.0}
+    plain = [case for name, case in changed.items() if name.startswith(("0.2 kg", "0.5 kg", "1.5 kg"))]
+    assert {case["found"] for case in plain} == {1.0}
+    assert max(case["off [s]"] for case in plain) < 0.015
+    wrong = cases("wrong_logs_panda")
+    healthy = [case for name, case in wrong.items() if name.startswith("nothing")]
+    others = {name: case for name, case in wrong.items() if not name.startswith("nothing")}
+    least = min(
+        min(case["covered or said"])
+        for name, case in others.items()
+        if "gain" not in name or name.endswith("known weight")
+    )
+    approximate = sum(round(case["logs"] * (1.0 - case["calibrated"])) for case in healthy)
+    assert f"of a Panda's wrong logs {100 * least:.0f} to 100 % are covered or said" in page
+    words = {2: "two"}
+    assert f"Of {sum(case['logs'] for case in healthy)} sound logs {words[approximate]} are called approximate" in page
 
 
 def test_hours_of_a_cell_s_work_are_those_of_the_committed_measurement():
