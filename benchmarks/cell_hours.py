@@ -12,8 +12,8 @@ standing   the arm stands from 2 s before to 2 s after, as at a gripper; each ta
 What is handed over is added to the sensors' torque, as in the scenes of `events.py` that take time; what counts as
 noticed, late, false and inside is said there. Streams are cells in out/cell-hours, and are not measured again while
 `armload.online`, `armload.posterior`, `armload.regression` and the scenes stay as they are. Constants were set on other
-seeds. Printed, and written to benchmarks/results/cell_hours.json and a table of docs/online_measured.md; printed only with
-another seed than 70000.
+seeds. Printed, and written to benchmarks/results/cell_hours.json and a table of docs/online_measured.md; printed only
+with another seed than 70000.
 """
 
 from __future__ import annotations

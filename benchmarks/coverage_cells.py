@@ -16,8 +16,8 @@ determined  share of the inertias that are
 inside      share of the true values inside their intervals: mass · first moments · inertia
 width       mean half-width over mean error, the same three
 
-Written to benchmarks/results/coverage_cells.json and a table of docs/hybrid_measured.md, after every kind of log; four minutes
-of one core.
+Written to benchmarks/results/coverage_cells.json and a table of docs/hybrid_measured.md, after every kind of log; four
+minutes of one core.
 """
 
 from __future__ import annotations

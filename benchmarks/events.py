@@ -36,8 +36,8 @@ probability was right; event_truth.py says what was true.
 Scenes are cells in out/events: a scene measured once is not measured again while `armload.online`, `armload.posterior`,
 `armload.regression`, the streams and what is true of them stay as they are. They are measured one of each part in turn;
 --minutes: begin none after so many minutes, and tell of those that are there. Written to benchmarks/results/events.json
-and from there to docs/online_measured.md; printed only: --quick, two of each part; some --parts; another --seed to begin with
-than 90000. Constants were set on others.
+and from there to docs/online_measured.md; printed only: --quick, two of each part; some --parts; another --seed to
+begin with than 90000. Constants were set on others.
 """
 
 from __future__ import annotations

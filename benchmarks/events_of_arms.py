@@ -9,8 +9,8 @@ the arm is rated for. Each arm has as many streams of each as are asked for, wit
 
 What counts as noticed, late, false and inside is said in events.py. calibrated, and out: the share of all moments
 whose answer is called calibrated and leaves the mass out. Printed, and written to
-benchmarks/results/events_of_arms.json and a table of docs/online_measured.md; printed only with another seed than 60000 or some
-arms.
+benchmarks/results/events_of_arms.json and a table of docs/online_measured.md; printed only with another seed than 60000
+or some arms.
 """
 
 from __future__ import annotations

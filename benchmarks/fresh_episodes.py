@@ -8,8 +8,8 @@ seed. Errors: beside those of its own physics with the weak prior (`map-gp`), of
 one Gaussian, and of the mean of all payloads; for all episodes, for each kind of world, for a known family of payloads
 and by weight; the differences are paired, ± their standard error, an episode being one observation.
 
-Writes benchmarks/results/fresh_episodes_ROBOT.json and, of the Panda, a table of docs/hybrid_measured.md. About a second of one
-core for each episode; goes on from --work.
+Writes benchmarks/results/fresh_episodes_ROBOT.json and, of the Panda, a table of docs/hybrid_measured.md. About a
+second of one core for each episode; goes on from --work.
 """
 
 from __future__ import annotations

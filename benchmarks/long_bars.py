@@ -14,7 +14,8 @@ width       mean half-width over mean error of those, after 1 and 6 s
 log alone   inside and width of the same under the weak prior of `map-gp`, the log trusted as the hybrid trusts it
 rest        share of those inside of masses · first moments, after 6 s
 
-Writes benchmarks/results/long_bars.json and a table of docs/hybrid_measured.md. Goes on from --work; three minutes of one core.
+Writes benchmarks/results/long_bars.json and a table of docs/hybrid_measured.md. Goes on from --work; three minutes of
+one core.
 """
 
 from __future__ import annotations

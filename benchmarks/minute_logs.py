@@ -5,10 +5,10 @@
 The shipped models' widths were calibrated up to 6 s after a run began. Here runs last 60 s: each log is another arm,
 payload and motion (a Fourier motion that repeats, a slow one that does not, stops at ever new poses, pick and place),
 at 200 Hz, without a tare and with one of 20 s on another motion, answered by the hybrid at several times of one run.
-Goes on from out/minute_logs. Written to benchmarks/results/minute_logs.json and a table of docs/hybrid_measured.md: share of the
-95 % intervals that hold the truth, ± the standard error if a log's ten count as one answer, and mean half-width over
-mean error of mass · first moments · inertia. In the results stand the errors, too, and d ln(error) / d ln(t) from 6 to
-60 s: −0.5 where errors average out, 0 where more of the log tells no more. Five minutes of one core.
+Goes on from out/minute_logs. Written to benchmarks/results/minute_logs.json and a table of docs/hybrid_measured.md:
+share of the 95 % intervals that hold the truth, ± the standard error if a log's ten count as one answer, and mean
+half-width over mean error of mass · first moments · inertia. In the results stand the errors, too, and d ln(error) / d
+ln(t) from 6 to 60 s: −0.5 where errors average out, 0 where more of the log tells no more. Five minutes of one core.
 """
 
 from __future__ import annotations

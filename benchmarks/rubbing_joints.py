@@ -17,8 +17,8 @@ calibrated         share of the answers
 inside             share of the true values inside their intervals: mass · first moments · inertia
 covered or said    share that lie inside, or whose answer is not called calibrated
 
-Written to benchmarks/results/rubbing_joints.json and a table of docs/hybrid_measured.md, after every case; a quarter of an hour
-of one core.
+Written to benchmarks/results/rubbing_joints.json and a table of docs/hybrid_measured.md, after every case; a quarter of
+an hour of one core.
 """
 
 from __future__ import annotations

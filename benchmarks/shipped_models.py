@@ -34,7 +34,8 @@ def row(name: str) -> list[str]:
 
 def main() -> None:
     columns = ["arm", "measures", "episodes", "intervals that held", "by parameter and time", "half-width over error"]
-    write_table(ROOT / "docs" / "hybrid_measured.md", "shipped models", markdown_table(columns, "llrrrr", [*map(row, SHIPPED)]))
+    table = markdown_table(columns, "llrrrr", [*map(row, SHIPPED)])
+    write_table(ROOT / "docs" / "hybrid_measured.md", "shipped models", table)
 
 
 if __name__ == "__main__":

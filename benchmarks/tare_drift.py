@@ -16,8 +16,8 @@ Each log is answered by the hybrid (or `map-gp`, where none is shipped) with and
 `armload.posterior.drift` and `armload.posterior.another_arm`; arms that measure motor current are not asked. doubted:
 share that are told to have changed. another: share that are told to be of another arm, or of a repaired one. said or
 inside: share whose mass lies in its interval, or that are doubted. Cases that are named replace their own among the
-results. Printed, and written to benchmarks/results/tare_drift.json and a table of docs/hybrid_measured.md; six minutes of one
-core.
+results. Printed, and written to benchmarks/results/tare_drift.json and a table of docs/hybrid_measured.md; six minutes
+of one core.
 """
 
 from __future__ import annotations

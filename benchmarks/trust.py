@@ -14,8 +14,8 @@ error       mean absolute error of mass [g] · first moments [g·m] · inertia [
 more        paired difference of the errors, summed less by traits, ± its standard error
 inside      share of the true values inside the 95 % intervals [%]; width: mean half-width over mean error
 
-Written to benchmarks/results/trust.json and a table of docs/hybrid_measured.md. A second of one core for each episode; --work
-keeps what was measured.
+Written to benchmarks/results/trust.json and a table of docs/hybrid_measured.md. A second of one core for each episode;
+--work keeps what was measured.
 """
 
 from __future__ import annotations

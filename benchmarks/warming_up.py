@@ -12,8 +12,8 @@ warms up    loses 30 % of its friction, and each sensor's offset moves by what i
 Each stream is answered with what a run knew cut back to `REMEMBERED` when it is taken up again, and without (all that
 was ever seen of the empty arm counts). What counts as noticed, late, false and inside is said in events.py; calibrated,
 and out: the share of all moments whose answer is called calibrated and leaves the mass out. Constants were set on seeds
-1 to 3. Printed, and written to benchmarks/results/warming_up.json and a table of docs/online_measured.md; printed only with
-another seed than 80000.
+1 to 3. Printed, and written to benchmarks/results/warming_up.json and a table of docs/online_measured.md; printed only
+with another seed than 80000.
 """
 
 from __future__ import annotations

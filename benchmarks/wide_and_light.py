@@ -13,8 +13,8 @@ error      mean error after over before: mass · first moments · inertia of the
 needed     share of c within which 95 % of the inertias lie where up to so much of the rated mass is found: of all, of
            wide bodies (as it is, before c is narrowed)
 
-Writes benchmarks/results/wide_and_light.json and a table of docs/hybrid_measured.md. Goes on from --work; ten minutes of one
-core.
+Writes benchmarks/results/wide_and_light.json and a table of docs/hybrid_measured.md. Goes on from --work; ten minutes
+of one core.
 """
 
 from __future__ import annotations

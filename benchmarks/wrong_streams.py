@@ -12,7 +12,8 @@ and out          share in which it is, and the mass lies outside its interval
 covered or said  share of the moments in which the mass lies inside, or the answer is not called calibrated
 at the end       the same of the last answer (`conclude`): mass · first moments · inertia
 
-Written to benchmarks/results/wrong_streams_<robot>.json and a table of docs/online_measured.md; ten minutes of one core.
+Written to benchmarks/results/wrong_streams_<robot>.json and a table of docs/online_measured.md; ten minutes of one
+core.
 """
 
 from __future__ import annotations

@@ -128,6 +128,16 @@ def test_what_never_comes_is_an_error_and_what_lacks_once_is_missing(panda, what
     assert missing == {name: name == what for name in whole}
 
 
+def test_velocities_may_lack_where_nobody_needs_them_but_not_in_part(panda):
+    q, names = np.zeros(7), panda.joint_names
+    states = JointStates(panda, "/joint_states", needs_velocities=False)
+    sample = states.sample(joint_state(names, q, [], q, SECOND), 0)
+    assert not states.has_velocities
+    assert np.isnan(sample.dq).all()
+    with pytest.raises(SourceError, match="3 values of velocity for its 7 joints"):
+        JointStates(panda, "/t", needs_velocities=False).sample(joint_state(names, q, q[:3], q, SECOND), 0)
+
+
 def test_time_is_the_stamps_to_the_nanosecond_and_else_the_time_of_receipt(panda):
     def times(stamps, received):
         states, rows = JointStates(panda, "/t"), [np.zeros(7)] * 3
@@ -333,10 +343,11 @@ def write_log(path, log, names):
 
 
 ARMLOAD = ("-m", "armload", "ros2")
+PUBLISHES = ROOT / "tests" / "devices" / "ros" / "publish_recording.py"
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("effort", ["torque", "without gravity", "currents"])
+@pytest.mark.parametrize("effort", ["torque", "without gravity", "currents", "torque, no velocities"])
 def test_joint_states_in_and_inertia_out_between_processes(ros, wait_until, panda, tmp_path, effort):
     """A driver's messages in, read back by plain rclpy: numbers as Pinocchio has them, the frame and the stamp."""
     truth = example_payload().parameters
@@ -352,7 +363,7 @@ def test_joint_states_in_and_inertia_out_between_processes(ros, wait_until, pand
     with (
         ros(ROOT / "tests" / "devices" / "ros" / "listen.py", "inertia", "/arm/load") as listener,
         ros(*node) as identifier,
-        ros(ROOT / "tests" / "devices" / "ros" / "publish_recording.py", file, "/arm/states", start) as driver,
+        ros(PUBLISHES, file, "/arm/states", start, *["velocity"] * ("no velocities" in effort)) as driver,
     ):
         wait_until(lambda: driver.poll() is not None, 60, driver, identifier)
         wait_until(listener.printed_lines, 5, identifier, listener)
@@ -360,6 +371,7 @@ def test_joint_states_in_and_inertia_out_between_processes(ros, wait_until, pand
         messages = [json.loads(line) for line in listener.printed_lines()]
         assert identifier.poll() is None, identifier.noted()
     assert identifier.returncode == 130  # interrupted, not broken
+    assert ("/arm/states has no velocities" in identifier.noted()) == ("no velocities" in effort)
     assert {message["frame"] for message in messages} == {"panda_link8"}
     stamps = {start + round(t * 1e9) for t in log.t.tolist()}
     assert {message["stamp"] for message in messages} <= stamps
@@ -447,14 +459,13 @@ def test_the_simulated_robot_follows_a_trajectory_and_carries_its_payload(ros, w
 def test_a_topic_that_cannot_serve_ends_in_one_sentence(ros, wait_until, panda, tmp_path):
     log = simulate(panda, taie2024(), rate=50.0)
     file = write_log(tmp_path / "log.npz", log, panda.joint_names)
-    driver = ROOT / "tests" / "devices" / "ros" / "publish_recording.py"
     cases = {
         "/silent": "no joint states on /silent for 3 s",
         "/fingers": "had only the joints finger_left, finger_right for 3 s, without panda_joint1",
         "/weak": "/weak has no effort for its 9 joints",
         "not a topic": "cannot be a ROS 2 topic here",
     }
-    with ros(driver, file, "/fingers", SECOND, "arm"), ros(driver, file, "/weak", SECOND, "effort"):
+    with ros(PUBLISHES, file, "/fingers", SECOND, "arm"), ros(PUBLISHES, file, "/weak", SECOND, "effort"):
         for topic, sentence in cases.items():
             with ros(*ARMLOAD, "node", "--robot", "panda", "--topic", topic, "--timeout", "3") as node:
                 wait_until(lambda node=node: node.poll() is not None, 30, node)

@@ -22,7 +22,7 @@ from tests.recording.test_recording_bags import write_bag
 
 from armload.errors import RecordingError, UsageError
 from armload.inertia import InertialParameters
-from armload.motion import taie2024
+from armload.motion import random_motion, taie2024
 from armload.payloads import test_payload as example_payload
 from armload.recording import Sample
 from armload.service.tare import Tare
@@ -77,6 +77,25 @@ def test_the_lifecycle_node_has_states_services_remapping_and_a_namespace(ros, w
     assert any("taring" in line.get("diagnostics", "") for line in after)
     *_, tared = (line["estimate"] for line in after if "estimate" in line)
     assert (tared["relative_to"], tared["held"]) == ("tare", False)  # what was mounted at the tare is the arm's
+
+
+@pytest.mark.full
+@pytest.mark.usefixtures("messages")
+def test_the_lifecycle_node_tells_velocities_by_the_positions_where_there_are_none(ros, wait_until, panda, tmp_path):
+    held = example_payload().parameters
+    log = simulate(panda, random_motion(panda, 3, duration=40.0), held, rate=200.0)
+    file = tmp_path / "log.npz"
+    np.savez(file, t=log.t, q=log.q, dq=log.dq, tau=log.tau, names=list(panda.joint_names))
+    with (
+        ros(PROGRAMS / "publish_recording.py", file, "/joint_states", START, "velocity"),
+        ros(*NODE, "--ros-args", "-r", "joint_states:=/joint_states", "-p", "robot:=panda") as node,
+        ros(PROGRAMS / "drive_lifecycle.py", "/payload_identifier", 8) as driver,
+    ):
+        wait_until(lambda: driver.poll() is not None, 120, driver, node)
+        said = [json.loads(line) for line in driver.printed_lines()]
+        assert "joint_states has no velocities" in node.noted()
+    *_, estimate = (line["estimate"] for line in said[: said.index({"reset": True})] if "estimate" in line)
+    assert estimate["low"] < held.mass < estimate["high"] < held.mass + 0.2
 
 
 @pytest.mark.full

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from armload import Recording
-from armload.recording import Sample, Steadying, steadied
+from armload.recording import Sample, Steadying, steadied, with_velocities_of_positions
 from armload.recording.steadied import AROUND
 
 NOISE = 2e-3  # [rad/s]
@@ -41,6 +41,17 @@ def test_a_stream_has_the_velocities_of_its_log(rate):
     assert np.sqrt(np.mean((dq - whole)[later] ** 2)) < 0.05 * NOISE
     assert np.sqrt(np.mean((dq - truth) ** 2)) < 1.1 * np.sqrt(np.mean((whole - truth) ** 2))
     assert all(np.array_equal(s.q, log.q[k]) and np.array_equal(s.tau, log.tau[k]) for _, k, s in out)
+
+
+@pytest.mark.parametrize("rate", [50.0, 200.0, 1000.0])
+def test_a_stream_without_velocities_has_those_of_the_positions_of_its_log(rate):
+    log, truth = swinging(rate, 2.0)
+    told = with_velocities_of_positions(log).dq
+    steadying = Steadying(2, alone=True)
+    samples = [sample._replace(dq=np.full(2, np.nan)) for sample in log]
+    out = [s for sample in samples for s, _ in steadying.take(sample)] + [s for s, _ in steadying.flush()]
+    np.testing.assert_allclose([s.dq for s in out], told, atol=1e-9)
+    assert np.sqrt(np.mean((told - truth) ** 2)) < NOISE
 
 
 def test_a_sample_waits_until_what_tells_its_velocity_has_come_and_no_longer():

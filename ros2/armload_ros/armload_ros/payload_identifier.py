@@ -29,12 +29,12 @@ from std_srvs.srv import Trigger
 
 from armload.arms import Arm
 from armload.devices.ros2 import announced, parameters_of
-from armload.devices.ros2.joint_states import JointStates
+from armload.devices.ros2.joint_states import JointStates, velocities_of_positions
 from armload.errors import ArmloadError
 from armload.identification import check_usable, plausible_known, plausible_tool
 from armload.online import OnlineEstimate
 from armload.posterior import Known
-from armload.recording import GAP
+from armload.recording import GAP, Sample, Steadying
 from armload.service.tare import Tare
 
 from .applying import Applying, applying_of
@@ -61,6 +61,7 @@ class PayloadIdentifier(LifecycleNode):
         self.steady = Clock(clock_type=ClockType.STEADY_TIME)  # runs on while simulated time stands
         self.beside = ReentrantCallbackGroup()  # of what waits for the rest of the node
         self._stream: Stream | None = None
+        self._telling: Steadying | None = None  # velocities, where the joint states have none
         self._applying: Applying | None = None
         self._measuring: Measuring | None = None
         self._outputs: Outputs | None = None
@@ -145,7 +146,8 @@ class PayloadIdentifier(LifecycleNode):
         given, bare = self.parameters, self.parameters.bare_arm()
         self._bare, tool = bare, given.tool(bare)
         robot = bare if tool is None else bare.with_payload(tool)
-        self._states = JointStates(robot, "joint_states", given.effort(robot))
+        self._states = JointStates(robot, "joint_states", given.effort(robot), needs_velocities=False)
+        self._telling = None
         log = given.tare(robot)
         age, aged = given.tare_age(log)
         for note in aged:
@@ -175,11 +177,23 @@ class PayloadIdentifier(LifecycleNode):
         if sample is None:
             return
         self._heard, self._trouble = time.monotonic(), ""
+        if self._states.has_velocities:
+            self._take_sample(sample)
+            return
+        if self._telling is None:
+            self._telling = Steadying(len(sample.q), alone=True)
+            self.get_logger().warning(velocities_of_positions("joint_states"))
+        for told, arrived in self._telling.take(sample, self._heard):
+            self._take_sample(told, arrived)
+
+    def _take_sample(self, sample: Sample, arrived: float | None = None) -> None:
+        """A sample with velocities; arrived: when it had, if it was held back since [s, monotonic]."""
+        assert self._stream is not None
         if self._taring is not None:
             if self._taring.take(sample) >= self.parameters.value("tare_duration"):
                 self._end_tare()
             return
-        estimate = self._stream.update(sample)
+        estimate = self._stream.update(sample, arrived)
         if estimate is None:
             return
         if (advice := self._stream.advice()) is not None:
@@ -204,6 +218,8 @@ class PayloadIdentifier(LifecycleNode):
         if self._outputs is None or stream is None:
             return
         if time.monotonic() - self._heard > GAP:
+            for told, arrived in () if self._telling is None else self._telling.flush():
+                self._take_sample(told, arrived)
             stream.flush()
         why = None if stream.estimate is None else stream.why_unknown()
         status = status_of(self._in_the_way(), stream.estimate, why)

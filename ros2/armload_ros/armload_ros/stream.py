@@ -57,8 +57,11 @@ class Stream:
         """What speaks against the answer."""
         return self._identifier.doubts
 
-    def update(self, sample: Sample) -> OnlineEstimate | None:
-        """The answer after one more sample; None where the first ones are held back."""
+    def update(self, sample: Sample, arrived: float | None = None) -> OnlineEstimate | None:
+        """The answer after one more sample; None where the first ones are held back.
+
+        arrived: when it had come, if it was held back since [s, monotonic].
+        """
         now, link = time.monotonic(), self._link
         if link.heard is not None and now - link.heard > STALLED:  # since then the payload may have been exchanged
             link = link._replace(connections=link.connections + 1, resumed=now)
@@ -67,6 +70,8 @@ class Stream:
             self._take_late(self._steadying.take(sample, (sample, time.monotonic())))
         else:
             self._take(sample, sample)
+        if arrived is not None and self.estimate is not None:
+            self.estimate = self.estimate.behind(now - arrived)
         return self.estimate
 
     def flush(self) -> None:

@@ -83,7 +83,8 @@ class _Reader:
                 if record is not None:
                     recorder = stack.enter_context(Recorder(record, source.n, arm.joint_names))
                 threading.Thread(target=self.listen, args=(source, lines), daemon=True).start()
-                self.report(event="ready", name=source.name, n=source.n, rate=source.rate, speed=source.speed)
+                about = {"name": source.name, "n": source.n, "rate": source.rate, "speed": source.speed}
+                self.report(event="ready", **about, notes=source.notes)
                 self.pass_on(source, recorder)
             self.report(event="ended")
         except ModuleNotFoundError as error:

@@ -145,6 +145,7 @@ class Recorded(Source):
         self.recorder = Recorder(path, source.n, joint_names)
         self.source = source
         self.name, self.n, self.rate, self.speed = source.name, source.n, source.rate, source.speed
+        self.notes = source.notes
 
     def __iter__(self) -> Iterator[Sample]:
         for sample in self.source:

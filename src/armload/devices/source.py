@@ -28,12 +28,14 @@ class Source(ABC):
         n: joints.
         rate: nominal samples per second [Hz].
         speed: seconds of samples that come in a second: 1 but for what is replayed slower or faster.
+        notes: what is made of what comes, a sentence each.
     """
 
     name: str
     n: int
     rate: float
     speed: float = 1.0
+    notes: tuple[str, ...] = ()
 
     @abstractmethod
     def __iter__(self) -> Iterator[Sample]:

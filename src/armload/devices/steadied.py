@@ -30,7 +30,7 @@ class Steadied(Source):
 
     @property
     def name(self) -> str:  # type: ignore[override]
-        """The source's, as are the next three: of one that is opened again they change."""
+        """The source's, as are the next four: of one that is opened again they change."""
         return self.source.name
 
     @property
@@ -47,6 +47,11 @@ class Steadied(Source):
     def speed(self) -> float:  # type: ignore[override]
         """Seconds of samples that come in a second."""
         return self.source.speed
+
+    @property
+    def notes(self) -> tuple[str, ...]:  # type: ignore[override]
+        """What is made of what comes."""
+        return self.source.notes
 
     @property
     def lost(self) -> int:

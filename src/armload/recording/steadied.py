@@ -29,8 +29,8 @@ from armload.recording.spooled import blocks, parts_of
 # (test_velocities_told_by_both_channels_have_a_third_of_the_noise_and_all_of_the_motion). With 0.05 s half is, and one
 # in six sound logs of a Gen3 stays doubted
 AROUND = 0.075
-# samples to either side at least, of a log without velocities: five points tell a cubic and its error
-_STEPS = 2.1
+# samples to either side at least, where there are no velocities: five points tell a cubic and its error
+STEPS = 2.1
 _POWER = np.add.outer(np.arange(4), np.arange(4))  # of s in the normal equations' matrix
 _FACTORIAL = np.array([1.0, 1.0, 2.0, 6.0])
 _OF_BOTH = np.outer(_FACTORIAL, _FACTORIAL)
@@ -47,8 +47,8 @@ def steadied(recording: Recording) -> Recording:
 def with_velocities_of_positions(recording: Recording) -> Recording:
     """The same log with the velocities that its positions tell; none is told across a gap, a lone sample has 0."""
     still = replace(recording, dq=np.zeros_like(recording.q))
-    precision = np.ones(recording.n), np.full(recording.n, _HELD)
-    around = max(AROUND, _STEPS / recording.rate)
+    precision = positions_alone(recording.n)
+    around = max(AROUND, STEPS / recording.rate)
     note = (
         f"{recording.source}: velocities are told by the positions within {around:.2g} s of each moment, and by the "
         "times, which must be those of the samples"
@@ -86,6 +86,11 @@ def precision_of(q_std: NDArray[np.float64], dq_std: NDArray[np.float64]) -> tup
     """One over the variance (n,) of the noise in q and in dq·`AROUND` [1/rad²]."""
     of_q, of_dq = np.maximum([q_std, AROUND * dq_std], _QUIET) ** -2.0
     return of_q, of_dq
+
+
+def positions_alone(n: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The same where nothing but the positions tells."""
+    return np.ones(n), np.full(n, _HELD)
 
 
 def told(

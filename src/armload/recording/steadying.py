@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.recording.recording import GAP, Sample
-from armload.recording.steadied import AROUND, precision_of, told
+from armload.recording.steadied import AROUND, positions_alone, precision_of, told
 from armload.recording.turns import TURN
 
 _ROWS = 1024  # of the arrays that the last samples are in, at first; they grow where more come within `AROUND`
@@ -37,10 +37,11 @@ class Steadying:
 
     Args:
         n: joints.
+        alone: the positions tell all: what a sample has for dq counts for nothing.
     """
 
-    def __init__(self, n: int) -> None:
-        self._n = n
+    def __init__(self, n: int, alone: bool = False) -> None:
+        self._n, self._alone = n, alone
         self._t, self._both = np.empty(_ROWS), np.empty((_ROWS, 2 * n))  # times, and q and dq·AROUND beside each other
         self._power, self._count = np.zeros(2 * n), 0.0  # mean square of third differences, and of how many
         self._begin()
@@ -84,7 +85,8 @@ class Steadying:
         """Time of a sample, and its q and dq·AROUND, as far as they can be used."""
         try:
             t = float(sample.t)
-            both = np.concatenate([np.asarray(sample.q, float), AROUND * np.asarray(sample.dq, float)])
+            q = np.asarray(sample.q, float)
+            both = np.concatenate([q, np.zeros_like(q) if self._alone else AROUND * np.asarray(sample.dq, float)])
         except (TypeError, ValueError):
             return _finite(sample.t), None
         good = both.shape == (2 * self._n,) and np.isfinite(both.sum())
@@ -115,7 +117,7 @@ class Steadying:
         powers = ((self._t[near] - t) / AROUND) ** np.arange(7)[:, None]
         sums = powers[:4] @ self._both[near]
         std = np.sqrt(self._power / 20.0)
-        precision = precision_of(std[: self._n], std[self._n :] / AROUND)
+        precision = positions_alone(self._n) if self._alone else precision_of(std[: self._n], std[self._n :] / AROUND)
         dq = told(powers.sum(axis=1)[:, None], sums[:, None, : self._n], sums[:3, None, self._n :], precision)[0]
         return sample._replace(dq=dq), tag
 

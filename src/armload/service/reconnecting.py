@@ -159,7 +159,7 @@ class Reconnecting(Source):
     def _take(self, source: Detached) -> None:
         self._source, self.connections = source, self.connections + 1
         self.name, self.n, self.rate, self.speed = source.name, source.n, source.rate, source.speed
-        self.resumed = None
+        self.notes, self.resumed = source.notes, None
 
     def _noted(self, sample: Sample) -> None:
         assert self._source is not None

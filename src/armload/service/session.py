@@ -92,6 +92,7 @@ class Session:
         self._orders: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._recent = Recent(arm.n)
         self._plausibility = Plausibility(arm, source.name, isinstance(source, Steadied))
+        self._said: tuple[str, ...] = ()  # what the source notes, and has been said
         self._thread: threading.Thread | None = None
         self._stop = False
 
@@ -174,6 +175,10 @@ class Session:
             self._recorder.close()
 
     def _take(self, sample: Sample) -> OnlineEstimate:
+        if self.source.notes != self._said:
+            self._said = self.source.notes
+            for note in self._said:
+                self._warn(note)
         came = self.source.as_it_came(sample)
         if self._recorder is not None:
             self._recorder.append(came)

@@ -3,7 +3,7 @@ on the same topic. Plain rclpy; run by test_ros2.py.
 
     publish_recording.py LOG.npz TOPIC START_NS [WITHOUT]
 
-LOG.npz: t, q, dq, tau and names. WITHOUT: "effort" or "arm", what the messages lack.
+LOG.npz: t, q, dq, tau and names. WITHOUT: "effort", "velocity" or "arm", what the messages lack.
 """
 
 import sys
@@ -38,6 +38,7 @@ for k, t in enumerate(log["t"].tolist()):
     if without != "arm":
         message.name, message.position, message.velocity = names, q[k].tolist(), dq[k].tolist()
         message.effort = [] if without == "effort" else tau[k].tolist()
+        message.velocity = [] if without == "velocity" else message.velocity
         publisher.publish(message)
 time.sleep(1.0)
 node.destroy_node()

@@ -146,6 +146,8 @@ def _node(options: argparse.Namespace) -> None:
         named = {"timeout": options.timeout, "node": "armload_payload", "effort": effort}
         with Ros2Source(address.host, arm, **named) as source:
             print_note(f"{address.host}: {arm.n} joints of {arm.name} at {source.rate:.0f} Hz")
+            for note in source.notes:
+                print_note(note)
             node = PayloadNode(source, lambda sample: identifier.update(*sample), options.publish, rate=options.rate)
             node.run(tell)
     finally:

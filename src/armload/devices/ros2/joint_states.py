@@ -18,6 +18,7 @@ from armload.arms import Arm, names_among
 from armload.devices.ros2.effort import Effort
 from armload.errors import SourceError
 from armload.recording import Sample
+from armload.recording.steadied import AROUND
 
 _MOST_LAYOUTS = 64  # lists of names remembered; a publisher that invents names cannot fill the memory
 
@@ -29,13 +30,16 @@ class JointStates:
         arm: whose joints, and in which order.
         topic: what errors call the source.
         effort: what the publisher calls effort; None: joint torque, gravity in it.
+        needs_velocities: whether a topic without them is refused.
 
     Attributes:
         others: names of joints seen in messages that did not have all of the arm's.
+        has_velocities: whether the first sample had any.
     """
 
-    def __init__(self, arm: Arm, topic: str, effort: Effort | None = None) -> None:
+    def __init__(self, arm: Arm, topic: str, effort: Effort | None = None, needs_velocities: bool = True) -> None:
         self.others: set[str] = set()
+        self.has_velocities, self._needs_velocities = True, needs_velocities
         self._arm, self._topic, self._effort = arm, topic, effort
         self._called: tuple[str, ...] | None = None  # what the topic calls the arm's joints
         self._layouts: dict[tuple[str, ...], list[int] | None] = {}
@@ -51,7 +55,8 @@ class JointStates:
             received: when it was received, since 1970 [ns].
 
         Raises:
-            SourceError: the very first sample lacks positions, velocities or efforts: the rest will, too.
+            SourceError: the very first sample lacks positions, efforts or velocities that must be there: the rest
+                will, too.
         """
         names = tuple(message.name)
         if names not in self._layouts:
@@ -93,15 +98,22 @@ class JointStates:
         return (nanoseconds - self._zero) / 1e9 if nanoseconds else float("nan")
 
     def _check(self, message: Any, n: int) -> None:
+        self.has_velocities = self._needs_velocities or len(message.velocity) > 0
         for what, values in (
             ("position", message.position),
             ("velocity", message.velocity),
             ("effort", message.effort),
         ):
-            if len(values) != n:
+            if len(values) != n and (what != "velocity" or self.has_velocities):
                 found = f"no {what}" if len(values) == 0 else f"{len(values)} values of {what}"
                 also = " (joint torque); name a topic that carries the torque" if what == "effort" else ""
                 raise SourceError(f"{self._topic} has {found} for its {n} joints: expected one per joint{also}")
+
+
+def velocities_of_positions(topic: str) -> str:
+    """What is said of a topic without velocities."""
+    late = f"{1e3 * AROUND:.0f} ms"
+    return f"{topic} has no velocities: they are those of its positions, and each sample is answered {late} later"
 
 
 def _in_order(values: Sequence[float], n: int, order: list[int]) -> NDArray[np.float64]:

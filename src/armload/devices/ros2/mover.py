@@ -51,7 +51,7 @@ class Ros2Mover(StreamedMover):
 
     def __init__(self, topic: str, arm: Arm, controller: str = CONTROLLER, effort: Effort | None = None) -> None:
         super().__init__(arm)
-        self._source = Ros2Source(topic, arm, effort=effort)
+        self._source = Ros2Source(topic, arm, effort=effort, needs_velocities=True)
         self.name, self.rate = topic, self._source.rate
         self._connection = self._source.connection
         try:

@@ -12,10 +12,11 @@ import numpy as np
 from armload.arms import Arm
 from armload.devices.ros2.connection import SENSOR_DEPTH, Ros2Connection
 from armload.devices.ros2.effort import Effort
-from armload.devices.ros2.joint_states import JointStates
+from armload.devices.ros2.joint_states import JointStates, velocities_of_positions
 from armload.devices.source import Source
 from armload.errors import SourceError
-from armload.recording import Sample
+from armload.recording import GAP, Sample, Steadying
+from armload.recording.steadied import AROUND, STEPS
 
 _LOOK = 0.1  # [s] at most between two looks at whether the source was closed or interrupted
 _TO_TELL_THE_RATE = 5  # samples
@@ -25,7 +26,9 @@ class Ros2Source(Source):
     """The joint states of an arm on a ROS 2 topic.
 
     The subscription is best effort, so that it hears reliable publishers too, and keeps the last 1000 messages while
-    an identifier is busy. Joints are mapped by name; see `JointStates` for times and for what is missing.
+    an identifier is busy. Joints are mapped by name; see `JointStates` for times and for what is missing. Where the
+    topic has no velocities they are those of its positions (`Steadying`): each sample then comes 75 ms later, and
+    `notes` say so.
 
     Args:
         topic: of sensor_msgs/JointState messages, such as /joint_states.
@@ -34,12 +37,14 @@ class Ros2Source(Source):
         timeout: longest time without a sample [s]; None: wait for ever.
         node: name of the ROS 2 node.
         effort: what the publisher calls effort; None: joint torque, gravity in it.
+        needs_velocities: whether a topic without them is refused: who moves the arm cannot wait for the positions'.
 
     Attributes:
         connection: the node, for whoever has something to publish.
 
     Raises:
-        SourceError: no ROS 2, no such topic name, nothing to hear in time, joints or efforts missing.
+        SourceError: no ROS 2, no such topic name, nothing to hear in time, joints or efforts missing; no velocities,
+            and fewer than 28 samples a second.
     """
 
     def __init__(
@@ -51,17 +56,22 @@ class Ros2Source(Source):
         timeout: float | None = 10.0,
         node: str = "armload",
         effort: Effort | None = None,
+        needs_velocities: bool = False,
     ) -> None:
         self.name, self.n = topic, arm.n
         self._arm, self._timeout, self._closed = arm, timeout, False
-        self._states = JointStates(arm, topic, effort)
+        self._states = JointStates(arm, topic, effort, needs_velocities)
         self._received: deque[tuple[Any, int]] = deque(maxlen=SENSOR_DEPTH)
-        self._first: deque[tuple[Sample, float]] = deque()
+        self._steadying: Steadying | None = None  # tells velocities, where the topic has none
+        self._ready: deque[tuple[Sample, float]] = deque()
         self._arrived: float | None = None
         self.connection = Ros2Connection(node)
         try:
             self.connection.subscribe(self.connection.JointState, topic, self._receive, sensor=True)
-            self.rate = self._measured_rate() if rate is None else float(rate)
+            self.rate = float("nan") if rate is None else float(rate)
+            if rate is None:
+                self.rate = self._measured_rate()
+                self._check_rate()
         except BaseException:
             self.close()
             raise
@@ -70,10 +80,10 @@ class Ros2Source(Source):
         """The samples as they come; ends after `close`.
 
         Raises:
-            SourceError: nothing was heard for `timeout` seconds, or the first message lacks velocities or efforts.
+            SourceError: nothing was heard for `timeout` seconds, or the first message lacks efforts.
         """
         while not self._closed:
-            heard = self._first.popleft() if self._first else self._next()
+            heard = self._next()
             if heard is not None:
                 sample, self._arrived = heard
                 yield sample
@@ -96,28 +106,53 @@ class Ros2Source(Source):
 
     def _next(self) -> tuple[Sample, float] | None:
         """The next sample of the arm and when it arrived, on the monotonic clock [s]; None: closed meanwhile."""
-        begun = time.monotonic()
+        heard = time.monotonic()
         while not self._closed:
-            while self._received:
+            while self._received and not self._ready:
                 message, received = self._received.popleft()
                 sample = self._states.sample(message, received)
                 if sample is not None:
+                    heard = time.monotonic()
                     waited = max(0, time.time_ns() - received) if received else 0  # a middleware may not tell
-                    return sample, time.monotonic() - waited / 1e9
-            waited = time.monotonic() - begun
-            if self._timeout is not None and waited > self._timeout:
+                    self._ready.extend(self._told(sample, heard - waited / 1e9))
+            silent = time.monotonic() - heard
+            if self._steadying is not None and silent > GAP and not self._ready:
+                self._ready.extend(self._steadying.flush())
+            if self._ready:
+                return self._ready.popleft()
+            if self._timeout is not None and silent > self._timeout:
                 raise SourceError(self._silence())
             self.connection.spin(_LOOK)
         return None
 
+    def _told(self, sample: Sample, arrived: float) -> list[tuple[Sample, float]]:
+        """The samples that can be handed on now that this one has come, with velocities, and when they arrived."""
+        if self._states.has_velocities:
+            return [(sample, arrived)]
+        if self._steadying is None:
+            self._steadying = Steadying(self.n, alone=True)
+            self.notes = (velocities_of_positions(self.name),)
+            self._check_rate()
+        return self._steadying.take(sample, arrived)
+
     def _measured_rate(self) -> float:
-        while len(self._first) < _TO_TELL_THE_RATE:
+        first = []
+        while len(first) < _TO_TELL_THE_RATE:
             heard = self._next()
             assert heard is not None  # nobody can close what is still being opened
-            self._first.append(heard)
-        steps = np.diff([sample.t for sample, _ in self._first])
+            first.append(heard)
+        self._ready.extendleft(reversed(first))
+        steps = np.diff([sample.t for sample, _ in first])
         steps = steps[steps > 0]
         return float(1.0 / np.median(steps)) if len(steps) else float("nan")
+
+    def _check_rate(self) -> None:
+        least = STEPS / AROUND
+        if self._steadying is not None and self.rate < least:  # one that is not known yet is not
+            raise SourceError(
+                f"{self.name} has no velocities and {self.rate:.3g} samples a second: expected velocities, or at least "
+                f"{least:.0f} samples a second, from whose positions they can be told"
+            )
 
     def _silence(self) -> str:
         missing = [name for name in self._arm.joint_names if name not in self._states.others]
