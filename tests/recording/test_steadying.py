@@ -8,6 +8,7 @@ import pytest
 from armload import Recording
 from armload.recording import Sample, Steadying, steadied, with_velocities_of_positions
 from armload.recording.steadied import AROUND
+from armload.recording.steadying import _ROWS
 
 NOISE = 2e-3  # [rad/s]
 
@@ -127,7 +128,8 @@ def test_a_sample_without_a_time_waits_for_nobody(t):
 
 
 def test_more_samples_than_were_made_room_for_are_kept():
-    """At 20 kHz 75 ms are 1500 samples to either side."""
-    log, truth = swinging(20000.0, 0.25)
+    """At 8 kHz 75 ms are 600 samples to either side."""
+    log, truth = swinging(8000.0, 0.25)
+    assert _ROWS < 2 * 8000.0 * AROUND
     dq = np.array([s.dq for _, _, s in through(list(log))])
     assert np.sqrt(np.mean((dq - truth) ** 2)) < 0.1 * NOISE

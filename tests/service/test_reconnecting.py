@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from armload.devices import Detached
+from armload.errors import SourceError
 from armload.online import OnlineIdentifier
 from armload.recording import write_recording
 from armload.service import ArmSettings, Reconnecting, Session, Unknown
@@ -102,13 +103,13 @@ def test_what_cannot_be_opened_is_tried_again_and_ends_when_told(panda, tmp_path
     assert source.why is None
 
 
-def test_a_reason_that_stays_is_said_as_often_as_the_wait_grows_and_then_now_and_then(panda, tmp_path, monkeypatch):
+def test_a_reason_that_stays_is_said_as_often_as_the_wait_grows_and_then_now_and_then(monkeypatch):
     monkeypatch.setattr("armload.service.reconnecting.Backoff", lambda: Backoff(0.001, 0.004))
-    said, trials, path = [], [], tmp_path / "none.csv"
+    said, trials = [], []
 
     def opened():
         trials.append(None)
-        return Detached(str(path), panda)
+        raise SourceError("none.csv is not there")
 
     source = Reconnecting(opened, said=said.append, name="arm", n=7)
     for _ in source.ticking(0.001):
