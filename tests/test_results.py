@@ -101,6 +101,32 @@ def test_how_often_intervals_of_the_readme_s_episodes_held_is_committed():
     assert words in " ".join(README.split())
 
 
+def test_what_a_known_payload_is_worth_is_committed():
+    made = json.loads((RESULTS / "known_payloads.json").read_text())["lines"]
+    page = " ".join((ROOT / "docs" / "hybrid.md").read_text(encoding="utf-8").split())
+    at = {(line["family"], line["known"], line["t"]): line for line in made}
+    drawing, nothing = (at["all", known, 6.0] for known in ("drawing", "nothing"))
+    mass, moments, inertia = zip(drawing["error"], nothing["error"], strict=True)
+    assert "{:.1f} g instead of {:.0f}".format(*mass) in page
+    assert "{:.1f} g·m instead of {:.1f}".format(*moments) in page
+    assert "{:.2f} g·m² instead of {:.2f}".format(*inertia) in page
+    assert "{:.0f}, {:.0f} and {:.0f} % of the intervals hold".format(*(100 * x for x in drawing["inside"])) in page
+    assert {line["right"] for line in made} == {0.0}
+    assert f"No right drawing of {2 * drawing['payloads']} is denied" in page
+    for known, words in (
+        ("drawing", "of another payload's {:.0f} to {:.0f} % are"),
+        ("family", "({:.0f} to {:.0f} %)"),
+    ):
+        shares = [100 * at["all", known, t]["wrong"] for t in (1.0, 6.0)]
+        assert words.format(*shares) in page
+    wide = {
+        known: [100 * at["trays, bars, rings", known, t]["inside"][2] for t in (1.0, 6.0)]
+        for known in ("nothing", "family")
+    }
+    assert "{:.0f} to {:.0f} % of their inertias'".format(*wide["family"]) in page
+    assert {f"{share:.0f}" for share in wide["nothing"]} == {"89"}
+
+
 def test_what_the_first_tenth_of_a_second_is_worth_is_committed():
     result = json.loads((RESULTS / "benchmark_reference.json").read_text())
     methods = result["populations"]["reference"]["methods"]

@@ -6,10 +6,20 @@ import stat
 
 import numpy as np
 import pytest
+import trimesh
 
 from armload.errors import PayloadError
 from armload.inertia import InertialParameters
-from armload.payloads import Payload, container_loadings, franka_hand, random_payload, read_payload, write_payload
+from armload.payloads import (
+    Payload,
+    container_loadings,
+    franka_hand,
+    random_payload,
+    read_payload,
+    solids,
+    write_payload,
+)
+from armload.payloads.uncertainty import Uncertainty
 from armload.runtime.atomic import replacing
 
 HAND = franka_hand().parameters
@@ -32,6 +42,28 @@ def write(tmp_path, content):
     path = tmp_path / "p.json"
     path.write_text(content if isinstance(content, str) else json.dumps(content), encoding="utf-8")
     return path
+
+
+def test_a_file_may_name_a_mesh_beside_it_and_how_well_the_drawing_is_known(tmp_path):
+    trimesh.creation.box((40.0, 60.0, 100.0)).export(tmp_path / "gear.stl")
+    turned = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    about = {"mesh": "gear.stl", "scale": 1e-3, "translation": [0.0, 0.0, 0.05], "rotation": turned, "frame": "tool0"}
+    read = read_payload(write(tmp_path, about | {"mass": 0.6, "std": {"mass": 0.01, "com": 1e-3, "inertia": 0.02}}))
+    box = solids.box((0.06, 0.04, 0.1), mass=0.6, translation=(0.0, 0.0, 0.05))
+    assert read.parameters.phi == pytest.approx(box.phi, abs=1e-9)
+    assert (read.name, read.parameters.frame) == ("p", "tool0")
+    assert read.uncertainty == Uncertainty(0.01, 1e-3, 0.02)
+    dense = read_payload(write(tmp_path, about | {"density": 2500.0}))
+    assert dense.parameters.mass == pytest.approx(0.6)
+    for wrong, said in (
+        (about, "neither mass nor density"),
+        (about | {"mass": 0.6, "com": [0, 0, 0]}, "has a mesh and com"),
+        (about | {"mass": 0.6, "scale": 0.0}, "scale of the mesh"),
+        (about | {"mass": 0.6, "mesh": "none.stl"}, "none.stl does not exist"),
+        (about | {"mass": 0.6, "translation": [0, 0]}, "translation"),
+    ):
+        with pytest.raises(PayloadError, match=said):
+            read_payload(write(tmp_path, wrong))
 
 
 def test_the_result_of_an_identification_reads_as_the_payload_it_found(tmp_path):

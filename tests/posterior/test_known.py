@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 from scipy.stats import chi, norm
 
 from armload import arm, identify
+from armload.app.cli import main
 from armload.app.cli.arguments import centre
-from armload.errors import IdentificationError
-from armload.inertia import HELD, Z95
+from armload.errors import IdentificationError, ModelError
+from armload.inertia import HELD, Z95, InertialParameters
 from armload.lab.episodes import draw_episodes, simulate_episodes
+from armload.motion import random_motion, taie2024
+from armload.online import OnlineIdentifier
+from armload.payloads import Payload, draw_payload, franka_hand, write_payload
+from armload.payloads.uncertainty import Uncertainty
 from armload.posterior import HybridIdentifier
-from armload.posterior.known import FAR, Known, KnownCentre, KnownMass
+from armload.posterior.known import FAR, UNLIKE, Known, KnownBody, KnownCentre, KnownMass
+from armload.recording import write_recording
+from armload.simulation import Sensors, World, simulate
 
 PHI = np.array([1.2, 0.02, -0.03, 0.1, 8e-3, 1e-4, -2e-4, 9e-3, 1e-4, 3e-3])  # a payload
 COM = (0.02, -0.02, 0.08)
@@ -88,6 +97,166 @@ def test_what_is_known_is_of_the_payload_and_not_of_the_tool_beside():
 
 def test_three_coordinates_are_as_seldom_denied_as_one_mass():
     assert chi.sf(FAR, 3) == pytest.approx(2.0 * norm.sf(HELD), rel=1e-3)
+
+
+def test_ten_parameters_are_as_seldom_denied_as_one_mass():
+    assert chi.sf(UNLIKE, 10) == pytest.approx(2.0 * norm.sf(HELD), rel=1e-3)
+
+
+def test_two_gaussians_of_one_body_are_what_their_product_is():
+    """In information form: precisions add, and so do the pulls."""
+    (mean, C), (phi, R) = gaussian(6), gaussian(7)
+    known = Known(body=KnownBody(phi, R))
+    information = np.linalg.inv(C) + np.linalg.inv(R)
+    expected = np.linalg.solve(information, np.linalg.solve(C, mean) + np.linalg.solve(R, phi))
+    found, covariance = known.given(mean, C)
+    assert found == pytest.approx(expected, rel=1e-6, abs=1e-10)
+    assert covariance == pytest.approx(np.linalg.inv(information), rel=1e-5, abs=1e-12)
+    assert known.which.all()
+    assert known.denied(mean, C) is None
+    assert known.denied(3.0 * mean, C) is known.body
+    assert known.given(3.0 * mean, C) is None
+    assert known.believed(3.0 * mean, C) is None
+
+
+@pytest.mark.parametrize(
+    ("phi", "covariance", "said"),
+    [
+        (PHI[:9], np.eye(10), "ten finite parameters"),
+        (np.full(10, np.nan), np.eye(10), "ten finite parameters"),
+        (PHI, np.eye(9), "ten finite parameters"),
+        (PHI, np.diag([0.0] + [1.0] * 9), "each above zero"),
+        (PHI, np.ones((10, 10)), "not positive definite"),
+    ],
+)
+def test_a_body_that_is_none_or_known_exactly_is_refused(phi, covariance, said):
+    with pytest.raises(IdentificationError, match=said):
+        KnownBody(phi, covariance)
+
+
+STATED = Uncertainty(0.01, 2e-3, 0.05)
+
+
+@pytest.fixture(scope="module")
+def tray():
+    """A tray, a log of 4 s with it, a tare, and the arm that it was held by."""
+    panda = arm("panda")
+    held = draw_payload("wide", 5, 3.0).parameters
+    how = {"world": World.real_like(panda, 9), "sensors": Sensors.of(panda), "rate": 200.0}
+    log = simulate(panda, taie2024(), held, seed=4, **how)
+    tare = simulate(panda, random_motion(panda, 2, duration=8.0), None, seed=6, **how)
+    return held, log.between(log.t[0], log.t[0] + 4.0), tare, panda
+
+
+def inside(low, held, high):
+    """Whether nine of ten intervals hold at least, as nearly all such tens do."""
+    return np.sum((np.asarray(low) <= held.phi) & (held.phi <= np.asarray(high))) >= 9
+
+
+@pytest.mark.parametrize("method", [None, "map-gp"])
+def test_a_drawing_tells_what_a_log_does_not_and_a_tray_is_not_held_against_what_is_usual(tray, method):
+    held, log, tare, panda = tray
+    plain = identify(log, panda, tare=tare, method=method)
+    drawn = identify(log, panda, tare=tare, method=method, body=Payload("tray", held, uncertainty=STATED))
+    assert not any("not what the log says" in note for note in drawn.notes)
+    assert drawn.determined.all()
+    assert not drawn.rests_on_prior.any()
+    assert inside(drawn.phi_low, held, drawn.phi_high)
+    widths = [(x.phi_high - x.phi_low)[4:].mean() for x in (plain, drawn)]
+    assert widths[1] < 0.8 * widths[0]
+    assert drawn.interval == plain.interval
+
+
+def test_a_drawing_of_another_body_is_said_by_what_differs_most_and_left_out(tray):
+    _, log, tare, panda = tray
+    other = Payload("other", draw_payload("container", 5, 3.0).parameters, uncertainty=STATED)
+    plain, told = identify(log, panda, tare=tare), identify(log, panda, tare=tare, body=other)
+    assert "the body given is not what the log says" in told.notes[0]
+    assert told.interval == "approximate"
+    assert told.phi == pytest.approx(plain.phi, abs=1e-9)
+
+
+def test_a_drawing_in_another_frame_is_turned_with_its_uncertainty(tray):
+    held, log, tare, panda = tray
+    elsewhere = arm("panda", "panda_link7")
+    drawn = Payload("tray", elsewhere.in_frame(InertialParameters(held.phi, "panda_link8")), uncertainty=STATED)
+    here = identify(log, panda, tare=tare, body=Payload("tray", held, uncertainty=STATED))
+    there = identify(log, panda, tare=tare, body=drawn)
+    assert there.phi == pytest.approx(here.phi, abs=2e-3)
+
+
+@pytest.mark.parametrize("body", [franka_hand(), Payload.without_inertia("ball", 0.9, (0.0, 0.0, 0.06))])
+def test_a_drawing_of_which_nobody_says_how_well_it_is_known_is_refused(tray, body):
+    _, log, tare, panda = tray
+    with pytest.raises(IdentificationError, match="how well it is known"):
+        identify(log, panda, tare=tare, body=body)
+
+
+def test_a_family_is_believed_until_the_log_denies_it(tray):
+    held, log, tare, panda = tray
+    families = (), "wide", ("container", "tools")
+    plain, wide, denied = (identify(log, panda, tare=tare, family=family) for family in families)
+    assert not any("is none of" in note for note in (*plain.notes, *wide.notes))
+    assert inside(wide.phi_low, held, wide.phi_high)
+    assert np.abs(wide.phi - plain.phi)[4:].max() > 1e-6
+    assert "is none of container, tools" in " ".join(denied.notes)
+    assert denied.interval == "approximate"
+    assert denied.phi == pytest.approx(plain.phi, abs=1e-9)
+
+
+def test_a_family_is_for_a_method_that_has_learned_of_it(tray):
+    _, log, tare, panda = tray
+    with pytest.raises(IdentificationError, match="map-gp has learned of no families"):
+        identify(log, panda, tare=tare, family="wide", method="map-gp")
+    with pytest.raises(ModelError, match="no family is called spoons: expected some of"):
+        identify(log, panda, tare=tare, family="spoons")
+    with pytest.raises(ModelError, match="all families are named"):
+        identify(log, panda, tare=tare, family=sorted(set(HybridIdentifier(panda).model.prior.families)))
+
+
+def test_a_stream_knows_a_drawing_and_a_family_while_something_is_held_and_goes_on_from_its_file(tray, tmp_path):
+    held, log, tare, panda = tray
+    covariance = STATED.covariance(held)
+    known = Known(body=KnownBody(held.phi, covariance), families=("wide",), if_held=True)
+    stream, half = OnlineIdentifier(panda, tare, known=known), len(log) // 2
+    for sample in log.select(np.arange(len(log)) < half):
+        stream.update(*sample)
+    stream.save(tmp_path / "state.npz")
+    again, ends = OnlineIdentifier.restore(tmp_path / "state.npz", panda, known=known), []
+    for each in (stream, again):
+        for sample in log.select(np.arange(len(log)) >= half):
+            last = each.update(*sample)
+        each.close()
+        ends.append(last)
+    assert inside(ends[0].low, held, ends[0].high)
+    assert ends[0].determined.all()
+    np.testing.assert_array_equal(ends[0].phi, ends[1].phi)
+    empty = OnlineIdentifier(panda, tare, known=known)
+    for sample in simulate(panda, taie2024(), None, rate=200.0, seed=5).between(0.0, 1.0):
+        last = empty.update(*sample)
+    empty.close()
+    assert not last.held
+    assert abs(last.phi[0]) < 0.1
+
+
+def test_the_command_line_knows_drawings_and_families(tray, tmp_path, capsys):
+    held, log, tare, _ = tray
+    run, empty, body = (tmp_path / name for name in ("run.csv", "empty.csv", "tray.json"))
+    write_recording(run, log)
+    write_recording(empty, tare)
+    write_payload(body, Payload("tray", InertialParameters(held.phi, "panda_link8"), uncertainty=STATED))
+    about = [str(run), "--robot", "panda", "--tare", str(empty)]
+    assert main(["identify", *about, "--body", str(body), "--family", "wide", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert inside(answer["phi_low"], held, answer["phi_high"])
+    assert all(answer["determined"])
+    assert main(["identify", *about, "--family", "spoons", "--json"]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "no family is called spoons" in err
+    more = ["--speed", "max", "--headless", "--body", str(body), "--family", "wide"]
+    assert main(["live", *about, *more]) == 0
+    assert all(json.loads(capsys.readouterr().out.splitlines()[-1])["determined"])
 
 
 def test_on_a_stream_nothing_is_claimed_of_an_empty_hand_nor_of_another_payload():

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from armload.identification.identify_log import check_usable, identify
     from armload.identification.left_out import LEFT_OUT
     from armload.identification.methods import METHODS, Method
-    from armload.identification.one_payload import plausible_known, plausible_tool
+    from armload.identification.one_payload import known_of, plausible_known, plausible_tool
     from armload.identification.plausibility import check_plausible
 
 __all__ = [
@@ -31,6 +31,7 @@ __all__ = [
     "choose",
     "default_for",
     "identify",
+    "known_of",
     "plausible_known",
     "plausible_tool",
 ]

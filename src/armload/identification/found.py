@@ -69,7 +69,8 @@ class Found(NamedTuple):
     kappa: by how much the physics overrates the log's evidence, of a method that knows.
     gain_std: relative standard deviation of the torque's scale, of a method that allows for one. gain_known: whether a
         known weight fixed it.
-    known: of the payload apart from the log. log_only: mean (10,) and covariance (10, 10) without that.
+    known: of the payload apart from the log. log_only: mean (10,) and covariance (10, 10) without that. denies_family:
+        whether the log denies the families that were given.
     health: the arm itself, of a method that asks.
     """
 
@@ -96,6 +97,7 @@ class Found(NamedTuple):
     exchanged: bool = False
     known: Known | None = None
     log_only: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    denies_family: bool = False
     kappa: float | None = None
     gain_std: float | None = None
     gain_known: bool = False
@@ -191,6 +193,7 @@ def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Foun
         gain_known=asked.profile is not None and asked.profile.gain_std is not None,
         known=asked.known,
         log_only=None if posterior is None else posterior.log_only,
+        denies_family=isinstance(identifier, HybridIdentifier) and identifier.denies_family,
         health=None if posterior is None else ArmHealth.of(posterior),
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -28,14 +28,14 @@ from armload.identification.notes import (
     rested,
     torques_drift,
 )
-from armload.identification.one_payload import Question, answer_of_one_payload, plausible_known
+from armload.identification.one_payload import Question, answer_of_one_payload, known_of, plausible_known
 from armload.identification.plausibility import check_plausible
 from armload.identification.segments import changes_of_payload
 from armload.identification.tare_age import drift_since
 from armload.identification.thresholds import EXPLAINS, LOWEST_RATE, SETTLED
 from armload.inertia import HELD, Z95, InertialParameters
 from armload.payloads import Payload, read_payload
-from armload.posterior import Known, KnownCentre, KnownMass, Profile, load_profile
+from armload.posterior import KnownCentre, KnownMass, Profile, load_profile
 from armload.posterior.drift import CHANGED
 from armload.recording import Recording, check_own_measurements, read_recording, steadied
 from armload.regression.mismatch import LINK_LOSS
@@ -50,6 +50,8 @@ def identify(
     tool: InertialParameters | Payload | str | Path | None = None,
     mass: KnownMass | tuple[float, float] | None = None,
     com: KnownCentre | tuple[ArrayLike, float] | None = None,
+    body: Payload | str | Path | None = None,
+    family: str | Sequence[str] = (),
     profile: Profile | str | Path | None = None,
     method: str | Path | None = None,
     progress: Callable[[str], None] | None = None,
@@ -69,6 +71,8 @@ def identify(
         mass: of what is identified, where it was weighed, and its standard deviation [kg].
         com: its centre of mass (3,), where that is known, in the arm's payload frame, and its standard deviation along
             each axis [m].
+        body: all that is known of it, as of a drawing, with how well (`Payload.uncertainty`), or the path of its file.
+        family: what kind it is of, by the names of the learned prior (`MixturePrior.families`), or several.
         profile: what was learned of this arm from many logs (`armload.posterior.learn_profile`), or the path of its
             file; the answer is what was added since. With a tare too, the tare is of the recording's own day.
         method: a name in `armload.METHODS`, or the path of a trained model; None: the most trustworthy for the arm,
@@ -80,7 +84,9 @@ def identify(
     """
     say = progress or (lambda _: None)
     arm = arm if isinstance(arm, Arm) else arm_named(arm)
-    known = plausible_known(Known.of(mass, com), arm)
+    drawn = read_payload(body) if isinstance(body, str | Path) else body
+    families = (family,) if isinstance(family, str) else tuple(family)
+    known = plausible_known(known_of(arm, mass, com, drawn, families), arm)
     recording = recording if isinstance(recording, Recording) else read_recording(recording, arm)
     tare = tare if tare is None or isinstance(tare, Recording) else read_recording(tare, arm)
     read = recording.notes if tare is None else of_both(recording, tare)

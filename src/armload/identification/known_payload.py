@@ -8,31 +8,48 @@ from numpy.typing import NDArray
 from armload.errors import IdentificationError
 from armload.estimators import Identifier
 from armload.identification.intervals import Before
-from armload.identification.notes import other_than_given
+from armload.identification.notes import of_none_of, other_than_given
 from armload.identification.thresholds import LEANS
 from armload.inertia import determined as determined_by
-from armload.posterior import Known, PosteriorLeastSquares
+from armload.posterior import HybridIdentifier, Known, PosteriorLeastSquares
 
 
 def know(identifier: Identifier, known: Known | None) -> None:
     """Tell an identifier what is known of the payload.
 
     Raises:
-        IdentificationError: its method can use nothing of the kind.
+        IdentificationError: its method can use nothing of the kind. ModelError: it has not learned such a family.
     """
-    if isinstance(identifier, PosteriorLeastSquares):
+    if isinstance(identifier, HybridIdentifier):
+        identifier.expect(known)
+    elif known is not None and known.families:
+        raise IdentificationError(
+            f"the method {identifier.name} has learned of no families of payloads: leave --family out, or use hybrid"
+        )
+    elif isinstance(identifier, PosteriorLeastSquares):
         identifier.known = known
     elif known is not None:
         raise IdentificationError(
-            f"the method {identifier.name} cannot use a known mass or centre: leave --mass and --com out, or use "
-            "hybrid, map-gp or map"
+            f"the method {identifier.name} cannot use what is known of a payload: leave --mass, --com and --body out, "
+            "or use hybrid, map-gp or map"
         )
 
 
-def denied_by(known: Known | None, log_only: tuple[NDArray[np.float64], NDArray[np.float64]] | None) -> str | None:
-    """That what a log says, mean (10,) and covariance (10, 10), is not what is known; None: it may be it."""
-    denied = None if known is None or log_only is None else known.denied(*log_only)
-    return None if denied is None or log_only is None else other_than_given(denied, *log_only)
+def denied_by(
+    known: Known | None,
+    log_only: tuple[NDArray[np.float64], NDArray[np.float64]] | None,
+    denies_family: bool = False,
+) -> str | None:
+    """That what a log says, mean (10,) and covariance (10, 10), is not what is known; None: it may be it.
+
+    denies_family: whether it is of none of the families that are known.
+    """
+    if known is None or log_only is None:
+        return None
+    denied = known.denied(*log_only)
+    if denied is None and denies_family:
+        return of_none_of(known.families)
+    return None if denied is None else other_than_given(denied, *log_only)
 
 
 def determined_with(
@@ -41,11 +58,13 @@ def determined_with(
     """Which parameters (10,) the log or what is known determines.
 
     Args:
-        determined: by the log alone (10,). known: what an answer rests on, too. std: of the answer (10,).
-        before: what was known of any payload.
+        determined: by the log alone (10,). known: what an answer rests on, too; of a body all are. std: of the answer
+            (10,). before: what was known of any payload.
     """
     if known is None:
         return determined
+    if known.body is not None:
+        return np.ones(10, dtype=bool)
     given = determined_by(std, before.std) & known.which
     given[1:4] &= given[0] | determined[0]
     return determined | given

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
 from armload.identification.thresholds import KNOWN, MOVES, NOMINAL, PAUSE_SAID
-from armload.inertia import NAMES, SHRINK, Z95
-from armload.posterior import KnownCentre, KnownMass
+from armload.inertia import NAMES, SHRINK, UNITS, Z95
+from armload.posterior import KnownBody, KnownCentre, KnownMass
 from armload.posterior.scales import AnotherArm, Drift, Tilt
 from armload.posterior.tilt import MAY_LEAN
 from armload.recording import Recording
@@ -210,8 +212,27 @@ def not_rigid(restlessness: float, joint: int = 0) -> str:
     )
 
 
-def other_than_given(given: KnownMass | KnownCentre, mean: NDArray[np.float64], covariance: NDArray[np.float64]) -> str:
-    """That the log, which says phi ~ N(mean, covariance), does not bear the mass or the centre that was given."""
+def of_none_of(families: Sequence[str]) -> str:
+    """That the log does not bear the families that were given."""
+    return (
+        f"the log says that the payload is none of {', '.join(families)}, which is left out: check what is held, and "
+        "what was mounted at the tare"
+    )
+
+
+def other_than_given(
+    given: KnownMass | KnownCentre | KnownBody, mean: NDArray[np.float64], covariance: NDArray[np.float64]
+) -> str:
+    """That the log, which says phi ~ N(mean, covariance), does not bear the mass, centre or body that was given."""
+    if isinstance(given, KnownBody):
+        off = np.abs(given.phi - mean) / np.sqrt(np.diag(covariance + given.covariance))
+        k = int(np.argmax(off))
+        ours, theirs = Z95 * np.sqrt([covariance[k, k], given.covariance[k, k]])
+        return (
+            f"the body given is not what the log says, and is left out: its {NAMES[k]} is {given.phi[k]:.3g} ± "
+            f"{theirs:.2g} {UNITS[k]} (95 %), the log's {mean[k]:.3g} ± {ours:.2g}; check its frame and units, what is "
+            "held, and what was mounted at the tare"
+        )
     if isinstance(given, KnownMass):
         return (
             f"the mass given, {given.mass:.4g} ± {Z95 * given.std:.2g} kg (95 %), is not what the log says, "

@@ -6,10 +6,11 @@ the two logs, or it is not.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm, rated_mass
 from armload.errors import IdentificationError
@@ -20,7 +21,7 @@ from armload.identification.reporting import answered
 from armload.identification.thresholds import DECISIVE, HEAVIEST
 from armload.inertia import HELD, InertialParameters
 from armload.payloads import INERTIA_ASSUMED, Payload
-from armload.posterior import Known, Profile
+from armload.posterior import Known, KnownBody, KnownCentre, KnownMass, Profile
 from armload.recording import Recording
 
 
@@ -99,6 +100,32 @@ def plausible_tool(tool: InertialParameters, arm: Arm) -> InertialParameters:
     return tool
 
 
+def known_of(
+    arm: Arm,
+    mass: KnownMass | tuple[float, float] | None,
+    com: KnownCentre | tuple[ArrayLike, float] | None,
+    body: Payload | None = None,
+    families: Sequence[str] = (),
+    if_held: bool = False,
+) -> Known | None:
+    """What is known of a payload; None: nothing. See `Known`; body: with how well it is known.
+
+    Raises:
+        IdentificationError: it is not said how well a body is known, or it has no inertia; and as `Known.of`.
+    """
+    drawn = None
+    if body is not None:
+        std = body.uncertainty
+        if not body.inertia_known or min(std.mass, std.com, std.inertia) <= 0.0:
+            raise IdentificationError(
+                f"the body {body.name} is to be weighed against the log: expected its inertia, and how well it is "
+                'known, such as "std": {"mass": 0.01, "com": 0.002, "inertia": 0.1}'
+            )
+        covariance = _in_frame(arm, std.covariance(body.parameters), body.parameters.frame)
+        drawn = KnownBody(arm.in_frame(body.parameters).phi, covariance)
+    return Known.of(mass, com, if_held, drawn, families)
+
+
 def plausible_known(known: Known | None, arm: Arm) -> Known | None:
     """What is known of a payload, if an arm can hold so much.
 
@@ -107,6 +134,8 @@ def plausible_known(known: Known | None, arm: Arm) -> Known | None:
     """
     if known is not None and known.mass is not None:
         plausible_mass(known.mass.mass, "the known mass is", arm)
+    if known is not None and known.body is not None:
+        plausible_mass(float(known.body.phi[0]), "the known body weighs", arm)
     return known
 
 

@@ -135,7 +135,7 @@ def _doubt(found: Found, arm: Arm, mass_determined: bool, relative_to: str) -> s
     doubt = doubt_of(found.exchanged, sound, changed, found.restlessness, found.restless_joint, relative_to)
     if doubt is not None:
         return doubt
-    if (denied := denied_by(found.known, found.log_only)) is not None:
+    if (denied := denied_by(found.known, found.log_only, found.denies_family)) is not None:
         return denied
     if found.strange_links and relative_to in ("arm", "tool"):  # a tare tells what the links are
         return another_model(arm.name, found.strange_links)

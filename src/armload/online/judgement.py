@@ -19,7 +19,7 @@ from armload.inertia import determined, held, held_probability
 from armload.online.doubts import Doubts
 from armload.online.thresholds import STANDS
 from armload.online.watch import PayloadWatch
-from armload.posterior import PosteriorLeastSquares
+from armload.posterior import HybridIdentifier, PosteriorLeastSquares
 from armload.regression import payload_prior_std
 
 _STANDING = "standing: nothing new is learned until the arm moves, or what it holds changes"
@@ -118,8 +118,9 @@ class Judgement:
         if is_removal(estimate, bool(self.determined[0])):
             notes.append(removal(relative_to))
         notes += self.doubts.sentences
-        if self.held and posterior is not None and taken is None:
-            denied = denied_by(posterior.known, posterior.log_only)
+        denies_family = isinstance(posterior, HybridIdentifier) and posterior.denies_family
+        if self.held and posterior is not None and (taken is None or denies_family):
+            denied = denied_by(posterior.known, posterior.log_only, denies_family)
             notes += [] if denied is None else [denied]
         self.notes = tuple(notes)
 

@@ -6,11 +6,15 @@
      "boxes": [{"size": [x, y, z], "centre": [x, y, z], "mass": 0.73}],
      "std": {"mass": 0.01, "com": 0.002, "inertia": 0.1}}
 
+    {"mesh": "gear.stl", "scale": 0.001, "mass": 0.4, "translation": [x, y, z], "rotation": [[...], [...], [...]],
+     "frame": "tool0", "std": {...}}
+
 phi or the three (mass, com, inertia_com) are enough, SI units; phi is about the frame's origin, inertia_com about the
 centre of mass. std says how well they are known (`Uncertainty`): a drawing is never quite what was built. Of what only
 mass and com are known, the inertia is assumed (`Payload.without_inertia`), and users of it say so. Everything else is
-optional, and other keys are ignored but for those that are nearly one of these. The JSON result of an identification
-reads as the payload it found.
+optional, and other keys are ignored but for those that are nearly one of these. A mesh is a closed surface in a file
+beside this one, of one density: its mass or density and where it is are as of `from_mesh`. The JSON result of an
+identification reads as the payload it found.
 """
 
 from __future__ import annotations
@@ -26,6 +30,7 @@ from numpy.typing import NDArray
 
 from armload.errors import ArmloadError, PayloadError
 from armload.inertia import NAMES, InertialParameters
+from armload.payloads.mesh import from_mesh
 from armload.payloads.payload import Box, Payload, require_consistent
 from armload.payloads.uncertainty import Uncertainty
 from armload.runtime.atomic import replacing
@@ -33,7 +38,8 @@ from armload.runtime.atomic import replacing
 FORMAT = "armload-payload/1"
 NOTHING = "nothing"  # what options and settings call no payload, in the place of a file
 _TRIPLE = ("mass", "com", "inertia_com")
-_KEYS = ("format", "name", "frame", "phi", *_TRIPLE, "boxes", "std")
+_OF_MESH = ("mesh", "scale", "density", "translation", "rotation")
+_KEYS = ("format", "name", "frame", "phi", *_TRIPLE, "boxes", "std", *_OF_MESH)
 _ALIKE = 0.7  # of two words (difflib): "inertia" is meant as "inertia_com", a comment is not
 _FARTHEST = 5.0  # [m] a centre of mass farther from the flange than this is in other units
 _WIDEST, _LIGHT = 1.0, 0.01  # [m] radius of gyration; [kg] below which inertia is what was known beforehand
@@ -56,6 +62,8 @@ def payload_from(content: dict[str, Any], path: str | Path) -> Payload:
     path = Path(path)
     _require_known(content, path)
     try:
+        if content.get("mesh") is not None:
+            return _of_mesh(content, path)
         given = {key for key in ("phi", *_TRIPLE) if content.get(key) is not None}
         if given == {"mass", "com"}:
             return _without_inertia(content, path)
@@ -83,6 +91,33 @@ def _require_known(content: dict[str, Any], path: Path) -> None:
         near = [] if key in _KEYS else get_close_matches(key.lower(), _KEYS, 1, _ALIKE)
         if near:
             raise PayloadError(f"payload file {path} has a key {key!r}: expected {near[0]!r}; rename or remove it")
+
+
+def _of_mesh(content: dict[str, Any], path: Path) -> Payload:
+    twice = [key for key in ("phi", "com", "inertia_com") if content.get(key) is not None]
+    if twice:
+        raise PayloadError(
+            f"payload file {path} has a mesh and {twice[0]}: a mesh says the latter; leave one of both out"
+        )
+
+    def number(key: str) -> float | None:
+        return None if content.get(key) is None else float(_numbers(content[key], (), key, path))
+
+    def numbers(key: str, *shape: int) -> NDArray[np.float64] | None:
+        return None if content.get(key) is None else _numbers(content[key], shape, key, path)
+
+    scale = number("scale")
+    drawn = from_mesh(
+        path.parent / (_text(content, "mesh", path) or ""),
+        density=number("density"),
+        mass=number("mass"),
+        scale=1.0 if scale is None else scale,
+        rotation=numbers("rotation", 3, 3),
+        translation=numbers("translation", 3),
+    )
+    placed = InertialParameters(drawn.parameters.phi, _text(content, "frame", path))
+    name = _text(content, "name", path) or path.stem
+    return replace(drawn, name=name, parameters=placed, uncertainty=_uncertainty(content, path))
 
 
 def _without_inertia(content: dict[str, Any], path: Path) -> Payload:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from armload.posterior.cramer_rao import TIMES, Bound, bound, efficiency
     from armload.posterior.evidence import TRAITS, Evidence
     from armload.posterior.hybrid import HybridIdentifier, shipped_model
-    from armload.posterior.known import Known, KnownCentre, KnownMass
+    from armload.posterior.known import Known, KnownBody, KnownCentre, KnownMass
     from armload.posterior.map import PosteriorLeastSquares
     from armload.posterior.model_file import HybridModel, Training
     from armload.posterior.payload_prior import MixturePosterior, MixturePrior
@@ -34,6 +34,7 @@ __all__ = [
     "HybridIdentifier",
     "HybridModel",
     "Known",
+    "KnownBody",
     "KnownCentre",
     "KnownMass",
     "MixturePosterior",

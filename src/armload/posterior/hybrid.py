@@ -16,7 +16,7 @@ from armload.inertia import Z95, near_consistent, nearest_body
 from armload.inertia.cholesky import inverse
 from armload.posterior.calibration import Calibration
 from armload.posterior.evidence import Evidence
-from armload.posterior.known import Known
+from armload.posterior.known import DENIED, Gaussian, Known
 from armload.posterior.map import PosteriorLeastSquares
 from armload.posterior.model_file import HybridModel
 from armload.posterior.payload_prior import MixturePrior
@@ -54,6 +54,8 @@ class HybridIdentifier(PosteriorLeastSquares):
     """
 
     name = "hybrid"
+    denies_family = False  # whether the last answer's log denies the families that the payload is said to be of
+    _of_families: tuple[MixturePrior, MixturePrior] | None = None  # the priors of these, and of the others
     _noise = SMOOTH
     _smooth = True
     _iterations = 5
@@ -78,7 +80,18 @@ class HybridIdentifier(PosteriorLeastSquares):
         """Forget the run (not the tare); the next sample is the first."""
         super().reset()
         self._trusted: Evidence | None = None
-        self.exchanged = False
+        self.exchanged = self.denies_family = False
+
+    def expect(self, known: Known | None) -> None:
+        """Take what is known of the payload into account from now on.
+
+        Raises:
+            ModelError: a family that the model does not know.
+        """
+        families = () if known is None else known.families
+        self._of_families = self._payloads.split(*families) if families else None
+        said = self._payloads if self._of_families is None else self._of_families[0]
+        self.payload_prior, self.known = (said.mean, said.std), known
 
     def prepare(self) -> None:
         """Do now what the first sample would have to wait for, the solver's loading among it."""
@@ -101,12 +114,19 @@ class HybridIdentifier(PosteriorLeastSquares):
         return None if self._trusted is None else without_learned_prior(self._trusted, solution_prior_std(self.arm))
 
     def _before(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        return self._payloads.mean, np.diag(self._payloads.std**2)
+        prior = self._payloads if self._of_families is None else self._of_families[0]
+        return prior.mean, np.diag(prior.std**2)
 
     def _answer(self, elapsed: float, concluded: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         self._trusted = self.model.calibration.trusted(self.evidence(elapsed), self.louder)
         tool = self.arm.attached is not None or self.stream.without_tare
-        found = answer(self._trusted, self.model.calibration, self._payloads, tool, not concluded, self.known)
+        payloads = self._payloads
+        if self._of_families is not None:
+            self.denies_family = denies(self._trusted, *self._of_families)
+            payloads = payloads if self.denies_family else self._of_families[0]
+        alone = None if self.known is None or self.known.body is None else self.unprojected
+        about = (payloads, tool, not concluded, self.known, self._payloads, alone)
+        found = answer(self._trusted, self.model.calibration, *about)
         self.exchanged, self.log_only, self.taken = found.exchanged, found.log_only, found.taken
         return found.phi, found.covariance
 
@@ -134,13 +154,17 @@ def answer(
     tool: bool,
     quick: bool = False,
     known: Known | None = None,
+    whole: MixturePrior | None = None,
+    alone: Gaussian | None = None,
 ) -> Answer:
     """What evidence and prior say together.
 
     `trusted`: evidence as far as it can be trusted (`Calibration.trusted`). `tool`: whether the arm counts with one,
     which may not be there, as something may have been taken off since a tare. `quick`: the body is found in bounded
     time, to a hundredth of a standard deviation, and nobody asks about an exchange. `known`: what is known of the
-    payload beside the log.
+    payload beside the log. `whole`: the prior of all families, where `payloads` is that of some: what was on before may
+    be of any. `alone`: what the log says without a learned prior (`without_learned_prior`), where a body is known: that
+    is the prior then, and a tray's drawing is not held against what payloads are usually like.
     """
     vectors = np.array([trusted.vector, -trusted.vector] if trusted.kind > 0 or tool else [trusted.vector])
     found, *removed = payloads.posteriors(trusted.information, vectors)
@@ -148,7 +172,7 @@ def answer(
     if removed and removed[0].log_evidence + np.log(_REMOVED) > found.log_evidence:
         found, sign = removed[0], -1.0
     found = calibration.posterior(replace(trusted, vector=sign * trusted.vector), payloads, found)
-    differences, exchanged = None if quick or trusted.kind == 0 else payloads.differences, 0.0
+    differences, exchanged = None if quick or trusted.kind == 0 else (whole or payloads).differences, 0.0
     other = None
     if differences is not None:
         other = differences.posterior(trusted.information, sign * trusted.vector)
@@ -160,7 +184,7 @@ def answer(
         covariance = holding(covariance, 0, found.mass_if_any - found.mean[0])
     log_only = given = None
     if known is not None:
-        log_only = sign * mean, covariance
+        log_only = alone or (sign * mean, covariance)
         given = known.given(*log_only)
         if given is not None:
             mean, covariance = sign * given[0], given[1]
@@ -177,6 +201,12 @@ def answer(
     if other is not None:
         covariance = holding_both(covariance, other[0] - body, other[1])
     return Answer(sign * body, covariance, False, *extra)
+
+
+def denies(trusted: Evidence, said: MixturePrior, others: MixturePrior) -> bool:
+    """Whether evidence speaks so much more for other families than for those that were said that it denies these."""
+    ahead, behind = (prior.posterior(trusted.information, trusted.vector).log_evidence for prior in (said, others))
+    return ahead - behind < DENIED
 
 
 def holding(covariance: NDArray[np.float64], i: int, aside: float) -> NDArray[np.float64]:

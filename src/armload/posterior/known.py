@@ -1,18 +1,21 @@
-"""What is known of a payload apart from the log: it was weighed, or its centre of mass is that of a drawing.
+"""What is known of a payload apart from the log: its weight, its centre, all of it from a drawing, or its kind.
 
-Each is one more measurement of phi ~ N(mean, C), H·phi = z + N(0, R), so that with S = H·C·Hᵀ + R and K = C·Hᵀ·S⁻¹
+Each of the first three is one more measurement of phi ~ N(mean, C), H·phi = z + N(0, R), so that with
+S = H·C·Hᵀ + R and K = C·Hᵀ·S⁻¹
 
     phi given it ~ N(mean + K·(z − H·mean), C − K·S·Kᵀ)
 
     a mass M ± s [kg]       H = (1, 0 …),          z = M,  R = s²
     a centre r ± s [m]      H = (−r, 1, 0 …),      z = 0,  R = s²·E[m²]·1      m·(com − r) ~ N(0, (s·m)²) on each axis
+    a body phi_0            H = 1,                 z = phi_0,  R its covariance
 
 An error of the torque's scale, which mass and moments have in common, goes with the error of the mass, and leaves the
-centre alone.
+centre alone. Families of payloads are no measurement: they say which components of a learned prior count.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -26,6 +29,10 @@ from armload.inertia.determinacy import LIGHTEST_HELD
 # [standard deviations] of a centre's three coordinates: as unlikely of the truth as `HELD` of a mass, 0.27 %
 # (test_three_coordinates_are_as_seldom_denied_as_one_mass)
 FAR = 3.7625
+# the same of a body's ten parameters (test_ten_parameters_are_as_seldom_denied_as_one_mass)
+UNLIKE = 5.1866
+# ln of the odds at which a log denies a family: as seldom as a mass, 0.27 %
+DENIED = float(np.log(0.0027))
 _FARTHEST = 5.0  # [m] from the frame's origin, of anything an arm holds: beyond, the unit is another
 
 Gaussian = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -109,11 +116,52 @@ class KnownCentre:
 
 
 @dataclass(frozen=True, eq=False)
+class KnownBody:
+    """All ten parameters, of a drawing say, and how well they are known.
+
+    Args:
+        phi: (10,) about the payload frame that is asked for. covariance: (10, 10) of its error.
+
+    Raises:
+        IdentificationError: other shapes, no number, or a covariance that is not positive definite: what is known
+            exactly cannot be tested against a log.
+    """
+
+    phi: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        phi, covariance = (np.asarray(x, dtype=float) for x in (self.phi, self.covariance))
+        unit = np.sqrt(np.abs(np.diag(covariance))) if covariance.shape == (10, 10) else np.zeros(10)
+        if phi.shape != (10,) or not (
+            np.all(np.isfinite(phi)) and np.all(np.isfinite(covariance)) and np.all(unit > 0)
+        ):
+            raise IdentificationError(
+                "a known body: expected ten finite parameters and a covariance (10, 10) of their error, each above zero"
+            )
+        if np.linalg.eigvalsh(covariance / np.outer(unit, unit))[0] <= 0.0:
+            raise IdentificationError("a known body: the covariance of its error is not positive definite")
+        object.__setattr__(self, "phi", phi)
+        object.__setattr__(self, "covariance", covariance)
+
+    def given(self, mean: NDArray[np.float64], covariance: NDArray[np.float64]) -> Gaussian:
+        """phi ~ N(mean, covariance), (10,), (10, 10), given the body."""
+        return _given(mean, covariance, np.eye(10), self.phi, self.covariance)
+
+    def away(self, mean: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
+        """Standard deviations between it and phi ~ N(mean, covariance), of ten degrees of freedom."""
+        between, S = self.phi - mean, self.covariance + covariance
+        unit = np.sqrt(np.diag(S))  # kg and kg·m² are of unlike size
+        return float(np.sqrt((between / unit) @ np.linalg.solve(S / np.outer(unit, unit), between / unit)))
+
+
+@dataclass(frozen=True, eq=False)
 class Known:
     """All that is known of a payload apart from the log.
 
     Args:
-        mass, com: None: not known.
+        mass, com, body: None: not known.
+        families: those it is of, by the names of the learned prior (`MixturePrior.only`); none: any.
         tool: phi (10,) of a tool that is held with it, in an estimate of both.
         if_held: whether it is taken only where an estimate holds something, and does not deny that this is it: a stream
             goes on when the payload was put down, or another one taken up.
@@ -123,6 +171,8 @@ class Known:
     com: KnownCentre | None = None
     tool: NDArray[np.float64] | None = None
     if_held: bool = False
+    body: KnownBody | None = None
+    families: tuple[str, ...] = ()
 
     @classmethod
     def of(
@@ -130,39 +180,49 @@ class Known:
         mass: KnownMass | tuple[float, float] | None,
         com: KnownCentre | tuple[ArrayLike, float] | None,
         if_held: bool = False,
+        body: KnownBody | None = None,
+        families: Sequence[str] = (),
     ) -> Self | None:
-        """What a caller knows: (mass [kg], its standard deviation), (centre (3,) [m], its standard deviation).
+        """What a caller knows; None: nothing.
 
-        None: nothing.
+        mass, com: (mass [kg], its standard deviation), (centre (3,) [m], its standard deviation), too.
 
         Raises:
             IdentificationError: see `KnownMass` and `KnownCentre`.
         """
         weighed = mass if mass is None or isinstance(mass, KnownMass) else KnownMass(*_pair("mass", mass))
         centre = com if com is None or isinstance(com, KnownCentre) else KnownCentre(*_pair("centre of mass", com))
-        return None if weighed is None and centre is None else cls(weighed, centre, None, if_held)
+        known = cls(weighed, centre, None, if_held, body, tuple(families))
+        return known if known._measured or known.families else None
 
     def with_tool(self, tool: NDArray[np.float64]) -> Self:
         """The same of an estimate that holds a tool (10,), too."""
         return replace(self, tool=tool)
 
     @property
+    def _measured(self) -> list[KnownMass | KnownCentre | KnownBody]:
+        return [one for one in (self.mass, self.com, self.body) if one is not None]
+
+    @property
     def which(self) -> NDArray[np.bool_]:
         """Which parameters (10,) it is about; moments are known where centre and mass are."""
-        return np.r_[self.mass is not None, [self.com is not None] * 3, [False] * 6]
+        body = self.body is not None
+        return np.r_[self.mass is not None, [self.com is not None] * 3, [False] * 6] | body
 
-    def denied(self, mean: NDArray[np.float64], covariance: NDArray[np.float64]) -> KnownMass | KnownCentre | None:
-        """Which of them phi ~ N(mean, covariance) denies, beyond `HELD` and `FAR`; None: none."""
+    def denied(
+        self, mean: NDArray[np.float64], covariance: NDArray[np.float64]
+    ) -> KnownMass | KnownCentre | KnownBody | None:
+        """Which of them phi ~ N(mean, covariance) denies, beyond `HELD`, `FAR` and `UNLIKE`; None: none."""
         own = self._own(mean)
-        if self.mass is not None and self.mass.away(own, covariance) > HELD:
-            return self.mass
-        return self.com if self.com is not None and self.com.away(own, covariance) > FAR else None
+        most = {KnownMass: HELD, KnownCentre: FAR, KnownBody: UNLIKE}
+        return next((one for one in self._measured if one.away(own, covariance) > most[type(one)]), None)
 
     def believed(self, mean: NDArray[np.float64], covariance: NDArray[np.float64]) -> Self | None:
         """What of it phi ~ N(mean, covariance) does not deny; None: nothing."""
         denied = self.denied(mean, covariance)
-        mass, com = (None if one is denied else one for one in (self.mass, self.com))
-        return None if mass is None and com is None else replace(self, mass=mass, com=com)
+        mass, com, body = (None if one is denied else one for one in (self.mass, self.com, self.body))
+        left = replace(self, mass=mass, com=com, body=body)
+        return left if left._measured else None
 
     def given(self, mean: NDArray[np.float64], covariance: NDArray[np.float64]) -> Gaussian | None:
         """phi ~ N(mean, covariance), (10,), (10, 10), given what of it that does not deny; None: nothing is taken.
@@ -175,7 +235,7 @@ class Known:
             least = max(HELD * float(np.sqrt(covariance[0, 0])), LIGHTEST_HELD)
             if own[0] <= least or denied is not None:
                 return None
-        taken = [one for one in (self.mass, self.com) if one is not None and one is not denied]
+        taken = [one for one in self._measured if one is not denied]
         if not taken:
             return None
         for one in taken:
@@ -203,11 +263,12 @@ def _given(
     covariance: NDArray[np.float64],
     rows: NDArray[np.float64],
     z: NDArray[np.float64],
-    variance: float,
+    variance: float | NDArray[np.float64],
 ) -> Gaussian:
-    """phi ~ N(mean, covariance) given rows·phi = z + N(0, variance·1)."""
+    """phi ~ N(mean, covariance) given rows·phi = z + N(0, R), R = variance·1 or the matrix."""
     cross = rows @ covariance
-    S = cross @ rows.T + variance * np.eye(len(z))
-    K = np.linalg.solve(S, cross).T
+    S = cross @ rows.T + (variance * np.eye(len(z)) if np.ndim(variance) == 0 else variance)
+    unit = np.sqrt(np.diag(S))  # kg and kg·m² are of unlike size
+    K = np.linalg.solve(S / np.outer(unit, unit), cross / unit[:, None]).T / unit
     rest = covariance - K @ cross
     return mean + K @ (z - rows @ mean), 0.5 * (rest + rest.T)

@@ -31,7 +31,8 @@ from armload.posterior.mixture_kernels import mixture_posteriors
 _COMPONENTS = 12  # per family: a container's loadings, a box's sizes and places; trained models hold them
 # families that a difference is made of: less nothing, or a screw, a payload is what it was
 _BODIES = ("boxes", "shapes", "tools", "container")
-_LITTLE = ("nothing", "light")  # families of an empty hand, or nearly
+NOTHING = "nothing"
+_LITTLE = (NOTHING, "light")  # families of an empty hand, or nearly
 # beta: the smaller, the more of the inertias lie inside, at no larger an error; the smallest in steps of 0.1 with which
 # half-widths are about three times the error on sound logs, no more (`benchmarks/coarsening.py`)
 COARSENED = 0.7
@@ -139,6 +140,18 @@ class MixturePrior:
         w = self.weights[keep]
         names = tuple(name for name in self.families if name in families)
         return MixturePrior(w / w.sum(), self.means[keep], self.covariances[keep], names, self.beta)
+
+    def split(self, *families: str) -> tuple[MixturePrior, MixturePrior]:
+        """The prior of these families or nothing, and that of all others.
+
+        Raises:
+            ModelError: a family the mixture does not have, or all that it has.
+        """
+        said = self.only(*families, NOTHING)
+        others = set(self.families) - set(said.families)
+        if not others:
+            raise ModelError("all families are named: expected some, or none where the payload may be of any")
+        return said, self.only(*sorted(others))
 
     def moved(self, T: NDArray[np.float64]) -> MixturePrior:
         """The same prior over T·phi, T (10, 10) regular: about another frame, say."""

@@ -209,8 +209,8 @@ def check_tare_age(options: argparse.Namespace) -> None:
         raise UsageError("--tare-age says how old a tare is, but there is no --tare")
 
 
-def add_known_arguments(parser: argparse.ArgumentParser) -> None:
-    """`--mass` and `--com`."""
+def add_known_arguments(parser: argparse.ArgumentParser, drawn: bool = True) -> None:
+    """`--mass` and `--com`; drawn: `--body` and `--family`, too."""
     parser.add_argument(
         "--mass", type=weighed, metavar="M±S", help="of the payload, where it was weighed [kg], with its 1 sigma"
     )
@@ -219,6 +219,21 @@ def add_known_arguments(parser: argparse.ArgumentParser) -> None:
         type=centre,
         metavar="X,Y,Z±S",
         help="its centre of mass, where that is known [m], about the payload frame, with the 1 sigma of each axis",
+    )
+    if not drawn:
+        return
+    parser.add_argument(
+        "--body",
+        type=file_name,
+        metavar="FILE",
+        help="all of it, where that is known, as of a CAD drawing: a payload file (docs/payloads.md) with its std",
+    )
+    parser.add_argument(
+        "--family",
+        type=lambda text: tuple(text.split(",")),
+        default=(),
+        metavar="NAME,...",
+        help="what kind it is of: boxes, shapes, tools, container or wide (trays, bars, rings), or several",
     )
 
 

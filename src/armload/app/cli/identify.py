@@ -30,6 +30,8 @@ examples:
   armload identify run.csv --robot panda --profile arm.profile       (an arm that knows itself: armload profile)
   armload identify run.csv --robot panda --mass 1.200±0.002         (weighed: what is left is found better)
   armload identify run.csv --robot panda --com 0,0,0.06±0.003       (the centre of mass of a drawing, [m])
+  armload identify run.csv --robot panda --body gear.json           (a drawing, and how far it can be trusted)
+  armload identify run.csv --robot panda --family wide              (a tray, a bar or a ring)
   armload identify bag/ --robot ur10e --tare empty/ --compensated set.json   (torque without gravity)
   armload identify run.csv --robot panda --out payload.json         (the answer as JSON, usable as --tool later)
   armload identify run.csv --robot panda --tool franka-hand --to franka    (what the controller reads)
@@ -105,6 +107,8 @@ def run(options: argparse.Namespace) -> None:
             tool=tool,
             mass=options.mass,
             com=options.com,
+            body=options.body,
+            family=options.family,
             profile=options.profile,
             method=options.method,
             progress=say,

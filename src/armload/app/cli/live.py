@@ -137,9 +137,10 @@ def run(options: argparse.Namespace) -> int | None:
     """Identify until the source ends (--headless) or somebody interrupts; 2 after an error."""
     from armload.app.cli.headless import lines
     from armload.devices import Detached, Recorder, Steadied, open_source
-    from armload.identification import plausible_known
+    from armload.identification import known_of, plausible_known
     from armload.identification.tare_age import age_of
-    from armload.posterior import Known, load_profile
+    from armload.payloads import read_payload
+    from armload.posterior import load_profile
     from armload.recording import ColumnSpec, check_own_measurements
     from armload.runtime.atomic import clear_left_over
     from armload.service.session import Session
@@ -149,7 +150,8 @@ def run(options: argparse.Namespace) -> int | None:
     options.robot = options.robot or robot_of(options.source)
     check_tare_age(options)
     arm = _arm_of(options)
-    known = plausible_known(Known.of(options.mass, options.com, if_held=True), arm)
+    drawn = None if options.body is None else read_payload(options.body)
+    known = plausible_known(known_of(arm, options.mass, options.com, drawn, options.family, if_held=True), arm)
     if options.steady and options.profile is not None:
         raise UsageError(
             "--steady and --profile: a profile is learned from velocities as they come; leave one of the two out"

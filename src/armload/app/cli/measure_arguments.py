@@ -66,7 +66,7 @@ def parser() -> Parser:
         "--tare", type=file_name, metavar="LOG0", help="a log of the empty arm: no empty run, the payload is on already"
     )
     add_tare_age_argument(parser)
-    add_known_arguments(parser)
+    add_known_arguments(parser, drawn=False)
     add("--profile", type=file_name, metavar="P", help="what was learned of this arm from many logs (armload profile)")
     add(
         "--tool",
