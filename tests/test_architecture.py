@@ -33,7 +33,7 @@ OWNERS = {
     "mujoco": {"simulation"},
     "jax": {"ensembles"},
     "sklearn": {"ensembles", "posterior"},
-    "safetensors": {"ensembles", "posterior"},
+    "safetensors": {"runtime"},
     "matplotlib": {"lab", "survey"},
     "distributed": {"lab"},
     "fsspec": {"survey"},

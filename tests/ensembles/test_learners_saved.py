@@ -172,7 +172,7 @@ def test_a_changed_byte_is_one_sentence(tree, tmp_path):
 def test_other_files_are_refused_by_name(tmp_path):
     foreign = tmp_path / "foreign.safetensors"
     save_file({"W": np.zeros(3)}, foreign)
-    with pytest.raises(ModelError, match=r"foreign.safetensors is a safetensors file without armload's header"):
+    with pytest.raises(ModelError, match=r"foreign.safetensors is no model: expected .* `armload train` wrote"):
         load_model(foreign)
     with pytest.raises(ModelError, match=r"no model at .*nothing.safetensors"):
         load_model(tmp_path / "nothing.safetensors")
