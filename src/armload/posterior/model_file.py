@@ -14,10 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm, link_fingerprint, prefixed_frame
+from armload.arms import Arm, from_frame, link_fingerprint, prefixed_frame
 from armload.ensembles.artefact import from_structure, to_structure
 from armload.errors import ModelError
-from armload.inertia import InertialParameters
 from armload.posterior.calibration import COVERAGE, Calibration
 from armload.posterior.evidence import KINDS, TRAITS
 from armload.posterior.payload_prior import MixturePrior
@@ -94,7 +93,7 @@ class HybridModel:
             )
         if arm.frame == flange:
             return None
-        return np.array([arm.in_frame(InertialParameters(unit, flange)).phi for unit in np.eye(10)]).T
+        return from_frame(arm, flange)
 
     def prior_for(self, arm: Arm) -> MixturePrior:
         """The payload prior about the frame of an arm. Raises as `into_frame`."""
