@@ -44,7 +44,7 @@ def run(options: argparse.Namespace) -> int | None:
     from armload.devices import Thresholds, open_mover
     from armload.excitation import Accuracy
     from armload.identification import plausible_known
-    from armload.measuring import Procedure
+    from armload.measuring import Basis, Procedure, Room
     from armload.measuring.plan import APPROACH
     from armload.posterior import Known, KnownCentre, KnownMass, load_profile
 
@@ -77,16 +77,9 @@ def run(options: argparse.Namespace) -> int | None:
             arm,
             motion,
             folder,
-            tare=tare,
-            tare_age=options.tare_age,
-            profile=profile,
-            mass=mass,
-            com=com,
-            method=options.method,
+            basis=Basis(tare, options.tare_age, profile, mass, com, options.method),
+            room=Room(options.floor, boxes_of(options), APPROACH if options.approach is None else options.approach),
             accuracy=accuracy,
-            floor=options.floor,
-            boxes=boxes_of(options),
-            approach=APPROACH if options.approach is None else options.approach,
             thresholds=Thresholds(options.off_path, options.push),
             say=print_note,
         )
