@@ -35,6 +35,15 @@ def test_an_episode_raises_once_and_clears_once():
     assert seen == [("over_rating", True), ("over_rating", False)] * 2
 
 
+def test_a_source_that_comes_again_is_said_to_whatever_is_unknown_then():
+    alarms, now, seen = Alarms("a"), 0.0, []
+    lost = {**UNKNOWN, "unknown": "source lost", "why": "gone"}
+    for said in (lost, {**UNKNOWN, "why": "the payload is changing"}):
+        found, now = told(alarms, said, CLEARED_AFTER + 1.0, now)
+        seen += [(a.kind, a.raised, a.text) for a in found]
+    assert seen == [("source_lost", True, "gone"), ("source_lost", False, "samples come again")]
+
+
 def test_a_limit_that_is_grazed_gives_one_alarm():
     alarms, now, seen = Alarms("a", rating=3.0), 0.0, []
     for k in range(20):
