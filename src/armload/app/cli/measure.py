@@ -143,10 +143,11 @@ def _typed_yes(question: str) -> bool:
 def _mount(options: argparse.Namespace, mover: Mover) -> Callable[[], None]:
     def mount() -> None:
         if options.grip is not None:
-            print_note(f"mounting: {options.grip}")
-            code = subprocess.run(shlex.split(options.grip), stdout=sys.stderr, check=False).returncode
+            grip = shlex.join(options.grip)
+            print_note(f"mounting: {grip}")
+            code = subprocess.run(options.grip, stdout=sys.stderr, check=False).returncode
             if code:
-                raise SafetyError(f"{options.grip} ended with exit code {code}: the payload may not be on")
+                raise SafetyError(f"{grip} ended with exit code {code}: the payload may not be on")
         elif not mover.mount():
             print("mount the payload, step back, and press Enter: the arm then moves: ", end="", file=sys.stderr)
             sys.stderr.flush()
