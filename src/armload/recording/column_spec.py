@@ -158,8 +158,8 @@ def _value(key: str, value: Any, where: str) -> Any:
             return float(value)
         if key == "episode":
             return int(value)
-    except (TypeError, ValueError):
-        raise RecordingError(f"{where}: {key} is {value!r}: expected numbers") from None
+    except (TypeError, ValueError, OverflowError):
+        raise RecordingError(f"{where}: {key} is {str(value)[:24]!r}: expected numbers") from None
     if key in QUANTITIES and isinstance(value, (list, tuple)) and value and all(isinstance(x, str) for x in value):
         return tuple(value)
     if not isinstance(value, str) or not value.strip():
