@@ -156,6 +156,18 @@ def test_nothing_is_pickled():
     assert wrong == []
 
 
+def test_what_is_written_at_once_is_written_beside_and_appears_whole():
+    """Into what `replacing` gives, which is called so everywhere; what grows is a `GrowingFile`."""
+    wrong = []
+    for path in MODULES:
+        for node in ast.walk(tree_of(path)):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+                into = ast.unparse(node.func.value)
+                if node.func.attr in ("write_text", "write_bytes") and into not in ("temporary", "part"):
+                    wrong.append(f"{path}:{node.lineno} writes into {into}: use armload.runtime.replacing")
+    assert wrong == []
+
+
 def test_modules_are_named_after_a_concept():
     words = {path: {*path.stem.strip("_").split("_"), *path.parent.relative_to(SOURCE).parts} for path in MODULES}
     vague = {"utils", "util", "helpers", "helper", "core", "common", "misc", "base", "shared"}
