@@ -140,7 +140,7 @@ def _toml(path: Path) -> dict[str, Any]:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise RecordingError(f"columns {path} cannot be read: {error.strerror or error}") from None
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
         raise RecordingError(f"columns {path} is not TOML: {one_line(error)[:160]}") from None
     inner = table.get("columns")
     return inner if isinstance(inner, dict) else table
