@@ -195,6 +195,16 @@ def rewritten(path, change, target):
     return target
 
 
+def test_a_model_without_its_sha_256_is_no_unaltered_one(tree, tmp_path):
+    with safe_open(tree[0], framework="np") as file:
+        header = json.loads(file.metadata()["armload"])
+        tensors = {k: file.get_tensor(k) for k in file.keys()}  # noqa: SIM118
+    for removed in ({k: v for k, v in header.items() if k != "sha256"}, header | {"sha256": None}):
+        save_file(tensors, tmp_path / "bare.safetensors", {"armload": json.dumps(removed)})
+        with pytest.raises(ModelError, match=r"bare\.safetensors was altered"):
+            load_model(tmp_path / "bare.safetensors")
+
+
 def test_a_model_of_members_that_armload_no_longer_has_is_said_to_be_of_another_version(tree, tmp_path):
     old = rewritten(tree[0], lambda h, _: h["structure"].update(type="support vectors"), tmp_path / "svr.safetensors")
     with pytest.raises(ModelError, match=r"svr\.safetensors belongs to another version of armload.*'support vectors'"):

@@ -73,8 +73,8 @@ class TensorFile:
                     f"{path} belongs to another version of armload: {self.make} it again (its format is {found}, this "
                     f"armload's {self.format})"
                 )
-            signed = header.pop(_DIGEST, None) if self.unsigned else header.pop(_DIGEST)
-            if signed not in (None, content_digest(header, tensors)):
+            signed = header.pop(_DIGEST, None)
+            if signed != content_digest(header, tensors) and not (self.unsigned and signed is None):
                 raise ModelError(f"{path} was altered after it was written (its SHA-256 differs): copy it again")
             return made(tensors, header)
         except ModelError:
