@@ -106,6 +106,9 @@ def test_without_a_motion_one_about_the_present_pose_is_designed(tmp_path, monke
         (["--motion", "MOTION", "--move", "--until", "weight=10g"], "is no accuracy: expected"),
         (["--motion", "MOTION", "--move", "--apply"], "takes no payload: leave out --apply"),
         (["--motion", "MOTION", "--move", "--tare-age", "1d"], "there is no --tare"),
+        (["--motion", "MOTION", "--move", "--grip", "no-such-gripper --close"], "is no command: expected a program"),
+        (["--motion", "MOTION", "--move", "--grip", "close 'it"], "is no command: no closing quotation"),
+        (["--motion", "MOTION", "--move", "--grip", ""], "is no command: expected a program"),
         (["--motion", "MOTION", "--move", "--at", "0,0,0,-2,0,2,0", "--approach", "0.1"], "more than the 0.1 rad"),
     ],
 )

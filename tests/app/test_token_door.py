@@ -5,6 +5,7 @@ import http.client
 import importlib.metadata
 import socket
 import threading
+import urllib.request
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from urllib.parse import urlsplit
 
@@ -149,6 +150,21 @@ def test_the_websocket_of_a_page_has_the_same_door(host, token):
         brought = address.query.removeprefix("token=")
         assert token is None or brought == QUOTED
         assert handshake(port, Cookie=f"armload_{port}={brought}") == 101
+    finally:
+        server.stop()
+
+
+def test_a_page_can_be_served_at_an_address_of_ipv6():
+    pytest.importorskip("viser", reason="the page needs viser")
+    try:
+        socket.create_server(("::1", 0), family=socket.AF_INET6).close()
+    except OSError:
+        pytest.skip("this machine has no loopback of IPv6")
+    server = PageServer("::1", 0, "a page")
+    try:
+        assert server.url.startswith("http://[::1]:")
+        with urllib.request.urlopen(server.url, timeout=30.0) as page:
+            assert page.status == 200
     finally:
         server.stop()
 

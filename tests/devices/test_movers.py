@@ -1,10 +1,14 @@
 """An arm that is moved: where a movement may begin, that it ends at rest, and what stops it."""
 
+import sys
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from armload.arms import arm
-from armload.devices import SimulatedMover, StreamedMover, Supervision, Thresholds
+from armload.devices import Load, SimulatedMover, StreamedMover, Supervision, Thresholds
+from armload.devices.ur.mover import URMover
 from armload.errors import SafetyError, SinkError
 from armload.inertia import InertialParameters
 from armload.motion import Course, StraightMotion, random_motion, taie2024
@@ -166,6 +170,69 @@ def test_an_arm_of_which_nothing_is_heard_is_stopped(panda):
 def test_thresholds_are_positive(wrong):
     with pytest.raises(SafetyError, match="expected a positive number"):
         Thresholds(**wrong)
+
+
+class Controls:
+    """What ur-rtde's control client is asked; it fails at `fails`, as that raises."""
+
+    def __init__(self, fails=""):
+        self.fails, self.asked = fails, []
+
+    def __call__(self, *_):
+        return self.do("connect") or self
+
+    def __getattr__(self, name):
+        return lambda *_: self.do(name)
+
+    def do(self, name):
+        self.asked.append(name)
+        if name == self.fails:
+            raise RuntimeError(f"{name}:\n no")
+
+
+@pytest.fixture
+def ur(monkeypatch):
+    """A factory of UR movers whose control client fails at something."""
+    robot = arm("ur10e")
+    still = {"getActualQd": lambda: [0.0] * 6, "getTargetQ": lambda: [0.0] * 6, "isConnected": lambda: True}
+    receive = SimpleNamespace(**still, disconnect=lambda: None)
+    received = SimpleNamespace(RTDEReceiveInterface=lambda *_: receive)
+    monkeypatch.setitem(sys.modules, "rtde_receive", received)
+
+    def make(fails):
+        controls = Controls(fails)
+        monkeypatch.setitem(sys.modules, "rtde_control", SimpleNamespace(RTDEControlInterface=controls))
+        return URMover("127.0.0.1", robot), controls
+
+    return make
+
+
+@pytest.mark.parametrize(
+    ("fails", "says"),
+    [
+        ("connect", "takes no payload .connect: no.: set it to remote control"),
+        ("setTargetPayload", "refused the payload: setTargetPayload: no"),
+        ("stopScript", "cannot be ended .stopScript: no.: see whether it runs"),
+    ],
+)
+def test_a_ur_that_takes_no_payload_is_a_sentence_and_its_script_is_ended(ur, fails, says):
+    mover, controls = ur(fails)
+    load = Load(InertialParameters.from_com(1.0, (0.0, 0.0, 0.1), 1e-3 * np.eye(3), "tool0"))
+    with pytest.raises(SinkError, match=says) as said:
+        mover.write(load)
+    assert "\n" not in str(said.value)
+    assert controls.asked[-1] == ("connect" if fails == "connect" else "disconnect")
+
+
+@pytest.mark.parametrize("fails", ["connect", "setWatchdog"])
+def test_a_ur_that_takes_no_movements_is_a_sentence_whatever_else_fails(ur, fails):
+    mover, controls = ur(fails)
+    controls.servoStop = lambda *_: controls.do(fails)
+    motion = StraightMotion(np.zeros(6), 0.1 * np.ones(6), 2.0)
+    with pytest.raises(SafetyError, match=f"does not take movements .{fails}: no.: switch it on"):
+        mover.follow(motion)
+    assert not mover.moving
+    mover.close()
 
 
 class Obedient(StreamedMover):

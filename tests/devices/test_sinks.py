@@ -387,6 +387,15 @@ def test_a_saved_identification_reads_as_its_load(tmp_path):
         np.testing.assert_allclose(load.std, 0.02 / 1.96, rtol=1e-4)
 
 
+@pytest.mark.parametrize("key", ["phi_low", "inertia_com_low"])
+def test_a_result_whose_interval_nobody_can_hold_is_a_load_without_it(tmp_path, key):
+    result = identification(skew_body()).to_dict()
+    (tmp_path / "held.json").write_text(json.dumps(result | {key: [10**400] * 10}))
+    load = read_load(tmp_path / "held.json")
+    np.testing.assert_array_equal(load.parameters.phi, skew_body().phi)
+    assert (load.std is None) == (key == "phi_low")
+
+
 def test_a_payload_file_is_a_load_that_is_known(tmp_path):
     write_payload(tmp_path / "hand.json", franka_hand())
     load = read_load(tmp_path / "hand.json")

@@ -172,7 +172,7 @@ def test_a_changed_byte_is_one_sentence(tree, tmp_path):
 def test_other_files_are_refused_by_name(tmp_path):
     foreign = tmp_path / "foreign.safetensors"
     save_file({"W": np.zeros(3)}, foreign)
-    with pytest.raises(ModelError, match=r"foreign.safetensors is a safetensors file without armload's header"):
+    with pytest.raises(ModelError, match=r"foreign.safetensors is no model: expected .* `armload train` wrote"):
         load_model(foreign)
     with pytest.raises(ModelError, match=r"no model at .*nothing.safetensors"):
         load_model(tmp_path / "nothing.safetensors")
@@ -193,6 +193,16 @@ def rewritten(path, change, target):
     header["sha256"] = content_digest(header, tensors)
     save_file(tensors, target, {"armload": json.dumps(header)})
     return target
+
+
+def test_a_model_without_its_sha_256_is_no_unaltered_one(tree, tmp_path):
+    with safe_open(tree[0], framework="np") as file:
+        header = json.loads(file.metadata()["armload"])
+        tensors = {k: file.get_tensor(k) for k in file.keys()}  # noqa: SIM118
+    for removed in ({k: v for k, v in header.items() if k != "sha256"}, header | {"sha256": None}):
+        save_file(tensors, tmp_path / "bare.safetensors", {"armload": json.dumps(removed)})
+        with pytest.raises(ModelError, match=r"bare\.safetensors was altered"):
+            load_model(tmp_path / "bare.safetensors")
 
 
 def test_a_model_of_members_that_armload_no_longer_has_is_said_to_be_of_another_version(tree, tmp_path):

@@ -1,11 +1,13 @@
 """An enriched path stays in its tube, keeps ends, stops and times, and tells what the path alone leaves open."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from armload.arms import arm
+from armload.devices.ros2.trajectory_file import read_path
 from armload.errors import MotionError
 from armload.excitation import Constraints, Criterion, PayloadRange, Surroundings, enrich, problems
 from armload.motion import PathMotion, load_motion, save_motion
@@ -28,6 +30,28 @@ def path():
 @pytest.fixture(scope="module")
 def allowed(panda):
     return Constraints(panda, READY, share=1.0, payload=PayloadRange(2.0), travel=10.0, speed=5.0)
+
+
+def trajectory(panda, *seconds):
+    points = [{"positions": READY.tolist(), "time_from_start": {"sec": s}} for s in seconds]
+    return json.dumps({"joint_names": panda.joint_names, "points": points})
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "says"),
+    [
+        ("p.json", lambda panda: trajectory(panda, 0, float("inf")), "is no JointTrajectory"),
+        ("p.json", lambda panda: trajectory(panda, 0, 10**400), "is no JointTrajectory"),
+        ("p.yaml", lambda _: "made: 2026-13-45", "is neither JSON nor YAML: month must be in"),
+        ("p.yaml", lambda _: "[" * 100_000, "is neither JSON nor YAML"),
+        ("p.csv", lambda _: "t,q1,q2,q3,q4,q5,q6,q7\n", "has a row that is not 8 numbers"),
+    ],
+    ids=["at no time", "at a time too long", "no date", "too deep", "no row"],
+)
+def test_what_is_no_path_is_refused_in_a_sentence(panda, tmp_path, name, content, says):
+    (tmp_path / name).write_text(content(panda))
+    with pytest.raises(MotionError, match=says):
+        read_path(tmp_path / name, panda)
 
 
 @pytest.fixture(scope="module")

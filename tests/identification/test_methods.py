@@ -60,7 +60,7 @@ def test_every_row_says_what_when_and_from_where():
 
 
 def test_a_row_with_an_unknown_use_of_the_tare_is_refused():
-    with pytest.raises(ValueError, match="sometimes"):
+    with pytest.raises(IdentificationError, match="sometimes"):
         Method("x", "x", "x", "x", tare="sometimes", prior=False, build=lambda *_: OrdinaryLeastSquares(_[0]))
 
 

@@ -84,7 +84,7 @@ def test_coverage_of_gaussian_draws_is_the_level(runs, level, seed):
 def test_half_widths_are_the_normal_quantiles():
     assert half_width(2.0, 0.6826894921370859) == pytest.approx(2.0, rel=1e-12)
     assert half_width(1.0) == pytest.approx(1.959963984540054)
-    with pytest.raises(ValueError, match="between 0 and 1"):
+    with pytest.raises(IdentificationError, match="between 0 and 1"):
         half_width(1.0, 95)
 
 

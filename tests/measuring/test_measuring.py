@@ -11,7 +11,7 @@ from armload.errors import RecordingError, SafetyError, SourceError, UsageError
 from armload.estimators import Estimate
 from armload.excitation import Accuracy, Obstacle
 from armload.inertia import InertialParameters
-from armload.measuring import Procedure, plan_of
+from armload.measuring import Basis, Procedure, Room, plan_of
 from armload.measuring.plan import BACK, EMPTY, LOADED, TO_START
 from armload.motion import PathMotion, taie2024
 from armload.motion.point_to_point import PointToPoint
@@ -27,6 +27,7 @@ _Q, _DQ, _DDQ = WHOLE(2 * _T)
 MOTION = PathMotion(_T, START + 0.25 * (_Q - START), 0.5 * _DQ, _DDQ)  # a quarter of the way in half the time
 NEAR = START + np.array([0.1, 0, 0, -0.1, 0, 0, 0.1])
 RATE = 250.0
+BY_MAP = Basis(method="map")
 
 
 class Orders:
@@ -70,7 +71,7 @@ def poses(mover, samples=60):
 
 def test_a_measurement_finds_the_payload_and_moves_in_the_order_that_was_said(panda, simulated, tmp_path):
     mover, orders = simulated(NEAR), Orders()
-    procedure = Procedure(mover, panda, MOTION, tmp_path / "logs", method="map", say=orders.seen.append)
+    procedure = Procedure(mover, panda, MOTION, tmp_path / "logs", basis=BY_MAP, say=orders.seen.append)
     assert [leg.purpose for leg in procedure.plan.legs] == [TO_START, EMPTY, LOADED]
     found = procedure.run(orders.consent, orders.mount(mover))
     moves = [f"moving {purpose}" for purpose in (TO_START, EMPTY)]
@@ -91,7 +92,7 @@ def test_a_measurement_finds_the_payload_and_moves_in_the_order_that_was_said(pa
 def test_the_loaded_run_ends_as_soon_as_enough_is_known(panda, simulated, tmp_path):
     mover, orders = simulated(), Orders()
     wanted = Accuracy(mass=0.5, moment=0.05)
-    procedure = Procedure(mover, panda, MOTION, tmp_path, method="map", accuracy=wanted)
+    procedure = Procedure(mover, panda, MOTION, tmp_path, basis=BY_MAP, accuracy=wanted)
     found = procedure.run(orders.consent, orders.mount(mover))
     assert found.reached
     assert found.seconds < 0.9 * MOTION.duration
@@ -123,7 +124,7 @@ def test_without_consent_nothing_moves_and_nothing_is_made(panda, simulated, tmp
 def test_what_passes_a_limit_is_refused_before_anybody_is_asked(panda, simulated, tmp_path, motion, at, room, said):
     mover, orders = simulated(at, sensors=None, world=None), Orders()
     with pytest.raises(SafetyError, match=said):
-        Procedure(mover, panda, motion, tmp_path, **room).run(orders.consent, orders.mount(mover))
+        Procedure(mover, panda, motion, tmp_path, room=Room(**room)).run(orders.consent, orders.mount(mover))
     assert not orders.seen
     assert np.abs(poses(mover) - at).max() < 0.02
 
@@ -151,7 +152,7 @@ def test_a_box_in_the_way_is_refused_before_anybody_is_asked(panda, simulated, t
     mover, orders = simulated(), Orders()
     place = panda.frame_pose(MOTION.position(np.array([1.5])))[1][0]
     box = Obstacle((float(place[0]), float(place[1]), float(place[2])), (0.1, 0.1, 0.1))
-    procedure = Procedure(mover, panda, MOTION, tmp_path / "logs", boxes=[box])
+    procedure = Procedure(mover, panda, MOTION, tmp_path / "logs", room=Room(boxes=[box]))
     with pytest.raises(SafetyError, match=r"the arm hits a box: .* is at box 1 at t = "):
         procedure.run(orders.consent, orders.mount(mover))
     assert orders.seen == []
@@ -161,7 +162,7 @@ def test_a_box_in_the_way_is_refused_before_anybody_is_asked(panda, simulated, t
 
 def test_a_plan_says_how_near_the_payload_comes_to_a_wall(panda):
     wall = Obstacle((3.0, 0.0, 0.5), (2.0, 10.0, 10.0))  # its face is at x = 2 m
-    plan = plan_of(panda, MOTION, START, boxes=[wall])
+    plan = plan_of(panda, MOTION, START, room=Room(boxes=[wall]))
     rotation, place = panda.frame_pose(MOTION.position(np.linspace(0.0, MOTION.duration, 2001)))
     ball = place + 0.1 * rotation[:, :, 2]  # of 0.15 m, the farthest in front
     assert plan.to_dict()["box_clearance"] == pytest.approx(2.0 - 0.15 - ball[:, 0].max(), abs=1e-4)
@@ -183,7 +184,7 @@ def test_movements_are_checked_with_the_payload_that_was_weighed(panda):
 def test_an_interrupted_arm_comes_to_rest_and_its_log_can_be_read(panda, simulated, tmp_path, number):
     before = signal.getsignal(signal.SIGINT)  # what a shell runs in the background ignores it
     mover, orders = simulated(kind=Restless, do=lambda _: signal.raise_signal(number)), Orders()
-    procedure = Procedure(mover, panda, MOTION, tmp_path, method="map")
+    procedure = Procedure(mover, panda, MOTION, tmp_path, basis=BY_MAP)
     with pytest.raises(KeyboardInterrupt):
         procedure.run(orders.consent, orders.mount(mover))
     assert mover.why == f"interrupted by {number.name}"
@@ -204,7 +205,7 @@ def test_a_push_ends_the_measurement_with_a_sentence(panda, simulated, tmp_path)
 
     mover, orders = simulated(kind=Restless, do=grow), Orders()
     with pytest.raises(SafetyError, match=r"stopped on its way with the payload: .* feels .*loaded.csv"):
-        Procedure(mover, panda, MOTION, tmp_path, method="map").run(orders.consent, orders.mount(mover))
+        Procedure(mover, panda, MOTION, tmp_path, basis=BY_MAP).run(orders.consent, orders.mount(mover))
 
 
 def test_a_lost_arm_is_said_with_what_was_recorded(panda, simulated, tmp_path):
@@ -213,13 +214,13 @@ def test_a_lost_arm_is_said_with_what_was_recorded(panda, simulated, tmp_path):
 
     mover, orders = simulated(kind=Restless, do=lose), Orders()
     with pytest.raises(SourceError, match=r"the arm was lost; what was recorded until then is in .*loaded.csv"):
-        Procedure(mover, panda, MOTION, tmp_path, method="map").run(orders.consent, orders.mount(mover))
+        Procedure(mover, panda, MOTION, tmp_path, basis=BY_MAP).run(orders.consent, orders.mount(mover))
     assert len(read_recording(tmp_path / "loaded.csv", panda)) == 99
 
 
 def test_an_arm_moved_meanwhile_is_asked_for_anew(panda, simulated, tmp_path):
     mover, orders = simulated(), Orders()
-    procedure = Procedure(mover, panda, MOTION, tmp_path, method="map")
+    procedure = Procedure(mover, panda, MOTION, tmp_path, basis=BY_MAP)
     elsewhere = Procedure(mover, panda, PointToPoint([START, NEAR], [0.0], [3.0]), tmp_path / "other")
 
     def mount():

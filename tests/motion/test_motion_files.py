@@ -9,7 +9,15 @@ from ruamel.yaml import YAML
 
 from armload.arms import arm
 from armload.errors import MotionError
-from armload.motion import FourierMotion, MotionFingerprint, export_motion, random_motion, taie2024
+from armload.motion import (
+    FourierMotion,
+    MotionFingerprint,
+    PathMotion,
+    export_motion,
+    load_motion,
+    random_motion,
+    taie2024,
+)
 from armload.recording import Recording
 
 
@@ -100,6 +108,34 @@ def log_of(motion, rate=500.0, start=0.0, duration=None, noise=0.0, clock=0.0):
     q, dq, _ = motion(t + start)
     q = q + noise * np.random.default_rng(0).normal(size=q.shape)
     return Recording(t + clock, q, dq, np.zeros_like(q))
+
+
+HUGE = 10**400  # a number of JSON that no float holds
+AT_REST = {"offset": [0.0] * 7, "sine": [[0.0]] * 7, "cosine": [[0.0]] * 7}
+NUMBERS = {key: [[0.0] * 7] * 2 for key in ("positions", "velocities", "accelerations")}
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "[" * 100_000,
+        json.dumps({"format": "armload-motion-1", "name": "x", "period": HUGE, **AT_REST}),
+        json.dumps({"format": "armload-motion-1", "name": "x", "period": 1.0, **AT_REST, "offset": [HUGE] * 7}),
+        json.dumps({"format": "armload-motion-1", "name": "x", "kind": "path", "times": [0, HUGE], **NUMBERS}),
+    ],
+    ids=["too deep", "an endless period", "an endless angle", "an endless time"],
+)
+def test_a_motion_file_whose_numbers_nobody_can_hold_is_refused_in_a_sentence(tmp_path, content):
+    (tmp_path / "m.json").write_text(content)
+    with pytest.raises(MotionError, match=r"m\.json is not a motion: "):
+        load_motion(tmp_path / "m.json")
+
+
+def test_a_table_with_a_cell_that_no_reader_takes_is_refused_in_a_sentence(tmp_path):
+    header = ",".join(["t", *(f"{kind}{j}" for kind in ("q", "dq", "ddq") for j in range(1, 8))])
+    (tmp_path / "m.csv").write_text(f'{header}\n"{"x" * 200_000}"\n')
+    with pytest.raises(MotionError, match=r"m\.csv is not a table of numbers"):
+        PathMotion.read(tmp_path / "m.csv")
 
 
 def test_a_log_of_the_motion_matches_on_any_clock_and_of_any_shorter_length():

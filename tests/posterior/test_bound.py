@@ -276,6 +276,21 @@ def test_an_arm_with_other_joints_is_refused():
         bound(arm("ur10e"), taie2024())
 
 
+@pytest.mark.parametrize(("constant", "finer"), [("_RATE", 100.0), ("_FEATURES", (64, 8))])
+def test_the_joint_named_is_that_of_a_finer_comparison(panda, monkeypatch, constant, finer):
+    motions = []
+    for seed in range(3):
+        whole = random_motion(panda, seed, duration=5.0)
+        for moved in ([0], [6], [1, 2], [5, 6]):
+            motions.append(whole.scaled(np.isin(np.arange(7), moved) * 0.5))
+    found = [advise(panda, motion) for motion in motions]
+    monkeypatch.setattr(f"armload.posterior.advice.{constant}", finer)
+    for motion, coarse in zip(motions, found, strict=True):
+        other = advise(panda, motion)
+        assert other.joint == coarse.joint
+        assert other.shrinks == pytest.approx(coarse.shrinks, abs=0.01)
+
+
 def test_the_joint_advised_gains_what_is_said(panda):
     """On the full model, and more than the base joint, which turns about gravity and tells a pose nothing new of it."""
     log = standing(POSE, 4.0)

@@ -129,6 +129,13 @@ def test_what_cannot_be_meant_is_refused(tmp_path, log, spec, says):
     assert "\n" not in str(refusal.value)
 
 
+@pytest.mark.parametrize("line", ["episode = inf", f"rate = {10**400}", f"torque_constants = [{10**400}]"])
+def test_a_number_that_nobody_can_hold_is_refused(tmp_path, line):
+    (tmp_path / "lab.toml").write_text(line)
+    with pytest.raises(RecordingError, match=r"lab\.toml: .*expected numbers"):
+        ColumnSpec.of(tmp_path / "lab.toml")
+
+
 def test_a_bag_takes_no_columns(tmp_path):
     (tmp_path / "a.mcap").write_bytes(b"\x89MCAP0\r\n")
     with pytest.raises(RecordingError, match=r"a ROS bag has its joints by name"):

@@ -130,5 +130,5 @@ def test_samples_of_another_arm_are_refused_and_leave_no_trace(joints, wrong):
 @pytest.mark.parametrize("gain", [-1.0, 0.0, np.nan, np.inf, "20", None])
 def test_a_lag_that_is_none_is_refused(gain):
     for made in (Lag, lambda value: FilteredRegression(arm("panda"), value)):
-        with pytest.raises(ValueError, match="expected the lag's"):
+        with pytest.raises(IdentificationError, match="expected the lag's"):
             made(gain)

@@ -35,6 +35,15 @@ def test_an_episode_raises_once_and_clears_once():
     assert seen == [("over_rating", True), ("over_rating", False)] * 2
 
 
+def test_a_source_that_comes_again_is_said_to_whatever_is_unknown_then():
+    alarms, now, seen = Alarms("a"), 0.0, []
+    lost = {**UNKNOWN, "unknown": "source lost", "why": "gone"}
+    for said in (lost, {**UNKNOWN, "why": "the payload is changing"}):
+        found, now = told(alarms, said, CLEARED_AFTER + 1.0, now)
+        seen += [(a.kind, a.raised, a.text) for a in found]
+    assert seen == [("source_lost", True, "gone"), ("source_lost", False, "samples come again")]
+
+
 def test_a_limit_that_is_grazed_gives_one_alarm():
     alarms, now, seen = Alarms("a", rating=3.0), 0.0, []
     for k in range(20):
@@ -95,7 +104,7 @@ def test_a_centre_of_mass_of_nothing_is_no_alarm():
 @pytest.fixture
 def receiver():
     """A real server that takes what it is sent after it has answered as told."""
-    taken, codes = [], [503, 200]
+    taken, codes = [], [503, 200]  # `taken` has "GET", too, which a receiver of alarms is never asked
 
     class Handler(BaseHTTPRequestHandler):
         def do_POST(self):
@@ -107,6 +116,13 @@ def receiver():
             if code == 200:
                 taken.append((json.loads(body), self.headers.get("Authorization")))
             self.send_response(code)
+            if 300 <= code < 400:
+                self.send_header("Location", "/elsewhere")
+            self.end_headers()
+
+        def do_GET(self):
+            taken.append("GET")
+            self.send_response(200)
             self.end_headers()
 
         def log_message(self, *_):
@@ -149,6 +165,19 @@ def test_a_message_that_will_never_be_taken_holds_up_no_other(receiver):
     assert (webhook.sent, webhook.dropped) == (1, 1)
 
 
+@pytest.mark.parametrize("code", [301, 302, 303, 307, 308])
+def test_a_receiver_that_has_moved_is_said_and_no_alarm_is_lost_to_it(receiver, caplog, code):
+    url, taken, codes = receiver
+    codes[:] = [code]
+    webhook = Webhook(url, {"Authorization": "Bearer x"})
+    webhook.post({"number": 0})
+    until(lambda: webhook.sent == 1)
+    webhook.close()
+    assert taken == [({"number": 0}, "Bearer x")]
+    said = f"the webhook answered {code}, that it is elsewhere: give the address it is at"
+    assert caplog.messages == [said, "the webhook takes alarms again"]
+
+
 def test_an_answer_that_is_no_http_is_said_and_alarms_go_on(receiver, caplog):
     url, taken, codes = receiver
     codes[:] = [b"garbage\r\n\r\n"]
@@ -171,6 +200,9 @@ def test_what_waits_for_a_dead_receiver_is_bounded():
 def test_an_address_that_is_none_is_refused():
     with pytest.raises(UsageError, match="expected an address"):
         Webhook("ftp://host/x")
+    with pytest.raises(UsageError, match=r"ftp://…@host/x") as said:
+        Webhook("ftp://me:secret@host/x")
+    assert "secret" not in str(said.value)
 
 
 def test_a_header_that_is_no_text_is_refused():

@@ -53,7 +53,7 @@ def test_an_address_or_a_folder_that_cannot_be_used_is_said_before_anything_begi
         ("ur://127.0.0.1", "ur10e", "rtde_receive", "ur-rtde, which cannot be imported (not here): pip install"),
         ("fr3://127.0.0.1", "fr3", "pylibfranka", "pylibfranka, which cannot be imported (not here): pip install"),
         ("ros2:///joint_states", "panda", "rclpy", "ROS 2 is not there for this Python (not here)"),
-        ("fr3://127.0.0.1", "ur10e", "pylibfranka", "ur10e has 6 joints: a FR3 has 7"),
+        ("fr3://127.0.0.1", "ur10e", "pylibfranka", "ur10e has 6 joints: FR3 robots have 7"),
         ("ur://127.0.0.1", "ur5", "rtde_receive", "no torque constants are known for it"),
     ],
 )

@@ -10,6 +10,7 @@ import urllib.request
 
 import pytest
 
+from armload.errors import UsageError
 from armload.service import Endpoint
 from armload.service.endpoint import _MOST
 
@@ -72,6 +73,26 @@ def test_clients_that_leave_the_stream_of_an_arm_that_ended_make_room_for_others
         except OSError:  # there is no room yet
             assert time.monotonic() < end
             time.sleep(0.05)
+
+
+@pytest.mark.skipif(not socket.has_ipv6, reason="this machine has no IPv6")
+def test_an_address_of_ipv6_can_be_listened_at():
+    try:
+        socket.create_server(("::1", 0), family=socket.AF_INET6).close()
+    except OSError:
+        pytest.skip("this machine has no loopback of IPv6")
+    endpoint = Endpoint(Cell(), "::1", 0)
+    try:
+        assert endpoint.url.startswith("http://[::1]:")
+        with urllib.request.urlopen(f"{endpoint.url}/arms/right", timeout=10.0) as answer:
+            assert json.load(answer)["arm"] == "right"
+    finally:
+        endpoint.close()
+
+
+def test_a_host_that_is_not_there_is_said_with_the_port():
+    with pytest.raises(UsageError, match=r"cannot listen at 192\.0\.2\.1:0: .*; name another host or port"):
+        Endpoint(Cell(), "192.0.2.1", 0, "sixteen characters")
 
 
 def test_a_stream_of_one_arm_goes_on_though_it_is_silent_for_a_while(address):

@@ -111,6 +111,36 @@ def test_alarms_arrive_in_order_though_the_broker_comes_later(port):
         mqtt.close()
 
 
+def test_a_broker_that_refuses_or_is_not_there_is_said_once(caplog):
+    pytest.importorskip("paho.mqtt.client", reason="paho-mqtt is not installed")
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        mqtt = Mqtt(f"mqtt://me:secret@127.0.0.1:{port}/cell")
+        try:
+            for _ in range(2):  # it is tried again
+                connection, _ = server.accept()
+                with connection:
+                    connection.recv(1024)
+                    connection.sendall(bytes([0x20, 2, 0, 5]))  # CONNACK of MQTT 3.1.1: not authorized
+                    connection.recv(1024)
+        finally:
+            mqtt.close()
+    assert len(caplog.messages) == 1
+    assert re.match("the MQTT broker refuses the connection: Not authori[sz]ed", caplog.messages[0])
+    caplog.clear()
+    mqtt, end = Mqtt(f"mqtt://127.0.0.1:{port}/cell"), time.monotonic() + PATIENCE
+    while not caplog.messages and time.monotonic() < end:
+        time.sleep(0.02)
+    mqtt.close()
+    assert caplog.messages == ["the MQTT broker cannot be reached; it is tried again"]
+
+
+def test_a_password_is_in_no_message():
+    with pytest.raises(UsageError, match=r"'mqtt://…@host/a/#'") as said:
+        checked("mqtt://me:secret@host/a/#")
+    assert "secret" not in str(said.value)
+
+
 @pytest.mark.parametrize("url", ["http://host/x", "mqtt://", "mqtt://host:port", "mqtt://host/a/#"])
 def test_an_address_that_is_none_is_refused(url):
     with pytest.raises(UsageError, match="expected an address such as mqtt://HOST:1883/PREFIX"):

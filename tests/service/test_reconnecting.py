@@ -2,6 +2,7 @@
 
 import itertools
 import os
+import re
 import signal
 import time
 
@@ -123,6 +124,26 @@ def test_a_reason_that_stays_is_said_as_often_as_the_wait_grows_and_then_now_and
             break
     source.close()
     assert len(said) >= 5
+
+
+@pytest.mark.parametrize(
+    ("error", "why"),
+    [
+        (RuntimeError("libfranka:\n  no route to host"), "libfranka: no route to host"),
+        (TimeoutError(), "TimeoutError"),
+        (SourceError("the reader of arm was killed by signal 9: open the source again"), "killed by signal 9$"),
+    ],
+)
+def test_why_it_cannot_be_opened_is_one_line_that_asks_for_nothing_that_is_done_anyway(error, why):
+    def opened():
+        raise error
+
+    source = Reconnecting(opened, name="arm", n=7)
+    for _ in source.ticking(0.001):
+        if source.why is not None:
+            source.close()
+    assert re.search(why, source.why)
+    assert "\n" not in source.why
 
 
 @pytest.mark.parametrize("step", [-100.0, 100.0])

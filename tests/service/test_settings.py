@@ -7,8 +7,10 @@ from pathlib import Path
 import pytest
 
 from armload.app.cli import main
-from armload.errors import UsageError
+from armload.errors import RecordingError, UsageError
+from armload.recording import ColumnSpec
 from armload.service import ArmSettings, ServiceSettings, read_settings
+from armload.service.settings import read_token
 
 CELL = """
 every = 0.5
@@ -152,3 +154,27 @@ def test_two_arms_are_not_recorded_in_one_file():
     arms = [ArmSettings(name=name, source="sim", robot="panda", record="run.csv") for name in ("left", "right")]
     with pytest.raises(UsageError, match=r"two arms are recorded in run\.csv"):
         ServiceSettings(tuple(arms))
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("token", "the token's file .*token' is no text"), ("to\0ken", "is no text"), ("gone", "cannot be read: No such")],
+)
+def test_a_token_that_is_no_text_is_one_sentence(tmp_path, name, said):
+    (tmp_path / "token").write_bytes(b"\xff" * 32)
+    with pytest.raises(UsageError, match=said):
+        read_token(tmp_path / name)
+
+
+def test_a_setting_with_a_zero_byte_is_one_sentence(tmp_path):
+    (tmp_path / "cell.toml").write_text(CELL.replace('save = "state"', 'save = "st\\u0000ate"'))
+    with pytest.raises(UsageError, match=r"save is .* expected a text without a zero byte"):
+        read_settings(tmp_path / "cell.toml")
+
+
+def test_a_file_nested_deeper_than_anybody_reads_is_one_sentence(tmp_path):
+    (tmp_path / "cell.toml").write_text("a = " + "[" * 10_000)
+    with pytest.raises(UsageError, match=r"cell\.toml is no TOML"):
+        read_settings(tmp_path / "cell.toml")
+    with pytest.raises(RecordingError, match=r"cell\.toml is not TOML"):
+        ColumnSpec.of(tmp_path / "cell.toml")

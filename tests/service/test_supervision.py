@@ -16,7 +16,13 @@ LINE = """json.dumps({"t": 1.0, "told": time.monotonic(), "known": True, "unknow
 
 
 @pytest.fixture
-def running(monkeypatch):
+def noted():
+    """What a service has said for its log."""
+    return []
+
+
+@pytest.fixture
+def running(monkeypatch, noted):
     """A factory of services whose one arm's process is a program of so many lines; its n-th start may fail."""
     services = []
 
@@ -32,7 +38,7 @@ def running(monkeypatch):
 
         monkeypatch.setattr(spare, "_started", started)
         arm = ArmSettings(name="left", source="sim", robot="panda")
-        services.append(Service(ServiceSettings((arm,), spare=False)))
+        services.append(Service(ServiceSettings((arm,), spare=False), noted.append))
         threading.Thread(target=services[-1].run, args=(PATIENCE,), daemon=True).start()
         return services[-1], starts
 
@@ -76,3 +82,19 @@ def test_a_process_that_is_started_again_may_take_as_long_as_the_first_until_its
     _, starts = running(f"time.sleep(1.0)\nprint({LINE}, flush=True)\nsys.exit(3)")
     until(lambda: len(starts) >= 4)
     assert all(b - a > 0.9 for a, b in pairwise(starts))  # none was ended before it spoke
+
+
+def test_why_a_source_is_lost_stands_once_in_the_log_and_in_its_alarm(running, noted):
+    lost = f"""line = {{**{LINE.removeprefix("json.dumps(").removesuffix(")")}, "connection": "lost"}}
+print(json.dumps({{"note": "sim was lost: gone; it is opened again in 0.1 s"}}), flush=True)
+while True:
+    why = {{"known": False, "unknown": "source lost", "why": "sim was lost: gone", "told": time.monotonic()}}
+    print(json.dumps({{**line, **why}}), flush=True)
+    time.sleep(0.05)"""
+    one, _ = running(lost)
+    heard = []
+    with one.heard_by(heard.append):
+        until(lambda: any("alarm" in each for each in heard))
+    assert [each["text"] for each in heard if "alarm" in each] == ["sim was lost: gone"]
+    until(lambda: len(noted) >= 2)
+    assert noted == ["left: sim was lost: gone; it is opened again in 0.1 s", "left: source_lost raised"]

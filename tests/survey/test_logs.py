@@ -9,6 +9,7 @@ import pytest
 from armload.errors import ArmloadError, UsageError
 from armload.recording import read_recording
 from armload.survey import find_logs
+from armload.survey.logs import Log
 
 
 @pytest.fixture
@@ -129,6 +130,29 @@ def test_objects_are_logs_by_their_url():
     before = log.content()
     store.pipe({"/cell/arm-7/a.csv": b"xyz"})
     assert log.content() != before
+
+
+def test_what_the_package_of_a_store_raises_is_an_error_of_the_store(monkeypatch):
+    """As of botocore, where nobody is logged in: its errors are no OSErrors."""
+    pytest.importorskip("fsspec")
+
+    class NoCredentialsError(Exception):
+        pass
+
+    class Closed:
+        protocol = "s3"
+
+        def glob(self, _):
+            raise NoCredentialsError("Unable to locate\ncredentials")
+
+        def ukey(self, _):
+            raise NoCredentialsError
+
+    monkeypatch.setattr("fsspec.core.url_to_fs", lambda url: (Closed(), url.partition("://")[2]))
+    with pytest.raises(OSError, match=r"^s3://cell/\*\.csv: NoCredentialsError: Unable to locate credentials$"):
+        find_logs(["s3://cell/*.csv"])
+    with pytest.raises(OSError, match=r"^s3://cell/a\.csv: NoCredentialsError"):
+        Log("s3://cell/a.csv", "cell").stamp()
 
 
 @pytest.mark.parametrize(

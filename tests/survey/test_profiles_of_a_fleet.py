@@ -95,3 +95,20 @@ def test_logs_in_an_object_store_teach_the_profile_that_those_on_disk_do(panda, 
         assert np.array_equal(one.b, other.b)
     finally:
         store.rm("/cell", recursive=True)
+
+
+@pytest.mark.parametrize("damage", ["", "{", "[]", "3", '{"key": 3}', "\xff", "[" * 100_000])
+def test_a_damaged_note_of_what_a_profile_was_learned_from_is_written_anew(tmp_path, monkeypatch, damage):
+    made = []
+    monkeypatch.setattr(learning, "save_profile", lambda _, path: made.append(path) or path.touch())
+    monkeypatch.setattr(learning, "_learned", lambda chosen, _: (object(), list(range(len(chosen))), []))
+    row = {"status": "answered", "held": False, "determined": "m", "mass_low": -1.0, "mass_high": 1.0, "moves": False}
+    rows = [row | {"arm": "a", "log": "a/0.csv", "part": 0, "date": None, "t0": 0.0, "t1": 60.0, "key": "k"}]
+    settings, folder = Settings("panda"), tmp_path / "p"
+    for _ in range(2):
+        said = learning.learn_profiles(rows, settings, folder)
+    assert said == {"a": "as before, of 1 stretches"}
+    (folder / "a.json").write_bytes(damage.encode("latin-1"))
+    assert learning.learn_profiles(rows, settings, folder) == {"a": "learned from 1 stretches"}
+    assert learning.learn_profiles(rows, settings, folder) == {"a": "as before, of 1 stretches"}
+    assert len(made) == 2

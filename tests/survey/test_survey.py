@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from armload.errors import UsageError
 from armload.lab.cells import load_cells
 from armload.motion import random_motion
 from armload.payloads import test_payload as make_payload
@@ -190,6 +191,20 @@ def test_every_form_of_the_table_holds_the_same_rows(surveyed, tmp_path):
     for suffix in (".csv", ".json"):
         write_rows(tmp_path / f"t{suffix}", rows, n)
         assert read_rows(tmp_path / f"t{suffix}") == (rows, n)
+
+
+def test_a_table_that_a_spreadsheet_has_saved_says_the_same_and_what_is_no_flag_is_refused(surveyed, tmp_path):
+    from armload.survey import write_rows
+
+    (rows, n), path = read_rows(surveyed), tmp_path / "t.csv"
+    write_rows(path, rows, n)
+    text = path.read_text()
+    assert ",true," in text
+    path.write_text(text.replace(",true,", ",TRUE,").replace(",false,", ",FALSE,"))
+    assert read_rows(path) == (rows, n)
+    path.write_text(text.replace(",true,", ",1,"))
+    with pytest.raises(UsageError, match=r"t\.csv is no survey that can be read"):
+        read_rows(path)
 
 
 def test_each_episode_of_a_file_is_answered_and_a_bad_one_is_a_row(panda, tmp_path):

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from armload.arms.facts import ARMS, ArmFacts, description_of
+from armload.arms.facts import ARMS, description_of
 from armload.arms.matching import link_fingerprint, prefixed_frame
 from armload.arms.model import STANDARD_GRAVITY, Arm
 from armload.errors import ArmError
@@ -61,16 +61,6 @@ def arm(robot: str | Path, frame: str | None = None, gravity: tuple[float, float
     if path.stem in ARMS and found.known_as != path.stem:
         return replace(found, name=path.name)  # called like an arm of the catalogue, and not that arm
     return found
-
-
-def facts_of(arm: Arm) -> ArmFacts | None:
-    """The sheet of an arm, whatever its file is called; None: it is no built-in one, or its frame cuts it short.
-
-    >>> facts_of(arm("ur10e")).rated_payload
-    12.5
-    """
-    facts = None if arm.known_as is None else ARMS.get(arm.known_as)
-    return facts if facts is not None and facts.joints == arm.n else None
 
 
 def _as_known(found: Arm) -> Arm:

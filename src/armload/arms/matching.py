@@ -8,8 +8,9 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms.facts import ARMS
+from armload.arms.facts import ARMS, ArmFacts
 from armload.arms.model import Arm
+from armload.inertia import InertialParameters
 
 _TURN = 0.3  # [rad, m] of the first joint, which shows its axis
 
@@ -38,6 +39,26 @@ def prefixed_frame(arm: Arm, frame: str) -> str | None:
     return found[0] if len(found) == 1 else None
 
 
+def from_frame(arm: Arm, frame: str) -> NDArray[np.float64]:
+    """T (10, 10): phi about the arm's payload frame is T·phi about another frame behind its last joint.
+
+    Raises:
+        ArmError: see `Arm.in_frame`.
+    """
+    return np.array([arm.in_frame(InertialParameters(unit, frame)).phi for unit in np.eye(10)]).T
+
+
+def facts_of(arm: Arm) -> ArmFacts | None:
+    """The sheet of an arm, whatever its file is called; None: it is no built-in one, or its frame cuts it short.
+
+    >>> from armload.arms import arm
+    >>> facts_of(arm("ur10e")).rated_payload
+    12.5
+    """
+    facts = None if arm.known_as is None else ARMS.get(arm.known_as)
+    return facts if facts is not None and facts.joints == arm.n else None
+
+
 def names_among(arm: Arm, found: Collection[str]) -> tuple[str, ...] | None:
     """What the arm's joints (n,) are called among these names; None: one of them is missing.
 
@@ -49,8 +70,8 @@ def names_among(arm: Arm, found: Collection[str]) -> tuple[str, ...] | None:
     >>> names_among(arm("iiwa14"), [f"iiwa_joint_{k}" for k in range(7, 0, -1)])[0]
     'iiwa_joint_1'
     """
-    facts = None if arm.known_as is None else ARMS.get(arm.known_as)
-    others = facts.log_names or () if facts is not None and facts.joints == arm.n else ()
+    facts = facts_of(arm)
+    others = () if facts is None else facts.log_names or ()
     return next((names for names in (arm.joint_names, *others) if set(names) <= set(found)), None)
 
 

@@ -236,14 +236,14 @@ def read_load(path: str | Path) -> Load:
         low, high = (np.array(content[key], dtype=float) for key in ("phi_low", "phi_high"))
         if low.shape == high.shape == (10,) and np.all(np.isfinite(high - low)) and np.all(high >= low):
             std = (high - low) / (2 * Z95)
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, OverflowError):
         pass  # written by hand: the numbers themselves are enough
     resting = _flags(content, "rests_on_prior", path) or (False,) * 10
     remarks = _leaning(determined, resting) + assumed(payload)
     try:
         inertia = (content[key] for key in ("inertia_com", "inertia_com_low", "inertia_com_high"))
         remarks += _loose(*(np.diag(np.array(x, dtype=float)) for x in inertia), known=determined)
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, OverflowError):
         pass
     return Load(parameters, determined, robot, relative_to, std, remarks)
 

@@ -131,7 +131,7 @@ def check_spec(spec: str) -> None:
 
 def _scheme(name: str) -> str:
     """That of a robot's address, "" of anything else."""
-    scheme = urlsplit(name).scheme if "://" in name else ""
+    scheme = name.partition("://")[0].lower() if "://" in name else ""
     if scheme and scheme not in SCHEMES:
         raise SourceSetupError(
             f"{name}: unknown kind of source {scheme!r}: expected {', '.join(f'{s}://' for s in SCHEMES)}, sim, or the "
@@ -146,16 +146,16 @@ def prepare(spec: str) -> str | None:
     Returns:
         The error message for a robot that then does not answer; None: no limit, or no client.
     """
-    parts = urlsplit(spec if "://" in spec else "")
-    if parts.scheme not in _DETACHED or not parts.hostname:
-        return None
     silent = "it does not answer"
     with contextlib.suppress(SourceError):  # raised again when the source is opened
-        if parts.scheme == "ur":
+        if _scheme(spec) not in _DETACHED:
+            return None
+        address = address_of(spec)
+        if address.scheme == "ur":
             ur.load_client()
-            return ur.unreachable(parts.hostname, silent)
-        franka.load_client(parts.scheme)
-        return franka.unreachable(parts.hostname, silent, parts.scheme)
+            return ur.unreachable(address.host, silent)
+        franka.load_client(address.scheme)
+        return franka.unreachable(address.host, silent, address.scheme)
     return None
 
 
@@ -177,13 +177,20 @@ def address_of(name: str) -> Address:
     """What a robot's address says.
 
     Raises:
-        SourceSetupError: it names no robot, or has an option that there is not.
+        SourceSetupError: it names no robot, has an option that there is not, or says what no client can use: a port.
     """
-    parts = urlsplit(name)
-    host = parts.netloc + parts.path if parts.scheme == "ros2" else parts.hostname
+    try:
+        parts = urlsplit(name)
+        host = parts.netloc + parts.path if parts.scheme == "ros2" else parts.hostname
+    except ValueError as error:
+        raise SourceSetupError(f"{name} is no address ({error}): expected a host's name or IP address") from None
     if not host:
         raise SourceSetupError(
             f"{name} names no robot: expected {parts.scheme}://ADDRESS, such as {parts.scheme}://172.16.0.2"
+        )
+    if parts.scheme != "ros2" and (parts.netloc.strip("[]").lower() != host.lower() or parts.path.strip("/")):
+        raise SourceSetupError(
+            f"{name} says more than where the robot is: expected {parts.scheme}://{host}; its ports are fixed"
         )
     asked = parse_qs(parts.query, keep_blank_values=True)
     options = _OPTIONS.get(parts.scheme, ())

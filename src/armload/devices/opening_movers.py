@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from typing import Any
-from urllib.parse import urlsplit
 
 from numpy.typing import ArrayLike
 
@@ -53,7 +52,7 @@ def open_mover(
         return SimulatedMover(
             arm, at, payload, mounted, world=world, sensors=sensors, rate=rate, speed=speed, seed=seed
         )
-    scheme = urlsplit(spec).scheme
+    scheme = spec.partition("://")[0].lower()
     if scheme not in SCHEMES:
         raise SourceError(f"{spec} cannot be moved: expected sim, {', '.join(f'{s}://ADDRESS' for s in SCHEMES)}")
     if scheme == "ros2":

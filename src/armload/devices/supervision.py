@@ -66,7 +66,7 @@ class Supervision:
 
     def __init__(self, arm: Arm, motion: Motion, thresholds: Thresholds) -> None:
         self._arm, self._thresholds = arm, thresholds
-        self._t = np.linspace(0.0, motion.duration, max(2, round(motion.duration / _GRID) + 1))
+        self._t = motion.instants(1.0 / _GRID)
         self._q, dq, ddq = motion(self._t)
         mass = rated_mass(arm)
         most = mass * np.array([1.0, *[_REACH] * 3, *[_REACH**2 + _SPREAD**2] * 6])

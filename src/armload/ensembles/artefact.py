@@ -6,9 +6,9 @@ trained on, because a learned payload model is valid for these only.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import fields
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,19 +26,17 @@ from armload.ensembles.compiled import (
     StackedOutputs,
 )
 from armload.ensembles.trained_model import LearnedModel
-from armload.errors import ArmloadError, ModelError
+from armload.errors import ModelError
 from armload.inertia import NAMES
 from armload.motion import Motion, MotionFingerprint
 from armload.recording.columns import column_names
-from armload.runtime.atomic import replacing
-from armload.runtime.content import content_digest
+from armload.runtime.tensor_file import TensorFile
 from armload.runtime.version import package_versions
 
 if TYPE_CHECKING:
     from armload.ensembles.bagging import Ensemble
 
-FORMAT = 1
-_HEADER = "armload"
+_FILE = TensorFile("armload", 1, "model", "train", "armload train")
 _LEAVES: dict[str, type[Compiled]] = {"trees": CompiledTrees, "networks": CompiledNetworks}
 # as stored in files: not the names of the classes
 _BRANCHES: dict[str, type[CombinedEnsembles]] = {"beside": StackedOutputs, "together": AveragedMembers}
@@ -90,7 +88,6 @@ def save_model(
     prints = [m if isinstance(m, MotionFingerprint) else MotionFingerprint.of(m) for m in motions]
     tensors: dict[str, NDArray] = {}
     header = {
-        "format": FORMAT,
         "kind": model.kind_name,
         "arm": {"name": arm.name, "fingerprint": arm.fingerprint, "joints": list(arm.joint_names)},
         "frame": arm.frame,
@@ -107,16 +104,8 @@ def save_model(
         "notes": notes,
         "structure": to_structure(compiled, "", tensors),
     }
-    from safetensors.numpy import save
-
-    header["sha256"] = content_digest(header, tensors)
     path = Path(path)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with replacing(path) as part:
-            part.write_bytes(save(tensors, {_HEADER: json.dumps(header)}))
-    except OSError as error:
-        raise ModelError(f"the model cannot be written to {path}: {error.strerror}") from None
+    _FILE.write(path, tensors, header)
     return load_model(path)
 
 
@@ -126,65 +115,41 @@ def load_model(path: str | PathLike[str]) -> LearnedModel:
     Raises:
         ModelError: missing, truncated, altered or foreign file, or one of another armload.
     """
-    from safetensors import SafetensorError, safe_open
+    return _FILE.read(Path(path), partial(_model, Path(path)))
 
-    path = Path(path)
-    try:
-        with safe_open(path, framework="np") as file:
-            text = (file.metadata() or {}).get(_HEADER)
-            tensors = {name: np.ascontiguousarray(file.get_tensor(name)) for name in file.keys()}  # noqa: SIM118
-    except FileNotFoundError:
-        raise ModelError(f"no model at {path}: expected a .safetensors file written by armload") from None
-    except (SafetensorError, OSError, ValueError, TypeError) as error:
+
+def _model(path: Path, tensors: dict[str, NDArray], header: dict[str, Any]) -> LearnedModel:
+    unknown = [kind for kind in _kinds(header["structure"]) if kind not in _LEAVES and kind not in _BRANCHES]
+    if unknown:
         raise ModelError(
-            f"{path} is not a readable model ({' '.join(str(error).split())}): expected a .safetensors file written by "
-            "armload; copy it again"
-        ) from None
-    if text is None:
-        raise ModelError(f"{path} is a safetensors file without armload's header: expected a model armload saved")
-    try:
-        header = json.loads(text)
-        found = header["format"]
-        if found != FORMAT:
-            raise ModelError(f"{path} has model format {found}: this armload reads {FORMAT}; update armload")
-        digest = header.pop("sha256")
-        if digest != content_digest(header, tensors):
-            raise ModelError(f"{path} was altered after it was saved (its SHA-256 differs): copy it again")
-        unknown = [kind for kind in _kinds(header["structure"]) if kind not in _LEAVES and kind not in _BRANCHES]
-        if unknown:
-            raise ModelError(
-                f"{path} belongs to another version of armload, its members are {unknown[0]!r}: expected "
-                f"{' or '.join(_LEAVES)}; train it again"
-            )
-        compiled = from_structure(header["structure"], "", tensors)
-        arm = header["arm"]
-        model = LearnedModel(
-            compiled=compiled,
-            kind=header["kind"],
-            arm_name=arm["name"],
-            arm_fingerprint=arm["fingerprint"],
-            joint_names=tuple(arm["joints"]),
-            frame=header["frame"],
-            motions=tuple(MotionFingerprint.from_dict(m) for m in header["motions"]),
-            dataset_hash=header["dataset_hash"],
-            phi_mean=np.array(header["phi_mean"], dtype=float),
-            phi_std=np.array(header["phi_std"], dtype=float),
-            error_std=None if header["error_std"] is None else np.array(header["error_std"], dtype=float),
-            settings=header["settings"],
-            epochs=header["epochs"],
-            versions=header["versions"],
-            notes=header["notes"],
-            source=str(path),
+            f"{path} belongs to another version of armload, its members are {unknown[0]!r}: expected "
+            f"{' or '.join(_LEAVES)}; train it again"
         )
-        if header["features"] != model.features or compiled.n_features != len(model.features):
-            raise ValueError(f"{compiled.n_features} features, named {', '.join(map(str, header['features']))}")
-        sizes = {len(x) for x in (model.phi_mean, model.phi_std, model.error_std) if x is not None}
-        if sizes | {compiled.n_outputs} != {len(NAMES)}:
-            raise ValueError(f"{compiled.n_outputs} outputs")
-    except ModelError:
-        raise
-    except (ArmloadError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        raise ModelError(f"{path} holds a model armload cannot use ({error}): save or copy it again") from None
+    compiled = from_structure(header["structure"], "", tensors)
+    arm = header["arm"]
+    model = LearnedModel(
+        compiled=compiled,
+        kind=header["kind"],
+        arm_name=arm["name"],
+        arm_fingerprint=arm["fingerprint"],
+        joint_names=tuple(arm["joints"]),
+        frame=header["frame"],
+        motions=tuple(MotionFingerprint.from_dict(m) for m in header["motions"]),
+        dataset_hash=header["dataset_hash"],
+        phi_mean=np.array(header["phi_mean"], dtype=float),
+        phi_std=np.array(header["phi_std"], dtype=float),
+        error_std=None if header["error_std"] is None else np.array(header["error_std"], dtype=float),
+        settings=header["settings"],
+        epochs=header["epochs"],
+        versions=header["versions"],
+        notes=header["notes"],
+        source=str(path),
+    )
+    if header["features"] != model.features or compiled.n_features != len(model.features):
+        raise ValueError(f"{compiled.n_features} features, named {', '.join(map(str, header['features']))}")
+    sizes = {len(x) for x in (model.phi_mean, model.phi_std, model.error_std) if x is not None}
+    if sizes | {compiled.n_outputs} != {len(NAMES)}:
+        raise ValueError(f"{compiled.n_outputs} outputs")
     return model
 
 

@@ -143,14 +143,13 @@ class OrdinaryLeastSquares(NormalLeastSquares):
     Args:
         arm: the bare arm.
         gain: λ of the lag [1/s].
-        weighted: as in `NormalLeastSquares`.
     """
 
     name = "ols"
 
-    def __init__(self, arm: Arm, gain: float = GAIN, weighted: bool = False) -> None:
+    def __init__(self, arm: Arm, gain: float = GAIN) -> None:
         self._regression = FilteredRegression(arm, gain)
-        super().__init__(arm, weighted)
+        super().__init__(arm)
 
     def _restart(self) -> None:
         self._regression.reset()

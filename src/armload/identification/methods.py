@@ -61,7 +61,9 @@ class Method:
 
     def __post_init__(self) -> None:
         if self.tare not in TARES or self.needs not in NEEDS:
-            raise ValueError(f"{self.name}: tare {self.tare!r} and needs {self.needs!r}: expected {TARES} and {NEEDS}")
+            raise IdentificationError(
+                f"{self.name}: tare {self.tare!r} and needs {self.needs!r}: expected {TARES} and {NEEDS}"
+            )
 
     def make(self, arm: Arm, tare: Recording | None = None, profile: Profile | None = None) -> Identifier:
         """The method for an arm, relative to a tare or a profile where one is given.

@@ -47,7 +47,7 @@ from armload.identification.thresholds import (
 )
 from armload.recording import Recording
 from armload.recording.windows import Windows, integrals, windows
-from armload.regression.prior import REACH
+from armload.regression.prior import within_reach
 
 _MOST_WINDOWS = 120  # spread over the log: one factor needs no more, whatever the log's length
 _ALIKE = 4  # neighbouring windows that err alike, and count for one
@@ -181,9 +181,7 @@ class _System(NamedTuple):
         level = friction[:, :, None] * np.eye(n)
         A = np.concatenate([payload, offset, level], axis=2)  # (W, n, 10 + 2n)
         mass = HEAVIEST * rated_mass(arm)
-        prior = np.concatenate(
-            [mass * np.r_[1.0, [REACH] * 3, [REACH**2] * 6], OFFSET * rated, FRICTION * rated]
-        )  # standard deviations
+        prior = np.concatenate([within_reach(mass), OFFSET * rated, FRICTION * rated])  # standard deviations
         # a joint at rest is held by any friction below stiction: tanh knows nothing of it
         noise = (rated * np.hypot(MODEL_ERROR, STICTION * (1.0 - np.minimum(moving, 1.0)))).ravel()
         return cls(W, A.reshape(W * n, -1) * prior / noise[:, None], own.ravel() / noise, tau.ravel() / noise)

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 from armload.runtime.lazy import on_first_use
 
 if TYPE_CHECKING:
-    from armload.measuring.plan import Leg, Plan, plan_of
-    from armload.measuring.procedure import Measurement, Procedure
+    from armload.measuring.plan import Leg, Plan, Room, plan_of
+    from armload.measuring.procedure import Basis, Measurement, Procedure
 
-__all__ = ["Leg", "Measurement", "Plan", "Procedure", "plan_of"]
+__all__ = ["Basis", "Leg", "Measurement", "Plan", "Procedure", "Room", "plan_of"]
 
 __getattr__, __dir__ = on_first_use(__name__)

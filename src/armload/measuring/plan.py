@@ -24,6 +24,21 @@ _CLEARANCES = 100.0  # [Hz] at which clearances are: at 2 m/s the tool goes 2 cm
 _TOO_MANY = 100_000  # samples of a check
 
 
+@dataclass(frozen=True)
+class Room:
+    """What movements have to keep clear of, and how far the arm may be from where they begin.
+
+    Args:
+        floor: height of the floor in the base's frame [m]; None: there is none.
+        boxes: what stands around; the arm, and a ball of 0.15 m around the payload, must not touch them.
+        approach: how far a joint may be from the motion's start [rad].
+    """
+
+    floor: float | None = 0.0
+    boxes: Sequence[Obstacle] = ()
+    approach: float = APPROACH
+
+
 @dataclass(frozen=True, eq=False)
 class Leg:
     """One movement: what it is for, the motion, what the check of it found, and how near it comes to a box [m]."""
@@ -126,10 +141,8 @@ def plan_of(
     *,
     empty_run: bool = True,
     empty_motion: Motion | None = None,
-    floor: float | None = 0.0,
-    boxes: Sequence[Obstacle] = (),
+    room: Room | None = None,
     heaviest: float | None = None,
-    approach: float = APPROACH,
 ) -> Plan:
     """The movements of a measurement by an arm that stands.
 
@@ -139,17 +152,16 @@ def plan_of(
         at: where the arm is commanded to be (n,) [rad].
         empty_run: whether the motion is run without the payload first.
         empty_motion: what is run then; None: the same motion.
-        floor: height of the floor in the base's frame [m]; None: there is none.
-        boxes: what stands around; the arm, and a ball of 0.15 m around the payload, must not touch them.
+        room: what they keep clear of; None: the floor at the base's height alone.
         heaviest: the payload that each movement is checked with [kg]; None: the rated one.
-        approach: how far a joint may be from the motion's start [rad].
 
     Raises:
-        SafetyError: the arm is farther from the start than `approach`.
+        SafetyError: the arm is farther from the start than `Room.approach`.
         MotionError: the motion is of another arm.
     """
     here, legs = np.asarray(at, dtype=float), []
-    check = _Check(arm, floor, boxes, heaviest)
+    room = room or Room()
+    check = _Check(arm, room, heaviest)
 
     def add(purpose: str, way: Motion) -> None:
         nonlocal here
@@ -157,11 +169,11 @@ def plan_of(
         away = np.abs(start - here)
         if np.max(away) > AT_START:
             j = int(np.argmax(away))
-            if away[j] > approach:
+            if away[j] > room.approach:
                 raise SafetyError(
                     f"{arm.joint_names[j]} is {away[j]:.2f} rad from where {way.name} begins, more than the "
-                    f"{approach:g} rad of --approach: move the arm nearer to {np.round(start, 2).tolist()}, or allow "
-                    "more"
+                    f"{room.approach:g} rad of --approach: move the arm nearer to {np.round(start, 2).tolist()}, "
+                    "or allow more"
                 )
             legs.append(_way(check, here, start, TO_START if not legs else BACK))
         legs.append(check(purpose, way))
@@ -180,12 +192,12 @@ def plan_of(
 class _Check:
     """Makes legs of motions: checks each of them, in one room and with one payload."""
 
-    def __init__(self, arm: Arm, floor: float | None, boxes: Sequence[Obstacle], heaviest: float | None) -> None:
-        self.arm, self._floor = arm, floor
+    def __init__(self, arm: Arm, room: Room, heaviest: float | None) -> None:
+        self.arm, self._floor = arm, room.floor
         self._load: InertialParameters | None = rated_load(arm)
         if heaviest is not None:
             self._load = PayloadRange(heaviest).payload(1.0, np.zeros(3))
-        self._around = Surroundings(arm, None, tuple(boxes)) if boxes else None
+        self._around = Surroundings(arm, None, tuple(room.boxes)) if room.boxes else None
 
     def __call__(self, purpose: str, motion: Motion) -> Leg:
         rate = min(_SAMPLES, _TOO_MANY / motion.duration)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,11 +17,11 @@ from armload.devices.mover import AT_START, Mover, samples_of_movement
 from armload.devices.recorder import Recorder
 from armload.devices.supervision import Thresholds
 from armload.errors import RecordingError, SafetyError, SourceError
-from armload.excitation import Accuracy, Obstacle
+from armload.excitation import Accuracy
 from armload.identification import Identification, identify, plausible_known
 from armload.identification.tare_age import age_of
 from armload.inertia import Z95
-from armload.measuring.plan import APPROACH, BACK, EMPTY, LOADED, TO_START, Plan, plan_of
+from armload.measuring.plan import BACK, EMPTY, LOADED, TO_START, Plan, Room, plan_of
 from armload.motion import Motion
 from armload.online import OnlineIdentifier
 from armload.posterior import Known, KnownCentre, KnownMass, Profile
@@ -35,6 +35,26 @@ _FRESH = 0.05  # [s] older samples waited somewhere, while somebody mounted the 
 _TO_SETTLE = 5.0  # [s] of waiting for that
 _TO_SWING_OUT = 1.0  # [s] of waiting for an arm that somebody has just stopped
 _WARM_UP = 0.5  # [s] of the tare that the identifier is fed before the arm moves, so that all it compiles is compiled
+
+
+@dataclass(frozen=True, eq=False)
+class Basis:
+    """What the answer rests on beside the runs, as of `identify`.
+
+    Args:
+        tare: a log of the empty arm: there is no empty run, and the payload is on already.
+        tare_age: how old that is [s]; None: by the logs' clocks.
+        profile: what was learned of this arm from many logs.
+        mass: of the payload, where it was weighed. com: its centre of mass, where that is known.
+        method: of the identification.
+    """
+
+    tare: Recording | None = None
+    tare_age: float | None = None
+    profile: Profile | None = None
+    mass: KnownMass | None = None
+    com: KnownCentre | None = None
+    method: str | Path | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,14 +86,10 @@ class Procedure:
         arm: which it is: bare, or with a tool that is known and mounted in both runs.
         motion: what is run, from rest to rest; empty_motion: what is run without the payload (None: the same).
         folder: for the logs `empty.csv` and `loaded.csv`, which must not exist.
-        tare: a log of the empty arm: there is no empty run, and the payload is on already.
-        tare_age: how old that is [s]; None: by the logs' clocks.
-        profile: what was learned of this arm from many logs.
-        mass: of the payload, where it was weighed: 3 sigma more is what the movements are checked with.
-        com: its centre of mass, where that is known.
-        method: of the identification.
+        basis: what is known of the arm and the payload; 3 sigma more than its mass is what the movements are checked
+            with. None: nothing.
+        room: see `plan_of`.
         accuracy: the loaded run ends when it is reached; None: with the motion.
-        floor, boxes, approach: see `plan_of`.
         thresholds: where a movement is stopped.
         say: called with what is being done.
 
@@ -91,32 +107,23 @@ class Procedure:
         folder: str | Path,
         *,
         empty_motion: Motion | None = None,
-        tare: Recording | None = None,
-        tare_age: float | None = None,
-        profile: Profile | None = None,
-        mass: KnownMass | None = None,
-        com: KnownCentre | None = None,
-        method: str | Path | None = None,
+        basis: Basis | None = None,
+        room: Room | None = None,
         accuracy: Accuracy | None = None,
-        floor: float | None = 0.0,
-        boxes: Sequence[Obstacle] = (),
-        approach: float = APPROACH,
         thresholds: Thresholds | None = None,
         say: Callable[[str], None] = lambda _: None,
     ) -> None:
         self.mover, self.arm, self.motion, self.empty_motion = mover, arm, motion, empty_motion
-        self.folder, self.tare, self.tare_age, self.method = Path(folder), tare, tare_age, method
-        self.mass, self.com = mass, com
-        self._known = plausible_known(Known.of(mass, com), arm)
+        self.folder, self.basis, self.room = Path(folder), basis or Basis(), room or Room()
+        mass = self.basis.mass
+        self._known = plausible_known(Known.of(mass, self.basis.com), arm)
+        self._heaviest = None if mass is None else mass.mass + 3.0 * mass.std
         self.accuracy, self.thresholds, self._say = accuracy, thresholds or Thresholds(), say
-        self.profile = profile
-        heaviest = None if mass is None else mass.mass + 3.0 * mass.std
-        self._room = {"floor": floor, "boxes": boxes, "heaviest": heaviest, "approach": approach}
         for path in (self.folder / "empty.csv", self.folder / "loaded.csv"):
             if path.exists():
                 raise RecordingError(f"{path} exists: a log is never written over; name another folder")
         at = self._standing(_TO_SWING_OUT)
-        self.plan = plan_of(arm, motion, at, empty_run=tare is None, empty_motion=empty_motion, **self._room)
+        self.plan = self._plan(at, empty_run=self.basis.tare is None)
 
     def run(self, consent: Callable[[Plan], bool], mount: Callable[[], None]) -> Measurement:
         """Make the measurement.
@@ -138,7 +145,7 @@ class Procedure:
         except OSError as error:
             raise RecordingError(f"{self.folder} cannot be made: {error.strerror}") from None
         empty, loaded = self.folder / "empty.csv", self.folder / "loaded.csv"
-        tare = self.tare
+        tare = self.basis.tare
         if tare is None:
             self._move(self.plan, TO_START)
             self._move(self.plan, EMPTY, empty)
@@ -153,13 +160,18 @@ class Procedure:
         finally:
             identifier.close()
         self._say("identifying")
-        known = {"mass": self.mass, "com": self.com, "profile": self.profile, "method": self.method}
-        answer = identify(loaded, self.arm, tare=tare, tare_age=self.tare_age, **known)
+        about = self.basis
+        known = {"mass": about.mass, "com": about.com, "profile": about.profile, "method": about.method}
+        answer = identify(loaded, self.arm, tare=tare, tare_age=about.tare_age, **known)
         reached = None
         if self.accuracy is not None:
             half_width = Z95 * np.sqrt(np.maximum(np.diag(answer.covariance), 0.0))
             reached = self.accuracy.holds(half_width)
-        return Measurement(answer, empty if self.tare is None else None, loaded, seconds, reached)
+        return Measurement(answer, empty if about.tare is None else None, loaded, seconds, reached)
+
+    def _plan(self, at: NDArray[np.float64], empty_run: bool) -> Plan:
+        more = {"empty_motion": self.empty_motion, "room": self.room, "heaviest": self._heaviest}
+        return plan_of(self.arm, self.motion, at, empty_run=empty_run, **more)
 
     def _allowed(self, plan: Plan, consent: Callable[[Plan], bool]) -> None:
         plan.check()
@@ -170,10 +182,10 @@ class Procedure:
         """The plan of what is left, from where the arm is now; agreed to anew if that is not where it was left."""
         at = self._standing(_TO_SETTLE)
         expected = self.plan.legs[-1].motion.position([0.0])[0]
-        if self.tare is not None:
+        if self.basis.tare is not None:
             first = self.plan.legs[0].motion
             expected = first.position([0.0])[0]
-        plan = plan_of(self.arm, self.motion, at, empty_run=False, **self._room)
+        plan = self._plan(at, empty_run=False)
         if np.abs(at - expected).max() > AT_START:
             self._say("the arm is not where it was left")
             self._allowed(plan, consent)
@@ -196,8 +208,8 @@ class Procedure:
 
     def _warm(self, tare: Recording) -> OnlineIdentifier:
         """An identifier that has compiled and loaded what it needs, and has seen nothing."""
-        age, _ = age_of(tare, time.time(), self.tare_age)  # that of the log says how old it is
-        identifier = OnlineIdentifier(self.arm, tare, self.method, self.profile, tare_age=age)
+        age, _ = age_of(tare, time.time(), self.basis.tare_age)  # that of the log says how old it is
+        identifier = OnlineIdentifier(self.arm, tare, self.basis.method, self.basis.profile, tare_age=age)
         short = tare.between(tare.t[0], tare.t[0] + _WARM_UP)
         for row in zip(short.t, short.q, short.dq, short.tau, strict=True):
             identifier.update(*row)

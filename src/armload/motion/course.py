@@ -117,7 +117,7 @@ def _passed(x: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _braking_times(motion: Motion, limits: Limits) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Instants (K,) and the shortest braking time from each, (K,) [s]."""
-    t = np.linspace(0.0, motion.duration, max(2, round(motion.duration / _GRID) + 1))
+    t = motion.instants(1.0 / _GRID)
     step = float(t[1])
     d1, d2, d3 = (motion._at(t, order) for order in (1, 2, 3))
     push = np.maximum(limits.acceleration, _OWN * np.abs(d2).max(axis=0))

@@ -117,7 +117,7 @@ def write_whole(path: str | Path, text: str) -> None:
 def _content(text: str, where: str) -> dict[str, Any]:
     try:
         content: Any = json.loads(text)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise MotionError(f"{where} is not a motion: it is not JSON ({error})") from None
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise MotionError(f'{where} is not a motion: expected a JSON object with "format": "{FORMAT}"')
@@ -166,5 +166,5 @@ def _made(content: dict[str, Any], where: str) -> FourierMotion | SplineMotion |
         raise MotionError(f"{where} is not a complete motion: the key {error} is missing") from None
     except MotionError as error:
         raise MotionError(f"{where}: {error}") from None
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise MotionError(f"{where} is not a motion: {expected}") from None

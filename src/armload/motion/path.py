@@ -93,7 +93,7 @@ class PathMotion(Motion):
             table = np.array(rows, dtype=float)
         except OSError as error:
             raise MotionError(f"motion file {path} cannot be read: {error.strerror}") from None
-        except ValueError:
+        except (ValueError, csv.Error):
             raise MotionError(f"motion file {path} is not a table of numbers under a header") from None
         n = (len(header) - 1) // 3
         if not _is_header(header) or table.ndim != 2:

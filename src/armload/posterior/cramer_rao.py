@@ -32,7 +32,7 @@ from armload.regression import Correction, GaussianPrior, JointFeatures, payload
 from armload.regression.information import SAME, RegressionData, Session
 from armload.regression.lag import GAIN
 from armload.regression.noise import SMOOTH, NoiseModel
-from armload.regression.prior import REACH
+from armload.regression.prior import within_reach
 from armload.regression.rows import REGRESSOR_RATE
 
 TIMES = (1.0, 3.0)  # [s] and the whole run: those that tables of errors have
@@ -238,7 +238,7 @@ def followed(arm: Arm, run: Recording | Motion, rate: float = REGRESSOR_RATE) ->
         raise IdentificationError(f"{what} moves {run.n} joints: {arm.name} has {arm.n}")
     if isinstance(run, Recording):
         return run
-    t = np.linspace(0.0, run.duration, max(2, round(run.duration * rate) + 1))
+    t = run.instants(rate)
     q, dq, ddq = run(t)
     return Recording(t, q, dq, arm.torque(q, dq, ddq), source=run.name)
 
@@ -285,7 +285,7 @@ def _add(data: RegressionData, log: Recording, rows: slice) -> None:
 
 def _condition(A: NDArray[np.float64], S: NDArray[np.float64]) -> float:
     """Condition number of the payload's regressor, from its information (n, 10, 10) and the noise (n,)."""
-    scale = np.array([1.0] + [REACH] * 3 + [REACH**2] * 6)
+    scale = within_reach(1.0)
     values = np.linalg.eigvalsh(np.einsum("jab,j->ab", A, 1.0 / S) * np.outer(scale, scale))
     least = len(scale) * np.finfo(float).eps * values[-1]
     return float(np.sqrt(values[-1] / values[0])) if values[0] > least else np.inf

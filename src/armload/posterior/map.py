@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm, rated_effort
+from armload.errors import IdentificationError
 from armload.estimators import ArmMismatch, Estimate, Identifier
 from armload.posterior.checked_solver import CheckedSolver
 from armload.posterior.evidence import Evidence
@@ -227,10 +228,10 @@ class PosteriorLeastSquares(Identifier):
         """The last full solution, with the arm's mismatch and the residual.
 
         Raises:
-            RuntimeError: no sample has been seen.
+            IdentificationError: no sample has been seen.
         """
         if not self._count:
-            raise RuntimeError("no sample has been seen: call update or run first")
+            raise IdentificationError("no sample has been seen: call update or run first")
         return self.stream.posterior
 
     @property

@@ -6,6 +6,7 @@ safetensors with JSON in its header, nothing in it is executed when it is read.
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -13,17 +14,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm, link_fingerprint, prefixed_frame
+from armload.arms import Arm, from_frame, link_fingerprint, prefixed_frame
 from armload.ensembles.artefact import from_structure, to_structure
 from armload.errors import ModelError
-from armload.inertia import InertialParameters
 from armload.posterior.calibration import COVERAGE, Calibration
 from armload.posterior.evidence import KINDS, TRAITS
 from armload.posterior.payload_prior import MixturePrior
-from armload.posterior.tensor_file import read_tensors, write_tensors
+from armload.runtime.tensor_file import TensorFile
 
-FORMAT = 3  # 1: the widths scaled the torque's gain too; 2: whether they were checked stood in the provenance
-_HEADER = "armload-hybrid"
+# format 1: the widths scaled the torque's gain too; 2: whether they were checked stood in the provenance
+_FILE = TensorFile("armload-hybrid", 3, "hybrid model", "train", "armload train --method hybrid", unsigned=True)
 # arms of the catalogue whose model is part of the package
 SHIPPED = ("panda", "fr3", "ur3e", "ur5", "ur5e", "ur10", "ur10e", "ur16e", "ur20", "iiwa7", "iiwa14", "gen3", "xarm7")
 ENOUGH = 1000  # episodes: the share of a parameter's intervals that hold is then within 1.5 points of what is said
@@ -93,7 +93,7 @@ class HybridModel:
             )
         if arm.frame == flange:
             return None
-        return np.array([arm.in_frame(InertialParameters(unit, flange)).phi for unit in np.eye(10)]).T
+        return from_frame(arm, flange)
 
     def prior_for(self, arm: Arm) -> MixturePrior:
         """The payload prior about the frame of an arm. Raises as `into_frame`."""
@@ -115,7 +115,6 @@ class HybridModel:
             "widths": calibration.widths,
         }
         header = {
-            "format": FORMAT,
             "arm": {"name": self.arm_name, "fingerprint": self.arm_fingerprint, "frame": self.frame, "joints": self.n},
             "families": list(prior.families),
             "traits": list(TRAITS),
@@ -126,7 +125,7 @@ class HybridModel:
             "provenance": self.provenance,
         }
         path = Path(path)
-        write_tensors(path, tensors, _HEADER, header, "the model")
+        _FILE.write(path, tensors, header)
         return path
 
     @classmethod
@@ -136,63 +135,46 @@ class HybridModel:
         Raises:
             ModelError: missing, damaged or foreign file, or one of another armload.
         """
-        tensors, header = read_tensors(
-            Path(path),
-            _HEADER,
-            f"no hybrid model at {path}: train one with `armload train --method hybrid`",
-            f"{path} is not a readable model: expected a .safetensors file; copy it again",
-            f"{path} is no hybrid model: expected one that armload trained with --method hybrid",
-        )
-        try:
-            if header["format"] != FORMAT or header["traits"] != list(TRAITS):
-                raise ModelError(f"{path} belongs to another version of armload: train it again")
-            arm = header["arm"]
-            bag = None if header["bag"] is None else from_structure(header["bag"], "bag.", tensors)
-            prior = MixturePrior(
-                tensors["weights"], tensors["means"], tensors["covariances"], tuple(header["families"])
-            )
-            times, widths = tensors["times"], tensors["widths"]
-            if widths.shape != (len(KINDS), len(times), 10) or not np.all((widths > 0) & np.isfinite(widths)):
-                raise ValueError(
-                    f"widths of shape {widths.shape}, expected {len(KINDS)} × {len(times)} × 10 positive ones"
-                )
-            if not all(np.all(np.isfinite(array)) for array in tensors.values()):
-                raise ValueError("numbers that are not finite")
-            training, provenance = header["training"], header["provenance"]
-            if not isinstance(provenance, dict):
-                raise ValueError(f"a provenance that is {provenance!r}")
-            light = float(header.get("light", 0.0))  # models before it have one c for all masses
-            if not (np.isfinite(light) and light >= 0.0):
-                raise ValueError(f"a light mass of {light:g} kg")
-            calibration = Calibration(bag, float(header["level"]), times, widths, light)
-            return cls(
-                prior,
-                calibration,
-                arm["name"],
-                arm["fingerprint"],
-                arm["frame"],
-                int(arm["joints"]),
-                provenance,
-                None if training is None else _training(training),
-            )
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
-            raise ModelError(f"{path} holds a hybrid armload cannot use ({error}): copy it again") from None
+        return _FILE.read(Path(path), partial(_model, path))
 
     @staticmethod
     def wrote(path: str | PathLike[str]) -> bool:
         """Whether a file is a hybrid, by its header."""
-        from safetensors import SafetensorError, safe_open
-
-        try:
-            with safe_open(Path(path), framework="np") as file:
-                return _HEADER in (file.metadata() or {})
-        except (SafetensorError, OSError, ValueError, TypeError):
-            return False
+        return _FILE.wrote(Path(path))
 
     @staticmethod
     def shipped(arm: Arm) -> Path | None:
         """The file of the model that is part of armload for an arm (`SHIPPED`), there or not; None: there is none."""
         return Path(__file__).parent / "models" / f"{arm.known_as}.safetensors" if arm.known_as in SHIPPED else None
+
+
+def _model(path: str | PathLike[str], tensors: dict[str, NDArray], header: dict[str, Any]) -> HybridModel:
+    if header["traits"] != list(TRAITS):
+        raise ModelError(f"{path} belongs to another version of armload: train it again")
+    arm = header["arm"]
+    bag = None if header["bag"] is None else from_structure(header["bag"], "bag.", tensors)
+    prior = MixturePrior(tensors["weights"], tensors["means"], tensors["covariances"], tuple(header["families"]))
+    times, widths = tensors["times"], tensors["widths"]
+    if widths.shape != (len(KINDS), len(times), 10) or not np.all((widths > 0) & np.isfinite(widths)):
+        raise ValueError(f"widths of shape {widths.shape}, expected {len(KINDS)} × {len(times)} × 10 positive ones")
+    if not all(np.all(np.isfinite(array)) for array in tensors.values()):
+        raise ValueError("numbers that are not finite")
+    training, provenance = header["training"], header["provenance"]
+    if not isinstance(provenance, dict):
+        raise ValueError(f"a provenance that is {provenance!r}")
+    light = float(header.get("light", 0.0))  # models before it have one c for all masses
+    if not (np.isfinite(light) and light >= 0.0):
+        raise ValueError(f"a light mass of {light:g} kg")
+    return HybridModel(
+        prior,
+        Calibration(bag, float(header["level"]), times, widths, light),
+        arm["name"],
+        arm["fingerprint"],
+        arm["frame"],
+        int(arm["joints"]),
+        provenance,
+        None if training is None else _training(training),
+    )
 
 
 def _training(found: dict[str, Any]) -> Training:

@@ -14,9 +14,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm, link_fingerprint, prefixed_frame, rated_effort
+from armload.arms import Arm, from_frame, link_fingerprint, prefixed_frame, rated_effort
 from armload.errors import ModelError
-from armload.inertia import InertialParameters
 from armload.posterior.scales import Scales
 from armload.posterior.solve import solve
 from armload.recording import Recording, digest_of, marks_of
@@ -139,9 +138,8 @@ class Profile:
         out = RegressionData(correction, gain, self.features, block)
         T = np.eye(self.A.shape[1])
         arm, flange = correction.arm, prefixed_frame(correction.arm, self.frame)
-        if flange != arm.frame:
-            T[:10, :10] = np.array([arm.in_frame(InertialParameters(unit, flange)).phi for unit in np.eye(10)])
-            T[:10, :10] = np.linalg.inv(T[:10, :10].T)
+        if flange is not None and flange != arm.frame:
+            T[:10, :10] = np.linalg.inv(from_frame(arm, flange))
         A, b = T.T @ self.A @ T, self.b @ T
         if self.A.shape[1] < out.A.shape[1]:  # it knows nothing of what joints lose
             known = np.delete(np.arange(out.A.shape[1]), 10 + np.r_[correction.load])

@@ -19,14 +19,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.errors import ModelError
 from armload.posterior.profile import Profile, SessionRecord
 from armload.posterior.scales import Scales
-from armload.posterior.tensor_file import read_tensors, write_tensors
 from armload.regression import JointFeatures
+from armload.runtime.tensor_file import TensorFile
 
-FORMAT = 1
-_HEADER = "armload-profile"
+_FILE = TensorFile("armload-profile", 1, "profile", "learn", "armload profile", unsigned=True)
 
 
 def save_profile(profile: Profile, path: str | PathLike[str]) -> Path:
@@ -50,7 +48,6 @@ def save_profile(profile: Profile, path: str | PathLike[str]) -> Path:
     if profile.gain_joint_std is not None:
         tensors["gain_joint_std"] = profile.gain_joint_std
     header = {
-        "format": FORMAT,
         "arm": {
             "name": profile.arm_name,
             "fingerprint": profile.fingerprint,
@@ -65,7 +62,7 @@ def save_profile(profile: Profile, path: str | PathLike[str]) -> Path:
         "sessions": [asdict(session) for session in profile.sessions],
     }
     path = Path(path)
-    write_tensors(path, tensors, _HEADER, header, "the profile")
+    _FILE.write(path, tensors, header)
     return path
 
 
@@ -75,43 +72,35 @@ def load_profile(path: str | PathLike[str]) -> Profile:
     Raises:
         ModelError: missing, damaged or foreign file, or one of another armload.
     """
-    tensors, header = read_tensors(
-        Path(path),
-        _HEADER,
-        f"no profile at {path}: learn one with `armload profile`",
-        f"{path} is not a readable profile: expected a file that `armload profile` wrote",
-        f"{path} is no profile of an arm: expected a file that `armload profile` wrote",
+    return _FILE.read(Path(path), _profile)
+
+
+def _profile(tensors: dict[str, NDArray], header: dict[str, Any]) -> Profile:
+    arm, n = header["arm"], int(header["arm"]["joints"])
+    features = JointFeatures(n, int(header["pose_features"]), int(header["velocity_features"]))
+    scales = Scales(np.ones((1, n)), tensors["eta"], tensors["features"], tensors["payloads"])
+    A, b = _information(tensors, features.size)
+    if not all(np.all(np.isfinite(x)) for x in (A, b, *tensors.values())):
+        raise ValueError("numbers that are not finite")
+    return Profile(
+        arm["name"],
+        arm["fingerprint"],
+        arm["frame"],
+        n,
+        tensors["gravity"],
+        float(header["attached"]),
+        features,
+        A,
+        b,
+        scales,
+        tensors["drift"],
+        float(header["repeated"]),
+        tuple(_session(one) for one in header["sessions"]),
+        tensors["poses"].astype(float),
+        tensors.get("gain"),
+        header["gain_std"],
+        tensors.get("gain_joint_std"),
     )
-    try:
-        if header["format"] != FORMAT:
-            raise ModelError(f"{path} belongs to another version of armload: learn the profile again")
-        arm, n = header["arm"], int(header["arm"]["joints"])
-        features = JointFeatures(n, int(header["pose_features"]), int(header["velocity_features"]))
-        scales = Scales(np.ones((1, n)), tensors["eta"], tensors["features"], tensors["payloads"])
-        A, b = _information(tensors, features.size)
-        if not all(np.all(np.isfinite(x)) for x in (A, b, *tensors.values())):
-            raise ValueError("numbers that are not finite")
-        return Profile(
-            arm["name"],
-            arm["fingerprint"],
-            arm["frame"],
-            n,
-            tensors["gravity"],
-            float(header["attached"]),
-            features,
-            A,
-            b,
-            scales,
-            tensors["drift"],
-            float(header["repeated"]),
-            tuple(_session(one) for one in header["sessions"]),
-            tensors["poses"].astype(float),
-            tensors.get("gain"),
-            header["gain_std"],
-            tensors.get("gain_joint_std"),
-        )
-    except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
-        raise ModelError(f"{path} holds a profile armload cannot use ({error}): learn it again") from None
 
 
 def _session(found: dict[str, Any]) -> SessionRecord:

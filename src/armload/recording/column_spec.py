@@ -140,7 +140,7 @@ def _toml(path: Path) -> dict[str, Any]:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise RecordingError(f"columns {path} cannot be read: {error.strerror or error}") from None
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
         raise RecordingError(f"columns {path} is not TOML: {one_line(error)[:160]}") from None
     inner = table.get("columns")
     return inner if isinstance(inner, dict) else table
@@ -158,8 +158,8 @@ def _value(key: str, value: Any, where: str) -> Any:
             return float(value)
         if key == "episode":
             return int(value)
-    except (TypeError, ValueError):
-        raise RecordingError(f"{where}: {key} is {value!r}: expected numbers") from None
+    except (TypeError, ValueError, OverflowError):
+        raise RecordingError(f"{where}: {key} is {str(value)[:24]!r}: expected numbers") from None
     if key in QUANTITIES and isinstance(value, (list, tuple)) and value and all(isinstance(x, str) for x in value):
         return tuple(value)
     if not isinstance(value, str) or not value.strip():

@@ -85,7 +85,7 @@ def _file(path: Path, info: Mapping[str, Any], places: Mapping[str, int]) -> Pat
 def _info(path: Path) -> dict[str, Any]:
     try:
         info = json.loads((path / _INFO).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise RecordingError(f"{path / _INFO} cannot be read: {one_line(error)[:160]}") from None
     if not isinstance(info, dict):
         raise RecordingError(f"{path / _INFO} holds no table: expected that of a LeRobot data set")

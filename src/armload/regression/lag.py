@@ -7,6 +7,7 @@ from numbers import Real
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armload.errors import IdentificationError
 from armload.runtime.kernels import kernel
 
 # λ [1/s], a lag of 50 ms: slow against the joints' vibration (15 Hz and more) and the sensors' skew, fast against the
@@ -30,10 +31,10 @@ def checked_gain(gain: float) -> float:
     """λ [1/s] of a lag, as it was given.
 
     Raises:
-        ValueError: it is no finite number above zero.
+        IdentificationError: it is no finite number above zero.
     """
     if not (isinstance(gain, Real) and 0.0 < gain < np.inf):
-        raise ValueError(f"gain is {gain!r}: expected the lag's λ, a number above 0 [1/s]")
+        raise IdentificationError(f"gain is {gain!r}: expected the lag's λ, a number above 0 [1/s]")
     return float(gain)
 
 
@@ -44,7 +45,7 @@ class Lag:
         gain: λ [1/s].
 
     Raises:
-        ValueError: see `checked_gain`.
+        IdentificationError: see `checked_gain`.
     """
 
     def __init__(self, gain: float) -> None:

@@ -37,7 +37,12 @@ BODY_GYRATION = 0.06
 
 def payload_prior_std(arm: Arm) -> NDArray[np.float64]:
     """Standard deviation (10,) of the weak payload prior: half of `rated_mass`, 15 cm from the flange."""
-    return _LOAD * rated_mass(arm) * np.array([1.0] + [REACH] * 3 + [REACH**2] * 6)
+    return within_reach(_LOAD * rated_mass(arm))
+
+
+def within_reach(mass: float) -> NDArray[np.float64]:
+    """phi (10,) [kg, kg·m, kg·m²] of a mass [kg] as a scale: its moments are those of a point at `REACH`."""
+    return mass * np.array([1.0] + [REACH] * 3 + [REACH**2] * 6)
 
 
 def solution_prior_std(arm: Arm) -> NDArray[np.float64]:

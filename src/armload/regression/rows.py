@@ -82,7 +82,7 @@ class FilteredRegression:
         settling: [s] that one pose of a standing arm counts; beyond it a row stands for no time.
 
     Raises:
-        ValueError: see `checked_gain`.
+        IdentificationError: see `checked_gain`.
     """
 
     def __init__(

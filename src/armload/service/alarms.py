@@ -110,7 +110,7 @@ class Alarms:
         if answer.get("unknown") == "compiling":
             return None, "", None, None
         lost = answer.get("unknown") in _LOST
-        return lost, answer.get("why") or "samples come again", None, None
+        return lost, (answer.get("why") or "no sample comes") if lost else "samples come again", None, None
 
 
 _Found = tuple[bool | None, str, float | None, float | None]  # whether it holds (None: not known), text, value, limit

@@ -7,6 +7,7 @@ import hmac
 import json
 import queue
 import select
+import socket
 import sys
 import threading
 from collections.abc import Callable
@@ -41,18 +42,19 @@ class Endpoint:
             have its visitor's browser ask.
 
     Raises:
-        UsageError: the port cannot be had.
+        UsageError: there is no such interface, or the port cannot be had.
     """
 
     def __init__(self, service: Service, host: str, port: int, token: str | None = None) -> None:
         handler = type("Handler", (_Handler,), {"service": service, "token": token})
+        where = f"[{host}]" if ":" in host else host  # an address of IPv6, as it stands in a URL
         try:
-            self._server = _Server((host, port), handler)
+            self._server = (_Server6 if ":" in host else _Server)((host, port), handler)
         except OSError as error:
             raise UsageError(
-                f"the endpoint cannot listen at {host}:{port}: {error.strerror}; name another port"
+                f"the endpoint cannot listen at {where}:{port}: {error.strerror}; name another host or port"
             ) from None
-        self.url = f"http://{host}:{self._server.server_address[1]}"
+        self.url = f"http://{where}:{self._server.server_address[1]}"
         self._thread = threading.Thread(target=self._server.serve_forever, args=(0.2,), daemon=True)
         self._thread.start()
 
@@ -87,6 +89,10 @@ class _Server(ThreadingHTTPServer):
         """A client that goes is no error; anything else is shown."""
         if not isinstance(sys.exception(), OSError):
             super().handle_error(request, client_address)
+
+
+class _Server6(_Server):
+    address_family = socket.AF_INET6
 
 
 class _Handler(BaseHTTPRequestHandler):

@@ -10,6 +10,7 @@ from urllib.parse import unquote, urlsplit
 
 from armload.errors import UsageError
 from armload.runtime.extras import install
+from armload.service.receiver import Health, without_user
 
 _KEPT = 1000  # messages that wait; then new ones are dropped
 _LONGEST = 60  # [s] between two trials to connect
@@ -28,7 +29,7 @@ class Mqtt:
         url: mqtt://[USER:PASSWORD@]HOST[:PORT][/PREFIX], or mqtts:// with TLS. The prefix is "armload" without one.
 
     Attributes:
-        dropped: messages there was no room for.
+        dropped: messages there was no room for. health: whether the broker takes messages.
 
     Raises:
         UsageError: the address is not one, or paho-mqtt is not installed.
@@ -41,7 +42,7 @@ class Mqtt:
             from paho.mqtt.enums import CallbackAPIVersion
         except ImportError:
             raise UsageError(f"MQTT needs paho-mqtt, which is not installed: {install('paho')}") from None
-        self._prefix, self.dropped = parts.path.strip("/") or "armload", 0
+        self._prefix, self.dropped, self.health = parts.path.strip("/") or "armload", 0, Health("the MQTT broker")
         self._client = client = Client(CallbackAPIVersion.VERSION2)
         client.max_queued_messages_set(_KEPT)
         client.reconnect_delay_set(1, _LONGEST)
@@ -50,7 +51,7 @@ class Mqtt:
             client.username_pw_set(unquote(parts.username), unquote(parts.password or ""))
         if parts.scheme == "mqtts":
             client.tls_set()
-        client.on_connect = self._connected
+        client.on_connect, client.on_connect_fail, client.on_disconnect = self._connected, self._absent, self._lost
         client.connect_async(str(parts.hostname), parts.port or _PORTS[parts.scheme])
         client.loop_start()
 
@@ -70,8 +71,18 @@ class Mqtt:
         self._client.loop_stop()
 
     def _connected(self, client: Any, _data: Any, _flags: Any, reason: Any, _properties: Any) -> None:
-        if not reason.is_failure:  # what a broker refuses comes here, too
-            client.publish(f"{self._prefix}/online", "true", qos=1, retain=True)
+        if reason.is_failure:  # what a broker refuses comes here, too
+            self.health.tell(f"refuses the connection: {reason}")
+            return
+        self.health.tell(None)
+        client.publish(f"{self._prefix}/online", "true", qos=1, retain=True)
+
+    def _absent(self, *_: Any) -> None:
+        self.health.tell("cannot be reached; it is tried again")
+
+    def _lost(self, _client: Any, _data: Any, _flags: Any, reason: Any, _properties: Any) -> None:
+        if reason.is_failure and self.health.failed is None:  # what was refused has been said
+            self.health.tell(f"was lost: {reason}")
 
 
 def checked(url: str) -> Any:
@@ -85,8 +96,8 @@ def checked(url: str) -> Any:
         parts = urlsplit(url)
         parts.port  # noqa: B018 - raises where it is no number
     except ValueError:
-        raise UsageError(f"the MQTT broker is {url!r}: {said}") from None
+        raise UsageError(f"the MQTT broker is {without_user(url)!r}: {said}") from None
     wrong = parts.scheme not in _PORTS or not parts.hostname or parts.port == 0 or parts.query
     if wrong or any(x in url for x in "+# ") or not url.isprintable():
-        raise UsageError(f"the MQTT broker is {url!r}: {said}")
+        raise UsageError(f"the MQTT broker is {without_user(url)!r}: {said}")
     return parts

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 
 from armload.devices import Detached, Source
-from armload.errors import ArmloadError, SourceError, SourceSetupError
+from armload.errors import ArmloadError, SourceError, SourceSetupError, one_line
 from armload.inertia import InertialParameters
 from armload.recording import Sample
 from armload.service.backoff import Backoff
@@ -131,7 +131,7 @@ class Reconnecting(Source):
                     yield sample
                     self.answering, self.heard = False, time.monotonic()
             except (ArmloadError, OSError) as error:
-                stopped = str(error).removesuffix(": open the source again")  # that is done here
+                stopped = _reason(error)
             if self._gone.is_set():
                 return
             if stopped is None:
@@ -197,7 +197,7 @@ class Reconnecting(Source):
         elif isinstance(made, ArmloadError) and not self.connections and self._never(made):
             raise made
         else:
-            self.state, self.why = "lost", str(made)
+            self.state, self.why = "lost", _reason(made)
             wait = self._backoff.failed(0.0)
             self._tell(self.why, wait, "tried")
             yield from self._waited(wait, tick)
@@ -217,6 +217,12 @@ class Reconnecting(Source):
         until = time.monotonic() + wait
         while (left := until - time.monotonic()) > 0 and not self._gone.wait(min(left, tick)):
             yield None
+
+
+def _reason(error: Exception | None) -> str:
+    """Why a source was lost, on one line, without the advice that is followed here."""
+    why = "it cannot be opened" if error is None else one_line(error)
+    return why.removesuffix(": open the source again")
 
 
 def _joined(thread: threading.Thread, tick: float) -> Iterator[None]:

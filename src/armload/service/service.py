@@ -45,7 +45,7 @@ class Service:
     """
 
     def __init__(self, settings: ServiceSettings, note: Callable[[str], None] | None = None) -> None:
-        self.settings, self._note = settings, note or (lambda _: None)
+        self.settings, self._log = settings, note or (lambda _: None)
         self.names = [arm.name for arm in settings.arms]
         self.error: str | None = None
         self.processes: dict[str, subprocess.Popen[bytes]] = {}
@@ -53,6 +53,7 @@ class Service:
         self._answers = {a.name: _starting(a) for a in settings.arms}
         self._lines = dict.fromkeys(self.names, -math.inf)  # when the last line of each was of [s, monotonic]
         self._heard = dict.fromkeys(self.names, time.monotonic())
+        self._noted = dict.fromkeys(self.names, "")  # the last sentence of each
         self._restarts = dict.fromkeys(self.names, 0)
         self._ended: set[str] = set()
         self._spare = Spare(settings.arms, settings.spare)
@@ -127,7 +128,7 @@ class Service:
             if how is None or self._gone.is_set():
                 break
             wait = backoff.failed(time.monotonic() - began)
-            self._note(f"{name}: its process {how}; it is started again in {wait:.1f} s")
+            self._note(name, f"its process {how}; it is started again in {wait:.1f} s")
             with self._state:
                 self._restarts[name] += 1
                 # "t" says that it has answered, and compiling need not be waited for
@@ -180,7 +181,7 @@ class Service:
                 with self._state:
                     self._heard[name] = time.monotonic()
                 if "note" in said:
-                    self._note(f"{name}: {said['note']}")
+                    self._note(name, said["note"])
                 else:
                     self._take(name, said)
         return None
@@ -203,9 +204,15 @@ class Service:
         for listener in self._listeners:
             listener(answer)
 
+    def _note(self, name: str, text: str) -> None:
+        """A sentence about an arm for the log."""
+        self._noted[name] = text
+        self._log(f"{name}: {text}")
+
     def _alarm(self, alarm: Alarm) -> None:
         message = {**alarm.to_dict(), "time": time.time()}
-        self._note(f"{alarm.arm}: {alarm.kind} {message['state']}: {alarm.text}")
+        why = "" if alarm.text in self._noted[alarm.arm] else f": {alarm.text}"  # why a source is lost is noted already
+        self._log(f"{alarm.arm}: {alarm.kind} {message['state']}{why}")
         for listener in self._listeners:
             listener(message)
         for receiver in self._receivers:
@@ -231,7 +238,7 @@ class Service:
                 first = self._answers[name].get("t") is None
             process = self.processes.get(name)
             if silent > (HUNG_COMPILING if first else HUNG) and process is not None:
-                self._note(f"{name}: its process has said nothing for {silent:.0f} s and is ended")
+                self._note(name, f"its process has said nothing for {silent:.0f} s and is ended")
                 process.kill()
 
 

@@ -205,7 +205,7 @@ def read_settings(path: str | Path, **over: Any) -> ServiceSettings:
         said = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise UsageError(f"{path} cannot be read: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise UsageError(f"{path} is no TOML: {error}") from None
     tables = said.pop("arm", [])
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
@@ -229,6 +229,10 @@ def read_token(path: str | Path) -> str:
         token = Path(path).read_text(encoding="utf-8").strip()
     except OSError as error:
         raise UsageError(f"the token's file {path} cannot be read: {error.strerror}") from None
+    except ValueError:  # bytes that are no UTF-8, or a name with a zero in it
+        raise UsageError(
+            f"the token's file {str(path)!r} is no text: expected 16 characters of ASCII or more"
+        ) from None
     if len(token) < 16 or not token.isascii():
         raise UsageError(f"the token in {path} has {len(token)} characters: expected 16 or more, all of ASCII")
     return token
@@ -285,6 +289,8 @@ def _checked(
         expected, words = _KINDS[fields[key]]
         if not isinstance(value, expected) or (isinstance(value, bool) and fields[key] != "bool"):
             raise UsageError(f"{where}: {key} is {json.dumps(value, default=str)}: expected {words}")
+        if isinstance(value, str) and "\0" in value:
+            raise UsageError(f"{where}: {key} is {value!r}: expected a text without a zero byte")
         if key in _RANGES:
             words, below, above = _RANGES[key]
             if not below < value < above:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import logging
 import re
 import threading
 import urllib.error
@@ -16,6 +15,7 @@ from urllib.parse import urlsplit
 
 from armload.errors import UsageError, one_line
 from armload.service.backoff import Backoff
+from armload.service.receiver import Health, without_user
 
 _ANSWERED = 5.0  # [s] a receiver may take
 _LONGEST = 60.0  # [s] between two trials
@@ -25,6 +25,16 @@ _ADDRESS = re.compile(r"[!-~]+")  # what a request's first line can hold
 _NAME = re.compile(r"[!#$%&'*+.^_`|~0-9A-Za-z-]+")  # of a header: RFC 9110, 5.6.2
 _VALUE = re.compile(r"[\t -~\xa0-\xff]*")  # RFC 9110, 5.5: a line break in it would begin another header
 _OF_THE_POST = ("content-length", "host", "transfer-encoding")  # headers that say how the message itself is sent
+
+
+class _NotFollowed(urllib.request.HTTPRedirectHandler):
+    """A post that is followed elsewhere arrives there as a request without a message, and with our headers."""
+
+    def redirect_request(self, *_: Any) -> None:
+        """Follow none: the answer is the status itself."""
+
+
+_OPENER = urllib.request.build_opener(_NotFollowed)
 
 
 class Webhook:
@@ -38,7 +48,7 @@ class Webhook:
         url: http:// or https://. headers: sent with each message, as `Authorization`.
 
     Attributes:
-        sent, dropped: messages. failed: why the last trial failed; None: it did not.
+        sent, dropped: messages. health: whether the last was taken.
 
     Raises:
         UsageError: the address is none, or a header cannot be sent.
@@ -48,7 +58,7 @@ class Webhook:
         check_webhook(url, headers or {})
         self.url, self._headers = url, {"Content-Type": "application/json", **(headers or {})}
         self.sent = self.dropped = 0
-        self.failed: str | None = None
+        self.health = Health("the webhook")
         self._waiting: deque[bytes] = deque()
         self._there, self._gone = threading.Condition(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="armload-webhook", daemon=True)
@@ -93,17 +103,17 @@ class Webhook:
         """Whether it was taken; None: try again."""
         request = urllib.request.Request(self.url, message, self._headers, method="POST")
         try:
-            with urllib.request.urlopen(request, timeout=_ANSWERED):
+            with _OPENER.open(request, timeout=_ANSWERED):
                 taken, failed = True, None
         except urllib.error.HTTPError as error:
             error.close()
             taken = False if 400 <= error.code < 500 and error.code not in (408, 429) else None
             failed = f"answered {error.code}"
+            if 300 <= error.code < 400:
+                failed += ", that it is elsewhere: give the address it is at"
         except (OSError, ValueError, HTTPException) as error:
             taken, failed = None, f"did not answer: {one_line(error)}"
-        if failed != self.failed:
-            self.failed = failed
-            logging.getLogger("armload").warning("the webhook %s", failed or "takes alarms again")
+        self.health.tell(failed)
         return taken
 
 
@@ -116,7 +126,8 @@ def check_webhook(url: str, headers: Mapping[str, str], called: str = "the webho
     Raises:
         UsageError: no post can be sent to it, or with these headers.
     """
-    said = f"{called} is {url!r}: expected an address such as https://HOST:PORT/PATH"
+    shown = without_user(url)
+    said = f"{called} is {shown!r}: expected an address such as https://HOST:PORT/PATH"
     try:
         parts = urlsplit(url)
         port = parts.port
@@ -129,8 +140,7 @@ def check_webhook(url: str, headers: Mapping[str, str], called: str = "the webho
     if not _ADDRESS.fullmatch(url):
         raise UsageError(f"{said}, of ASCII without blanks (a blank is %20)")
     if "@" in parts.netloc:
-        where = url.replace(parts.netloc, "…@" + parts.netloc.rpartition("@")[2], 1)  # without what may be a secret
-        raise UsageError(f"{called} is {where!r}, with a user in it: give a header Authorization instead")
+        raise UsageError(f"{called} is {shown!r}, with a user in it: give a header Authorization instead")
     for name, value in headers.items():  # whose value is not shown: it may be a secret
         if not _NAME.fullmatch(name) or name.lower() in _OF_THE_POST:
             raise UsageError(f"the webhook has a header {name!r}: expected a name such as Authorization")

@@ -134,12 +134,6 @@ def _log(
     return q, dq, run.world.measured(joint, run.start + clock.times)
 
 
-def iteration_error(runs: Sequence[Prepared], clock: Clock, workers: int) -> list[NDArray[np.float64]]:
-    """What the Picard iteration leaves: d(applied) − d(at the motion that came out), (steps, n) per run [N·m]."""
-    states, applied = _picard(runs, clock, workers)
-    return [u - _along(run, clock, state, u) for run, state, u in zip(runs, states, applied, strict=True)]
-
-
 def _picard(runs: Sequence[Prepared], clock: Clock, workers: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The last pass: states after each step (runs, steps, 1 + 2n) and the disturbance applied (runs, steps, n)."""
     import mujoco

@@ -84,9 +84,9 @@ def _of_arm(
     chosen = [*stretches[:FIRST], *later[::step]]
     about = folder / f"{arm}.json"
     key = key_of([[row["key"], row["t0"], row["t1"]] for row in chosen])
-    before = json.loads(about.read_text(encoding="utf-8")) if about.is_file() else {}
-    if before.get("key") == key and (folder / f"{arm}.profile").is_file():
-        return f"as before, of {len(before['learned_from'])} stretches"
+    before = _learned_from(about, key)
+    if before is not None and (folder / f"{arm}.profile").is_file():
+        return f"as before, of {before} stretches"
     say(f"learning the profile of {arm} from {len(chosen)} stretches")
     profile, learned, left_out = _learned(chosen, settings)
     if profile is None:
@@ -96,6 +96,15 @@ def _of_arm(
         whole = {"key": key, "learned_from": learned, "left_out": left_out}
         temporary.write_text(json.dumps(whole, indent=1) + "\n", encoding="utf-8")
     return f"learned from {len(learned)} stretches" + (f", {len(left_out)} did not fit" if left_out else "")
+
+
+def _learned_from(about: Path, key: str) -> int | None:
+    """How many stretches what lies in a folder was learned from; None: of others, or nobody can read it any more."""
+    try:
+        before = json.loads(about.read_text(encoding="utf-8"))
+        return len(before["learned_from"]) if before["key"] == key else None
+    except (FileNotFoundError, ValueError, KeyError, TypeError, RecursionError):
+        return None
 
 
 def _learned(

@@ -5,10 +5,10 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from typing import Any
 
-from armload.errors import UsageError
+from armload.errors import ArmloadError, UsageError, one_line
 from armload.recording import is_log
 
 WILD = re.compile(r"[*?\[]")  # what makes a path a pattern
@@ -26,18 +26,20 @@ def filesystem(url: str) -> tuple[Any, str]:
 
     Raises:
         UsageError: fsspec, or what it needs for this kind of store, is not installed.
+        OSError: the store cannot be used.
     """
-    try:
-        from fsspec.core import url_to_fs  # type: ignore[import-not-found]
+    with _asked(url):
+        try:
+            from fsspec.core import url_to_fs  # type: ignore[import-not-found]
 
-        return url_to_fs(url)
-    except ImportError as error:
-        raise UsageError(
-            f"{url}: object stores are read through fsspec, and {error.name or 'a package of the store'} is missing: "
-            "pip install fsspec, and the store's package (aiohttp of a web server, s3fs, gcsfs, adlfs)"
-        ) from None
-    except ValueError as error:
-        raise UsageError(f"{url}: {error}") from None
+            return url_to_fs(url)
+        except ImportError as error:
+            raise UsageError(
+                f"{url}: object stores are read through fsspec, and {error.name or 'a package of the store'} is "
+                "missing: pip install fsspec, and the store's package (aiohttp of a web server, s3fs, gcsfs, adlfs)"
+            ) from None
+        except ValueError as error:
+            raise UsageError(f"{url}: {error}") from None
 
 
 def stamp_of(url: str) -> str:
@@ -48,7 +50,8 @@ def stamp_of(url: str) -> str:
     """
     fs, path = filesystem(url)
     is_web = "http" in ((fs.protocol,) if isinstance(fs.protocol, str) else fs.protocol)
-    return _of_web(fs, path) if is_web else str(fs.ukey(path))
+    with _asked(url):
+        return _of_web(fs, path) if is_web else str(fs.ukey(path))
 
 
 def _of_web(fs: Any, url: str) -> str:
@@ -64,12 +67,28 @@ def _of_web(fs: Any, url: str) -> str:
 
 
 def logs_in(url: str) -> Iterator[str]:
-    """The URLs of the logs that a URL names: itself, what fits its pattern, or what is below it as a folder."""
+    """The URLs of the logs that a URL names: itself, what fits its pattern, or what is below it as a folder.
+
+    Raises:
+        OSError: the store cannot be asked what fits a pattern.
+    """
     fs, inside = filesystem(url)
     there = [inside]
     if WILD.search(inside):
-        there = fs.glob(inside)
+        with _asked(url):
+            there = fs.glob(inside)
     elif not is_log(inside):  # to ask a web server whether it is a folder fetches it
         with suppress(Exception):  # of the store's package: the row of what is named will say why
             there = fs.find(inside) if fs.isdir(inside) else there
     yield from (fs.unstrip_protocol(one) for one in there if one == inside or is_log(one))
+
+
+@contextmanager
+def _asked(url: str) -> Iterator[None]:
+    """Within the block a store is asked; what its package raises, as of a login that fails, is an OSError."""
+    try:
+        yield
+    except (OSError, ArmloadError):
+        raise
+    except Exception as error:
+        raise OSError(f"{url}: {type(error).__name__}: {one_line(error)}") from None

@@ -115,4 +115,6 @@ def _read(cell: str, kind: str) -> Any:
         return cell
     if cell == "":
         return None
-    return cell == "true" if kind == FLAG else int(cell) if kind == WHOLE else float(cell)
+    if kind == FLAG:
+        return {"true": True, "false": False}[cell.lower()]  # a spreadsheet writes TRUE; what is neither is no flag
+    return int(cell) if kind == WHOLE else float(cell)

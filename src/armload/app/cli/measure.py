@@ -44,7 +44,7 @@ def run(options: argparse.Namespace) -> int | None:
     from armload.devices import Thresholds, open_mover
     from armload.excitation import Accuracy
     from armload.identification import plausible_known
-    from armload.measuring import Procedure
+    from armload.measuring import Basis, Procedure, Room
     from armload.measuring.plan import APPROACH
     from armload.posterior import Known, KnownCentre, KnownMass, load_profile
 
@@ -77,16 +77,9 @@ def run(options: argparse.Namespace) -> int | None:
             arm,
             motion,
             folder,
-            tare=tare,
-            tare_age=options.tare_age,
-            profile=profile,
-            mass=mass,
-            com=com,
-            method=options.method,
+            basis=Basis(tare, options.tare_age, profile, mass, com, options.method),
+            room=Room(options.floor, boxes_of(options), APPROACH if options.approach is None else options.approach),
             accuracy=accuracy,
-            floor=options.floor,
-            boxes=boxes_of(options),
-            approach=APPROACH if options.approach is None else options.approach,
             thresholds=Thresholds(options.off_path, options.push),
             say=print_note,
         )
@@ -150,10 +143,11 @@ def _typed_yes(question: str) -> bool:
 def _mount(options: argparse.Namespace, mover: Mover) -> Callable[[], None]:
     def mount() -> None:
         if options.grip is not None:
-            print_note(f"mounting: {options.grip}")
-            code = subprocess.run(shlex.split(options.grip), stdout=sys.stderr, check=False).returncode
+            grip = shlex.join(options.grip)
+            print_note(f"mounting: {grip}")
+            code = subprocess.run(options.grip, stdout=sys.stderr, check=False).returncode
             if code:
-                raise SafetyError(f"{options.grip} ended with exit code {code}: the payload may not be on")
+                raise SafetyError(f"{grip} ended with exit code {code}: the payload may not be on")
         elif not mover.mount():
             print("mount the payload, step back, and press Enter: the arm then moves: ", end="", file=sys.stderr)
             sys.stderr.flush()

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import argparse
+import shlex
+import shutil
+
 from armload.app.cli.arguments import (
     Parser,
     add_arm_arguments,
@@ -28,6 +32,21 @@ What will move, how far and how fast is said first, and nothing moves until you 
 the arm on its path. Keep the emergency stop at hand: nothing here knows what stands around the arm but the floor and
 the boxes that --box names.
 """
+
+
+def command(text: str) -> tuple[str, ...]:
+    """The words of a command that this machine has: that there is none is said before an arm has moved for it.
+
+    >>> command("true 'a b'")
+    ('true', 'a b')
+    """
+    try:
+        words = tuple(shlex.split(text))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r} is no command: {str(error).lower()}") from None
+    if not words or shutil.which(words[0]) is None:
+        raise argparse.ArgumentTypeError(f"{text!r} is no command: expected a program of this machine, by name or path")
+    return words
 
 
 def parser() -> Parser:
@@ -75,7 +94,7 @@ def parser() -> Parser:
         help="a known tool that is on in both runs (JSON, or franka-hand); the answer is what it carries",
     )
     add("--method", type=file_name, metavar="M", help="a name `armload methods` lists, or a trained model's path")
-    add("--grip", metavar="COMMAND", help="a command that mounts the payload; else you are asked to")
+    add("--grip", type=command, metavar="COMMAND", help="a command that mounts the payload; else you are asked to")
     add_column_arguments(parser)
     safety = parser.add_argument_group("what is allowed").add_argument
     safety("--floor", type=floor, default=0.0, metavar="Z|none", help="height of the floor in the base's frame [m] (0)")

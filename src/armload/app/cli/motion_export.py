@@ -73,7 +73,7 @@ def _led(motion: Motion, arm: Arm, options: argparse.Namespace) -> Motion:
     Raises:
         MotionError: another number of joints, or one of both is not allowed.
     """
-    from armload.measuring.plan import APPROACH, plan_of
+    from armload.measuring.plan import APPROACH, Room, plan_of
     from armload.motion import JoinedMotion
 
     if len(options.start) != arm.n:
@@ -86,8 +86,8 @@ def _led(motion: Motion, arm: Arm, options: argparse.Namespace) -> Motion:
                 f"{arm.limits.as_degrees(options.start)}"
             )
     approach = APPROACH if options.approach is None else options.approach
-    about = {"floor": options.floor, "boxes": boxes_of(options), "heaviest": options.payload, "approach": approach}
-    plan = plan_of(arm, motion, options.start, empty_run=False, **about)
+    room = Room(options.floor, boxes_of(options), approach)
+    plan = plan_of(arm, motion, options.start, empty_run=False, room=room, heaviest=options.payload)
     for leg in plan.legs:
         if leg.check.problems:
             which = motion.name if leg is plan.legs[-1] else f"the way {leg.purpose}"

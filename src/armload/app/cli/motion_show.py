@@ -40,8 +40,8 @@ def run_show(options: argparse.Namespace) -> int:
     """Print the table; draw, or serve, what is asked for."""
     import numpy as np
 
-    if not options.page and (options.host is not None or options.port is not None or options.box):
-        raise UsageError("--host, --port and --box are of the page, but there is no --page")
+    if not options.page and (options.box or any(x is not None for x in (options.host, options.port, options.held))):
+        raise UsageError("--host, --port, --box and --held are of the page, but there is no --page")
     named, options.robot = options.robot is not None, options.robot or _DEFAULT
     arm = arm_of(options)
     motion = motion_of(options.motion, arm, named or options.page or options.figure is not None)

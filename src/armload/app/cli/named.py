@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 from typing import TYPE_CHECKING
-from urllib.parse import urlsplit
 
 from armload.app.cli.arguments import AS_NAMED
 from armload.app.cli.printing import print_note
@@ -167,7 +166,7 @@ def robot_of(source: str) -> str:
 
     if source == "sim":
         return _SIMULATED
-    scheme = urlsplit(source).scheme if "://" in source else None
+    scheme = source.partition("://")[0].lower() if "://" in source else None
     known = [name for name, facts in ARMS.items() if scheme is not None and facts.scheme == scheme]
     if len(known) != 1:
         raise UsageError(f"{source}: name the robot with --robot, such as --robot {_SIMULATED}")

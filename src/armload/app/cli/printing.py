@@ -20,12 +20,12 @@ def print_json(value: dict[str, Any]) -> None:
     print(json.dumps(value, allow_nan=False))
 
 
-def write_json(path: str, value: dict[str, Any]) -> None:
+def write_json(path: str, value: dict[str, Any], indent: int | None = None) -> None:
     """One JSON object in a file that appears whole or not at all; UsageError where it cannot be written."""
     from armload.errors import UsageError
     from armload.runtime.atomic import replacing
 
-    text = json.dumps(value, allow_nan=False) + "\n"
+    text = json.dumps(value, allow_nan=False, indent=indent) + "\n"
     try:
         with replacing(path) as temporary:
             temporary.write_text(text, encoding="utf-8")

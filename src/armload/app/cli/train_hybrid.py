@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import json
 import shlex
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from armload.app.cli.printing import console, print_json, print_note, table
+from armload.app.cli.printing import console, print_json, print_note, table, write_json
 from armload.app.cli.progress import progress_shown
 
 if TYPE_CHECKING:
@@ -57,9 +56,7 @@ def run(options: argparse.Namespace) -> None:
         "wall_s": round(time.perf_counter() - began, 1),
     }
     if options.report:
-        path = Path(options.report)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(report, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        write_json(options.report, report, indent=1)
     if not model.calibrated:
         few = f"{episodes} episodes are too few to set the widths by, expected {ENOUGH} or more"
         missed = f"{100 * coverage.pooled:.1f} % is not the 95 % that was asked for"

@@ -156,10 +156,15 @@ class Page:
         @hand.on_click
         def _(event: Any) -> None:
             taken = event.target.value == "Take up"
-            self.take_up(*((float(mass.value), float(away.value)) if taken else (0.0, 0.0)))
+            held = (float(mass.value), float(away.value)) if taken else (0.0, 0.0)
+            _done(event.client, event.target.value, lambda: self.take_up(*held))
 
     def take_up(self, mass: float, away: float) -> None:
-        """Let a simulated arm hold a ball of 5 cm radius, of so many kg, so many metres along z; 0 kg: nothing."""
+        """Let a simulated arm hold a ball of 5 cm radius, of so many kg, so many metres along z; 0 kg: nothing.
+
+        Raises:
+            SourceError: the simulator has ended.
+        """
         body = InertialParameters.zero(self.session.arm.frame)
         if mass > 0.0:
             body = InertialParameters.from_com(mass, (0.0, 0.0, away), 0.4 * mass * _BALL**2 * np.eye(3), body.frame)

@@ -49,7 +49,8 @@ class PageServer:
             hint = install("viser")
             raise UsageError(f"the page needs viser, which is not installed: {hint}; or {otherwise}") from None
         try:
-            socket.create_server((host, 0)).close()  # viser would try one port after another, for ever
+            family = socket.AF_INET6 if ":" in host else socket.AF_INET
+            socket.create_server((host, 0), family=family).close()  # viser would try one port after another, for ever
         except OSError as error:
             raise UsageError(f"no page can be served at {host!r}: {error.strerror or error}; try 127.0.0.1") from None
         with contextlib.redirect_stdout(io.StringIO()):

@@ -146,7 +146,11 @@ class _Called:
 
     def readOnce(self) -> tuple[Any, None]:
         """The newest state; what ended the control is raised."""
-        state = _newest(self._states, self._states.get(timeout=_SILENCE))
+        try:
+            first = self._states.get(timeout=_SILENCE)
+        except queue.Empty:
+            raise SourceError(f"no state for {_SILENCE:g} s") from None
+        state = _newest(self._states, first)
         if isinstance(state, Exception):
             raise state
         return state, None

@@ -76,7 +76,9 @@ class FrankaSource(Source):
     def __init__(self, address: str, arm: Arm, system: str = "fr3", *, realtime: bool = False) -> None:
         facts = SYSTEMS[system]
         if arm.n != 7:
-            raise SourceSetupError(f"{arm.name} has {arm.n} joints: a {facts.called} has 7; name the arm that is there")
+            raise SourceSetupError(
+                f"{arm.name} has {arm.n} joints: {facts.called} robots have 7; name the arm that is there"
+            )
         self.name, self.n = f"{system}://{address}", arm.n
         self._closed = False
         self._arrived: float | None = None
@@ -164,7 +166,7 @@ def load_client(system: str) -> Any:
         return importlib.import_module(facts.module)
     except ImportError as error:
         raise SourceSetupError(
-            f"a {facts.called} is read through {facts.package}, which cannot be imported ({error}): "
+            f"{facts.called} robots are read through {facts.package}, which cannot be imported ({error}): "
             f"{install(facts.module)}"
         ) from None
 

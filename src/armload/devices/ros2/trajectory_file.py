@@ -11,7 +11,7 @@ import numpy as np
 
 from armload.arms import Arm
 from armload.devices.ros2.trajectory import TrajectoryMotion, read_trajectory
-from armload.errors import MotionError
+from armload.errors import MotionError, one_line
 from armload.motion import Motion, check_joints, load_motion
 
 
@@ -43,7 +43,7 @@ def read_path(name: str, arm: Arm) -> Motion:
 def _content(text: str, name: str) -> dict[str, Any]:
     try:
         found = json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):
         found = _yaml(text, name)
     if not isinstance(found, dict):
         raise MotionError(f"{name} is no path: expected a JointTrajectory with joint_names and points, or a motion")
@@ -57,8 +57,8 @@ def _yaml(text: str, name: str) -> Any:
 
     try:
         return YAML(typ="safe", pure=True).load(text)
-    except YAMLError as error:
-        raise MotionError(f"{name} is neither JSON nor YAML: {' '.join(str(error).split())}") from None
+    except (YAMLError, ValueError, RecursionError) as error:  # a date that is none is a ValueError
+        raise MotionError(f"{name} is neither JSON nor YAML: {one_line(error)}") from None
 
 
 def _trajectory(content: dict[str, Any], name: str, arm: Arm) -> Motion:
@@ -80,7 +80,7 @@ def _trajectory(content: dict[str, Any], name: str, arm: Arm) -> Motion:
         message = SimpleNamespace(header=header, joint_names=list(content["joint_names"]), points=made)
         order = [message.joint_names.index(joint) for joint in arm.joint_names]
         start = np.array(made[0].positions, dtype=float)[order]
-    except (KeyError, IndexError, TypeError, AttributeError, ValueError):
+    except (KeyError, IndexError, TypeError, AttributeError, ValueError, OverflowError):
         raise MotionError(
             f"{name} is no JointTrajectory of {arm.name}: expected joint_names with {', '.join(arm.joint_names)}, and "
             "points with positions and time_from_start"
@@ -99,7 +99,8 @@ def _table(text: str, name: str, arm: Arm) -> Motion:
     try:
         rows = np.array([[float(cell) for cell in line.split(",")] for line in lines]).reshape(-1, len(names))
         t = rows[:, names.index("t")]
-    except ValueError:
+        t = t - t[0]
+    except (ValueError, IndexError):
         raise MotionError(f"{name} has a row that is not {len(names)} numbers") from None
     found: dict[str, Any] = {
         kind: rows[:, [names.index(column) for column in columns]]
@@ -108,7 +109,7 @@ def _table(text: str, name: str, arm: Arm) -> Motion:
     }
     velocities = found.get("dq")
     return TrajectoryMotion(
-        t - t[0],
+        t,
         found["q"],
         velocities,
         None if velocities is None else found.get("ddq"),

@@ -13,8 +13,8 @@ from armload.devices.counted import Counted
 from armload.devices.guard import flange_of
 from armload.devices.load import Load
 from armload.devices.ur.source import load_client, load_control, unreachable
-from armload.devices.ur.writer import set_load
-from armload.errors import SinkError, SourceError, one_line
+from armload.devices.ur.writer import ended_control, set_load, taken_control
+from armload.errors import SourceError, one_line
 from armload.inertia import InertialParameters, inertia_matrix
 
 _FIELDS = ["timestamp", "actual_qd", "payload", "payload_cog", "payload_inertia"]
@@ -64,13 +64,8 @@ class URController:
             SinkError: the payload must not be written, or the arm refused it.
         """
         receive = self._reading()
-        try:
-            if self._control is None:
-                self._control = self._controls(self._address)
-        except Exception as error:
-            raise SinkError(
-                f"the UR arm at {self._address} takes no payload ({one_line(error)}): set it to remote control"
-            ) from None
+        if self._control is None:
+            self._control = taken_control(self._controls, self._address)
         set_load(
             self._control, receive, load, self._arm, write=True, allow_undetermined_inertia=True, allow_nothing=True
         )
@@ -82,17 +77,8 @@ class URController:
             SinkError: nobody can say whether it has ended.
         """
         control, self._control = self._control, None
-        if control is None:
-            return
-        try:
-            try:
-                control.stopScript()
-            finally:
-                control.disconnect()
-        except Exception as error:
-            raise SinkError(
-                f"the script on the UR arm at {self._address} cannot be ended ({one_line(error)}): see whether it runs"
-            ) from None
+        if control is not None:
+            ended_control(control, self._address)
 
     def close(self) -> None:
         """Let go of the arm.

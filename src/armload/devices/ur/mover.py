@@ -8,6 +8,7 @@ network between.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
@@ -21,7 +22,7 @@ from armload.devices.mover import StreamedMover
 from armload.devices.supervision import Thresholds
 from armload.devices.ur import writer
 from armload.devices.ur.source import URSource, load_control
-from armload.errors import SafetyError, SourceError, one_line
+from armload.errors import ArmloadError, SafetyError, SourceError, one_line
 from armload.motion import Motion
 from armload.recording import Sample
 
@@ -74,15 +75,20 @@ class URMover(StreamedMover):
             self._control.setWatchdog(_WATCHDOG)
         except Exception as error:
             self._movement = None
-            self._release()
+            with contextlib.suppress(ArmloadError):  # why it does not is said, not what came of it
+                self._release()
             raise SafetyError(
                 f"{self.name} does not take movements ({one_line(error)}): switch it on, release its brakes, and set "
                 "it to remote control"
             ) from None
 
     def write(self, load: Load, *, allow_undetermined_inertia: bool = False) -> Any:
-        """Tell the controller the load, guarded (`writer.set_load`), and return the arguments."""
-        control = load_control()(self._address)
+        """Tell the controller the load, guarded (`writer.set_load`), and return the arguments.
+
+        Raises:
+            SinkError: the load must not be written, or the robot refused it.
+        """
+        control = writer.taken_control(load_control(), self._address)
         try:
             return writer.set_load(
                 control,
@@ -93,8 +99,7 @@ class URMover(StreamedMover):
                 allow_undetermined_inertia=allow_undetermined_inertia,
             )
         finally:
-            control.stopScript()
-            control.disconnect()
+            writer.ended_control(control, self._address)
 
     def arrived(self) -> float | None:
         """When the client had the values handed on last."""
@@ -102,8 +107,10 @@ class URMover(StreamedMover):
 
     def close(self) -> None:
         """Let go of the robot."""
-        self._release()
-        self._source.close()
+        try:
+            self._release()
+        finally:
+            self._source.close()
 
     def _servo(self, q: NDArray[np.float64]) -> None:
         assert self._control is not None
@@ -112,7 +119,11 @@ class URMover(StreamedMover):
 
     def _release(self) -> None:
         control, self._control = self._control, None
-        if control is not None:
+        if control is None:
+            return
+        try:
             control.servoStop(_STOPJ)
-            control.stopScript()
-            control.disconnect()
+        except Exception as error:  # the watchdog stops the arm in any case
+            raise SourceError(f"{self.name} cannot be told to stand still: {one_line(error)}") from None
+        finally:
+            writer.ended_control(control, self._address)

@@ -33,6 +33,37 @@ class URReceive(Protocol):
         ...
 
 
+def taken_control(client: Any, address: str) -> Any:
+    """A connection that commands an arm: its script is uploaded, and ends with `ended_control`.
+
+    Raises:
+        SinkError: the arm is not to be commanded from here.
+    """
+    try:
+        return client(address)
+    except Exception as error:  # the vendor's own exceptions have no common base
+        raise SinkError(
+            f"the UR arm at {address} takes no payload ({one_line(error)}): set it to remote control"
+        ) from None
+
+
+def ended_control(control: Any, address: str) -> None:
+    """End the script and the connection.
+
+    Raises:
+        SinkError: nobody can say whether it has ended.
+    """
+    try:
+        try:
+            control.stopScript()
+        finally:
+            control.disconnect()
+    except Exception as error:
+        raise SinkError(
+            f"the script on the UR arm at {address} cannot be ended ({one_line(error)}): see whether it runs"
+        ) from None
+
+
 def set_load(
     control: URControl,
     receive: URReceive,

@@ -88,7 +88,7 @@ def read_provenance(folder: Path) -> dict[str, Any]:
         provenance = json.loads(path.read_text(encoding="utf-8"))
     except (FileNotFoundError, NotADirectoryError):
         raise DatasetError(f"{folder} is not a data set: expected a folder with {PROVENANCE_FILE}") from None
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise DatasetError(f"{path} cannot be read ({error}): restore it, or build the data set anew") from None
     if not isinstance(provenance, dict) or provenance.get("format") != FORMAT:
         raise DatasetError(f"{path} is not the provenance of a data set of this version: expected format {FORMAT!r}")

@@ -204,7 +204,9 @@ def _at(identifier: Identifier, recording: Recording, times: NDArray) -> list[Es
     last = len(recording) - 1
     rows = [*range(0, last, every), last]
     if len(estimates) != len(rows):
-        raise RuntimeError(f"{identifier.name} gave {len(estimates)} estimates where {len(rows)} were asked for")
+        raise IdentificationError(
+            f"{identifier.name} gave {len(estimates)} estimates where {len(rows)} were asked for: expected one of each"
+        )
     t = recording.t[rows] - recording.t[0]
     return [estimates[int(np.argmin(np.abs(t - wanted)))] for wanted in times]
 

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtri
 
+from armload.errors import IdentificationError
+
 
 def absolute_error(phi: ArrayLike, truth: ArrayLike) -> NDArray[np.float64]:
     """|phi − truth|, any shapes that broadcast [units of phi]."""
@@ -35,9 +37,12 @@ def half_width(std: ArrayLike, level: float = 0.95) -> NDArray[np.float64]:
 
     >>> round(float(half_width(1.0)), 3)
     1.96
+
+    Raises:
+        IdentificationError: the level is no share between 0 and 1.
     """
     if not 0.0 < level < 1.0:
-        raise ValueError(f"level is {level}: expected a share between 0 and 1")
+        raise IdentificationError(f"level is {level}: expected a share between 0 and 1")
     return ndtri(0.5 * (1.0 + level)) * np.asarray(std, dtype=float)
 
 

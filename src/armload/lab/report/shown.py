@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from armload.errors import ReportError
 from armload.inertia import NAMES
 
 # Errors are shown in g, g·m and g·m² (= 10⁻³ kg·m²): SI × 1000, so that no column is full of zeros.
@@ -52,7 +53,7 @@ class Table:
 
     def __post_init__(self) -> None:
         if any(len(row) != len(self.columns) for row in self.rows):
-            raise ValueError(f"table {self.title!r} has rows that do not fit its {len(self.columns)} columns")
+            raise ReportError(f"table {self.title!r} has rows that do not fit its {len(self.columns)} columns")
 
     def __iter__(self) -> Iterator[tuple[str, ...]]:
         return iter(self.rows)
