@@ -17,7 +17,7 @@ from armload.inertia import InertialParameters
 from armload.lab.episodes import draw_episodes
 from armload.motion import random_motion, taie2024
 from armload.payloads import draw_payload, franka_hand
-from armload.recording import Recording, read_recording, with_gravity
+from armload.recording import Recording, read_recording, with_gravity, write_recording
 from armload.recording.windows import integrals, windows
 from armload.simulation import Run, Sensors, World, simulate, simulate_many
 
@@ -289,13 +289,16 @@ def test_a_torque_that_is_rounded_is_not_taken_for_one_that_stands_still(sound, 
 
 
 @pytest.mark.parametrize("name", ["panda", "ur10e"])
-def test_joints_in_the_order_of_the_alphabet_are_refused_by_name(sound, wrong, name):
+def test_joints_in_the_order_of_the_alphabet_are_refused_by_name(sound, wrong, name, tmp_path):
     robot, logs = sound[name]
     order = [2, 1, 0, *range(3, robot.n)]  # elbow, shoulder lift, shoulder pan of a UR
     for log in (*logs, wrong[name][1]):
         other = replace(log, q=log.q[:, order], dq=log.dq[:, order], tau=log.tau[:, order], joint_names=None)
         with pytest.raises(RecordingError, match=r"joints 1 and 3 seem to be exchanged|order of the joints"):
             check_plausible(other, robot)
+    write_recording(tmp_path / "log.csv", other)  # a file that counts its joints names none, either
+    with pytest.raises(RecordingError, match=r"joints 1 and 3 seem to be exchanged|order of the joints"):
+        check_plausible(read_recording(tmp_path / "log.csv", robot), robot)
 
 
 @pytest.mark.parametrize(

@@ -91,5 +91,5 @@ def test_what_is_known_now_counts_for_the_run_that_begins_as_a_stream_is_taken_u
 
 
 def test_a_method_that_cannot_use_it_says_so():
-    with pytest.raises(IdentificationError, match="cannot use a known mass or centre"):
+    with pytest.raises(IdentificationError, match="cannot use what is known"):
         OnlineIdentifier(arm("panda"), method="rls-filter", known=Known.of((1.0, 0.1), None, if_held=True))

@@ -223,7 +223,7 @@ def test_a_log_of_another_number_of_joints_is_refused(tmp_path, panda, suffix):
     ):
         read_recording(path, panda)
     write_recording(path, log(n=7))
-    assert read_recording(path, panda).joint_names == panda.joint_names
+    assert read_recording(path, panda).n == 7
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)

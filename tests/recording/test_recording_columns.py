@@ -54,6 +54,22 @@ def test_joint_names_stand_for_joints(tmp_path, log):
         read_recording(path, columns=spec)
 
 
+@pytest.mark.parametrize(
+    ("written", "keys", "columns", "named"),
+    [
+        (("q{}", "dq{}", "tau{}"), range(1, 8), None, False),
+        (("{}_position", "{}_velocity", "{}_effort"), PANDA.joint_names, None, True),
+        (("{}:a", "{}:b", "{}:c"), PANDA.joint_names, "q={joint}:a,dq={joint}:b,tau={joint}:c", True),
+        (("enc_{}", "rate_{}", "load_{}"), range(7), "q=enc_{i},dq=rate_{i},tau=load_{i}", False),
+    ],
+)
+def test_joints_have_names_only_where_the_table_names_them(tmp_path, log, written, keys, columns, named):
+    path = write(tmp_path / "a.csv", log, *written, time="t", keys=keys)
+    found = read_recording(path, PANDA, columns=columns)
+    same(found, log)
+    assert found.joint_names == (PANDA.joint_names if named else None)
+
+
 def test_a_toml_file_says_the_same_with_units_and_lists_of_names(tmp_path, log):
     path = write(tmp_path / "a.csv", log, scale=1000.0, angle=180.0 / np.pi)
     names = ", ".join(f'"load_{k}"' for k in range(7))

@@ -31,7 +31,7 @@ class ColumnMap:
         places: of each quantity, the place in the header of each joint's column (n,); of velocity none where there are
             no such columns.
         scales: of each quantity, what its columns are multiplied with (n,) to be in rad, rad/s, N·m.
-        joints: names of the joints, where they are known.
+        joints: names of the joints, where the table names them: joints that are only counted may be in another order.
         episode: the column that tells several episodes apart.
         notes: what was read from where.
         wanted: where the torque is motor current of unknown constants, the places of the moments and of the currents
@@ -110,7 +110,8 @@ def map_columns(
         _check_bases(header, places)
     time = header.time(spec)
     episode = list(names).index(EPISODE) if EPISODE in names else None
-    return ColumnMap(time, places, scales, header.joints, episode, (*_notes(header, places, time), *notes), wanted)
+    joints = header.joints if _are_named(header, places["q"]) else None
+    return ColumnMap(time, places, scales, joints, episode, (*_notes(header, places, time), *notes), wanted)
 
 
 def _form_of(names: Sequence[str], families: Sequence[Family]) -> Form | None:
@@ -150,6 +151,15 @@ def _with_joint_names(
             family = Family(family.quantity, family.kind, family.stem, True, places, family.units)
         out.append(family)
     return out
+
+
+def _are_named(header: Header, places: Sequence[int]) -> bool:
+    """Whether the table says by name which joint each of these columns (n,) is of, rather than by a number."""
+    named = [family.places.values() for family in header.families if family.by_name]
+    if any(set(places) <= {place for at in keys for place in at} for keys in named):
+        return True
+    joints = header.joints or ()
+    return bool(joints) and all(joint in header.names[k] for joint, k in zip(joints, places, strict=True))
 
 
 def _joint_count(families: Sequence[Family], given: dict[str, list[int]], where: str, arm: Arm | None) -> int:

@@ -47,7 +47,7 @@ class Recording:
         t: time (N,) [s], strictly increasing, not necessarily even.
         q, dq, tau: (N, n) [rad, rad/s, N·m].
         channel: what tau is; "measured" (rigid body + friction, gravity included), "desired" or "external".
-        joint_names: names of the columns, where the source has them.
+        joint_names: names of the columns, where the source has them; None: they are only counted, in whatever order.
         source: where it comes from (a path), for messages and provenance.
         notes: what a reader did to the log that its user should know (rows dropped, say), one sentence each.
         epoch: time since 1970 at t = 0 [s], where the source has stamps that t is counted from; else 0.
