@@ -72,7 +72,7 @@ def held(robot: Arm, model: HybridModel, records: Records) -> dict[str, NDArray[
     for k in range(len(records)):
         trusted, truth = model.calibration.trusted(records.evidence(k)), records.truth[k]
         found = model.calibration.posterior(trusted, prior)
-        covariance = model.calibration.widened(found, trusted)
+        covariance = model.calibration.widened(found, trusted, prior)
         half = Z95 * np.sqrt(np.diag(holding(covariance, 0, found.mass_if_any - found.mean[0])))
         out["hybrid"][k] = np.abs(found.mean - truth) <= half
         P = np.linalg.inv(trusted.information + np.diag(weak**-2))

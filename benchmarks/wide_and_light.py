@@ -83,7 +83,7 @@ def answered(
     """One payload in one log, under one prior and calibration."""
     trusted = calibration.trusted(log)
     found = calibration.posterior(trusted, prior)
-    std = np.sqrt(np.diag(calibration.widened(found, trusted)))
+    std = np.sqrt(np.diag(calibration.widened(found, trusted, prior)))
     told = determined(std, prior.std, std_under_weak_prior(trusted.information, weak), weak)
     scales = (trusted.gain_std * found.mean) ** 2 + np.diag(trusted.of_joints(found.mean, found.covariance))
     beyond = np.maximum((found.mean - truth) ** 2 - Z95**2 * scales, 0.0)

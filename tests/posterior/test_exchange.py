@@ -79,7 +79,8 @@ def test_intervals_hold_an_exchange_that_fits_the_log_better_than_a_body(panda, 
     other = payloads.differences.posterior(information, information @ truth)
     body = payloads.posterior(information, information @ truth)
     assert (0.0 < other.log_evidence - body.log_evidence < np.log(10.0)) == off
-    low, high = (other.mean + s * Z95 * np.sqrt(np.diag(model.calibration.widened(other, evidence))) for s in (-1, 1))
+    std = np.sqrt(np.diag(model.calibration.widened(other, evidence, payloads)))
+    low, high = (other.mean + s * Z95 * std for s in (-1, 1))
     half = Z95 * np.sqrt(np.diag(found.covariance))
     inside = (found.phi - half <= low + 1e-12) & (high <= found.phi + half + 1e-12)
     assert inside.all() == held

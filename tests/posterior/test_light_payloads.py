@@ -46,7 +46,7 @@ def test_the_interval_of_a_light_mass_holds_with_and_without_the_empty_hand(mode
         log = evidence_of(truth, STD, rng)
         phi, covariance = answer(log, model.calibration, model.prior, False)[:2]
         found = model.prior.posterior(log.information, log.vector)
-        before = model.calibration.widened(found, log)
+        before = model.calibration.widened(found, log, model.prior)
         inside.append(abs(phi[0] - truth[0]) <= Z95 * np.sqrt(covariance[0, 0]))
         narrow.append(abs(found.mean[0] - truth[0]) <= Z95 * np.sqrt(before[0, 0]))
     assert np.mean(inside) > 0.95 > np.mean(narrow) + 0.02

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from armload import arm
-from armload.inertia import Z95
+from armload.inertia import Z95, InertialParameters
 from armload.lab.training.added_families import LIGHT, WIDE
 from armload.payloads import draw_payload, solids
 from armload.posterior import Evidence, HybridModel, shipped_model
@@ -89,10 +89,26 @@ def test_the_inertia_of_light_ones_narrows_as_that_of_bodies_of_one_density(mode
     ratio = (half_as_heavy.phi[4] / half_as_heavy.mass) / (big.phi[4] / big.mass)
     found = model.prior.posterior(np.eye(10), np.zeros(10))
     surely = found._replace(covariance=np.diag(np.full(10, 1e-20)))  # of a mass that is known
-    narrows = [model.calibration.narrowing(surely._replace(mean=b.phi)) for b in (big, half_as_heavy)]
+    narrows = [model.calibration.narrowing(surely._replace(mean=b.phi), model.prior) for b in (big, half_as_heavy)]
     assert narrows == pytest.approx([1.0, ratio], rel=1e-6)
     doubtful = np.diag([m0**2] + [1e-20] * 9)
-    assert model.calibration.narrowing(surely._replace(mean=0.1 * big.phi, covariance=doubtful)) == 1.0
+    assert model.calibration.narrowing(surely._replace(mean=0.1 * big.phi, covariance=doubtful), model.prior) == 1.0
+
+
+def test_the_inertia_of_a_light_one_far_out_narrows_no_more_than_its_mass_times_its_lever_squared(model):
+    """Oracle: of bodies of one density the square of the lever goes with m^(2/3)."""
+    m0, usual = model.calibration.light, model.prior.lever_square
+    heavy = np.sqrt(model.prior.mean[0] ** 2 + model.prior.std[0] ** 2)
+    found = model.prior.posterior(np.eye(10), np.zeros(10))._replace(covariance=np.diag(np.full(10, 1e-20)))
+
+    def left(mass, lever):
+        point = InertialParameters.from_com(mass, (0.0, 0.0, lever), np.zeros((3, 3)))
+        return model.calibration.narrowing(found._replace(mean=point.phi), model.prior)
+
+    lever = np.sqrt(0.5 * usual) * (m0 / heavy) ** (1 / 3)  # of a body of m_0, as `FAR_OUT` has it
+    assert left(0.3 * m0, 0.2 * lever) == pytest.approx(0.3 ** (2 / 3))
+    assert left(0.3 * m0, 0.8 * lever) == pytest.approx(0.8**2)
+    assert left(0.3 * m0, 1.1 * lever) == 1.0
 
 
 def test_only_the_inertia_of_light_ones_narrows_and_only_if_a_model_says_so(model, tmp_path):

@@ -166,20 +166,21 @@ def answer(
     be of any. `alone`: what the log says without a learned prior (`without_learned_prior`), where a body is known: that
     is the prior then, and a tray's drawing is not held against what payloads are usually like.
     """
+    any_body = whole or payloads
     vectors = np.array([trusted.vector, -trusted.vector] if trusted.kind > 0 or tool else [trusted.vector])
     found, *removed = payloads.posteriors(trusted.information, vectors)
     sign = 1.0
     if removed and removed[0].log_evidence + np.log(_REMOVED) > found.log_evidence:
         found, sign = removed[0], -1.0
     found = calibration.posterior(replace(trusted, vector=sign * trusted.vector), payloads, found)
-    differences, exchanged = None if quick or trusted.kind == 0 else (whole or payloads).differences, 0.0
+    differences, exchanged = None if quick or trusted.kind == 0 else any_body.differences, 0.0
     other = None
     if differences is not None:
         other = differences.posterior(trusted.information, sign * trusted.vector)
         fits_better = other.log_evidence > found.log_evidence  # whatever was likely beforehand
         found, exchanged = found.or_else(other, _EXCHANGED)
-        other = (other.mean, calibration.widened(other, trusted)) if fits_better else None
-    mean, covariance = found.mean, calibration.widened(found, trusted)
+        other = (other.mean, calibration.widened(other, trusted, any_body)) if fits_better else None
+    mean, covariance = found.mean, calibration.widened(found, trusted, any_body)
     if not quick:
         covariance = holding(covariance, 0, found.mass_if_any - found.mean[0])
     log_only = given = None

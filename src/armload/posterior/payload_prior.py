@@ -195,6 +195,12 @@ class MixturePrior:
         return np.sqrt(self.weights @ second - self.mean**2)
 
     @cached_property
+    def lever_square(self) -> float:
+        """E|m·r|² over E m² [m²]: the mean square lever of the centre of mass, by the square of the mass."""
+        squares = (self.mean**2 + self.std**2)[:4]
+        return float(squares[1:].sum() / squares[0])
+
+    @cached_property
     def _something(self) -> NDArray[np.bool_]:
         """Which components (K,) are of something that is not light; all, where all are."""
         some = ~np.isin(self.families, _LITTLE)

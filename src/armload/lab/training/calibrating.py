@@ -89,7 +89,7 @@ def scores(records: Records, prior: MixturePrior, calibration: Calibration) -> N
         beyond = (found.mean - records.truth[k]) ** 2 - (Z95 * trusted.gain_std * found.mean) ** 2
         beyond -= Z95**2 * np.diag(trusted.of_joints(found.mean, found.covariance))
         out[k] = np.sqrt(np.maximum(beyond, 0.0) / np.diag(found.covariance))
-        out[k, 4:] /= calibration.narrowing(found)
+        out[k, 4:] /= calibration.narrowing(found, prior)
     return out
 
 
