@@ -439,6 +439,19 @@ def test_every_text_says_what_was_not_determined(form):
     assert "not determined" not in export_load(Load(skew_body()), form)
 
 
+@pytest.mark.parametrize("form", [name for name in FORMS if name != "franka-desk"])
+def test_a_text_says_that_its_intervals_are_approximate_and_that_nothing_seems_to_be_held(form, tmp_path):
+    path, light = tmp_path / "held.json", InertialParameters(0.01 * skew_body().phi, "panda_link8")
+    for body, interval in ((skew_body(), "calibrated"), (skew_body(), "approximate"), (light, "approximate")):
+        result = replace(identification(body), interval=interval)
+        path.write_text(json.dumps(result.to_dict()))
+        for load in (Load.of(result), read_load(path)):
+            text = export_load(load, form)
+            assert ("approximate, not calibrated" in text) == (interval == "approximate")
+            assert ("nothing seems to be held" in text) == (body is light)
+            assert "nothing seems" not in export_load(load + franka_hand().parameters, form)
+
+
 @pytest.mark.parametrize("form", ["urdf", "mjcf", "sdf"])
 def test_names_cannot_break_a_description(form):
     load = Load(skew_body('a"<b>&--c'), (False,) * 10, "--><evil/>\n", "arm")

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.errors import SinkError
-from armload.inertia import NAMES, Z95, InertialParameters, is_consistent, to_order
+from armload.inertia import NAMES, Z95, InertialParameters, held, is_consistent, to_order
 from armload.payloads.payload_file import payload_from, read_content
 
 if TYPE_CHECKING:
@@ -25,6 +25,8 @@ _KNOWN = (True,) * 10
 _MOMENTS = (4, 7, 9)  # places of Ixx, Iyy, Izz
 _LEANING = "rests on what payloads are usually like more than on the log"
 HARDLY_KNOWN = "moments of inertia uncertain by more than half of their value"
+_APPROXIMATE = "the intervals of what was identified are approximate, not calibrated"
+NOTHING_HELD = "nothing seems to be held: the mass is within three standard deviations of zero"
 _RELATIVE = {"before": "empty arm before"}  # what reads otherwise than it is called
 _MISFIT = 3.0  # standard deviations between what is left and the nearest body, beyond which too much was taken off
 
@@ -73,12 +75,12 @@ class Load:
             return result
         if isinstance(result, OnlineEstimate):
             known, robot = tuple(bool(x) for x in result.determined), None if arm is None else arm.name
-            remarks = _leaning(known, result.rests_on_prior.tolist())
+            remarks = _doubted(result.interval) + _leaning(known, result.rests_on_prior.tolist())
             return cls(result.parameters, known, robot, result.relative_to, result.std, remarks)
         std = (result.phi_high - result.phi_low) / (2 * Z95)
         known, resting = tuple(result.determined.tolist()), result.rests_on_prior.tolist()
         inertia = (result.inertia_com, result.inertia_com_low, result.inertia_com_high)
-        remarks = _leaning(known, resting) + _loose(*map(np.diag, inertia), known=known)
+        remarks = _doubted(result.interval) + _leaning(known, resting) + _loose(*map(np.diag, inertia), known=known)
         return cls(result.parameters, known, result.robot, result.relative_to, std, remarks)
 
     @property
@@ -95,6 +97,11 @@ class Load:
     def undetermined(self) -> tuple[str, ...]:
         """Names of the parameters that were not measured."""
         return tuple(name for name, known in zip(NAMES, self.determined, strict=True) if not known)
+
+    @property
+    def seems_nothing(self) -> bool:
+        """Whether its mass was measured and may be none; a payload that is known is what it is."""
+        return self.std is not None and self.determined[0] and not held(self.parameters.mass, self.std[0], True)
 
     @property
     def lacks(self) -> str | None:
@@ -155,7 +162,7 @@ class Load:
             what += f" about {self.frame}"
         if self.relative_to:
             what += f", relative to the {_RELATIVE.get(self.relative_to, self.relative_to)}"
-        lines = [what]
+        lines = [what, *[NOTHING_HELD] * self.seems_nothing]
         if self.undetermined:
             lines.append(f"not determined by the log: {', '.join(self.undetermined)}; known beforehand, not measured")
         # each on one line, and without what would end a comment
@@ -239,7 +246,7 @@ def read_load(path: str | Path) -> Load:
     except (KeyError, TypeError, ValueError, OverflowError):
         pass  # written by hand: the numbers themselves are enough
     resting = _flags(content, "rests_on_prior", path) or (False,) * 10
-    remarks = _leaning(determined, resting) + assumed(payload)
+    remarks = _doubted(content.get("interval")) + _leaning(determined, resting) + assumed(payload)
     try:
         inertia = (content[key] for key in ("inertia_com", "inertia_com_low", "inertia_com_high"))
         remarks += _loose(*(np.diag(np.array(x, dtype=float)) for x in inertia), known=determined)
@@ -264,6 +271,11 @@ def _without_moments(remark: str) -> str:
         return "" if remark == INERTIA_ASSUMED else remark
     left = [name for name in names.split(", ") if name[0] != "I"]
     return f"{said}: {', '.join(left)}" if left else ""
+
+
+def _doubted(interval: Any) -> tuple[str, ...]:
+    """A remark on intervals that are not calibrated."""
+    return (_APPROXIMATE,) if interval == "approximate" else ()
 
 
 def _leaning(determined: Sequence[bool], rests_on_prior: Sequence[bool]) -> tuple[str, ...]:

@@ -195,7 +195,7 @@ def _check_speed(recording: Recording, arm: Arm) -> None:
         k, j = found
         speed = float(recording.dq[k : k + 1][0, j])
         degrees = np.all(np.percentile(np.abs(recording.dq[:]), 99, axis=0) / _DEGREE < limit)
-        unit = "; q and dq look like degrees" if degrees and count > 0.05 * len(recording) else ""
+        unit = "; dq looks like degrees per second" if degrees and count > 0.05 * len(recording) else ""
         raise RecordingError(
             f"{recording.source}: dq{j + 1} = {speed:.4g} rad/s at {row_of(recording, k)} is more than "
             f"{SPEED:g} times the limit of {arm.joint_names[j]} ({limit[j]:.4g} rad/s): expected rad/s of "

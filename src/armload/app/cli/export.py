@@ -129,11 +129,9 @@ def write(
     """
     from armload.devices import CONTROLLERS, export_load
     from armload.devices import FORMS as FORMS_OF
-    from armload.devices.load import HARDLY_KNOWN
-    from armload.inertia import held
+    from armload.devices.load import HARDLY_KNOWN, NOTHING_HELD
 
-    nothing = load.std is not None and load.determined[0] and not held(load.parameters.mass, load.std[0], True)
-    about = frame
+    nothing, about = load.seems_nothing, frame
     if about is None and arm is not None:
         # a load about a flange that the arm knows by another name stays as it is
         on_flange = load.frame is not None and load.frame not in arm.frames and _is_flange(load.frame)
@@ -151,7 +149,7 @@ def write(
         )
     text = export_load(body, to, out, name)
     if nothing:
-        print_note("nothing seems to be held: the mass is within three standard deviations of zero")
+        print_note(NOTHING_HELD)
     if elsewhere:
         print_note(f"a controller counts from its flange; these numbers are about {load.frame}, as was asked for")
     numbers = [note for note in _on_numbers(FORMS_OF[to].held_of(body)) if not earlier or note.startswith(HARDLY_KNOWN)]
