@@ -104,7 +104,7 @@ class Judgement:
                 moves. stands: whether what was seen lately says nothing new, as it stands.
         """
         if isinstance(run, HybridIdentifier):  # what the log denies is not known beforehand
-            self.before = Before(*run.payload_prior)
+            self.before = Before(*(run.payload_prior or self._first))
         std, before, posterior = estimate.std, self.before, run if isinstance(run, PosteriorLeastSquares) else None
         taken = posterior.known if posterior is not None and posterior.taken else None
         shown = determined(std, before.std, run.weak_std, self._weak)
