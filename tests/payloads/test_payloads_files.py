@@ -61,6 +61,7 @@ def test_a_file_may_name_a_mesh_beside_it_and_how_well_the_drawing_is_known(tmp_
         (about | {"mass": 0.6, "scale": 0.0}, "scale of the mesh"),
         (about | {"mass": 0.6, "mesh": "none.stl"}, "none.stl does not exist"),
         (about | {"mass": 0.6, "translation": [0, 0]}, "translation"),
+        (about | {"mass": 0.6, "translation": [0, 0, 50]}, "is it in millimetres"),
     ):
         with pytest.raises(PayloadError, match=said):
             read_payload(write(tmp_path, wrong))

@@ -133,3 +133,13 @@ def test_more_samples_than_were_made_room_for_are_kept():
     assert _ROWS < 2 * 8000.0 * AROUND
     dq = np.array([s.dq for _, _, s in through(list(log))])
     assert np.sqrt(np.mean((dq - truth) ** 2)) < 0.1 * NOISE
+
+
+def test_a_position_that_has_no_other_near_tells_no_velocity():
+    """As of a bag that is played slowly: it may move, or not, and 0 would be believed."""
+    log, _ = swinging(30.0, 0.5)
+    steadying = Steadying(2, alone=True)
+    for sample in log:
+        held, ((told, _),) = steadying.take(sample), steadying.flush()
+        assert held == []
+        assert np.isnan(told.dq).all()

@@ -141,6 +141,14 @@ def test_a_password_is_in_no_message():
     assert "secret" not in str(said.value)
 
 
+@pytest.mark.parametrize("within", "#/?@ ")
+def test_a_password_with_any_character_in_it_is_not_shown(within):
+    with pytest.raises(UsageError) as said:
+        checked(f"mqtt://me:sec{within}ret@host:/a b")
+    assert "ret" not in str(said.value)
+    assert "host" in str(said.value)
+
+
 @pytest.mark.parametrize("url", ["http://host/x", "mqtt://", "mqtt://host:port", "mqtt://host/a/#"])
 def test_an_address_that_is_none_is_refused(url):
     with pytest.raises(UsageError, match="expected an address such as mqtt://HOST:1883/PREFIX"):

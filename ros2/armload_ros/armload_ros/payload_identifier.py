@@ -132,6 +132,7 @@ class PayloadIdentifier(LifecycleNode):
         if self._subscription is not None:
             self.destroy_subscription(self._subscription)
         self._subscription, self._taring = None, None
+        self._drop_held_back()
         if self._measuring is not None:
             self._measuring.end("the node is not active any more")
 
@@ -246,8 +247,14 @@ class PayloadIdentifier(LifecycleNode):
         assert self._stream is not None
         self._stream.reset()
         self._last, self._taring = -np.inf, None
+        self._drop_held_back()
         if self._measuring is not None:
             self._measuring.forget()
+
+    def _drop_held_back(self) -> None:
+        """Forget the samples whose velocities are not told yet: what comes next is of another time."""
+        if self._telling is not None:
+            self._telling = Steadying(self._bare.n, alone=True)
 
     def _reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:  # noqa: ARG002
         self.reset_stream()

@@ -46,10 +46,10 @@ def denied_by(
     """
     if known is None or log_only is None:
         return None
-    denied = known.denied(*log_only)
-    if denied is None and denies_family:
-        return of_none_of(known.families)
-    return None if denied is None else other_than_given(denied, *log_only)
+    said = [other_than_given(one, *log_only) for one in known.denied(*log_only)]
+    if not said and denies_family:
+        said = [of_none_of(known.families)]
+    return "; ".join(said) or None
 
 
 def determined_with(

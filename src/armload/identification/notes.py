@@ -116,10 +116,15 @@ def another_model(name: str, links: float) -> str:
     )
 
 
-def leaning_on_prior(leaning: NDArray[np.bool_]) -> list[str]:
-    """That the intervals of some parameters (10,) rest on a learned prior."""
+def leaning_on_prior(leaning: NDArray[np.bool_], families: Sequence[str] = ()) -> list[str]:
+    """That the intervals of some parameters (10,) rest on a learned prior. families: of which the payload is."""
     if not leaning.any():
         return []
+    if families:
+        return [
+            f"the intervals of {_names(leaning)} rest on what payloads of the kind given ({', '.join(families)}) are "
+            "usually like more than on this log"
+        ]
     return [
         f"the intervals of {_names(leaning)} rest on what payloads are usually like more than on this log: of "
         "something wide and thin (a tray, a frame) believe --method map-gp instead"

@@ -116,6 +116,8 @@ def known_of(
     drawn = None
     if body is not None:
         std = body.uncertainty
+        if not body.parameters.mass > 0.0:
+            raise IdentificationError(f"the body {body.name} has no mass: expected one above 0 kg")
         if not body.inertia_known or min(std.mass, std.com, std.inertia) <= 0.0:
             raise IdentificationError(
                 f"the body {body.name} is to be weighed against the log: expected its inertia, and how well it is "

@@ -76,7 +76,8 @@ def answered(
         )
     if is_held or not determined[0]:  # an empty hand has no inertia to be determined
         every_note += lacking(arm, tared, determined, found.known_arm_std, weak)
-        every_note += leaning_on_prior(leans)
+        families = () if found.known is None or found.denies_family else found.known.families
+        every_note += leaning_on_prior(leans, families)
     rigid = found.explained or is_removal(estimate, determined[0])  # what was taken off is no body, and need not swing
     consistent = is_consistent(phi)
     trusted = found.calibrated and not doubts and consistent and otherwise is None and unsure is None

@@ -55,12 +55,13 @@ class Judgement:
 
     def __init__(self, arm: Arm, prior: tuple[NDArray[np.float64], NDArray[np.float64]] | None) -> None:
         self._arm, self._weak = arm, payload_prior_std(arm)
-        self.before = Before(*(prior or (np.zeros(10), self._weak)))
+        self.before = self._first = Before(*(prior or (np.zeros(10), self._weak)))
         self.doubts = Doubts(arm)
         self.reset()
 
     def reset(self) -> None:
         """What is known beforehand."""
+        self.before = self._first
         mean, std = self.before
         self.estimate = Estimate(0.0, mean, np.diag(std**2), 0, str(self._arm.frame))
         self.around, self.doubted = mean, False
@@ -102,6 +103,8 @@ class Judgement:
             estimate: to be judged. run: that it is of. relative_to: as of `OnlineEstimate`. moving: whether the arm
                 moves. stands: whether what was seen lately says nothing new, as it stands.
         """
+        if isinstance(run, HybridIdentifier):  # what the log denies is not known beforehand
+            self.before = Before(*(run.payload_prior or self._first))
         std, before, posterior = estimate.std, self.before, run if isinstance(run, PosteriorLeastSquares) else None
         taken = posterior.known if posterior is not None and posterior.taken else None
         shown = determined(std, before.std, run.weak_std, self._weak)

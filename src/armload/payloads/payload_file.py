@@ -115,6 +115,7 @@ def _of_mesh(content: dict[str, Any], path: Path) -> Payload:
         rotation=numbers("rotation", 3, 3),
         translation=numbers("translation", 3),
     )
+    _require_metres(drawn.parameters.com, path)
     placed = InertialParameters(drawn.parameters.phi, _text(content, "frame", path))
     name = _text(content, "name", path) or path.stem
     return replace(drawn, name=name, parameters=placed, uncertainty=_uncertainty(content, path))

@@ -81,6 +81,7 @@ class HybridIdentifier(PosteriorLeastSquares):
         super().reset()
         self._trusted: Evidence | None = None
         self.exchanged = self.denies_family = False
+        self._rest_on(self._said)
 
     def expect(self, known: Known | None) -> None:
         """Take what is known of the payload into account from now on.
@@ -90,8 +91,17 @@ class HybridIdentifier(PosteriorLeastSquares):
         """
         families = () if known is None else known.families
         self._of_families = self._payloads.split(*families) if families else None
-        said = self._payloads if self._of_families is None else self._of_families[0]
-        self.payload_prior, self.known = (said.mean, said.std), known
+        self.known = known
+        self._rest_on(self._said)
+
+    @property
+    def _said(self) -> MixturePrior:
+        """The prior of what the payload is said to be."""
+        return self._payloads if self._of_families is None else self._of_families[0]
+
+    def _rest_on(self, prior: MixturePrior) -> MixturePrior:
+        self.payload_prior = (prior.mean, prior.std)
+        return prior
 
     def prepare(self) -> None:
         """Do now what the first sample would have to wait for, the solver's loading among it."""
@@ -114,16 +124,13 @@ class HybridIdentifier(PosteriorLeastSquares):
         return None if self._trusted is None else without_learned_prior(self._trusted, solution_prior_std(self.arm))
 
     def _before(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        prior = self._payloads if self._of_families is None else self._of_families[0]
-        return prior.mean, np.diag(prior.std**2)
+        return self._said.mean, np.diag(self._said.std**2)
 
     def _answer(self, elapsed: float, concluded: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         self._trusted = self.model.calibration.trusted(self.evidence(elapsed), self.louder)
         tool = self.arm.attached is not None or self.stream.without_tare
-        payloads = self._payloads
-        if self._of_families is not None:
-            self.denies_family = denies(self._trusted, *self._of_families)
-            payloads = payloads if self.denies_family else self._of_families[0]
+        self.denies_family = self._of_families is not None and denies(self._trusted, *self._of_families)
+        payloads = self._rest_on(self._payloads if self.denies_family else self._said)
         alone = None if self.known is None or self.known.body is None else self.unprojected
         about = (payloads, tool, not concluded, self.known, self._payloads, alone)
         found = answer(self._trusted, self.model.calibration, *about)

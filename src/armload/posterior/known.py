@@ -211,16 +211,16 @@ class Known:
 
     def denied(
         self, mean: NDArray[np.float64], covariance: NDArray[np.float64]
-    ) -> KnownMass | KnownCentre | KnownBody | None:
-        """Which of them phi ~ N(mean, covariance) denies, beyond `HELD`, `FAR` and `UNLIKE`; None: none."""
+    ) -> tuple[KnownMass | KnownCentre | KnownBody, ...]:
+        """Those of them that phi ~ N(mean, covariance) denies, beyond `HELD`, `FAR` and `UNLIKE`."""
         own = self._own(mean)
         most = {KnownMass: HELD, KnownCentre: FAR, KnownBody: UNLIKE}
-        return next((one for one in self._measured if one.away(own, covariance) > most[type(one)]), None)
+        return tuple(one for one in self._measured if one.away(own, covariance) > most[type(one)])
 
     def believed(self, mean: NDArray[np.float64], covariance: NDArray[np.float64]) -> Self | None:
         """What of it phi ~ N(mean, covariance) does not deny; None: nothing."""
         denied = self.denied(mean, covariance)
-        mass, com, body = (None if one is denied else one for one in (self.mass, self.com, self.body))
+        mass, com, body = (None if _among(one, denied) else one for one in (self.mass, self.com, self.body))
         left = replace(self, mass=mass, com=com, body=body)
         return left if left._measured else None
 
@@ -233,9 +233,9 @@ class Known:
         own, denied = self._own(mean), self.denied(mean, covariance)
         if self.if_held:
             least = max(HELD * float(np.sqrt(covariance[0, 0])), LIGHTEST_HELD)
-            if own[0] <= least or denied is not None:
+            if own[0] <= least or denied:
                 return None
-        taken = [one for one in self._measured if one is not denied]
+        taken = [one for one in self._measured if not _among(one, denied)]
         if not taken:
             return None
         for one in taken:
@@ -245,6 +245,10 @@ class Known:
     def _own(self, mean: NDArray[np.float64]) -> NDArray[np.float64]:
         """Less the tool."""
         return mean if self.tool is None else mean - self.tool
+
+
+def _among(one: Any, others: Sequence[Any]) -> bool:
+    return any(one is other for other in others)  # equal ones would need equal arrays
 
 
 def _pair(what: str, given: Any) -> tuple[Any, float]:
@@ -265,10 +269,15 @@ def _given(
     z: NDArray[np.float64],
     variance: float | NDArray[np.float64],
 ) -> Gaussian:
-    """phi ~ N(mean, covariance) given rows·phi = z + N(0, R), R = variance·1 or the matrix."""
+    """phi ~ N(mean, covariance) given rows·phi = z + N(0, R), R = variance·1 or the matrix.
+
+    C − K·S·Kᵀ is (1 − K·H)·C·(1 − K·H)ᵀ + K·R·Kᵀ: a sum, which rounding takes below zero nowhere, however small R is.
+    """
     cross = rows @ covariance
-    S = cross @ rows.T + (variance * np.eye(len(z)) if np.ndim(variance) == 0 else variance)
+    R = variance * np.eye(len(z)) if np.ndim(variance) == 0 else variance
+    S = cross @ rows.T + R
     unit = np.sqrt(np.diag(S))  # kg and kg·m² are of unlike size
     K = np.linalg.solve(S / np.outer(unit, unit), cross / unit[:, None]).T / unit
-    rest = covariance - K @ cross
+    left = np.eye(len(mean)) - K @ rows
+    rest = left @ covariance @ left.T + K @ R @ K.T
     return mean + K @ (z - rows @ mean), 0.5 * (rest + rest.T)

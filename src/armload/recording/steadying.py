@@ -37,7 +37,8 @@ class Steadying:
 
     Args:
         n: joints.
-        alone: the positions tell all: what a sample has for dq counts for nothing.
+        alone: the positions tell all: what a sample has for dq counts for nothing. One that has no other near has no
+            velocity, NaN.
     """
 
     def __init__(self, n: int, alone: bool = False) -> None:
@@ -114,6 +115,8 @@ class Steadying:
         first, stop = np.searchsorted(kept, t - AROUND), np.searchsorted(kept, t + AROUND, side="right")
         near = slice(self._first + int(first), self._first + int(stop))
         self._first = near.start
+        if self._alone and near.stop - near.start < 2:  # it may move, or not
+            return sample._replace(dq=np.full(self._n, np.nan)), tag
         powers = ((self._t[near] - t) / AROUND) ** np.arange(7)[:, None]
         sums = powers[:4] @ self._both[near]
         std = np.sqrt(self._power / 20.0)

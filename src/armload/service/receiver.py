@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import re
 
-_USER = re.compile(r"(?<=//)[^/?#]*@")  # of an address: a name, and perhaps a password
+_USER = re.compile(r"(?<=//).*@", re.DOTALL)  # of an address: a name, perhaps a password with any character in it
 
 
 class Health:

@@ -230,7 +230,7 @@ def add_known_arguments(parser: argparse.ArgumentParser, drawn: bool = True) -> 
     )
     parser.add_argument(
         "--family",
-        type=lambda text: tuple(text.split(",")),
+        type=lambda text: tuple(name.strip() for name in text.split(",")),
         default=(),
         metavar="NAME,...",
         help="what kind it is of: boxes, shapes, tools, container or wide (trays, bars, rings), or several",
