@@ -266,8 +266,8 @@ def test_what_held_of_payload_intervals_is_what_was_measured():
     diagonal = hybrid["its diagonal"]
     assert f"(`{found['command']}`) {hybrid['first moments']} % of the first moments'" in page
     assert f"{hybrid['inertia']} % of the inertia's and {diagonal} % of its diagonal's" in page
-    assert f"intervals that it reports, {reported['inertia']} and {reported['its diagonal']} % hold" in page
-    assert f"The posterior without the learned prior holds {weak['inertia']} % there" in page
+    assert f"intervals that it reported, {reported['inertia']} and {reported['its diagonal']} % held" in page
+    assert f"The posterior without the learned prior held {weak['inertia']} % there" in page
     light, less_light, *heavier = (f"{100 * line['mass']:.0f}" for line in found["weights"])
     assert f"of those of 30–100 g {light} % of the mass's intervals hold, of 100–200 g {less_light} %" in page
     assert {f"of heavier ones {share} %" in page for share in heavier} == {True}
