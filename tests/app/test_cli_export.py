@@ -17,7 +17,7 @@ from armload.app.cli.export import _EXAMPLES, write
 from armload.app.cli.export import FORMS as NAMED
 from armload.arms import arm
 from armload.devices import FORMS, Load
-from armload.devices.load import HARDLY_KNOWN
+from armload.devices.load_remarks import HARDLY_KNOWN
 from armload.inertia import NAMES, InertialParameters
 from armload.payloads import Payload, franka_hand, write_payload
 from armload.recording import write_recording

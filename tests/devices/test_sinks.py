@@ -31,7 +31,7 @@ from armload.devices import (
 from armload.devices.franka import writer as franka_robot
 from armload.devices.franka.form import desk_text
 from armload.devices.kuka.form import kuka_load
-from armload.devices.load import HARDLY_KNOWN
+from armload.devices.load_remarks import HARDLY_KNOWN
 from armload.devices.ur import writer as ur_robot
 from armload.errors import ArmError, ArmloadError, InertiaError, PayloadError, SinkError
 from armload.identification import Identification

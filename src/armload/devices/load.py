@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armload.devices.load_remarks import NOTHING_HELD, assumed, doubted, leaning, loose, without_moments
 from armload.errors import SinkError
 from armload.inertia import NAMES, Z95, InertialParameters, held, is_consistent, to_order
 from armload.payloads.payload_file import payload_from, read_content
@@ -19,14 +19,8 @@ if TYPE_CHECKING:
     from armload.arms import Arm
     from armload.identification import Identification
     from armload.online import OnlineEstimate
-    from armload.payloads import Payload
 
 _KNOWN = (True,) * 10
-_MOMENTS = (4, 7, 9)  # places of Ixx, Iyy, Izz
-_LEANING = "rests on what payloads are usually like more than on the log"
-HARDLY_KNOWN = "moments of inertia uncertain by more than half of their value"
-_APPROXIMATE = "the intervals of what was identified are approximate, not calibrated"
-NOTHING_HELD = "nothing seems to be held: the mass is within three standard deviations of zero"
 _RELATIVE = {"before": "empty arm before"}  # what reads otherwise than it is called
 _MISFIT = 3.0  # standard deviations between what is left and the nearest body, beyond which too much was taken off
 
@@ -75,12 +69,12 @@ class Load:
             return result
         if isinstance(result, OnlineEstimate):
             known, robot = tuple(bool(x) for x in result.determined), None if arm is None else arm.name
-            remarks = _doubted(result.interval) + _leaning(known, result.rests_on_prior.tolist())
+            remarks = doubted(result.interval) + leaning(known, result.rests_on_prior.tolist())
             return cls(result.parameters, known, robot, result.relative_to, result.std, remarks)
         std = (result.phi_high - result.phi_low) / (2 * Z95)
         known, resting = tuple(result.determined.tolist()), result.rests_on_prior.tolist()
         inertia = (result.inertia_com, result.inertia_com_low, result.inertia_com_high)
-        remarks = _doubted(result.interval) + _leaning(known, resting) + _loose(*map(np.diag, inertia), known=known)
+        remarks = doubted(result.interval) + leaning(known, resting) + loose(*map(np.diag, inertia), known=known)
         return cls(result.parameters, known, result.robot, result.relative_to, std, remarks)
 
     @property
@@ -152,7 +146,7 @@ class Load:
     def without_inertia(self) -> Load:
         """The same for who does not ask for an inertia: nothing is said of that."""
         determined = tuple(known or name[0] == "I" for known, name in zip(self.determined, NAMES, strict=True))
-        remarks = (_without_moments(remark) for remark in self.remarks)
+        remarks = (without_moments(remark) for remark in self.remarks)
         return replace(self, determined=determined, remarks=tuple(remark for remark in remarks if remark))
 
     def description(self) -> tuple[str, ...]:
@@ -246,52 +240,13 @@ def read_load(path: str | Path) -> Load:
     except (KeyError, TypeError, ValueError, OverflowError):
         pass  # written by hand: the numbers themselves are enough
     resting = _flags(content, "rests_on_prior", path) or (False,) * 10
-    remarks = _doubted(content.get("interval")) + _leaning(determined, resting) + assumed(payload)
+    remarks = doubted(content.get("interval")) + leaning(determined, resting) + assumed(payload)
     try:
         inertia = (content[key] for key in ("inertia_com", "inertia_com_low", "inertia_com_high"))
-        remarks += _loose(*(np.diag(np.array(x, dtype=float)) for x in inertia), known=determined)
+        remarks += loose(*(np.diag(np.array(x, dtype=float)) for x in inertia), known=determined)
     except (KeyError, TypeError, ValueError, OverflowError):
         pass
     return Load(parameters, determined, robot, relative_to, std, remarks)
-
-
-def assumed(payload: Payload) -> tuple[str, ...]:
-    """A remark on a payload whose inertia is not known."""
-    from armload.payloads import INERTIA_ASSUMED
-
-    return () if payload.inertia_known else (INERTIA_ASSUMED,)
-
-
-def _without_moments(remark: str) -> str:
-    """A remark without the moments of inertia that it names; empty: it is of nothing else."""
-    from armload.payloads import INERTIA_ASSUMED
-
-    said, _, names = remark.partition(": ")
-    if said not in (_LEANING, HARDLY_KNOWN):
-        return "" if remark == INERTIA_ASSUMED else remark
-    left = [name for name in names.split(", ") if name[0] != "I"]
-    return f"{said}: {', '.join(left)}" if left else ""
-
-
-def _doubted(interval: Any) -> tuple[str, ...]:
-    """A remark on intervals that are not calibrated."""
-    return (_APPROXIMATE,) if interval == "approximate" else ()
-
-
-def _leaning(determined: Sequence[bool], rests_on_prior: Sequence[bool]) -> tuple[str, ...]:
-    """A remark on parameters that the log determines, though less than what payloads are usually like does."""
-    names = [n for n, known, prior in zip(NAMES, determined, rests_on_prior, strict=True) if known and prior]
-    return (f"{_LEANING}: {', '.join(names)}",) if names else ()
-
-
-def _loose(value: NDArray, low: NDArray, high: NDArray, known: Sequence[bool]) -> tuple[str, ...]:
-    """A remark on moments of inertia about the centre of mass (3,) that are hardly known, though determined.
-
-    Hardly: the interval is wider than the value, which a controller takes for exact.
-    """
-    which = (np.shape(value) == np.shape(low) == np.shape(high) == (3,)) and (high - low > value)
-    names = [NAMES[k] for k, hardly in zip(_MOMENTS, np.broadcast_to(which, 3), strict=True) if hardly and known[k]]
-    return (f"{HARDLY_KNOWN}: {', '.join(names)}",) if names else ()
 
 
 def _flags(content: dict[str, Any], key: str, path: str | Path) -> tuple[bool, ...] | None:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from armload.errors import IdentificationError
 from armload.estimators import Identifier
 from armload.identification.intervals import Before
-from armload.identification.notes import of_none_of, other_than_given
 from armload.identification.thresholds import LEANS
+from armload.inertia import NAMES, UNITS, Z95
 from armload.inertia import determined as determined_by
-from armload.posterior import HybridIdentifier, Known, PosteriorLeastSquares
+from armload.posterior import HybridIdentifier, Known, KnownBody, KnownCentre, KnownMass, PosteriorLeastSquares
 
 
 def know(identifier: Identifier, known: Known | None) -> None:
@@ -46,10 +48,46 @@ def denied_by(
     """
     if known is None or log_only is None:
         return None
-    said = [other_than_given(one, *log_only) for one in known.denied(*log_only)]
+    said = [_other_than_given(one, *log_only) for one in known.denied(*log_only)]
     if not said and denies_family:
-        said = [of_none_of(known.families)]
+        said = [_of_none_of(known.families)]
     return "; ".join(said) or None
+
+
+def _of_none_of(families: Sequence[str]) -> str:
+    """That the log does not bear the families that were given."""
+    return (
+        f"the log says that the payload is none of {', '.join(families)}, which is left out: check what is held, and "
+        "what was mounted at the tare"
+    )
+
+
+def _other_than_given(
+    given: KnownMass | KnownCentre | KnownBody, mean: NDArray[np.float64], covariance: NDArray[np.float64]
+) -> str:
+    """That the log, which says phi ~ N(mean, covariance), does not bear the mass, centre or body that was given."""
+    if isinstance(given, KnownBody):
+        off = np.abs(given.phi - mean) / np.sqrt(np.diag(covariance + given.covariance))
+        k = int(np.argmax(off))
+        ours, theirs = Z95 * np.sqrt([covariance[k, k], given.covariance[k, k]])
+        return (
+            f"the body given is not what the log says, and is left out: its {NAMES[k]} is {given.phi[k]:.3g} ± "
+            f"{theirs:.2g} {UNITS[k]} (95 %), the log's {mean[k]:.3g} ± {ours:.2g}; check its frame and units, what is "
+            "held, and what was mounted at the tare"
+        )
+    if isinstance(given, KnownMass):
+        return (
+            f"the mass given, {given.mass:.4g} ± {Z95 * given.std:.2g} kg (95 %), is not what the log says, "
+            f"{mean[0]:.4g} ± {Z95 * np.sqrt(covariance[0, 0]):.2g} kg, and is left out: check its unit, what was "
+            "weighed and what was mounted at the tare"
+        )
+    r = np.array([given.com, mean[1:4] / mean[0]])
+    (x, y, z), (a, b, c) = (1e3 * r).tolist()
+    return (
+        f"the centre of mass given, ({x:.0f}, {y:.0f}, {z:.0f}) ± {1e3 * Z95 * given.std:.2g} mm (95 %), is not what "
+        f"the log says, ({a:.0f}, {b:.0f}, {c:.0f}) mm, and is left out: check the frame that it is given in, what is "
+        "held, and what was mounted at the tare"
+    )
 
 
 def determined_with(

@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
 from armload.identification.thresholds import KNOWN, MOVES, NOMINAL, PAUSE_SAID
-from armload.inertia import NAMES, SHRINK, UNITS, Z95
-from armload.posterior import KnownBody, KnownCentre, KnownMass
+from armload.inertia import NAMES, SHRINK, Z95
 from armload.posterior.scales import AnotherArm, Drift, Tilt
 from armload.posterior.tilt import MAY_LEAN
 from armload.recording import Recording
@@ -214,42 +213,6 @@ def not_rigid(restlessness: float, joint: int = 0) -> str:
         f"the torques are {restlessness:.1f} times as restless with the payload as they should be{which}: part of it "
         "seems to swing, slosh or slip, the arm touches something, or a torque is wrong (its sensor, or late); the "
         "intervals are those of a rigid body: hold it tighter, move more slowly, or look at that torque in another log"
-    )
-
-
-def of_none_of(families: Sequence[str]) -> str:
-    """That the log does not bear the families that were given."""
-    return (
-        f"the log says that the payload is none of {', '.join(families)}, which is left out: check what is held, and "
-        "what was mounted at the tare"
-    )
-
-
-def other_than_given(
-    given: KnownMass | KnownCentre | KnownBody, mean: NDArray[np.float64], covariance: NDArray[np.float64]
-) -> str:
-    """That the log, which says phi ~ N(mean, covariance), does not bear the mass, centre or body that was given."""
-    if isinstance(given, KnownBody):
-        off = np.abs(given.phi - mean) / np.sqrt(np.diag(covariance + given.covariance))
-        k = int(np.argmax(off))
-        ours, theirs = Z95 * np.sqrt([covariance[k, k], given.covariance[k, k]])
-        return (
-            f"the body given is not what the log says, and is left out: its {NAMES[k]} is {given.phi[k]:.3g} ± "
-            f"{theirs:.2g} {UNITS[k]} (95 %), the log's {mean[k]:.3g} ± {ours:.2g}; check its frame and units, what is "
-            "held, and what was mounted at the tare"
-        )
-    if isinstance(given, KnownMass):
-        return (
-            f"the mass given, {given.mass:.4g} ± {Z95 * given.std:.2g} kg (95 %), is not what the log says, "
-            f"{mean[0]:.4g} ± {Z95 * np.sqrt(covariance[0, 0]):.2g} kg, and is left out: check its unit, what was "
-            "weighed and what was mounted at the tare"
-        )
-    r = np.array([given.com, mean[1:4] / mean[0]])
-    (x, y, z), (a, b, c) = (1e3 * r).tolist()
-    return (
-        f"the centre of mass given, ({x:.0f}, {y:.0f}, {z:.0f}) ± {1e3 * Z95 * given.std:.2g} mm (95 %), is not what "
-        f"the log says, ({a:.0f}, {b:.0f}, {c:.0f}) mm, and is left out: check the frame that it is given in, what is "
-        "held, and what was mounted at the tare"
     )
 
 

@@ -38,9 +38,9 @@ COVERAGE = 0.95  # share of intervals that hold: the convention of the field
 # 85–88 % of odd bodies' inertias lay inside instead of 92; without, light ones' intervals are 6 to 7 times the error
 # (seeds 700 and 701 of `benchmarks/coverage_cells.py`)
 LIGHT_MASS = 0.35
-# r_0² in units of the mean square lever of payloads as heavy as m_0. It was set on seed 77 of
-# `benchmarks/light_and_far.py`: of light things 5 to 12 cm beyond their usual place 88 to 94 % of the inertias lie
-# inside by arm, with 1 84 to 91 %, without the lever 79 to 83 %, with c in full 94 to 97 %
+# r_0² in units of the mean square lever of payloads as heavy as m_0; set on logs of another seed. Of light things 5 to
+# 12 cm beyond their usual place 88 to 99 % of the inertias lie inside by arm, without the lever 69 to 93 %, with c in
+# full 88 to 99 % (`benchmarks/light_and_far.py`)
 FAR_OUT = 0.5
 _LEAST = 0.4  # of c: the least that 95 % of what was hardly more than nothing needed (`benchmarks/wide_and_light.py`)
 # range of the factor: a guard, where the bag is asked about traits unlike all it has seen

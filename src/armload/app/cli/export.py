@@ -129,7 +129,7 @@ def write(
     """
     from armload.devices import CONTROLLERS, export_load
     from armload.devices import FORMS as FORMS_OF
-    from armload.devices.load import HARDLY_KNOWN, NOTHING_HELD
+    from armload.devices.load_remarks import HARDLY_KNOWN, NOTHING_HELD
 
     nothing, about = load.seems_nothing, frame
     if about is None and arm is not None:

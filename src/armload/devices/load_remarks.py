@@ -1,0 +1,59 @@
+"""What a load's reader should know beside its numbers, a line each, in every form that it is written in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armload.inertia import NAMES
+
+if TYPE_CHECKING:
+    from armload.payloads import Payload
+
+_MOMENTS = (4, 7, 9)  # places of Ixx, Iyy, Izz
+_LEANING = "rests on what payloads are usually like more than on the log"
+HARDLY_KNOWN = "moments of inertia uncertain by more than half of their value"
+_APPROXIMATE = "the intervals of what was identified are approximate, not calibrated"
+NOTHING_HELD = "nothing seems to be held: the mass is within three standard deviations of zero"
+
+
+def assumed(payload: Payload) -> tuple[str, ...]:
+    """A remark on a payload whose inertia is not known."""
+    from armload.payloads import INERTIA_ASSUMED
+
+    return () if payload.inertia_known else (INERTIA_ASSUMED,)
+
+
+def without_moments(remark: str) -> str:
+    """A remark without the moments of inertia that it names; empty: it is of nothing else."""
+    from armload.payloads import INERTIA_ASSUMED
+
+    said, _, names = remark.partition(": ")
+    if said not in (_LEANING, HARDLY_KNOWN):
+        return "" if remark == INERTIA_ASSUMED else remark
+    left = [name for name in names.split(", ") if name[0] != "I"]
+    return f"{said}: {', '.join(left)}" if left else ""
+
+
+def doubted(interval: Any) -> tuple[str, ...]:
+    """A remark on intervals that are not calibrated."""
+    return (_APPROXIMATE,) if interval == "approximate" else ()
+
+
+def leaning(determined: Sequence[bool], rests_on_prior: Sequence[bool]) -> tuple[str, ...]:
+    """A remark on parameters that the log determines, though less than what payloads are usually like does."""
+    names = [n for n, known, prior in zip(NAMES, determined, rests_on_prior, strict=True) if known and prior]
+    return (f"{_LEANING}: {', '.join(names)}",) if names else ()
+
+
+def loose(value: NDArray, low: NDArray, high: NDArray, known: Sequence[bool]) -> tuple[str, ...]:
+    """A remark on moments of inertia about the centre of mass (3,) that are hardly known, though determined.
+
+    Hardly: the interval is wider than the value, which a controller takes for exact.
+    """
+    which = (np.shape(value) == np.shape(low) == np.shape(high) == (3,)) and (high - low > value)
+    names = [NAMES[k] for k, hardly in zip(_MOMENTS, np.broadcast_to(which, 3), strict=True) if hardly and known[k]]
+    return (f"{HARDLY_KNOWN}: {', '.join(names)}",) if names else ()
