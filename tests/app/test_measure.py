@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +16,8 @@ from armload.arms import arm
 from armload.identification import identify
 from armload.motion import FourierMotion, load_motion, save_motion, taie2024
 from armload.payloads import test_payload as held_payload
+from armload.payloads import write_payload
+from armload.payloads.uncertainty import Uncertainty
 from armload.recording import read_recording, write_recording
 from armload.simulation import World, simulate
 
@@ -57,6 +60,41 @@ def test_the_whole_way_prints_and_writes_the_answer(motion, tmp_path, capsys):
     assert np.allclose(said["com"], held_payload().parameters.com, atol=0.005)
     assert said["relative_to"] == "tare"
     assert [os.path.basename(said["measurement"][log]) for log in ("empty", "loaded")] == ["empty.csv", "loaded.csv"]
+
+
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [
+        (("--method", "commanded"), "cannot follow a live stream"),
+        (("--method", "hybird"), "did you mean 'hybrid'"),
+        (("--method", "joint", "--com", "0,0,0.05±0.01"), "cannot use what is known of a payload"),
+        (("--method", "rls-filter", "--mass", "1.48±0.001"), "cannot use what is known of a payload"),
+        (("--method", "map", "--family", "wide"), "has learned of no families"),
+        (("--method", "hybrid", "--family", "spoons"), "spoons"),
+    ],
+)
+def test_what_no_answer_could_rest_on_is_said_before_the_arm_moves(said, why, motion, tmp_path, capsys):
+    logs = tmp_path / "logs"
+    assert main(["measure", "sim", *QUICK, "--motion", motion, "--move", "--dir", str(logs), *said]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert why in printed.err.splitlines()[-1]
+    assert not logs.exists()
+
+
+def test_a_drawing_tells_the_inertia_that_a_run_of_some_seconds_does_not(motion, tmp_path, capsys):
+    held = replace(held_payload(), uncertainty=Uncertainty(mass=0.01, com=0.002, inertia=0.05))
+    write_payload(tmp_path / "held.json", held)
+    found = {}
+    for name, more in {"plain": (), "drawn": ("--body", str(tmp_path / "held.json"))}.items():
+        where = ["--dir", str(tmp_path / name), "--json"]
+        assert main(["measure", "sim", *QUICK, "--motion", motion, "--move", *where, *more]) == 0
+        found[name] = json.loads(capsys.readouterr().out)
+    low, high = (np.array(found["drawn"][edge]) for edge in ("phi_low", "phi_high"))
+    phi = arm("panda").in_frame(held.parameters).phi
+    assert np.sum((low <= phi) & (phi <= high)) >= 9
+    assert (high - low)[4:].mean() < 0.5 * np.subtract(found["plain"]["phi_high"], found["plain"]["phi_low"])[4:].mean()
+    assert all(found["drawn"]["determined"])
 
 
 @pytest.mark.full  # some seconds

@@ -23,7 +23,9 @@ from tests.recording.test_recording_bags import write_bag
 from armload.errors import RecordingError, UsageError
 from armload.inertia import InertialParameters
 from armload.motion import random_motion, taie2024
+from armload.payloads import Payload, write_payload
 from armload.payloads import test_payload as example_payload
+from armload.payloads.uncertainty import Uncertainty
 from armload.recording import Sample
 from armload.service.tare import Tare
 from armload.simulation import simulate
@@ -238,6 +240,33 @@ def test_a_known_mass_and_a_known_tool_begin_the_stream_anew(scene):
         assert told["set_tool"], told["message"]
         order.wait(lambda: last(order.said("estimate"))["estimate"]["relative_to"] == "tool")
         assert order("apply")["apply"] is False  # nobody was named
+
+
+@pytest.mark.full
+def test_a_drawing_that_the_parameters_name_stays_known_when_a_mass_is_said(scene, tmp_path):
+    drawn = Payload("part", HELD, uncertainty=Uncertainty(mass=0.05, com=0.002, inertia=0.05))
+    write_payload(tmp_path / "part.json", drawn)
+    inertia = HELD.phi[4:]
+    widths = {}
+    with scene(f"body:={tmp_path / 'part.json'}") as order:
+        for name in ("drawn", "weighed, too"):
+            if name != "drawn":
+                told = order("set_mass", mass=HELD.mass, std=0.001)
+                assert told["set_mass"], told["message"]
+                before = len(order.said("estimate"))
+                order.wait(
+                    lambda n=before: (
+                        len(order.said("estimate")) > n + 30 and last(order.said("estimate"))["estimate"]["known"]
+                    )
+                )
+            said = at_rest(order)
+            low, high = np.array(said["low"]), np.array(said["high"])
+            assert np.sum((low[4:] <= inertia) & (inertia <= high[4:])) >= 5
+            widths[name] = high - low
+    known = 4.0 * 0.05 * np.abs(inertia[[0, 3, 5]])  # 95 % of what the drawing says, about its centre of mass
+    for name, width in widths.items():
+        assert (width[[4, 7, 9]] < 3.0 * known).all(), name
+    assert widths["weighed, too"][0] < 0.01 < widths["drawn"][0]
 
 
 @pytest.mark.full

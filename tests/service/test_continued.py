@@ -4,11 +4,13 @@ import json
 import resource
 import select
 import time
+from dataclasses import replace
 
 import pytest
 
 from armload.online import OnlineIdentifier
-from armload.payloads import test_payload
+from armload.payloads import test_payload, write_payload
+from armload.payloads.uncertainty import Uncertainty
 from armload.recording import write_recording
 from armload.service import ArmSettings
 from armload.service.arm_process import ArmProcess
@@ -72,6 +74,32 @@ def test_a_state_is_gone_on_from_while_the_arm_is_that_of_the_same_session(
     else:
         assert found.conclude().phi[0] == pytest.approx(identifier.conclude().phi[0])
         found.close()
+
+
+def test_what_is_known_of_payloads_counts_in_a_stream_that_begins_and_in_one_that_goes_on(
+    panda, analytic_log, tmp_path
+):
+    held = replace(test_payload(), uncertainty=Uncertainty(mass=0.01, com=0.002, inertia=0.05))
+    run, part = tmp_path / "run.csv", tmp_path / "part.json"
+    log = analytic_log(panda, held.parameters, duration=3.0)
+    write_recording(run, log)
+    write_payload(part, held)
+    plain = ArmSettings(name="left", source=str(run), robot="panda", method="map", save=str(tmp_path))
+    told = replace(plain, body=str(part))
+    assert told.state != plain.state
+    determined = {}
+    for name, settings in {"plain": plain, "begins": told, "goes on": told}.items():
+        process = ArmProcess(settings, 0.1, ())
+        session = process._made_session()
+        for sample in log.between(1.5 if name == "goes on" else 0.0, 3.0):
+            estimate = session.identifier.update(*sample)
+        determined[name] = estimate.determined.sum()
+        session.identifier.save(settings.state)
+        session.close()
+        process.source.close()
+        assert process._continued == (name == "goes on")
+    assert determined["begins"] == determined["goes on"] == 10
+    assert determined["plain"] < 10
 
 
 def test_a_state_is_of_the_tare_that_the_stream_goes_by_whatever_its_file_says_since(panda, analytic_log, tmp_path):

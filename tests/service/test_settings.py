@@ -27,6 +27,9 @@ tare = "empty.csv"
 tare_age = "3d"
 save = "state"
 rating = 2.5
+mass = "1.200±0.002"
+body = "gear.json"
+family = "wide"
 
 [[arm]]
 name = "right"
@@ -43,6 +46,7 @@ def test_a_file_says_what_it_says_with_paths_from_its_own_folder(tmp_path):
     left, right = settings.arms
     assert (settings.every, settings.port, settings.headers) == (1.0, 0, {"Authorization": "Bearer abc"})
     assert (left.tare, left.save, left.rating) == (str(tmp_path / "empty.csv"), str(tmp_path / "state"), 2.5)
+    assert (left.mass, left.body, left.family) == ("1.200±0.002", str(tmp_path / "gear.json"), "wide")
     assert (left.steady, right.steady) == (False, True)
     assert (left.tare_age, right.tare_age) == (3 * 86400.0, None)
     assert (right.source, right.gravity, right.state) == ("sim", (0.0, 0.0, -9.8), None)
@@ -77,6 +81,8 @@ def test_the_page_has_a_row_for_every_setting():
         (("rating = 2.5", 'record = "/dev/full"'), "ends in .csv or .mcap"),
         (("every = 0.5", "every = true"), "every is true: expected a number"),
         (("port = 0", 'port = "80"'), 'port is "80": expected a whole number'),
+        (('mass = "1.200±0.002"', 'mass = "1.2"'), "'1.2' is not a weighed mass"),
+        (('mass = "1.200±0.002"', 'com = "0,0±0.002"'), "is not a centre of mass"),
         (("steady = true", 'steady = "yes"'), 'steady is "yes": expected true or false'),
         (("steady = true", "port = 8090"), "port is of the service: write it above the first"),
         (("every = 0.5", "every = nan"), "every is nan: expected a time above 0 s"),
@@ -130,12 +136,13 @@ def test_what_cannot_be_meant_is_one_sentence(tmp_path, capsys, change, said):
     assert err.count("\n") == 1
 
 
-def test_a_state_belongs_to_the_settings_it_was_made_with(tmp_path):
-    (tmp_path / "empty.csv").write_text("1")
-    settings = ArmSettings("panda", name="left", source="sim", save=str(tmp_path), tare=str(tmp_path / "empty.csv"))
+@pytest.mark.parametrize("of", ["tare", "body"])
+def test_a_state_belongs_to_the_settings_it_was_made_with(of, tmp_path):
+    (tmp_path / "file").write_text("1")
+    settings = ArmSettings("panda", name="left", source="sim", save=str(tmp_path), **{of: str(tmp_path / "file")})
     first = settings.state
     assert settings.state == first
-    (tmp_path / "empty.csv").write_text("2")
+    (tmp_path / "file").write_text("2")
     assert settings.state != first
     assert ArmSettings("panda", name="left", source="sim", save=str(tmp_path), rate=1000.0).state == (
         ArmSettings("panda", name="left", source="sim", save=str(tmp_path)).state

@@ -11,10 +11,11 @@ from armload.arms import Arm
 from armload.devices.ros2 import Effort
 from armload.errors import UsageError
 from armload.identification import check_usable, plausible_tool
+from armload.identification.known_options import KnownOptions
 from armload.identification.tare_age import age_of, seconds_of
 from armload.inertia import InertialParameters
 from armload.payloads import NOTHING
-from armload.posterior import Profile, load_profile
+from armload.posterior import Known, Profile, load_profile
 from armload.recording import has_topics
 
 DEFAULTS: dict[str, Any] = {
@@ -26,6 +27,10 @@ DEFAULTS: dict[str, Any] = {
     "tare": "",
     "tare_age": "",
     "profile": "",
+    "mass": "",
+    "com": "",
+    "body": "",
+    "family": "",
     "steady": False,
     "torque_constants": [0.0],
     "compensated": "",
@@ -90,6 +95,11 @@ class Parameters:
     def profile(self) -> Profile | None:
         """What was learned of the arm from many logs."""
         return load_profile(self.value("profile")) if self.value("profile") else None
+
+    def known(self, robot: Arm) -> Known | None:
+        """What is known of a payload apart from the stream."""
+        said = {name: self.value(name) or None for name in ("mass", "com", "body", "family")}
+        return KnownOptions(**said).known_on(robot)
 
     def _of_effort(self) -> dict[str, Any]:
         """What the parameters say of it, of the topic and of a bag of it."""

@@ -153,7 +153,7 @@ class PayloadIdentifier(LifecycleNode):
         age, aged = given.tare_age(log)
         for note in aged:
             self.get_logger().warning(note)
-        self._identify(robot, None if log is None else Tare(log, age))
+        self._identify(robot, None if log is None else Tare(log, age), given.known(robot))
         if given.value("apply"):
             self._applying = applying_of(self, given, bare)
 
@@ -297,7 +297,8 @@ class PayloadIdentifier(LifecycleNode):
         assert self._stream is not None
         forgotten = request.mass == 0.0 and request.std == 0.0
         try:
-            known = None if forgotten else Known.of((request.mass, request.std), None, if_held=True)
+            mass, old = None if forgotten else (request.mass, request.std), self._stream.known or Known()
+            known = Known.of(mass, old.com, if_held=True, body=old.body, families=old.families)
             self._identify(self._stream.arm, self._stream.tare, plausible_known(known, self._bare))
         except ArmloadError as error:
             return self._told(response, False, str(error))

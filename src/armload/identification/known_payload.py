@@ -31,10 +31,15 @@ def know(identifier: Identifier, known: Known | None) -> None:
     elif isinstance(identifier, PosteriorLeastSquares):
         identifier.known = known
     elif known is not None:
-        raise IdentificationError(
-            f"the method {identifier.name} cannot use what is known of a payload: leave --mass, --com and --body out, "
-            "or use hybrid, map-gp or map"
-        )
+        raise of_no_use_to(identifier.name)
+
+
+def of_no_use_to(method: str) -> IdentificationError:
+    """That a method can use nothing of what is known."""
+    return IdentificationError(
+        f"the method {method} cannot use what is known of a payload: leave --mass, --com and --body out, "
+        "or use hybrid, map-gp or map"
+    )
 
 
 def denied_by(

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 from armload.runtime.lazy import on_first_use
 
 if TYPE_CHECKING:
+    from armload.measuring.basis import Basis
     from armload.measuring.plan import Leg, Plan, Room, plan_of
-    from armload.measuring.procedure import Basis, Measurement, Procedure
+    from armload.measuring.procedure import Measurement, Procedure
 
 __all__ = ["Basis", "Leg", "Measurement", "Plan", "Procedure", "Room", "plan_of"]
 

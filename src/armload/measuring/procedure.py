@@ -18,13 +18,14 @@ from armload.devices.recorder import Recorder
 from armload.devices.supervision import Thresholds
 from armload.errors import RecordingError, SafetyError, SourceError
 from armload.excitation import Accuracy
-from armload.identification import Identification, identify, plausible_known
+from armload.identification import Identification, identify
 from armload.identification.tare_age import age_of
 from armload.inertia import Z95
+from armload.measuring.basis import Basis
 from armload.measuring.plan import BACK, EMPTY, LOADED, TO_START, Plan, Room, plan_of
 from armload.motion import Motion
 from armload.online import OnlineIdentifier
-from armload.posterior import Known, KnownCentre, KnownMass, Profile
+from armload.posterior import Known
 from armload.recording import Recording, Sample, read_recording
 from armload.runtime.interruption import held_back
 
@@ -35,26 +36,6 @@ _FRESH = 0.05  # [s] older samples waited somewhere, while somebody mounted the 
 _TO_SETTLE = 5.0  # [s] of waiting for that
 _TO_SWING_OUT = 1.0  # [s] of waiting for an arm that somebody has just stopped
 _WARM_UP = 0.5  # [s] of the tare that the identifier is fed before the arm moves, so that all it compiles is compiled
-
-
-@dataclass(frozen=True, eq=False)
-class Basis:
-    """What the answer rests on beside the runs, as of `identify`.
-
-    Args:
-        tare: a log of the empty arm: there is no empty run, and the payload is on already.
-        tare_age: how old that is [s]; None: by the logs' clocks.
-        profile: what was learned of this arm from many logs.
-        mass: of the payload, where it was weighed. com: its centre of mass, where that is known.
-        method: of the identification.
-    """
-
-    tare: Recording | None = None
-    tare_age: float | None = None
-    profile: Profile | None = None
-    mass: KnownMass | None = None
-    com: KnownCentre | None = None
-    method: str | Path | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +67,7 @@ class Procedure:
         arm: which it is: bare, or with a tool that is known and mounted in both runs.
         motion: what is run, from rest to rest; empty_motion: what is run without the payload (None: the same).
         folder: for the logs `empty.csv` and `loaded.csv`, which must not exist.
-        basis: what is known of the arm and the payload; 3 sigma more than its mass is what the movements are checked
-            with. None: nothing.
+        basis: what is known of the arm and the payload; the movements are checked with its `heaviest`. None: nothing.
         room: see `plan_of`.
         accuracy: the loaded run ends when it is reached; None: with the motion.
         thresholds: where a movement is stopped.
@@ -97,6 +77,7 @@ class Procedure:
         RecordingError: a log is there already, or the folder cannot be made.
         SourceError: the arm does not say where it is.
         SafetyError: the arm moves, or is too far from the motion's start.
+        IdentificationError, ModelError: see `Basis.known`.
     """
 
     def __init__(
@@ -115,9 +96,7 @@ class Procedure:
     ) -> None:
         self.mover, self.arm, self.motion, self.empty_motion = mover, arm, motion, empty_motion
         self.folder, self.basis, self.room = Path(folder), basis or Basis(), room or Room()
-        mass = self.basis.mass
-        self._known = plausible_known(Known.of(mass, self.basis.com), arm)
-        self._heaviest = None if mass is None else mass.mass + 3.0 * mass.std
+        self._known = self.basis.known(arm)
         self.accuracy, self.thresholds, self._say = accuracy, thresholds or Thresholds(), say
         for path in (self.folder / "empty.csv", self.folder / "loaded.csv"):
             if path.exists():
@@ -161,8 +140,9 @@ class Procedure:
             identifier.close()
         self._say("identifying")
         about = self.basis
-        known = {"mass": about.mass, "com": about.com, "profile": about.profile, "method": about.method}
-        answer = identify(loaded, self.arm, tare=tare, tare_age=about.tare_age, **known)
+        known = {"mass": about.mass, "com": about.com, "body": about.body, "family": about.family}
+        of_arm = {"tare": tare, "tare_age": about.tare_age, "profile": about.profile}
+        answer = identify(loaded, self.arm, **of_arm, **known, method=about.method)
         reached = None
         if self.accuracy is not None:
             half_width = Z95 * np.sqrt(np.maximum(np.diag(answer.covariance), 0.0))
@@ -170,7 +150,7 @@ class Procedure:
         return Measurement(answer, empty if about.tare is None else None, loaded, seconds, reached)
 
     def _plan(self, at: NDArray[np.float64], empty_run: bool) -> Plan:
-        more = {"empty_motion": self.empty_motion, "room": self.room, "heaviest": self._heaviest}
+        more = {"empty_motion": self.empty_motion, "room": self.room, "heaviest": self.basis.heaviest}
         return plan_of(self.arm, self.motion, at, empty_run=empty_run, **more)
 
     def _allowed(self, plan: Plan, consent: Callable[[Plan], bool]) -> None:
@@ -209,7 +189,9 @@ class Procedure:
     def _warm(self, tare: Recording) -> OnlineIdentifier:
         """An identifier that has compiled and loaded what it needs, and has seen nothing."""
         age, _ = age_of(tare, time.time(), self.basis.tare_age)  # that of the log says how old it is
-        identifier = OnlineIdentifier(self.arm, tare, self.basis.method, self.basis.profile, tare_age=age)
+        kind = None if self._known is None else Known.of(None, None, families=self._known.families)
+        about = self.basis
+        identifier = OnlineIdentifier(self.arm, tare, about.method, about.profile, known=kind, tare_age=age)
         short = tare.between(tare.t[0], tare.t[0] + _WARM_UP)
         for row in zip(short.t, short.q, short.dq, short.tau, strict=True):
             identifier.update(*row)

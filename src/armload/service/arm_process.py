@@ -26,7 +26,7 @@ from armload.errors import ArmloadError, IdentificationError
 from armload.identification.tare_age import age_of, in_words
 from armload.online import OnlineEstimate, OnlineIdentifier
 from armload.online.state import saved_at
-from armload.posterior import Profile, load_profile
+from armload.posterior import Known, Profile, load_profile
 from armload.posterior.drift import SESSION
 from armload.recording import Sample, read_recording
 from armload.runtime.atomic import clear_left_over
@@ -192,16 +192,17 @@ class ArmProcess:
     def _made_session(self) -> Session:
         settings = self.settings
         profile = None if settings.profile is None else load_profile(settings.profile)
-        identifier = self._restored(profile)
+        known = settings.known_on(self.arm)
+        identifier = self._restored(profile, known)
         tare = None if settings.tare is None else read_recording(settings.tare, self.arm)
         age, aged = age_of(tare, time.time() if "://" in settings.source else None, settings.tare_age)
         for note in aged if identifier is None else ():  # a state that goes on has its tare's age
             self.note(note)
         source = Steadied(self.source) if settings.steady else self.source
         about = (tare, settings.method, self.note, profile, identifier)
-        return Session(source, self.arm, *about, every=self.every, tare_age=age)
+        return Session(source, self.arm, *about, known=known, every=self.every, tare_age=age)
 
-    def _restored(self, profile: Profile | None) -> OnlineIdentifier | None:
+    def _restored(self, profile: Profile | None, known: Known | None = None) -> OnlineIdentifier | None:
         """What goes on from the saved state, unless that is of a time when the arm may have been another."""
         path = self._state
         if path is not None:
@@ -219,7 +220,8 @@ class ArmProcess:
                     f"{path} was saved {in_words(ago)} ago, and offsets and friction change within hours: begun anew"
                 )
                 return None
-            identifier = OnlineIdentifier.restore(path, self.arm, self.settings.method, profile, every=self.every)
+            method, every = self.settings.method, self.every
+            identifier = OnlineIdentifier.restore(path, self.arm, method, profile, known=known, every=every)
         except (IdentificationError, OSError) as error:
             self.note(f"{str(error).removesuffix(': begin without it')}: begun anew")
             return None

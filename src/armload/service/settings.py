@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from armload.devices import WITH_CONTROLLER
 from armload.errors import IdentificationError, UsageError
 from armload.identification.arm_options import ArmOptions
+from armload.identification.known_options import KnownOptions, centre, weighed
 from armload.recording.growing_file import RECORDS
 from armload.service.idle import check_arm, check_service
 from armload.service.mqtt import checked
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from armload.inertia import InertialParameters
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
-_PATHS = ("tare", "profile", "tool", "save", "record", "mounted")
+_PATHS = ("tare", "profile", "tool", "save", "record", "mounted", "body")
 _NAMES_OR_PATHS = ("robot", "method")  # a path has a suffix or a folder, a name has neither
 TOOL_OR_TARE = (  # but for a tare that is taken on the stream itself
     "whether the tool was mounted at the tare, or in the profile's logs, cannot be found out on a stream: give the "
@@ -52,7 +53,7 @@ _KINDS = {  # of a field: what TOML may give for it, and in words
 
 
 @dataclass(frozen=True, kw_only=True)
-class ArmSettings(ArmOptions):
+class ArmSettings(ArmOptions, KnownOptions):
     """One arm.
 
     name: in lines and addresses. source: see `open_source`. save: the folder of its state; None: nothing is kept.
@@ -92,6 +93,12 @@ class ArmSettings(ArmOptions):
             raise UsageError(
                 f"{self.name}: steady and profile: a profile is learned from velocities as they come; leave one out"
             )
+        for text, read in ((self.mass, weighed), (self.com, centre)):
+            if text is not None:
+                try:
+                    read(text)
+                except IdentificationError as error:
+                    raise UsageError(f"{self.name}: {error}") from None
         if self.apply not in (None, "auto"):
             raise UsageError(f'{self.name}: apply is {self.apply!r}: expected "auto"')
         check_arm(self)
@@ -112,12 +119,12 @@ class ArmSettings(ArmOptions):
             return None
         beside = ("save", "record", "rating", "com_range", "apply", "mounted")
         asked = {key: value for key, value in self.to_dict().items() if key not in beside}
-        for key, unsaid in (("steady", False), ("tare_age", None)):  # a state of a version without it goes on
-            if asked[key] is unsaid:
+        for key in ("steady", "tare_age", "mass", "com", "body", "family"):
+            if asked[key] is None or asked[key] is False:  # a state of a version that had no such setting goes on
                 del asked[key]
         asked["rate"] = _RATE if self.rate is None else self.rate  # as versions wrote it that had no other word for it
-        for key in ("tare", "profile", "tool"):
-            if asked[key] is not None and (path := Path(asked[key])).is_file():
+        for key in ("tare", "profile", "tool", "body"):
+            if asked.get(key) is not None and (path := Path(asked[key])).is_file():
                 asked[key] = [asked[key], hashlib.sha256(path.read_bytes()).hexdigest()]
         digest = hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:8]
         return Path(self.save) / f"{self.name}-{digest}.npz"

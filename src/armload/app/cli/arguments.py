@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import re
+from collections.abc import Callable
 from importlib import resources
-from typing import NoReturn
+from typing import NoReturn, TypeVar
 
 from armload.errors import IdentificationError, UsageError
 
+T = TypeVar("T")
 # options whose value may begin with a minus sign: argparse would take "-1,0,-9.7" for an option
 _SIGNED = ("--gravity", "--mass", "--from", "--at", "--box", "--floor", "--centre", "--com")
 COLUMNS = 'names and units of columns, such as "t=time,q=joint_pos_{i},t_unit=ms", or a TOML file'
@@ -149,44 +150,31 @@ def duration(text: str) -> float:
 
 
 def weighed(text: str) -> tuple[float, float]:
-    """A mass and its standard deviation [kg].
+    """See `armload.identification.known_options.weighed`."""
+    from armload.identification import known_options
 
-    >>> weighed("1.2±0.002"), weighed("0.5+-0.01")
-    ((1.2, 0.002), (0.5, 0.01))
-    """
-    parts = re.split("±|\\+/?-", text)
-    try:
-        mass, std = (float(part) for part in parts)
-    except ValueError:
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is not a weighed mass: expected kilograms and their standard deviation, such as 1.200±0.002 "
-            "(or 1.200+-0.002)"
-        ) from None
-    if mass <= 0.0:
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is a mass of {mass:g} kg: expected one above zero; leave it out where nothing was weighed"
-        )
-    return mass, std
+    return _understood(known_options.weighed, text)
 
 
 def centre(text: str) -> tuple[tuple[float, ...], float]:
-    """A centre of mass and its standard deviation along each axis [m].
+    """See `armload.identification.known_options.centre`."""
+    from armload.identification import known_options
 
-    >>> centre("0,-0.012,0.06±0.002"), centre("0,0,0.1+-0.01")
-    (((0.0, -0.012, 0.06), 0.002), ((0.0, 0.0, 0.1), 0.01))
-    """
-    parts = re.split("±|\\+/?-", text)
+    return _understood(known_options.centre, text)
+
+
+def _families(text: str) -> tuple[str, ...]:
+    from armload.identification.known_options import families
+
+    return families(text)
+
+
+def _understood(read: Callable[[str], T], text: str) -> T:
+    """What a reader of texts makes of an argument."""
     try:
-        place, spread = parts
-        com, std = tuple(float(part) for part in place.split(",")), float(spread)
-    except ValueError:
-        com, std = (), 0.0
-    if len(com) != 3:
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is not a centre of mass: expected x,y,z in metres and their standard deviation, such as "
-            "0,0,0.060±0.002 (or 0,0,0.060+-0.002)"
-        )
-    return com, std
+        return read(text)
+    except IdentificationError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def add_tare_age_argument(parser: argparse.ArgumentParser) -> None:
@@ -209,8 +197,8 @@ def check_tare_age(options: argparse.Namespace) -> None:
         raise UsageError("--tare-age says how old a tare is, but there is no --tare")
 
 
-def add_known_arguments(parser: argparse.ArgumentParser, drawn: bool = True) -> None:
-    """`--mass` and `--com`; drawn: `--body` and `--family`, too."""
+def add_known_arguments(parser: argparse.ArgumentParser) -> None:
+    """`--mass`, `--com`, `--body` and `--family`."""
     parser.add_argument(
         "--mass", type=weighed, metavar="M±S", help="of the payload, where it was weighed [kg], with its 1 sigma"
     )
@@ -220,8 +208,6 @@ def add_known_arguments(parser: argparse.ArgumentParser, drawn: bool = True) -> 
         metavar="X,Y,Z±S",
         help="its centre of mass, where that is known [m], about the payload frame, with the 1 sigma of each axis",
     )
-    if not drawn:
-        return
     parser.add_argument(
         "--body",
         type=file_name,
@@ -230,7 +216,7 @@ def add_known_arguments(parser: argparse.ArgumentParser, drawn: bool = True) -> 
     )
     parser.add_argument(
         "--family",
-        type=lambda text: tuple(name.strip() for name in text.split(",")),
+        type=_families,
         default=(),
         metavar="NAME,...",
         help="what kind it is of: boxes, shapes, tools, container or wide (trays, bars, rings), or several",

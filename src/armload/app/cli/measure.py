@@ -43,10 +43,10 @@ def run(options: argparse.Namespace) -> int | None:
 
     from armload.devices import Thresholds, open_mover
     from armload.excitation import Accuracy
-    from armload.identification import plausible_known
     from armload.measuring import Basis, Procedure, Room
     from armload.measuring.plan import APPROACH
-    from armload.posterior import Known, KnownCentre, KnownMass, load_profile
+    from armload.payloads import read_payload
+    from armload.posterior import KnownCentre, KnownMass, load_profile
 
     options.robot = options.robot or robot_of(options.source)
     bare = arm_of(options)
@@ -59,7 +59,9 @@ def run(options: argparse.Namespace) -> int | None:
     accuracy = None if options.until is None else Accuracy.read(options.until)
     mass = None if options.mass is None else KnownMass(*options.mass)
     com = None if options.com is None else KnownCentre(*options.com)
-    plausible_known(Known.of(mass, com), arm)  # before a motion is designed for it
+    body = None if options.body is None else read_payload(options.body)
+    known = {"mass": mass, "com": com, "body": body, "family": options.family, "method": options.method}
+    Basis(**known).known(arm)  # before a motion is designed for it
     mounted = tool if options.mounted in (None, "nothing") else payload_of(options.mounted, arm)
     if tool is not None and options.mounted is not None:
         raise UsageError("--tool is what is on at the empty run, and so is --mounted: give one of them")
@@ -69,7 +71,7 @@ def run(options: argparse.Namespace) -> int | None:
     simulated = {} if options.source != "sim" else _simulated(options, arm, motion, loaded=tare is not None)
     with open_mover(options.source, arm, **simulated) as mover:
         if motion is None:
-            motion = _designed(arm, mover.commanded(), profile, options)
+            motion = _designed(arm, mover.commanded(), profile, Basis(**known).heaviest, options)
         if options.apply and not mover.writes:
             raise UsageError(f"{mover.name} takes no payload: leave out --apply, and export the answer")
         procedure = Procedure(
@@ -77,7 +79,7 @@ def run(options: argparse.Namespace) -> int | None:
             arm,
             motion,
             folder,
-            basis=Basis(tare, options.tare_age, profile, mass, com, options.method),
+            basis=Basis(tare, options.tare_age, profile, **known),
             room=Room(options.floor, boxes_of(options), APPROACH if options.approach is None else options.approach),
             accuracy=accuracy,
             thresholds=Thresholds(options.off_path, options.push),
@@ -114,11 +116,13 @@ def _tool(options: argparse.Namespace, arm: Arm) -> InertialParameters:
     return plausible_tool(arm.in_frame(payload_of(options.tool, arm)), arm)
 
 
-def _designed(arm: Arm, pose: NDArray, profile: Profile | None, options: argparse.Namespace) -> Motion:
+def _designed(
+    arm: Arm, pose: NDArray, profile: Profile | None, mass: float | None, options: argparse.Namespace
+) -> Motion:
     """The motion about the present pose that tells most, for who named none: after an empty run of it, or a tare."""
     from armload.excitation import Constraints, Criterion, PayloadRange, design_motion
 
-    heaviest = None if options.mass is None else PayloadRange(options.mass[0] + 3.0 * options.mass[1])
+    heaviest = None if mass is None else PayloadRange(mass)
     around = surroundings_of(options, arm)
     limits = Constraints(arm, pose, payload=heaviest, surroundings=around, speed=options.tool_speed)
     with working("designing a motion about the present pose"):

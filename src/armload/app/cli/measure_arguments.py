@@ -26,6 +26,7 @@ examples:
   armload measure sim --motion taie2024 --move --speed max
   armload measure fr3://172.16.0.2 --motion excite.json --until mass=10g,moment=1.5g.m
   armload measure ur://192.168.0.10 --robot ur10e --motion random:1 --mass 1.200±0.002 --out payload.json
+  armload measure fr3://172.16.0.2 --body gear.json                       (a drawing, and how far it can be trusted)
   armload measure ros2:///joint_states --robot ur5e --motion excite.json --tare empty.csv
 
 What will move, how far and how fast is said first, and nothing moves until you type yes (or give --move). Ctrl-C stops
@@ -85,7 +86,7 @@ def parser() -> Parser:
         "--tare", type=file_name, metavar="LOG0", help="a log of the empty arm: no empty run, the payload is on already"
     )
     add_tare_age_argument(parser)
-    add_known_arguments(parser, drawn=False)
+    add_known_arguments(parser)
     add("--profile", type=file_name, metavar="P", help="what was learned of this arm from many logs (armload profile)")
     add(
         "--tool",
