@@ -59,6 +59,7 @@ def test_a_file_may_name_a_mesh_beside_it_and_how_well_the_drawing_is_known(tmp_
         (about, "neither mass nor density"),
         (about | {"mass": 0.6, "com": [0, 0, 0]}, "has a mesh and com"),
         (about | {"mass": 0.6, "scale": 0.0}, "scale of the mesh"),
+        ({"mass": 0.6, "com": [0, 0, 0.05], "scale": 1e-3}, "has scale, but no mesh"),
         (about | {"mass": 0.6, "mesh": "none.stl"}, "none.stl does not exist"),
         (about | {"mass": 0.6, "translation": [0, 0]}, "translation"),
         (about | {"mass": 0.6, "translation": [0, 0, 50]}, "is it in millimetres"),

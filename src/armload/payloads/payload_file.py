@@ -64,6 +64,8 @@ def payload_from(content: dict[str, Any], path: str | Path) -> Payload:
     try:
         if content.get("mesh") is not None:
             return _of_mesh(content, path)
+        if alone := [key for key in _OF_MESH if content.get(key) is not None]:
+            raise PayloadError(f"payload file {path} has {alone[0]}, but no mesh: name the mesh, or leave it out")
         given = {key for key in ("phi", *_TRIPLE) if content.get(key) is not None}
         if given == {"mass", "com"}:
             return _without_inertia(content, path)
