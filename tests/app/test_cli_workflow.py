@@ -264,6 +264,7 @@ def test_report_of_a_log_shows_motion_torques_and_every_method(call, work, tmp_p
     assert "truth" not in page.replace("No truth is known", "")
 
 
+@pytest.mark.full  # some seconds
 @pytest.mark.usefixtures("few_points")
 def test_report_with_truth_shows_errors_and_baselines(call, tmp_path):
     panda = arm("panda")

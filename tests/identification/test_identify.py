@@ -434,7 +434,11 @@ def test_a_torque_that_is_computed_and_not_measured_is_told_by_its_lack_of_frict
 
 @pytest.mark.parametrize(
     ("name", "turned"),
-    [("panda", [6]), ("ur10e", [5]), pytest.param("ur10e", [3], marks=pytest.mark.full), ("ur10e", range(6))],
+    [
+        ("ur10e", [5]),
+        ("ur10e", range(6)),
+        *(pytest.param(*other, marks=pytest.mark.full) for other in (("panda", [6]), ("ur10e", [3]))),
+    ],
 )
 def test_friction_that_drives_a_joint_is_told_by_the_joint(name, turned):
     """A torque with its sign turned; or all positions and velocities, which is the same for friction."""

@@ -47,9 +47,10 @@ def logs_of(robot, k, share, rate, coarse, changed=0.0):
     return (*(differenced(log) if coarse else log for log in (run, tare)), body.phi)
 
 
+@pytest.mark.full  # some seconds
 @pytest.mark.parametrize(
     ("name", "share", "rate", "coarse"),
-    [pytest.param("panda", 0.02, 200.0, False, marks=pytest.mark.full), ("gen3", 0.01, 100.0, True)],
+    [("panda", 0.02, 200.0, False), ("gen3", 0.01, 100.0, True)],
 )
 def test_sound_logs_of_rubbing_joints_and_noisy_velocities_are_not_called_changed(name, share, rate, coarse):
     robot, again = arm(name), 0
@@ -96,7 +97,8 @@ def test_real_velocities_that_are_differences_of_unsteady_positions_are_not_take
     assert UNCHECKED in answer.notes
 
 
-@pytest.mark.parametrize(("rate", "k"), [(100.0, 0), pytest.param(50.0, 4, marks=pytest.mark.full)])
+@pytest.mark.full  # some seconds
+@pytest.mark.parametrize(("rate", "k"), [(100.0, 0), (50.0, 4)])
 def test_vibration_that_a_slow_log_folds_is_no_change_and_hides_none(rate, k):
     """15–120 Hz, seen at 50 or 100 Hz, is white noise of all of its power."""
     robot = arm("panda")

@@ -73,7 +73,8 @@ def test_a_payload_taken_up_within_a_log_is_found_and_each_part_answered(panda, 
     assert json.loads(json.dumps(found.to_dict()))["segments"][1]["mass"] == found.mass
 
 
-@pytest.mark.parametrize("when", [3.0, pytest.param(6.0, marks=pytest.mark.full)])
+@pytest.mark.full  # some seconds
+@pytest.mark.parametrize("when", [3.0, 6.0])
 def test_what_was_on_at_the_tare_and_comes_off_within_a_log_is_found(panda, when):
     """No body has what is left then, which is no sign of one that swings."""
     body = draw_payload("boxes", 3, 0.8)
@@ -279,6 +280,7 @@ def test_a_weighed_mass_is_in_the_answer_and_one_that_the_log_contradicts_is_sai
     assert wrong["phi"] == answer(capsys, log, "--tare", tare)["phi"]  # and no mass between the two
 
 
+@pytest.mark.full  # some seconds
 def test_a_known_centre_is_in_the_answer_and_one_that_the_log_contradicts_is_said(files, capsys):
     r = draw_payload("boxes", 3, MASS).parameters.com
     log, tare = files / "loaded.csv", files / "empty.csv"

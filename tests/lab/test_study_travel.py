@@ -18,6 +18,7 @@ def travel(monkeypatch):
     return importlib.import_module("study_travel")
 
 
+@pytest.mark.full  # some seconds
 def test_only_arm_and_payloads_differ_between_the_settings(travel, tmp_path):
     bases = [travel.basis_of(tmp_path, setting, 811) for setting in travel.SETTINGS]
     assert [(b.arm.name, b.arm.n) for b in bases] == [("panda", 7), ("ur10e", 6), ("panda", 7)]

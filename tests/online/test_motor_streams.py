@@ -64,7 +64,7 @@ def _stopping(name: str, seed: int):
     return robot, Recording(log.t, log.q, log.dq, log.tau + kept), tare
 
 
-@pytest.mark.parametrize(("name", "seed"), [("ur10e", 57004), ("ur5e", 57000)])
+@pytest.mark.parametrize(("name", "seed"), [pytest.param("ur10e", 57004, marks=pytest.mark.full), ("ur5e", 57000)])
 def test_joints_that_keep_their_friction_at_a_stop_are_no_change_of_payload(name, seed):
     estimates = _told(*_stopping(name, seed))
     assert {one.event for one in estimates} == {None}

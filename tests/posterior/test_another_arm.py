@@ -111,6 +111,7 @@ def test_what_is_left_of_the_payload_is_the_difference_of_two_arms_loads(panda, 
     assert np.linalg.solve(out.information, out.vector) / wide == pytest.approx(mean / wide, rel=1e-4, abs=1e-6)
 
 
+@pytest.mark.full  # some seconds
 def test_the_tare_of_another_arm_is_said_and_the_intervals_hold_without_it(panda):
     drawn = draw_episodes(panda, "reference", 3, seed=81, motions=3)
     others = [replace(e, tare_world=World.real_like(panda, (e.world.seed or 0) + 1)) for e in drawn]

@@ -127,6 +127,7 @@ def test_a_sample_without_a_time_waits_for_nobody(t):
     assert out[100][0] == 100
 
 
+@pytest.mark.full  # some seconds
 def test_more_samples_than_were_made_room_for_are_kept():
     """At 8 kHz 75 ms are 600 samples to either side."""
     log, truth = swinging(8000.0, 0.25)

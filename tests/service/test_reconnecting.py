@@ -104,6 +104,7 @@ def test_what_cannot_be_opened_is_tried_again_and_ends_when_told(panda, tmp_path
     assert source.why is None
 
 
+@pytest.mark.full  # some seconds
 def test_a_reason_that_stays_is_said_as_often_as_the_wait_grows_and_then_now_and_then(monkeypatch):
     monkeypatch.setattr("armload.service.reconnecting.Backoff", lambda: Backoff(0.001, 0.004))
     said, trials = [], []

@@ -185,6 +185,7 @@ def test_a_full_disk_is_said_and_the_survey_goes_on_from_there(share, whole, tmp
     assert len(kept) == 3
 
 
+@pytest.mark.full  # some seconds
 def test_a_share_that_vanishes_costs_no_row_once_it_is_back(share, whole, tmp_path):
     out = tmp_path / "survey.json"
     away = share.with_name("away")
@@ -202,6 +203,7 @@ def test_a_share_that_vanishes_costs_no_row_once_it_is_back(share, whole, tmp_pa
     assert read_rows(out)[0] == back.rows
 
 
+@pytest.mark.full  # some seconds
 def test_a_name_that_is_no_utf8_has_its_row_in_every_form(share, tmp_path):
     odd = os.fsencode(share) + b"/k\xe4lte.csv"
     try:
@@ -255,6 +257,7 @@ def test_a_method_that_needs_a_tare_is_asked_with_one(logs, tmp_path):
     assert (found.logs, len(found.rows)) == (1, 1)
 
 
+@pytest.mark.full  # some seconds
 def test_each_arms_tare_among_the_logs_is_passed_over_as_one_of_all_arms_is(panda, share, tmp_path):
     arm = share.name
     log = simulate_inverse(panda, random_motion(panda, 9, duration=3.0), rate=100.0, seed=9)
