@@ -273,6 +273,37 @@ def test_what_held_of_payload_intervals_is_what_was_measured():
     assert {f"of heavier ones {share} %" in page for share in heavier} == {True}
 
 
+def test_what_holds_of_every_kind_of_log_is_what_was_measured():
+    short, long = (
+        " ".join((ROOT / "docs" / name).read_text(encoding="utf-8").split())
+        for name in ("hybrid.md", "hybrid_measured.md")
+    )
+    found = json.loads((RESULTS / "coverage_cells.json").read_text())
+
+    def shares(which, part, what="inside"):
+        all_of_it = [x[what][part] for cell in which for x in found["cells"] if x["cell"] == cell]
+        return min(all_of_it), max(all_of_it)
+
+    every = {x["cell"] for x in found["cells"]}
+    kinds = {x["cell"] for x in found["cells"] if x["by"] not in ("mass", "family")}
+    rest = every - {"odd", "trays, bars, rings"}
+    low = min(shares(kinds, 0)[0], shares(kinds, 1)[0])
+    inertia, wide = shares(rest, 2), shares(["trays, bars, rings"], 2)
+    assert f"masses and first moments do in {100 * low:.0f} to 100 % of every kind of sound logs" in short
+    assert f"inertias in {100 * inertia[0]:.0f} to {100 * inertia[1]:.0f} % of the training's families" in short
+    assert f"but in {100 * wide[0]:.0f} to {100 * wide[1]:.0f} % of trays, bars and rings" in short
+    assert f"**Masses and first moments** hold in {100 * low:.0f}–100 % in all cells" in long
+    width = shares(rest, 2, "width")
+    assert (
+        f"hold in {100 * inertia[0]:.0f}–{100 * inertia[1]:.0f} % for the training's families, in intervals of "
+        f"{width[0]:.1f} to {width[1]:.1f} times"
+    ) in long
+    width = shares(["trays, bars, rings"], 2, "width")
+    assert (
+        f"{100 * wide[0]:.0f}–{100 * wide[1]:.0f} % for trays, bars and rings ({width[0]:.1f} to {width[1]:.1f}" in long
+    )
+
+
 def test_what_holds_for_a_minute_is_what_was_measured():
     page = (ROOT / "docs" / "hybrid_measured.md").read_text(encoding="utf-8")
     found = json.loads((RESULTS / "minute_logs.json").read_text())
