@@ -22,7 +22,7 @@ from armload.app.cli.named import (
     world_of,
 )
 from armload.app.cli.printing import print_json, print_note, working, write_json
-from armload.errors import SafetyError, SinkError, UsageError
+from armload.errors import MotionError, SafetyError, SinkError, UsageError
 
 __all__ = ["parser", "run"]
 
@@ -142,9 +142,15 @@ def _designed(arm: Arm, pose: NDArray, profile: Profile | None, options: argpars
 
     heaviest = None if options.mass is None else PayloadRange(options.mass[0] + 3.0 * options.mass[1])
     around = surroundings_of(options, arm)
-    limits = Constraints(arm, pose, payload=heaviest, surroundings=around, speed=options.tool_speed)
-    with working("designing a motion about the present pose"):
-        return design_motion(limits, Criterion(arm, "same", profile), options.time, name="designed").motion
+    try:
+        limits = Constraints(arm, pose, payload=heaviest, surroundings=around, speed=options.tool_speed)
+        with working("designing a motion about the present pose"):
+            return design_motion(limits, Criterion(arm, "same", profile), options.time, name="designed").motion
+    except MotionError as error:
+        raise MotionError(
+            f"{error} (the mass is --mass here, the time --time; `armload motion design --share` makes a motion for "
+            "--motion)"
+        ) from None
 
 
 def _consent(options: argparse.Namespace) -> Callable[[Plan], bool]:
