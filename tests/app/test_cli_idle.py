@@ -19,6 +19,7 @@ READY = "0,-0.5,0,-2,0,1.6,0.8"
         ("measure fr3://192.0.2.1 --payload test.json --seed 3", "--payload and --seed are of the simulator"),
         ("measure sim --mounted nothing --undetermined-inertia", "--mounted and --undetermined-inertia are of --apply"),
         ("measure sim --columns t=clock --rate 100", "--columns and --rate are of the log of --tare"),
+        ("measure sim --tare empty.csv --grip true", "--grip is of mounting the payload, and with --tare it is on"),
         ("ros2 node --robot panda --columns t=clock", "--columns is of the log of --tare"),
         ("motion check taie2024 --robot panda --rate 100", "--rate is of a log, and none is named"),
         ("motion check taie2024 --robot panda --tare random:1 --tare-columns none", "--tare-columns is of a log"),

@@ -118,6 +118,8 @@ def _check_idle(options: argparse.Namespace) -> None:
         )
     if options.tare is None:
         refuse_idle(given(options, *COLUMN_OPTIONS), "of the log of --tare, which is not given")
+    else:
+        refuse_idle(given(options, "grip"), "of mounting the payload, and with --tare it is on already")
 
 
 def _tool(options: argparse.Namespace, arm: Arm) -> InertialParameters:
@@ -147,10 +149,9 @@ def _designed(arm: Arm, pose: NDArray, profile: Profile | None, options: argpars
         with working("designing a motion about the present pose"):
             return design_motion(limits, Criterion(arm, "same", profile), options.time, name="designed").motion
     except MotionError as error:
-        raise MotionError(
-            f"{error} (the mass is --mass here, the time --time; `armload motion design --share` makes a motion for "
-            "--motion)"
-        ) from None
+        if "larger share" not in str(error):
+            raise
+        raise MotionError(f"{error}; one with a larger share `armload motion design` makes, for --motion") from None
 
 
 def _consent(options: argparse.Namespace) -> Callable[[Plan], bool]:
