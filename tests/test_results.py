@@ -82,9 +82,13 @@ def test_the_readme_s_output_is_that_of_its_commands():
     for there, here in zip(re.findall(number, shown), re.findall(number, said), strict=True):
         assert float(there) == pytest.approx(float(here), abs=1.01 * 10.0 ** -len(there.split(".")[1]))  # a last digit
     truth = test_payload().parameters
-    inside = "All ten true values lie inside their intervals; so does the true inertia." in " ".join(README.split())
+    inside = (
+        "All true values lie inside the printed intervals, and inside those of the ten parameters (`--all`)."
+        in " ".join(README.split())
+    )
     holds = [(found.phi_low <= truth.phi) & (truth.phi <= found.phi_high)]
     holds.append((found.inertia_com_low <= truth.inertia_com) & (truth.inertia_com <= found.inertia_com_high))
+    holds.append((found.com_low <= truth.com) & (truth.com <= found.com_high))
     assert inside == all(np.all(each) for each in holds)
     com = ", ".join(f"{1e3 * x:.1f}".replace("-", "−") for x in truth.com)
     assert f"The true mass is {truth.mass:.3f} kg, the true centre of mass ({com}) mm." in README
@@ -136,7 +140,8 @@ def test_what_the_first_tenth_of_a_second_is_worth_is_committed():
     )
     held = 100 * methods["hybrid"]["coverage"][result["times"].index(0.02)][0]
     words = " ".join(README.split())
-    assert f"the better mass ({late['map-gp']:.0f} against {late['hybrid']:.0f} g in the 300 episodes above)" in words
+    better = f"{late['map-gp']:.0f} against {late['hybrid']:.0f} g in the 300 episodes above"
+    assert f"as early as 0.1 s, then `map-gp` has the better one ({better})" in words
     assert f"({early['hybrid']:.0f} against {early['map-gp']:.0f} g), but only {held:.0f} % of its intervals" in words
     page = " ".join((ROOT / "docs" / "hybrid_measured.md").read_text(encoding="utf-8").split())
     assert f"after 0.1 s is {late['hybrid'] / late['map-gp']:.2f} times that of the physics" in page
@@ -195,6 +200,10 @@ def test_the_readme_s_real_logs_are_those_of_the_committed_benchmark():
         missed = abs(found["mass_kg"] - found["truth_kg"]) > found["half_width_kg"]
         mass = f"{found['mass_kg']:.2f} ± {found['half_width_kg']:.2f} kg" + missed * " (the interval misses)"
         assert f"| {log} | {found['truth_kg']:g} kg | {mass} | {held[found['held']]} |" in README
+    found = result["ur10e_pair"]["hybrid, no tare"]
+    share = abs(found["mass_kg"] - found["truth_kg"]) / found["half_width_kg"]
+    page = " ".join((ROOT / "docs" / "hybrid.md").read_text(encoding="utf-8").split())
+    assert f"real log of a loaded UR10e without a tare lies inside, at {100 * share:.0f} % of the half-width" in page
     empty = result["panda_unloaded_phantom"]["hybrid"]
     assert f"| Panda, empty | no | 0 kg | {empty['mass_kg']:.3f} kg | {held[empty['held']]} |" in README
     for name, digits, row in (

@@ -191,11 +191,12 @@ def test_the_process_refuses_as_main_does():
     assert "no_such_log.csv" in done.stderr
 
 
-def test_a_reader_that_left_is_not_complained_about():
+@pytest.mark.parametrize("argv", [["--help"], ["methods"]], ids=["text", "a table"])
+def test_a_reader_that_left_is_not_complained_about(argv):
     read, write = os.pipe()
     os.close(read)
     try:
-        done = subprocess.run([sys.executable, "-m", "armload", "--help"], stdout=write, stderr=subprocess.PIPE)
+        done = subprocess.run([sys.executable, "-m", "armload", *argv], stdout=write, stderr=subprocess.PIPE)
     finally:
         os.close(write)
     assert (done.returncode, done.stderr) == (141, b"")

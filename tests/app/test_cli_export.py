@@ -439,6 +439,7 @@ def test_the_rest_of_a_subtraction_is_made_a_body_and_that_is_said(export, tmp_p
         (result_of(HELD), [], "--to"),
         (result_of(HELD), ["--to", "urdf", "--frame", "nowhere"], "unknown frame 'nowhere'"),
         (result_of(HELD), ["--to", "urdf", "--minus", "none.json"], "none.json"),
+        (result_of(HELD), ["--to", "urdf", "--minus", "nothing"], "--minus nothing takes nothing off"),
         (
             result_of(HELD),
             ["--to", "urdf", "--plus", "franka-hand", "--minus", "test", "--minus", "test"],
@@ -456,6 +457,15 @@ def test_refusals_are_one_sentence_and_nothing_is_printed(export, result, argume
     assert out == ""
     assert says in err
     assert err.count("\n") == 1
+
+
+def test_a_name_is_that_of_what_is_described_and_said_to_change_nothing_elsewhere(export):
+    out, err = export(result_of(HELD), "--to", "urdf", "--name", "gear")
+    assert ET.fromstring(out).find("link").get("name") == "gear"
+    assert "--name" not in err
+    out, err = export(result_of(HELD), "--to", "franka", "--name", "gear")
+    assert "gear" not in out
+    assert "--name is of a link, body or model, and franka names none: it changes nothing" in err
 
 
 def test_the_hand_itself_can_be_exported(capsys):

@@ -227,6 +227,7 @@ def test_a_log_with_the_wrong_gravity_is_refused(refused, log_text, tmp_path):
         (["--headless", "--token-file", "token"], "--token-file is of the page"),
         (["--every", "0.5"], "--every is of --headless"),
         (["--loop"], "--loop replays a log again and again, but sim is none"),
+        (["--topic", "/joint_states"], "--topic is of a bag, and sim is none"),
         (["fr3://172.16.0.2", "--speed", "2"], "--speed is of a log or the simulator, but the source is fr3://"),
     ],
 )

@@ -115,6 +115,7 @@ def test_a_table_of_a_motion_is_the_motion_and_comes_back_from_its_file(tmp_path
     ("text", "said"),
     [
         ("t,q1,dq1\n0,0,0\n1,1,0\n", "has the columns t, q1, dq1: expected"),
+        ("t,q1,q2,q3,q4,dq1,dq2,dq3,tau1,tau2,tau3\n0,0\n", "t, q1, q2, q3, …, tau1, tau2, tau3: expected"),
         ("t,q1,dq1,ddq1\n0,0,0,0\n0,1,0,0\n", "do not rise from 0"),
         ("t,q1,dq1,ddq1\n0,x,0,0\n1,1,0,0\n", "is not a table of numbers"),
         ("t,q1,dq1,ddq1\n0,nan,0,0\n1,1,0,0\n", "not finite"),

@@ -136,11 +136,14 @@ def test_columns_are_taken_by_name(tmp_path):
         lambda s: "# " + s,
         lambda s: "# made on Monday\n# " + s,
         lambda s: "\ufeff# made on Monday\n" + s.replace(",", ";").replace(".", ","),
+        lambda s: "\ufeffsep=;\r\n" + s.replace(",", ";").replace(".", ",").replace("\n", "\r\n"),
+        lambda s: "sep=,\n# made on Monday\n" + s,
     ],
     ids=[
         *("crlf", "cr", "bom", "blank end", "blank lines", "spaces", "quotes", "plus", "no last newline", "capital e"),
         *("blank start", "semicolons", "tabs", "parted by spaces", "aligned", "decimal commas; semicolons"),
         *("decimal commas, tabs", "decimal commas, spaces", "comments", "commented header", "both", "excel"),
+        *("separator told to excel", "and a comment"),
     ],
 )
 def test_harmless_variants_of_csv_read_the_same(tmp_path, change):

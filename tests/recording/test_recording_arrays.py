@@ -61,7 +61,7 @@ def test_one_of_several_episodes_is_asked_for_and_read(tmp_path):
 
 def test_effort_under_another_key_is_named(tmp_path):
     path = lerobot(tmp_path / "log.parquet", [log()], effort="observation.sensors.load")
-    with pytest.raises(RecordingError, match=r"lacks columns of torque, or name them with --columns tau="):
+    with pytest.raises(RecordingError, match=r"lacks columns of torque .found .*: if .* say so with --columns tau="):
         read_recording(path, PANDA)
     same(read_recording(path, PANDA, columns="tau=observation.sensors.load"), log())
 

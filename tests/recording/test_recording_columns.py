@@ -134,7 +134,7 @@ def test_motor_currents_are_multiplied_with_the_constants(tmp_path, log):
         ),
         (SPEC.replace("clock", "time"), r"has no column 'time', which --columns names for t"),
         ("t=clock,q=enc_{0..5},dq=rate_{i},tau=load_{i}", r"names 6 column\(s\) of position for 7 joints"),
-        (SPEC + ",episode=2", r"has no column 'episode_index': expected none of --episode"),
+        (SPEC + ",episode=2", r"has no column 'episode_index', and so no episodes: leave --episode out"),
         (SPEC + ",rate=100", r"has times \(column 'clock'\): expected no --rate"),
     ],
 )

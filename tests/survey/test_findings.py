@@ -153,7 +153,10 @@ def test_logs_without_dates_are_counted_from_one_and_nothing_has_half_a_log_or_p
             ["survey", "x.csv", "--robot", "panda", "--out", "s.csv", "--profile", "p", "--learn-profiles", "q"],
             "leave --profile out",
         ),
+        (["survey", "none"], "needs --out, its table: --out survey.parquet; or: armload survey report TABLE --out"),
+        (["survey", "none", "--robot", "panda", "--out", "s.csv"], "none: no such file or folder"),
         (["survey", "report", "--out", "r.html"], "takes one table"),
+        (["survey", "report", "s.parquet"], "takes one table and --out: armload survey report survey.parquet --out"),
         (["survey", "report", "none.parquet", "--out", "r.html"], "none.parquet is not there"),
         (
             ["survey", "report", "s.parquet", "--out", "r.html", "--json", "--arm-of", "(.)"],
@@ -170,4 +173,5 @@ def test_what_cannot_be_is_refused_in_a_sentence(tmp_path, monkeypatch, capsys, 
     out = capsys.readouterr()
     assert out.out == ""
     assert said in out.err.strip().splitlines()[-1]
+    assert out.err.count("\n") == 1 or "x.csv" in argv  # of logs that are there it is said how many
     assert not (tmp_path / "s.csv").exists()

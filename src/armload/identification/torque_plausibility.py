@@ -151,8 +151,9 @@ def _check_no_torque_is_dead(recording: Recording) -> None:
     moves = span(recording.q) > FROZEN_MOTION
     if np.any(dead & moves) and not np.all(dead):
         j = int(np.flatnonzero(dead & moves)[0])
+        value = recording.tau[:1][0, j] + 0.0  # no -0
         raise RecordingError(
-            f"{recording.source}: tau{j + 1} is {recording.tau[:1][0, j]:.4g} in all rows although q{j + 1} moves: "
+            f"{recording.source}: tau{j + 1} is {value:.4g} in all rows although q{j + 1} moves: "
             "expected the measured joint torque in N·m; the channel is dead, or another one was meant"
         )
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from armload.errors import MotionError
 from armload.motion.motion import Motion
+from armload.recording.templates import abridged
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,8 +99,8 @@ class PathMotion(Motion):
         n = (len(header) - 1) // 3
         if not _is_header(header) or table.ndim != 2:
             raise MotionError(
-                f"motion file {path} has the columns {', '.join(header)[:80]}: expected t, q1 …, dq1 …, ddq1 … as "
-                "`armload motion export --format csv` writes them"
+                f"motion file {path} has the columns {abridged(header)}: expected t, q1 …, dq1 …, ddq1 … as "
+                "`armload motion export --format csv` writes them; of a log, see `armload motion check`"
             )
         return cls(table[:, 0], table[:, 1 : n + 1], table[:, n + 1 : 2 * n + 1], table[:, 2 * n + 1 :], str(path))
 

@@ -225,8 +225,8 @@ class Header:
                     f"or, if it is there under a name of its own, say so with --columns {quantity}=NAME{{i}}"
                 )
         return RecordingError(
-            f"{self.where} lacks columns of {called}, or name them with --columns {quantity}=NAME{{i}} "
-            f"(found {abridged(self.names)})"
+            f"{self.where} lacks columns of {called} (found {abridged(self.names)}): if they have other names, say so "
+            f"with --columns {quantity}=NAME{{i}}"
         )
 
     def shown(self, family: Family) -> str:

@@ -1,8 +1,9 @@
 """How a text file of numbers is laid out: its header line and its separator.
 
 Read from the header and the first row below it. Comment lines in front (`#`, `%`) are passed over, unless the last of
-them is the header itself, as NumPy's `savetxt` and `rostopic echo -p` write it. Columns without a header are called by
-their numbers, the first being 1; those of `ros2 topic echo --csv /joint_states` are known by what is in them.
+them is the header itself, as NumPy's `savetxt` and `rostopic echo -p` write it; so is a first line `sep=;`, which tells
+Excel the separator. Columns without a header are called by their numbers, the first being 1; those of
+`ros2 topic echo --csv /joint_states` are known by what is in them.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from armload.recording.column_spec import ColumnSpec
 
 NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,5})?")
 _SEPARATORS = ("\t", ";", ",", " ")  # a space parts only what nothing else does
+_FOR_EXCEL = re.compile(r'"?sep=."?', re.IGNORECASE)  # the first line of files that are to be opened there
 _EXPECTED = "expected the header, such as t,q1..qn,dq1..dqn,tau1..taun before the data"
 _JOINTS = 7  # of an example
 _STAMP = ("header.stamp.sec", "header.stamp.nanosec", "header.frame_id")
@@ -53,10 +55,10 @@ def layout_of(lines: Sequence[str], where: str) -> Layout:
     Raises:
         RecordingError: there is nothing but comments, or a header that cannot be read.
     """
-    first = 0
+    first = begin = 1 if lines and _FOR_EXCEL.fullmatch(lines[0].strip(" \r\n")) else 0
     while first < len(lines) and (not lines[first].strip() or lines[first].lstrip().startswith(("#", "%"))):
         first += 1
-    comments = [k for k in range(first) if lines[k].strip()]
+    comments = [k for k in range(begin, first) if lines[k].strip()]
     if first == len(lines) and not comments:
         raise RecordingError(f"{where} has no header: expected a line that names the columns, then rows of numbers")
     if first < len(lines) and not _numeric(lines[first]):

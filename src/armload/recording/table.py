@@ -166,7 +166,7 @@ class _Reading:
         elif spec.episode is None:
             keep = np.ones(len(raw), dtype=bool)
         else:
-            raise RecordingError(f"{where} has no column {EPISODE!r}: expected none of --episode; leave it out")
+            raise RecordingError(f"{where} has no column {EPISODE!r}, and so no episodes: leave --episode out")
         rows = np.flatnonzero(keep)
         if time is None:
             assert spec.rate is not None

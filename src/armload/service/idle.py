@@ -27,9 +27,9 @@ def check_arm(arm: ArmSettings) -> None:
             'says what the controller must count, too, but nothing is told to it: give apply = "auto"',
         )
     if arm.loop and (robot or sim):
-        _refuse(arm.name, "loop", f"replays a log again and again, but the source is {arm.source}, which is none")
+        _refuse(arm.name, "loop", f"replays a log again and again, but the source is {arm.source}: name a log")
     if arm.rate is not None and not sim:
-        _refuse(arm.name, "rate", f"is of the simulator, but the source is {arm.source}, which has its own")
+        _refuse(arm.name, "rate", f"is of the simulator, but the source is {arm.source}: name sim")
 
 
 def check_service(service: ServiceSettings) -> None:

@@ -81,11 +81,11 @@ def survey(
     settings.mounted()
     _check_method(settings)
     count = "1 log" if len(logs) == 1 else f"{len(logs)} logs"
-    say(f"{count}: asking which have changed")
     before = load_cells(folder)
     # what was answered once may be away for a while: its row says so
     if not any(log.there or _name(log) in before for log in logs):
         raise UsageError(f"{', '.join(paths)}: no such file or folder: expected logs, folders, globs or URLs")
+    say(f"{count}: asking which have changed")
     with ThreadPoolExecutor(jobs) as pool:
         tasks = list(pool.map(lambda log: _task(log, settings, before.get(_name(log))), logs))
     fresh = {t.name for t in tasks if before.get(t.name, {}).get("key") != t.keys[t.name]}

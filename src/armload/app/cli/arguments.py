@@ -14,6 +14,8 @@ T = TypeVar("T")
 _SIGNED = ("--gravity", "--mass", "--from", "--at", "--box", "--floor", "--centre", "--com")
 COLUMNS = 'names and units of columns, such as "t=time,q=joint_pos_{i},t_unit=ms", or a TOML file'
 AS_NAMED = "none"  # as SPEC: nothing is said of the columns
+# of a log that is a table: what `add_column_arguments` adds, those of the tare last
+COLUMN_OPTIONS = ("columns", "effort_key", "log_rate", "episode", "tare_episode", "tare_columns")
 
 
 class Parser(argparse.ArgumentParser):
@@ -270,17 +272,37 @@ def add_tool_and_topic_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--topic", metavar="T", help="JointState topic of a bag, where it has several")
 
 
-def add_column_arguments(parser: argparse.ArgumentParser) -> None:
+def given(options: argparse.Namespace, *names: str, parser: argparse.ArgumentParser | None = None) -> list[str]:
+    """Those of some options that say something, as they are written; `parser` knows what they are where left out."""
+    defaults = {name: None if parser is None else parser.get_default(name) for name in names}
+    said = [name for name, default in defaults.items() if getattr(options, name, default) != default]
+    return [f"--{'rate' if name == 'log_rate' else name.replace('_', '-')}" for name in said]
+
+
+def refuse_idle(said: list[str], why: str) -> None:
+    """Refuse options that would change nothing: whoever gave one believes that it does something.
+
+    Raises:
+        UsageError: there is one.
+    """
+    if said:
+        one = len(said) == 1
+        raise UsageError(f"{' and '.join(said)} {'is' if one else 'are'} {why}: leave {'it' if one else 'them'} out")
+
+
+def add_column_arguments(parser: argparse.ArgumentParser, tare: bool = True) -> None:
     """`--columns`, `--effort-key`, `--rate`, `--episode`, and for the tare: what the header of a log leaves open."""
     add = parser.add_argument_group("logs that are tables (CSV, Parquet, NPZ, HDF5, MATLAB, LeRobot)").add_argument
     add("--columns", type=file_name, metavar="SPEC", help=COLUMNS)
     add("--effort-key", type=file_name, metavar="K", help="list-valued column of the joint torques (--columns tau=K)")
     add("--rate", dest="log_rate", type=at_least(1e-3, float), metavar="HZ", help="of a log without times")
     add("--episode", type=at_least(0), metavar="K", help="which one of a file or data set that holds several")
+    if not tare:
+        return
     add("--tare-episode", type=at_least(0), metavar="K", help="that of the tare (default: as --episode)")
     add(
         "--tare-columns",
         type=file_name,
         metavar="SPEC",
-        help=f"of a tare from another tool, in place of the four above; {AS_NAMED}: its header says all",
+        help=f"of a tare from another tool, in place of --columns to --episode; {AS_NAMED}: its header says all",
     )

@@ -5,6 +5,7 @@
 | 0         | done                                                      | the answer | notes                         |
 | 1         | a bug in armload                                          |            | one line, with a hint         |
 | 2         | the input or the usage is wrong                           | empty      | one sentence that names where |
+| 3         | `motion check`: the arm may not run it, a limit is passed | the answer | notes                         |
 | 130       | interrupted                                               |            | one line                      |
 | 141       | nobody reads the output any more (`armload … | head -1`)  |            | nothing                       |
 

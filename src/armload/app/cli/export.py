@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from armload.app.cli.arguments import Parser, file_name, output_file
 from armload.app.cli.named import payload_of
 from armload.app.cli.printing import print_note
+from armload.errors import UsageError
 
 if TYPE_CHECKING:
     from armload.arms import Arm
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 _SINCE = {"tare": "at the tare", "before": "at the tare", "profile": "in the profile's logs"}
 # the names of armload.devices.FORMS, so that --help need not import them; a test compares
 FORMS = ("franka", "franka-desk", "ur", "ur-payload", "kuka", "kinova", "xarm", "urdf", "mjcf", "sdf", "ros2")
+_WITH_NAME = ("urdf", "mjcf", "sdf")  # those that name what they describe
+_NAME = "payload"
 _EXAMPLES = """\
 examples:
   armload identify run.csv --robot panda --json > held.json
@@ -77,7 +80,7 @@ def parser() -> Parser:
     )
     add("--frame", metavar="F", help="link to write it about (default: a controller's flange, else that of RESULT)")
     add("--robot", metavar="NAME|FILE.urdf", help="the arm, where frames differ (default: that of RESULT)")
-    add("--name", default="payload", metavar="N", help="name of the link, body or model (default: payload)")
+    add("--name", default=_NAME, metavar="N", help=f"name of the link, body or model (default: {_NAME})")
     return parser
 
 
@@ -93,6 +96,8 @@ def run(options: argparse.Namespace) -> None:
     facts = ARMS.get(load.robot or "")
     if arm is None and facts is not None and _moves(options, load.frame, facts.flange):
         arm = _arm(facts.name)
+    if NOTHING in options.minus:
+        raise UsageError(f"--minus {NOTHING} takes nothing off: leave it out")
     doubts = _doubts(options.minus, load)
     added = bool(options.plus) and load.relative_to in _SINCE
     if added and set(options.plus) != {NOTHING}:
@@ -104,6 +109,8 @@ def run(options: argparse.Namespace) -> None:
         load = load + _part(part, load, arm)
     for part in options.minus:
         load = load - _part(part, load, arm)
+    if options.name != _NAME and options.to not in _WITH_NAME:
+        doubts.append(f"--name is of a link, body or model, and {options.to} names none: it changes nothing")
     write(load, options.to, options.out, arm, options.frame, options.name, doubts, added=added)
 
 
@@ -113,7 +120,7 @@ def write(
     out: str | None = None,
     arm: Arm | None = None,
     frame: str | None = None,
-    name: str = "payload",
+    name: str = _NAME,
     doubts: Sequence[str] = (),
     earlier: Sequence[str] = (),
     added: bool = False,

@@ -214,6 +214,8 @@ def without_effect(options: argparse.Namespace) -> list[str]:
             out.append(f"--{name.replace('_', '-')} is {what}: it changes nothing")
     if options.loop and (robot or sim):
         out.append(f"--loop replays a log again and again, but {options.source} is none: it changes nothing")
+    if options.topic is not None and options.tare is None and (robot or sim):
+        out.append(f"--topic is of a bag, and {options.source} is none: it changes nothing")
     if robot and options.speed is not _UNSAID:
         out.append(f"--speed is of a log or the simulator, but the source is {options.source}: it changes nothing")
     return out

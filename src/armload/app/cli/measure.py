@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from armload.app.cli.arguments import check_tare_age
+from armload.app.cli.arguments import COLUMN_OPTIONS, check_tare_age, given, refuse_idle
 from armload.app.cli.measure_arguments import parser
 from armload.app.cli.named import (
     arm_of,
@@ -22,7 +22,7 @@ from armload.app.cli.named import (
     world_of,
 )
 from armload.app.cli.printing import print_json, print_note, working, write_json
-from armload.errors import SafetyError, SinkError, UsageError
+from armload.errors import MotionError, SafetyError, SinkError, UsageError
 
 __all__ = ["parser", "run"]
 
@@ -48,6 +48,7 @@ def run(options: argparse.Namespace) -> int | None:
     from armload.payloads import read_payload
     from armload.posterior import KnownCentre, KnownMass, load_profile
 
+    _check_idle(options)
     options.robot = options.robot or robot_of(options.source)
     bare = arm_of(options)
     tool = None if options.tool is None else _tool(options, bare)
@@ -63,8 +64,6 @@ def run(options: argparse.Namespace) -> int | None:
     known = {"mass": mass, "com": com, "body": body, "family": options.family, "method": options.method}
     Basis(**known).known(arm)  # before a motion is designed for it
     mounted = tool if options.mounted in (None, "nothing") else payload_of(options.mounted, arm)
-    if tool is not None and options.mounted is not None:
-        raise UsageError("--tool is what is on at the empty run, and so is --mounted: give one of them")
     check_tare_age(options)
     _, tare = read_logs(options, arm, None, options.tare)
     folder = options.dir or f"measurement-{datetime.now():%Y%m%d-%H%M%S}"
@@ -100,6 +99,31 @@ def run(options: argparse.Namespace) -> int | None:
     return None
 
 
+def _check_idle(options: argparse.Namespace) -> None:
+    """Refuse options that would change nothing, or say a thing twice, before an arm moves faster than is expected.
+
+    Raises:
+        UsageError: there is one.
+    """
+    defaults = parser()
+    if options.motion is not None:
+        designed = given(options, "time", "tool_speed", parser=defaults)
+        refuse_idle(designed, f"of a motion that is designed, and --motion names {options.motion}")
+    if options.source != "sim":
+        simulated = given(options, "payload", "world", "at", "speed", "seed", parser=defaults)
+        refuse_idle(simulated, f"of the simulator, and the source is {options.source}")
+    if options.tool is not None and options.mounted is not None:
+        raise UsageError("--tool is what is on at the empty run, and so is --mounted: give one of them")
+    if not options.apply:
+        refuse_idle(
+            given(options, "mounted", "undetermined_inertia", parser=defaults), "of --apply, which is not given"
+        )
+    if options.tare is None:
+        refuse_idle(given(options, *COLUMN_OPTIONS), "of the log of --tare, which is not given")
+    else:
+        refuse_idle(given(options, "grip"), "of mounting the payload, and with --tare it is on already")
+
+
 def _tool(options: argparse.Namespace, arm: Arm) -> InertialParameters:
     """The tool that is on in both runs.
 
@@ -124,9 +148,14 @@ def _designed(
 
     heaviest = None if mass is None else PayloadRange(mass)
     around = surroundings_of(options, arm)
-    limits = Constraints(arm, pose, payload=heaviest, surroundings=around, speed=options.tool_speed)
-    with working("designing a motion about the present pose"):
-        return design_motion(limits, Criterion(arm, "same", profile), options.time, name="designed").motion
+    try:
+        limits = Constraints(arm, pose, payload=heaviest, surroundings=around, speed=options.tool_speed)
+        with working("designing a motion about the present pose"):
+            return design_motion(limits, Criterion(arm, "same", profile), options.time, name="designed").motion
+    except MotionError as error:
+        if "larger share" not in str(error):
+            raise
+        raise MotionError(f"{error}; one with a larger share `armload motion design` makes, for --motion") from None
 
 
 def _consent(options: argparse.Namespace) -> Callable[[Plan], bool]:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import argparse
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from armload.app.cli.arguments import add_arm_arguments, add_column_arguments
-from armload.app.cli.named import arm_of, motion_of, payload_of, read_logs
+from armload.app.cli.named import arm_of, check_columns, motion_of, names_motion, payload_of, read_logs
 from armload.app.cli.printing import console, print_json, table, working
 from armload.errors import UsageError
 from armload.service.finite import finite
@@ -48,6 +47,7 @@ def run_check(options: argparse.Namespace) -> int:
     from armload.posterior import advise, bound
     from armload.recording import Recording
 
+    check_columns(options, options.motion, options.tare)
     arm = arm_of(options)
     run = run_of(options, options.motion, arm)
     tare = run if options.tare is None else run_of(options, options.tare, arm, is_tare=True)
@@ -104,11 +104,8 @@ def _limits(payload_name: str, arm: Arm, motion: Motion) -> tuple[MotionCheck, s
 def run_of(options: argparse.Namespace, name: str, arm: Arm, is_tare: bool = False) -> Recording | Motion:
     """A log by the suffix of its file (or the folder of one), else a motion; a motion's own table is one, too."""
     from armload.identification import check_plausible
-    from armload.motion import PathMotion
-    from armload.recording import is_log
 
-    path = Path(name)
-    if not path.is_dir() and (not is_log(path) or PathMotion.is_table(path)):
+    if names_motion(name):
         return motion_of(name, arm)
     log = read_logs(options, arm, None, name)[1] if is_tare else read_logs(options, arm, name)[0]
     assert log is not None

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from armload.app.cli.arguments import OutputFile
-from armload.app.cli.named import arm_of, surroundings_of
+from armload.app.cli.named import arm_of, check_columns, surroundings_of
 from armload.app.cli.outputs import check_motion_file, check_outputs
 from armload.app.cli.printing import console, print_json, print_note, table, working
 from armload.errors import UsageError
@@ -54,6 +54,7 @@ def criterion_of(options: argparse.Namespace, arm: Arm, own_tare: bool = False) 
     from armload.excitation import Criterion
     from armload.posterior import load_profile
 
+    check_columns(options, None if options.tare == "none" else options.tare)
     profile = None if options.profile is None else load_profile(options.profile)
     if profile is not None:
         profile.check(arm)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armload.app.cli.arguments import AS_NAMED
+from armload.app.cli.arguments import AS_NAMED, COLUMN_OPTIONS, given, refuse_idle
 from armload.app.cli.printing import print_note
 from armload.errors import RecordingError, UsageError
 
@@ -171,6 +172,25 @@ def robot_of(source: str) -> str:
     if len(known) != 1:
         raise UsageError(f"{source}: name the robot with --robot, such as --robot {_SIMULATED}")
     return known[0]
+
+
+def check_columns(options: argparse.Namespace, *names: str | None) -> None:
+    """Refuse what `--columns` and its companions say where none of the runs that are named is a log.
+
+    Raises:
+        UsageError: all of them are motions.
+    """
+    if all(name is None or names_motion(name) for name in names):
+        refuse_idle(given(options, *COLUMN_OPTIONS), "of a log, and none is named")
+
+
+def names_motion(name: str) -> bool:
+    """Whether a run is a motion: no folder and no log by its suffix, or a table that a motion was exported to."""
+    from armload.motion import PathMotion
+    from armload.recording import is_log
+
+    path = Path(name)
+    return not path.is_dir() and (not is_log(path) or PathMotion.is_table(path))
 
 
 def motion_of(name: str, arm: Arm, of_arm: bool = True) -> Motion:

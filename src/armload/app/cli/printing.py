@@ -78,7 +78,12 @@ def console() -> Console:
     """Where answers go; wide enough for any table if it is not a terminal."""
     from rich.console import Console
 
-    return Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 180)
+    class Answers(Console):
+        def on_broken_pipe(self) -> None:
+            """Leave it to the command's end: rich would end it with the exit code of a bug."""
+            raise BrokenPipeError
+
+    return Answers(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 180)
 
 
 def print_table(result: Table) -> None:

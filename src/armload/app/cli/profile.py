@@ -6,7 +6,17 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from armload.app.cli.arguments import Parser, add_arm_arguments, add_column_arguments, file_name, output_file, weighed
+from armload.app.cli.arguments import (
+    COLUMN_OPTIONS,
+    Parser,
+    add_arm_arguments,
+    add_column_arguments,
+    file_name,
+    given,
+    output_file,
+    refuse_idle,
+    weighed,
+)
 from armload.app.cli.named import arm_of, payload_of, read_logs
 from armload.app.cli.printing import console, print_json, print_note, table, working
 from armload.errors import UsageError
@@ -57,7 +67,7 @@ def parser() -> Parser:
         "--mass", type=weighed, metavar="M±S", help="the log is of a known weight [kg], with its 1 sigma; with --update"
     )
     parser.add_argument("--topic", metavar="T", help="JointState topic of a bag, where it has several")
-    add_column_arguments(parser)
+    add_column_arguments(parser, tare=False)
     parser.add_argument("--figure", type=output_file, metavar="F.png", help="with show: draw where the arm is known")
     parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     return parser
@@ -68,6 +78,7 @@ def run(options: argparse.Namespace) -> None:
     if options.logs[0] == "show":
         _show(options)
         return
+    refuse_idle(given(options, "figure"), "of armload profile show")
     if options.mass is not None and (not options.update or len(options.logs) != 1):
         raise UsageError("--mass is of the one log of a known weight that --update adds to the profile --out")
     if options.robot is None or options.out is None:
@@ -136,6 +147,10 @@ def _show(options: argparse.Namespace) -> None:
 
     if len(options.logs) != 2:
         raise UsageError("armload profile show takes one profile: armload profile show arm.profile")
+    of_logs = ("out", "update", "one_session", "tool", "mass", "topic", *COLUMN_OPTIONS)
+    refuse_idle(given(options, *of_logs, parser=parser()), "of learning, not of armload profile show")
+    if options.robot is None:
+        refuse_idle(given(options, "frame", "gravity"), "of --robot, which is not given")
     profile = load_profile(options.logs[1])
     arm = None
     if options.robot is not None:
@@ -249,5 +264,8 @@ def _next(profile: Profile) -> tuple[str, ...]:
     moved = profile.poses.max(axis=0) - profile.poses.min(axis=0)
     still = [str(j + 1) for j in range(profile.n) if moved[j] < 0.5]
     if still:
-        advice.append(f"joint {', '.join(still)} moved by less than half a radian in all logs: move it further")
+        joints = f"joint{'s' if len(still) > 1 else ''} {', '.join(still)}"
+        advice.append(
+            f"{joints} moved by less than half a radian in all logs: move {'them' if len(still) > 1 else 'it'} further"
+        )
     return tuple(advice)

@@ -8,7 +8,17 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armload.app.cli.arguments import Parser, add_arm_arguments, add_column_arguments, at_least, file_name, output_file
+from armload.app.cli.arguments import (
+    COLUMN_OPTIONS,
+    Parser,
+    add_arm_arguments,
+    add_column_arguments,
+    at_least,
+    file_name,
+    given,
+    output_file,
+    refuse_idle,
+)
 from armload.app.cli.named import arm_of, arm_of_dataset, payload_of, read_logs
 from armload.app.cli.outputs import check_page
 from armload.app.cli.printing import print_note, print_table, working
@@ -66,6 +76,11 @@ def run(options: argparse.Namespace) -> None:
         raise UsageError("expected either a LOG or --dataset DIR; see 'armload report --help'")
     if options.log is not None and options.robot is None:
         raise UsageError("the following arguments are required: --robot; see 'armload report --help'")
+    if options.log is not None:
+        refuse_idle(given(options, "runs", "seed", parser=parser()), "of --dataset, which is not given")
+    else:
+        of_log = ("frame", "gravity", "tare", "truth", "topic", *COLUMN_OPTIONS)
+        refuse_idle(given(options, *of_log), "of a LOG, and a data set says it itself")
     with working("reading") as say:
         sections, title = (_of_log if options.dataset is None else _of_dataset)(options, say)
         say("drawing and writing")

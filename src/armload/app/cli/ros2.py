@@ -14,6 +14,8 @@ from armload.app.cli.arguments import (
     at_least,
     check_tare_age,
     file_name,
+    given,
+    refuse_idle,
 )
 from armload.app.cli.named import arm_of, motion_of, payload_of, read_logs, world_of
 from armload.app.cli.printing import print_note
@@ -124,6 +126,8 @@ def _node(options: argparse.Namespace) -> None:
     from armload.posterior import load_profile
 
     check_tare_age(options)
+    if options.tare is None:
+        refuse_idle(given(options, "columns"), "of the log of --tare, which is not given")
     arm = arm_of(options)
     address = address_of(options.topic if "://" in options.topic else f"ros2://{options.topic}")
     effort = address.effort(arm)

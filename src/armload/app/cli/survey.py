@@ -73,11 +73,13 @@ def parser() -> Parser:
 
 def run(options: argparse.Namespace) -> None:
     """Answer what is new, write the table, learn profiles; or write the report."""
-    if options.out is None:
-        raise UsageError("a survey needs --out, its table: --out survey.parquet; or: armload survey report TABLE")
     if options.paths[0] == "report":
         _report(options)
         return
+    if options.out is None:
+        raise UsageError(
+            "a survey needs --out, its table: --out survey.parquet; or: armload survey report TABLE --out report.html"
+        )
     if options.robot is None:
         raise UsageError("a survey needs --robot, the arms' kind; see 'armload survey --help'")
     if options.learn_profiles is not None and options.profile is not None:
@@ -128,9 +130,9 @@ def _learned(options: argparse.Namespace, settings: Any, found: Survey) -> dict[
 def _report(options: argparse.Namespace) -> None:
     from armload.survey.report import write_survey_report
 
-    if len(options.paths) != 2:
+    if len(options.paths) != 2 or options.out is None:
         raise UsageError(
-            "armload survey report takes one table: armload survey report survey.parquet --out report.html"
+            "armload survey report takes one table and --out: armload survey report survey.parquet --out report.html"
         )
     if stray := [name for name, value in vars(options).items() if name not in ("paths", "out") and value]:
         given = ", ".join(f"--{name.replace('_', '-')}" for name in stray)
