@@ -152,6 +152,12 @@ def test_harmless_variants_of_csv_read_the_same(tmp_path, change):
     assert same(read_recording(tmp_path / "log.csv"), recording)
 
 
+def test_an_arm_that_is_only_named_is_refused_in_a_sentence(tmp_path):
+    write_recording(tmp_path / "log.csv", log(n=2, rows=8))
+    with pytest.raises(RecordingError, match=r"is given as 'panda': expected an Arm, such as armload.arm\('panda'\)"):
+        read_recording(tmp_path / "log.csv", "panda")
+
+
 def cell(line, column, value):
     """A change of one cell of a CSV text; the header is line 1."""
 

@@ -86,6 +86,8 @@ def read_recording(
         RecordingError: the file cannot be read, its columns are not clear, or a line of it is not valid; one sentence
             that names the place (for CSV the line of the file, the first being 1).
     """
+    if isinstance(arm, str):
+        raise RecordingError(f"the arm of {path} is given as {arm!r}: expected an Arm, such as armload.arm({arm!r})")
     spec = ColumnSpec.of(columns).over(rate=rate, episode=episode)
     with log_in(path) as file:
         return OfArm(arm, spec, str(path)).of(read_as_told(file, str(path), arm, topic, spec))
