@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from armload.arms import Arm
-from armload.estimators import Identifier
 from armload.identification.notes import arm_changed, leaning
 from armload.identification.reporting import doubt_of
 from armload.posterior import PosteriorLeastSquares
@@ -40,14 +39,8 @@ class Doubts:
         self.arm_changed: str | None = None
         self.sentences: tuple[str, ...] = ()
 
-    def look(self, run: Identifier, relative_to: str) -> None:
-        """Take what a run's last solution was asked, if that is new.
-
-        Args:
-            run: any. relative_to: what its answers are, as of `OnlineEstimate`.
-        """
-        if not isinstance(run, PosteriorLeastSquares):
-            return
+    def look(self, run: PosteriorLeastSquares, relative_to: str) -> None:
+        """Take what a run's last solution was asked, if that is new; `relative_to`: as of `OnlineEstimate`."""
         stream = run.stream
         now = id(stream), stream.solutions, stream.seconds >= PERIOD, relative_to
         if now == self._looked:

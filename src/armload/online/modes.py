@@ -147,12 +147,12 @@ class Modes:
             taken: whether the run took it, too. error: of an arm that stands, the variance (n,) of what all rows there
                 are wrong by, beside what the run does not know [N²·m²].
         """
-        row = (h, seen, X, wrench, scale, mean, covariance, taken, np.zeros(len(scale)) if error is None else error)
-        noise = (self._loud, self._level, self._about_level, self._rest)
-        known = (self.root, self.effort, self._pushes, self._hands, self._others, self._rates)
-        state = (self._weights, self._b, self._f, self._x, self._P, self._A, self._c, self._since)
-        found = take_row(*row, *noise, *known, *state)
-        self.steady, self.drift, self.contact, self.handing, self.other, self.stays = found
+        self.steady, self.drift, self.contact, self.handing, self.other, self.stays = take_row(
+            h, seen, X, wrench, scale, mean, covariance, taken, np.zeros(len(scale)) if error is None else error,
+            self._loud, self._level, self._about_level, self._rest,
+            self.root, self.effort, self._pushes, self._hands, self._others, self._rates,
+            self._weights, self._b, self._f, self._x, self._P, self._A, self._c, self._since,
+        )  # fmt: skip
         self.taken_off = 0.0
 
     def shift(self, going_on: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -42,8 +42,7 @@ class Tracker:
             run.louder = louder
         if self.lasting is not None:
             self.lasting.take(run.stream, louder)
-            if self.lasting.over(float(run.last.covariance[0, 0])):
-                self.lasting = None
+            self.lasting = None if self.lasting.over(float(run.last.covariance[0, 0])) else self.lasting
 
     def of_now(self, last: Gaussian) -> Gaussian:
         """What the run says, and by how much a hand-over that may go on in it is ahead."""

@@ -187,12 +187,10 @@ class PayloadWatch:
         began = max(self._weighing.steady_t, sample.t - PATIENCE)
         until = began - max(sample.t - began, TAKEN_BACK)
         shift = self._weighing.modes.shift()[0]
-        rest = self._tracker.rest(shift) or self._naming.corrects_the_recognition(
-            sample.t, float(shift[0]) / self.runs.unit
-        )
-        self._naming.begin(sample.t, began, run, rest)
-        reference = self.runs.reference_for_next()
-        following = self._background.submit(next_run, run, reference, until, self._weighing.sticks)
+        step, corrects = float(shift[0]) / self.runs.unit, self._naming.corrects_the_recognition
+        self._naming.begin(sample.t, began, run, self._tracker.rest(shift) or corrects(sample.t, step))
+        next_about = run, self.runs.reference_for_next(), until, self._weighing.sticks
+        following = self._background.submit(next_run, *next_about)
         self._change, self._doubted_at = Change(sample.t, began, state, following), None
 
     def _settle(self, change: Change, sample: Sample) -> None:
