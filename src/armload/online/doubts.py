@@ -33,8 +33,7 @@ class Doubts:
         self.asked_whose = False
         self._drift: Drift | None = None
         self._tilt: Tilt | None = None
-        self._torque = "link"  # the side that the torque was of when gravity was asked
-        self._than = ""  # what the arm is not as, as of `OnlineEstimate.relative_to`
+        self._torque, self._than = "link", ""  # when gravity was asked; what the arm is not as, as of `relative_to`
         self._looked: tuple[int, int, bool, str] | None = None
         self.arm_changed: str | None = None
         self.sentences: tuple[str, ...] = ()

@@ -1,8 +1,7 @@
 """How friction behaves where joints hardly move: smooth in velocity, as the rows have it, or stuck at anything.
 
-The rows have Coulomb friction as f·tanh(dq/w). A joint that sticks, or has just turned round, is held by anything up to
-f: the rows are then wrong by a share s of it, of variance s²·f²·(1 − |tanh|)²/3, and about the same for a block of
-rows. Each s of a few is weighed by the innovations of the blocks of a steady arm,
+A joint that sticks, or has just turned round, is held by anything up to a share s of its Coulomb friction f, about the
+same for a block of rows. Each s of a few is weighed by the innovations of the blocks of a steady arm,
 
     ē_j ~ N(0, level·v_j + s²·f_j²·mean (1 − |tanh|)²/3)      joints j, independent,
 
@@ -68,10 +67,7 @@ class Sticking:
 
 @kernel
 def stuck(weights, presliding, coulomb):  # pragma: no cover - compiled
-    """f²·(1 − |tanh|)²/3 (n,) [N²·m²] of a row: what a slow joint's friction may be wrong by, as of a block of rows.
-
-    The model has f·tanh(dq/w), what sticks has up to ±f at rest: the error is somewhere within ±f·(1 − |tanh|).
-    """
+    """f²·(1 − |tanh|)²/3 (n,) [N²·m²] of a row: f·tanh(dq/w) is off by anything within ±f·(1 − |tanh|)."""
     out = np.empty_like(coulomb)
     for j in range(len(out)):
         slow = (1.0 / weights[j] - 1.0) / presliding[j]  # 1 − tanh²

@@ -75,11 +75,6 @@ class Weighing:
         self._sure_since = self._impossible_since = self._lifted_since = self._first_t = np.inf
 
     @property
-    def likely(self) -> tuple[float, float, float]:
-        """Probabilities that the payload is not what the run holds, or changes; of a contact; of a drift of the arm."""
-        return self.modes.handing + self.modes.other, self.modes.contact, self.modes.drift
-
-    @property
     def steady(self) -> float:
         """Probability that the last rows are of the arm as it was and the same payload.
 
@@ -170,14 +165,12 @@ class Weighing:
     def passed_over(self, sample: Sample, run: PosteriorLeastSquares, state: SequentialPosterior | None) -> bool:
         """Weigh a sample that the run does not take, by its `state`; whether a row came of it that says something."""
         assert state is not None
-        row = run.stream.look(*sample)
-        if row is None:
+        if (row := run.stream.look(*sample)) is None:
             return False
         h, self.row_t = row.t - self.row_t, row.t
-        if not 0.0 < h <= GAP:
-            return False
-        self._weigh(row, h, state, run)
-        return True
+        if says := 0.0 < h <= GAP:
+            self._weigh(row, h, state, run)
+        return says
 
     def _weigh(self, row: Row, h: float, state: SequentialPosterior, run: PosteriorLeastSquares) -> None:
         """Weigh a row that the run did not take, or of an arm at rest, for as long as it stands."""
