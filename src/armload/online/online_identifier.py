@@ -1,9 +1,4 @@
-"""The identifier that runs next to a robot for days: nothing it is fed makes it stop, every sample is answered.
-
-identifier = OnlineIdentifier(arm("panda"))
-for sample in source:
-    estimate = identifier.update(*sample)
-"""
+"""The identifier that runs next to a robot for days: nothing it is fed makes it stop, every sample is answered."""
 
 from __future__ import annotations
 
@@ -31,6 +26,9 @@ from armload.online.watch import PayloadWatch
 from armload.posterior import Known, PosteriorLeastSquares, Profile
 from armload.posterior.map import PUBLISH
 from armload.recording import Recording, Sample
+
+# what an `OnlineEstimate` has of the judgement under the same name
+_JUDGED = ("determined", "held", "rests_on_prior", "torque_gain_std", "around", "before", "p_held")
 
 
 class OnlineIdentifier:
@@ -144,8 +142,7 @@ class OnlineIdentifier:
         sample = self._stream.take(t, q, dq, tau)
         if sample is None:
             return self._present()
-        if self._since is None:
-            self._since = self._stream.clock
+        self._since = self._stream.clock if self._since is None else self._since
         if self._watch is None:
             self._pass_on(sample)
         else:
@@ -294,25 +291,18 @@ class OnlineIdentifier:
         change, contact, drift = (None, None, None) if watch is None else watch.likely
         sure = watch is None or watch.sure
         notes = judged.words(None if sure else watch, self._blind, moving)
-        known_by_log = self._tared or self.profile is not None
         return OnlineEstimate.of(
             {
                 **vars(judged.estimate),
+                **{name: getattr(judged, name) for name in _JUDGED},
                 "t": stream.clock,
                 "age": float(stream.unseen + stream.ahead + judged.age(stream.now)),
                 "lag": 0.0,
                 "since": stream.clock if self._since is None else self._since,
                 "relative_to": self.relative_to,
                 "method": self.method,
-                "determined": judged.determined,
-                "held": judged.held,
-                "rests_on_prior": judged.rests_on_prior,
-                "torque_gain_std": judged.torque_gain_std,
-                "same_arm_assumed": known_by_log and not judged.doubts.asked_whose,
-                "around": judged.around,
-                "before": judged.before,
+                "same_arm_assumed": (self._tared or self.profile is not None) and not judged.doubts.asked_whose,
                 "calibrated": self.engine.calibrated and sure and not (judged.doubted or self._blind),
-                "p_held": judged.p_held,
                 "p_change": change,
                 "p_contact": contact,
                 "p_drift": drift,
