@@ -39,9 +39,9 @@ class Change:
 
     Attributes:
         t: when it was noticed [s]. began: when it began [s]. state: the posterior of the run before, which samples are
-            looked at with. following: the run after it. taken_from: since when that run takes samples [s], if it does.
-        stayed: for how long the payload seems to have been the same by then [s]. lasting: what those say of a change
-            that goes on.
+            looked at with. following: the run after it. taken_from: since when that run takes samples [s], if it does;
+            stayed: for how long the payload seems to have been the same by then [s].
+        lasting: what those samples say of a change that goes on.
     """
 
     t: float

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from armload.arms import Arm
-from armload.estimators import Identifier
 from armload.identification.notes import arm_changed, leaning
 from armload.identification.reporting import doubt_of
 from armload.posterior import PosteriorLeastSquares
@@ -34,20 +33,13 @@ class Doubts:
         self.asked_whose = False
         self._drift: Drift | None = None
         self._tilt: Tilt | None = None
-        self._torque = "link"  # the side that the torque was of when gravity was asked
-        self._than = ""  # what the arm is not as, as of `OnlineEstimate.relative_to`
+        self._torque, self._than = "link", ""  # when gravity was asked; what the arm is not as, as of `relative_to`
         self._looked: tuple[int, int, bool, str] | None = None
         self.arm_changed: str | None = None
         self.sentences: tuple[str, ...] = ()
 
-    def look(self, run: Identifier, relative_to: str) -> None:
-        """Take what a run's last solution was asked, if that is new.
-
-        Args:
-            run: any. relative_to: what its answers are, as of `OnlineEstimate`.
-        """
-        if not isinstance(run, PosteriorLeastSquares):
-            return
+    def look(self, run: PosteriorLeastSquares, relative_to: str) -> None:
+        """Take what a run's last solution was asked, if that is new; `relative_to`: as of `OnlineEstimate`."""
         stream = run.stream
         now = id(stream), stream.solutions, stream.seconds >= PERIOD, relative_to
         if now == self._looked:

@@ -115,7 +115,10 @@ class OnlineEstimate(Estimate):
     @property
     def interval(self) -> str:
         """ "calibrated" or "approximate"; of what no body can be it is never calibrated."""
-        return "calibrated" if self.calibrated and is_consistent(self.phi) else "approximate"
+        return self._interval(is_consistent(self.phi))
+
+    def _interval(self, consistent: bool) -> str:
+        return "calibrated" if self.calibrated and consistent else "approximate"
 
     def to_dict(self) -> dict[str, Any]:
         """One JSON object, its names those of `armload identify --json` where they mean the same.
@@ -125,18 +128,18 @@ class OnlineEstimate(Estimate):
         """
         mass = float(self.phi[0])
         com, inertia_com = (None, None) if mass == 0.0 else (x.tolist() for x in phi_to_com(self.phi)[1:])
-        (low, high), own = self._ends, vars(self)
+        (low, high), own, consistent = self._ends, vars(self), is_consistent(self.phi)
         return {
             **{name: own[name] for name in _FIRST},
             "phi": self.phi.tolist(),
             "phi_low": _finite(low),
             "phi_high": _finite(high),
-            "interval": self.interval,
+            "interval": self._interval(consistent),
             "determined": self.determined.tolist(),
             "mass": mass,
             "com": com,
             "inertia_com": inertia_com,
-            "consistent": is_consistent(self.phi),
+            "consistent": consistent,
             "held": self.held,
             "rests_on_prior": self.rests_on_prior.tolist(),
             **{name: own[name] for name in _LAST},

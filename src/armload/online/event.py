@@ -42,8 +42,8 @@ class Naming:
     """The last change noticed, and whether the run after it is still judged.
 
     Attributes:
-        event: the last change; None: there was none. judging: whether the run is new, and may give way to the earlier
-            one. held_before: whether anything was held before the change, or the doubt.
+        event: the last change. judging: whether the run is new, and may give way to the earlier one.
+        held_before: whether anything was held before the change, or the doubt.
     """
 
     def __init__(self) -> None:
@@ -67,8 +67,8 @@ class Naming:
             t, began: as of `Event`. run: that ends. rest: it is that of the last change, which went on in this run, or
                 after which the run was recognised wrongly.
         """
-        self._rest, self.judging, self._unnamed = rest and self.event is not None, False, True
-        self._recognised = False
+        self.judging = self._recognised = False
+        self._rest, self._unnamed = rest and self.event is not None, True
         if self.event is not None and self._rest:
             self.event = replace(self.event, mass=None)
         else:

@@ -25,6 +25,13 @@ REASONS = (
     "late",  # out of order by less than a clock's jump
     "jump",  # joint angles that cannot have been reached since: swapped joints, a glitch of an encoder
 )
+_IN_GENERAL = {
+    "implausible": "beyond anything this arm can do",
+    "repeated": "the time of the samples does not change",
+    "late": "the times of the samples do not rise",
+    "jump": "joint angles cannot have been reached since the sample before; check the order of the joints",
+}
+_PARTS = ("position", "velocity", "torque")
 _NOTHING, _NOT_FINITE, _IMPLAUSIBLE, _REPEATED, _LATE, _JUMPED = range(6)  # into them; sizes are looked at before
 # A stream cannot be mended and sent again: only what no arm can do is left out, wider than `identification.thresholds`
 _SLACK_POSITION = 0.5  # [rad] beyond a joint's limits
@@ -116,14 +123,12 @@ class Gate:
         if _NOTHING < found < _JUMPED:
             return self._leave_out(REASONS[found])
         step = now - self._t
-        set_back = step < 0.0  # far enough not to be late
-        if set_back:
+        if step < 0.0:  # far enough not to be late: the clock was set back
             self.health.clock_jumps += 1
             self.shift += _PAUSE - step
-            step = _PAUSE
+            self._t, step = now, _PAUSE
         if found == _JUMPED:
             if not self._believed(now, q):
-                self._t = now if set_back else self._t
                 return self._leave_out("jump")
             self.shift += max(_PAUSE - step, 0.0)
         elif step > GAP:
@@ -152,35 +157,26 @@ class Gate:
             now, parts = float(t), [np.array(x, float) for x in (q, dq, tau)]
         except Exception:
             return f"expected a time and three times {self.n} numbers"
-        names = ("position", "velocity", "torque")
-        for name, x in zip(names, parts, strict=True):
+        for what, x in zip(_PARTS, parts, strict=True):
             if x.shape != (self.n,):
-                return f"expected {self.n} joints, found {name} of shape {x.shape}"
+                return f"expected {self.n} joints, found {what} of shape {x.shape}"
+        low, high, velocity, effort, _ = self._limits
         if reason == "not finite":
-            for name, x in zip(names[::-1], parts[::-1], strict=True):
+            for what, x in [*zip(_PARTS, parts, strict=True)][::-1]:
                 for k in np.flatnonzero(~np.isfinite(x)):
-                    return f"{name} of joint {k + 1} is {'not a number' if np.isnan(x[k]) else 'infinite'}"
+                    return f"{what} of joint {k + 1} is {'not a number' if np.isnan(x[k]) else 'infinite'}"
             if not math.isfinite(now):
                 return "the time is not a number"
-        if reason == "implausible":
-            return self._beyond_limits(now, *parts)
-        return {
-            "repeated": "the time of the samples does not change",
-            "late": "the times of the samples do not rise",
-            "jump": "joint angles cannot have been reached since the sample before; check the order of the joints",
-        }.get(reason, reason)
-
-    def _beyond_limits(self, t: float, q: NDArray, dq: NDArray, tau: NDArray) -> str:
-        low, high, velocity, effort, _ = self._limits
-        if abs(t) > ANY_TIME:
-            return f"the time is {t:.3g} s"
-        for k in np.flatnonzero((q < low) | (q > high)):
-            degrees = "; is it in degrees?" if np.abs(q).max() > DEGREES_FROM else ""
-            return f"position of joint {k + 1} is {q[k]:.4g} rad, beyond its limits{degrees}"
-        for name, unit, x, most in (("velocity", "rad/s", dq, velocity), ("torque", "N·m", tau, effort)):
-            for k in np.flatnonzero(np.abs(x) > most):
-                return f"{name} of joint {k + 1} is {x[k]:.4g} {unit}, beyond anything it can do"
-        return "beyond anything this arm can do"
+        elif reason == "implausible":
+            if abs(now) > ANY_TIME:
+                return f"the time is {now:.3g} s"
+            for k in np.flatnonzero((parts[0] < low) | (parts[0] > high)):
+                degrees = "; is it in degrees?" if np.abs(parts[0]).max() > DEGREES_FROM else ""
+                return f"position of joint {k + 1} is {parts[0][k]:.4g} rad, beyond its limits{degrees}"
+            for what, unit, x, most in zip(_PARTS[1:], ("rad/s", "N·m"), parts[1:], (velocity, effort), strict=True):
+                for k in np.flatnonzero(np.abs(x) > most):
+                    return f"{what} of joint {k + 1} is {x[k]:.4g} {unit}, beyond anything it can do"
+        return _IN_GENERAL.get(reason, reason)
 
 
 @kernel

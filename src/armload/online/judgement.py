@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +32,6 @@ _MAYBE = (  # of p_change, p_contact and p_drift, the largest while they are lar
     "something may be touching the arm",
     "the torques drift slowly, as an arm does that warms up: the intervals do not allow for it",
 )
-_FIELDS = ("determined", "held", "rests_on_prior", "torque_gain_std", "around", "before", "p_held")
 
 
 class Judgement:
@@ -43,14 +41,10 @@ class Judgement:
         arm: whose payload it is. prior: as of `Identifier.payload_prior`.
 
     Attributes:
-        before: what is known beforehand.
-        estimate: the answer. around: (10,) where its intervals are. run: that it is of; None: of no run alone.
-        determined: which parameters (10,) the data determine. held: whether anything is. p_held: how probable that is.
-        rests_on_prior: which of them (10,) owe their intervals more to what is known of payloads.
-        torque_gain_std: of the torque's scale, of a method that allows for one.
+        before, around, determined, held, p_held, rests_on_prior, torque_gain_std, notes: as of `OnlineEstimate`.
+        estimate: the answer. run: that it is of; None: of no run alone.
         newest: time of the newest sample that counts in it [s]; −∞ before one does.
-        doubts: what was asked of the runs besides the payload.
-        doubted: whether something speaks against its error bars. notes: what else there is to say.
+        doubts: what was asked of the runs besides the payload. doubted: whether that speaks against its error bars.
     """
 
     def __init__(self, arm: Arm, prior: tuple[NDArray[np.float64], NDArray[np.float64]] | None) -> None:
@@ -61,13 +55,11 @@ class Judgement:
 
     def reset(self) -> None:
         """What is known beforehand."""
-        self.before = self._first
-        mean, std = self.before
+        mean, std = self.before = self._first
         self.estimate = Estimate(0.0, mean, np.diag(std**2), 0, str(self._arm.frame))
-        self.around, self.doubted = mean, False
+        self.around, self.doubted, self.newest = mean, False, -np.inf
         self.run: Identifier | None = None
         self.doubts.reset()
-        self.newest = -np.inf
         self.determined, self.held, self.p_held = np.zeros(10, dtype=bool), False, 0.0
         self.rests_on_prior, self.torque_gain_std = np.ones(10, dtype=bool), None
         self.notes: tuple[str, ...] = ()
@@ -78,11 +70,9 @@ class Judgement:
         if run is not None:
             self.doubted = bool(self.doubts.sentences)
 
-    def counts(self, t: float, run: Identifier) -> tuple[bool, bool]:
-        """Whether a sample at t [s] that a run took makes `newest` newer, or says nothing new, as the arm stands."""
-        if not isinstance(run, PosteriorLeastSquares):
-            self.newest = t
-        elif run.fresh:
+    def counts(self, run: PosteriorLeastSquares) -> tuple[bool, bool]:
+        """Whether a sample that a run took makes `newest` newer, or says nothing new, as the arm stands."""
+        if run.fresh:
             if run.stream.stands and run is self.run and self.newest > -np.inf:
                 return False, run.data_t - self.newest > STANDS
             self.newest = run.data_t
@@ -121,7 +111,7 @@ class Judgement:
         if is_removal(estimate, bool(self.determined[0])):
             notes.append(removal(relative_to))
         notes += self.doubts.sentences
-        denies_family = isinstance(posterior, HybridIdentifier) and posterior.denies_family
+        denies_family = isinstance(run, HybridIdentifier) and run.denies_family
         if self.held and posterior is not None and (taken is None or denies_family):
             denied = denied_by(posterior.known, posterior.log_only, denies_family)
             notes += [] if denied is None else [denied]
@@ -131,15 +121,11 @@ class Judgement:
         """Say that samples are left out."""
         self.notes += (_CHANGING if watch.settling else _LIFTED if watch.lifted else _LEFT_OUT,)
 
-    def fields(self) -> dict[str, Any]:
-        """What an `OnlineEstimate` says of the payload, by its names."""
-        return {**vars(self.estimate), **{name: getattr(self, name) for name in _FIELDS}}
-
-    def words(self, watch: PayloadWatch | None, blind: bool, moving: bool) -> tuple[str, ...]:
-        """The notes, and what the last rows may be."""
+    def words(self, unsure: PayloadWatch | None, blind: bool, moving: bool) -> tuple[str, ...]:
+        """The notes, and what the last rows may be, if the watch is not sure of them."""
         notes = self.notes
-        if watch is not None and not watch.sure and not {_CHANGING, _LEFT_OUT, _LIFTED} & set(notes):
-            notes += (_MAYBE[int(np.argmax(watch.likely))],)
+        if unsure is not None and not {_CHANGING, _LEFT_OUT, _LIFTED} & set(notes):
+            notes += (_MAYBE[int(np.argmax(unsure.likely))],)
         if blind and _STANDING_MOTOR not in self.notes:
             notes += (_SLOW_MOTOR if moving else _STANDING_MOTOR,)
         return notes

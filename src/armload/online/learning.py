@@ -23,8 +23,7 @@ def learned_from(profile: Profile, runs: Iterable[PosteriorLeastSquares], name: 
     best = max((run for run in runs if _is_empty(run)), key=lambda run: run.stream.seconds, default=None)
     if best is None:
         return None
-    data = best.stream.accumulated()
-    correction = Correction(best.arm, rated_effort(best.arm))
+    data, correction = best.stream.accumulated(), Correction(best.arm, rated_effort(best.arm))
     data.session = profile.session(correction)
     if compared(profile, correction, data)[2]:  # the stream asks now and then only
         return None

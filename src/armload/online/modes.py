@@ -11,12 +11,9 @@ R·Rᵀ = E[phi·phiᵀ] of a body (`body_root`) the hypotheses are
     handing over    d = W·R·x + noise,     x (10,) an Ornstein–Uhlenbeck process: a body that varies
     another         d = W·R·x + noise,     x ~ N(0, s²·1) since one of several moments: a body that stays
 
-of several sizes and times each. Each is a Gaussian filter, so that the likelihood of a row is in closed form; of
-another body it is that of all rows since its moment, ½·cᵀ·(A + s⁻²)⁻¹·c − ½·ln|1 + s²·A| over steady's, with
-A = Σ Rᵀ·Wᵀ·W·R/v, c = Σ Rᵀ·Wᵀ·d/v. Probabilities follow from how often each begins and how long it lasts, as in a
-hidden Markov model; a hand-over seldom ends in what was held before unless x may be nothing. Rows that are withheld
-from a run share the errors of its predictions, and count for less. Where an arm stands all rows share one error,
-d_j = b_j + noise with b_j ~ N(0, what the pose may be wrong by): it is known after a few rows, and hides no change.
+of several sizes and times each, A = Σ Rᵀ·Wᵀ·W·R/v and c = Σ Rᵀ·Wᵀ·d/v of another body since its moment. Likelihoods,
+how one follows another and what an arm that stands foresees wrongly: docs/theory.md, "A live stream". Rows that are
+withheld from a run share the errors of its predictions, and count for less.
 
 Sources: interacting multiple models, Blom & Bar-Shalom, IEEE T-AC 1988; change points, Adams & MacKay 2007.
 """
@@ -147,12 +144,12 @@ class Modes:
             taken: whether the run took it, too. error: of an arm that stands, the variance (n,) of what all rows there
                 are wrong by, beside what the run does not know [N²·m²].
         """
-        row = (h, seen, X, wrench, scale, mean, covariance, taken, np.zeros(len(scale)) if error is None else error)
-        noise = (self._loud, self._level, self._about_level, self._rest)
-        known = (self.root, self.effort, self._pushes, self._hands, self._others, self._rates)
-        state = (self._weights, self._b, self._f, self._x, self._P, self._A, self._c, self._since)
-        found = take_row(*row, *noise, *known, *state)
-        self.steady, self.drift, self.contact, self.handing, self.other, self.stays = found
+        self.steady, self.drift, self.contact, self.handing, self.other, self.stays = take_row(
+            h, seen, X, wrench, scale, mean, covariance, taken, np.zeros(len(scale)) if error is None else error,
+            self._loud, self._level, self._about_level, self._rest,
+            self.root, self.effort, self._pushes, self._hands, self._others, self._rates,
+            self._weights, self._b, self._f, self._x, self._P, self._A, self._c, self._since,
+        )  # fmt: skip
         self.taken_off = 0.0
 
     def shift(self, going_on: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

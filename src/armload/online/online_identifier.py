@@ -1,9 +1,4 @@
-"""The identifier that runs next to a robot for days: nothing it is fed makes it stop, every sample is answered.
-
-identifier = OnlineIdentifier(arm("panda"))
-for sample in source:
-    estimate = identifier.update(*sample)
-"""
+"""The identifier that runs next to a robot for days: nothing it is fed makes it stop, every sample is answered."""
 
 from __future__ import annotations
 
@@ -31,6 +26,9 @@ from armload.online.watch import PayloadWatch
 from armload.posterior import Known, PosteriorLeastSquares, Profile
 from armload.posterior.map import PUBLISH
 from armload.recording import Recording, Sample
+
+# what an `OnlineEstimate` has of the judgement under the same name
+_JUDGED = ("determined", "held", "rests_on_prior", "torque_gain_std", "around", "before", "p_held")
 
 
 class OnlineIdentifier:
@@ -144,10 +142,12 @@ class OnlineIdentifier:
         sample = self._stream.take(t, q, dq, tau)
         if sample is None:
             return self._present()
-        if self._since is None:
-            self._since = self._stream.clock
-        self._identify(sample)
-        self._blind = self._watch is not None and self._watch.blind
+        self._since = self._stream.clock if self._since is None else self._since
+        if self._watch is None:
+            self._pass_on(sample)
+        else:
+            self._identify(sample, self._watch)
+            self._blind = self._watch.blind
         return self._present()
 
     def conclude(self) -> OnlineEstimate:
@@ -161,7 +161,8 @@ class OnlineIdentifier:
             self._blind = False
             estimate = (self._watch or self._engine).conclude()
             if all_finite(estimate.phi):
-                self._judgement.doubts.look(self.engine, self.relative_to)
+                if self._watch is not None:
+                    self._judgement.doubts.look(self._watch.run, self.relative_to)
                 self._judge(estimate, self.engine)
                 self._judgement.conclude(estimate, self.engine, self.relative_to, self._stream.now)
         return self._present()
@@ -223,37 +224,45 @@ class OnlineIdentifier:
             know(run, known)
         return new
 
-    def _identify(self, sample: Sample) -> None:
-        watch, judgement, run = self._watch, self._judgement, self._engine
-        if watch is None:
-            estimate, fresh = run.update(sample), not 0.0 <= sample.t - self._published < self._every
-        else:
-            event, now = watch.event, watch.run
-            now.publish = self._every if now.stream.seconds > KIND_LATEST else PUBLISH
-            estimate = watch.update(sample, judgement.held)
-            if watch.event is not None and watch.event is not event:
-                self._noticed(watch.event, watch.settling, self._stream.clock - sample.t)
-            if estimate is None:
-                if sample.t - self._published > PUBLISH:
-                    self._track(watch, sample)
-                return
-            run, fresh = watch.answered, watch.answered.fresh
-            if not fresh and run is not judgement.run and math.isfinite(watch.answered.data_t):
-                return  # a run just taken up again: until it answers anew, its answer is of long ago
-        if (fresh or watch is None) and not all_finite(estimate.phi):
+    def _pass_on(self, sample: Sample) -> None:
+        """To a method that is not watched."""
+        estimate = self._engine.update(sample)
+        if not all_finite(estimate.phi):
             return
-        counts, stands = judgement.counts(sample.t, run)
-        if counts and self._stream.unseen:
+        self._judgement.newest = sample.t
+        self._stream.forget_pauses()
+        if not 0.0 <= sample.t - self._published < self._every:
+            self._published = sample.t
+            self._judge(estimate, self._engine)
+        self._judgement.take(estimate, self._engine)
+
+    def _identify(self, sample: Sample, watch: PayloadWatch) -> None:
+        judgement, event, run = self._judgement, watch.event, watch.run
+        run.publish = self._every if run.stream.seconds > KIND_LATEST else PUBLISH
+        estimate = watch.update(sample, judgement.held)
+        if watch.event is not event and watch.event is not None:
+            self._noticed(watch.event, watch.settling, self._stream.clock - sample.t)
+        if estimate is None:
+            if sample.t - self._published > PUBLISH:
+                self._track(watch, sample)
+            return
+        run, mixed = watch.answered, watch.mixed
+        fresh = run.fresh
+        if not fresh and run is not judgement.run and math.isfinite(run.data_t):
+            return  # a run just taken up again: until it answers anew, its answer is of long ago
+        if fresh and not all_finite(estimate.phi):
+            return
+        counts, stands = judgement.counts(run)
+        if counts:
             self._stream.forget_pauses()
-        mixed = watch is not None and watch.mixed
-        if fresh or not mixed:
-            judgement.doubts.look(run, self.relative_to)
+        if mixed and not fresh:
+            return
+        judgement.doubts.look(run, self.relative_to)
         if fresh:
             self._published = sample.t
-            estimate = watch.track(sample.t) if watch is not None and mixed else estimate
+            estimate = watch.track(sample.t) if mixed else estimate
             self._judge(estimate, run, stands)
-        if fresh or not mixed:
-            judgement.take(estimate, run)
+        judgement.take(estimate, run)
 
     def _track(self, watch: PayloadWatch, sample: Sample) -> None:
         """While samples are left out: what all that may have happened makes of the payload."""
@@ -274,35 +283,33 @@ class OnlineIdentifier:
         self.event = replace(event, t=event.t + self._event_shift, began=event.began + self._event_shift)
 
     def _judge(self, estimate: Estimate, run: Identifier, stands: bool = False) -> None:
-        stands = stands and self.trouble is None
-        self._judgement.judge(estimate, run, self.relative_to, self._stream.moving, stands)
+        about = self.relative_to, self._stream.moving, stands and self.trouble is None
+        self._judgement.judge(estimate, run, *about)
 
     def _present(self) -> OnlineEstimate:
-        stream, judged, watch = self._stream, self._judgement, self._watch
+        stream, judged, watch, moving = self._stream, self._judgement, self._watch, self._stream.moving
         change, contact, drift = (None, None, None) if watch is None else watch.likely
-        trouble = () if stream.trouble is None else (stream.trouble,)
-        known_by_log = self._tared or self.profile is not None
+        sure = watch is None or watch.sure
+        notes = judged.words(None if sure else watch, self._blind, moving)
         return OnlineEstimate.of(
             {
-                **judged.fields(),
+                **vars(judged.estimate),
+                **{name: getattr(judged, name) for name in _JUDGED},
                 "t": stream.clock,
                 "age": float(stream.unseen + stream.ahead + judged.age(stream.now)),
                 "lag": 0.0,
                 "since": stream.clock if self._since is None else self._since,
                 "relative_to": self.relative_to,
                 "method": self.method,
-                "same_arm_assumed": known_by_log and not judged.doubts.asked_whose,
-                "calibrated": self.engine.calibrated
-                and not judged.doubted
-                and not self._blind
-                and (watch is None or watch.sure),
+                "same_arm_assumed": (self._tared or self.profile is not None) and not judged.doubts.asked_whose,
+                "calibrated": self.engine.calibrated and sure and not (judged.doubted or self._blind),
                 "p_change": change,
                 "p_contact": contact,
                 "p_drift": drift,
-                "moving": stream.moving,
+                "moving": moving,
                 "settling": watch is not None and watch.settling,
                 "event": self.event,
-                "health": self.health,
-                "notes": judged.words(watch, self._blind, stream.moving) + trouble,
+                "health": stream.gate.health,
+                "notes": notes if stream.trouble is None else (*notes, stream.trouble),
             }
         )

@@ -76,8 +76,7 @@ class Runs:
 
     def is_earlier(self) -> bool:
         """Whether the mass and first moments of the current run are those of the earlier one."""
-        step = None if self.earlier is None else _step(self.earlier, self.current)
-        if step is None:
+        if self.earlier is None or (step := _step(self.earlier, self.current)) is None:
             return False
         phi, covariance = step[0][:4], step[1][:4, :4]
         return bool(phi @ np.linalg.solve(covariance, phi) < SAME_RUN)

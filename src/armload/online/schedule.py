@@ -31,20 +31,15 @@ class Deferred:
 
     def due(self, t: float) -> bool:
         """Whether the last row's task is due at a sample at t [s]."""
-        if self._samples is not None:
-            self._samples += 1
-            if self._samples >= _LATER or t - self._row >= SPACING:
-                self.clear()
-                return True
-        return False
+        if self._samples is None:
+            return False
+        self._samples += 1
+        return self._samples >= _LATER or t - self._row >= SPACING
 
     def row(self, t: float) -> bool:
         """A sample at t [s] completed a row: whether its task is due at once."""
         self._row, self._samples = t, 0
-        if t - self._last > FAST:
-            self.clear()
-            return True
-        return False
+        return t - self._last > FAST
 
     def seen(self, t: float) -> None:
         """A sample at t [s] is done with."""

@@ -5,23 +5,21 @@ It refers to the arm and to the trained model, has neither in it, and is refused
 
 from __future__ import annotations
 
-import hashlib
 import json
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import fields, is_dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.errors import IdentificationError
 from armload.estimators import Identifier
 from armload.runtime.atomic import replacing
+from armload.runtime.content import digest_of_numbers
 from armload.runtime.packing import Packer, Unpacker
 
 FORMAT = 26
@@ -38,13 +36,8 @@ def save_state(path: str | PathLike[str], state: dict[str, Any], arm: Arm, metho
         tree = packer.node(state)
     except TypeError as error:
         raise IdentificationError(f"a live identifier of this kind cannot be saved: {error}") from None
-    text = {
-        "format": FORMAT,
-        "saved": time.time(),
-        "origin": _origin(arm, method, engine),
-        "tree": tree,
-        "objects": packer.objects,
-    }
+    about = {"format": FORMAT, "saved": time.time(), "origin": _origin(arm, method, engine)}
+    text = {**about, "tree": tree, "objects": packer.objects}
     arrays = {f"a{k}": array for k, array in enumerate(packer.arrays)}
     with replacing(Path(path)) as part, part.open("wb") as file:
         np.savez(file, allow_pickle=False, tree=np.frombuffer(json.dumps(text).encode(), dtype=np.uint8), **arrays)
@@ -97,27 +90,9 @@ def _known(arm: Arm, engine: Identifier) -> dict[str, Any]:
 
 def _origin(arm: Arm, method: str, engine: Identifier) -> dict[str, Any]:
     known = _known(arm, engine)
-    digests = {"model": _digest(known["model"]) if "model" in known else None}
-    digests["profile"] = known["profile"].digest if "profile" in known else None
-    return {"arm": arm.fingerprint, "name": arm.name, "method": method, **digests}
-
-
-def _digest(model: Any) -> str:
-    """SHA-256 of a trained model: of all arrays and numbers in its fields, whatever its file and its provenance say."""
-    digest = hashlib.sha256()
-    for array in _numbers(model):
-        digest.update(f"{array.dtype.str} {array.shape} ".encode() + array.tobytes())
-    return digest.hexdigest()
-
-
-def _numbers(value: Any) -> Iterator[NDArray]:
-    if is_dataclass(value):  # its fields alone: what it has worked out since is no part of it
-        value = tuple(getattr(value, field.name) for field in fields(value))
-    if isinstance(value, tuple):
-        for part in value:
-            yield from _numbers(part)
-    elif isinstance(value, np.ndarray | int | float):
-        yield np.asarray(value)
+    model = digest_of_numbers(known["model"]) if "model" in known else None  # whatever its file says of it
+    profile = known["profile"].digest if "profile" in known else None
+    return {"arm": arm.fingerprint, "name": arm.name, "method": method, "model": model, "profile": profile}
 
 
 def _check_origin(path: str | PathLike[str], saved: Mapping[str, Any], own: Mapping[str, Any]) -> None:

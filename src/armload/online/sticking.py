@@ -1,8 +1,7 @@
 """How friction behaves where joints hardly move: smooth in velocity, as the rows have it, or stuck at anything.
 
-The rows have Coulomb friction as f·tanh(dq/w). A joint that sticks, or has just turned round, is held by anything up to
-f: the rows are then wrong by a share s of it, of variance s²·f²·(1 − |tanh|)²/3, and about the same for a block of
-rows. Each s of a few is weighed by the innovations of the blocks of a steady arm,
+A joint that sticks, or has just turned round, is held by anything up to a share s of its Coulomb friction f, about the
+same for a block of rows. Each s of a few is weighed by the innovations of the blocks of a steady arm,
 
     ē_j ~ N(0, level·v_j + s²·f_j²·mean (1 − |tanh|)²/3)      joints j, independent,
 
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 from armload.online.modes import Modes
 from armload.online.runs import Gaussian
 from armload.online.thresholds import LEVEL_BLOCK, LEVEL_OUTLIER, STICKING_SHARES, STICKS, STICKS_BEHIND
+from armload.runtime.kernels import kernel
 
 _SHARES = np.append(0.0, STICKING_SHARES)  # none sticks, or so far
 
@@ -52,8 +52,7 @@ class Sticking:
             self._sums, self._h = np.zeros_like(self._sums), 0.0
             return
         w, (mean, P) = seen[:, :10], before
-        d, v = seen[:, 10] - w @ mean, seen[:, 11] + ((w @ P) * w).sum(axis=1)
-        self._sums += scale**2 / v, scale * d / v, h * sticks
+        _add(h, scale, seen, w @ mean, w @ P, sticks, self._sums)
         self._h += h
         if self._h < LEVEL_BLOCK:
             return
@@ -64,3 +63,27 @@ class Sticking:
         p = np.exp(self._log)
         self.share = float(p @ _SHARES**2 / p.sum()) if p[0] < 0.5 * p.sum() else 0.0
         self._sums, self._h = np.zeros_like(self._sums), 0.0
+
+
+@kernel
+def stuck(weights, presliding, coulomb):  # pragma: no cover - compiled
+    """f²·(1 − |tanh|)²/3 (n,) [N²·m²] of a row: f·tanh(dq/w) is off by anything within ±f·(1 − |tanh|)."""
+    out = np.empty_like(coulomb)
+    for j in range(len(out)):
+        slow = (1.0 / weights[j] - 1.0) / presliding[j]  # 1 − tanh²
+        out[j] = (coulomb[j] * (1.0 - np.sqrt(max(1.0 - slow, 0.0)))) ** 2 / 3.0
+    return out
+
+
+@kernel
+def _add(h, scale, seen, expected, known, sticks, sums):  # pragma: no cover - compiled
+    """A row more in a block: sums (3, n) of 1/v, d/v and h·sticks; `expected`: w·m (n,). known: w·P (n, 10)."""
+    y = np.empty(10)
+    for j in range(len(scale)):
+        for i in range(10):
+            y[i] = known[j, i] * seen[j, i]
+        pairs = ((y[0] + y[1]) + (y[2] + y[3])) + ((y[4] + y[5]) + (y[6] + y[7]))  # in numpy's order: to the last digit
+        d, v = seen[j, 10] - expected[j], seen[j, 11] + (pairs + y[8] + y[9])
+        sums[0, j] += scale[j] ** 2 / v
+        sums[1, j] += scale[j] * d / v
+        sums[2, j] += h * sticks[j]

@@ -26,11 +26,6 @@ class Tracker:
         self._t, self._lagged = 0.0, np.zeros(10)  # [s] of the last call; the shift of phi, lagged
         self.lasting: Lasting | None = None
 
-    @property
-    def goes_on(self) -> float:
-        """Probability that the hand-over before the run goes on."""
-        return 0.0 if self.lasting is None else self.lasting.goes_on
-
     def rest(self, shift: NDArray[np.float64]) -> bool:
         """Whether a change of phi (10,) is the rest of a hand-over amid which the run began: it goes the same way."""
         lasting = self.lasting
@@ -42,8 +37,7 @@ class Tracker:
             run.louder = louder
         if self.lasting is not None:
             self.lasting.take(run.stream, louder)
-            if self.lasting.over(float(run.last.covariance[0, 0])):
-                self.lasting = None
+            self.lasting = None if self.lasting.over(float(run.last.covariance[0, 0])) else self.lasting
 
     def of_now(self, last: Gaussian) -> Gaussian:
         """What the run says, and by how much a hand-over that may go on in it is ahead."""

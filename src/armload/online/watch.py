@@ -95,8 +95,9 @@ class PayloadWatch:
     @property
     def likely(self) -> tuple[float, float, float]:
         """Probabilities that the payload is not what the run holds, or changes; of a contact; of a drift of the arm."""
-        changed, contact, drift = self._weighing.likely
-        return changed + self._weighing.modes.steady * self._tracker.goes_on, contact, drift
+        modes, lasting = self._weighing.modes, self._tracker.lasting
+        goes_on = 0.0 if lasting is None else lasting.goes_on
+        return modes.handing + modes.other + modes.steady * goes_on, modes.contact, modes.drift
 
     @property
     def sure(self) -> bool:
@@ -130,7 +131,9 @@ class PayloadWatch:
             return None
         if self._look.due(sample.t):
             self._examine(sample, held)
-        return self._follow(sample, held) if self._following else None
+            if not self._following:
+                return None
+        return self._follow(sample, held)
 
     def conclude(self) -> Estimate:
         """The estimate of the current run after a last solution, and of a hand-over that may go on in it."""
@@ -143,24 +146,24 @@ class PayloadWatch:
     # ------------------------------------------------------------------ following
 
     def _follow(self, sample: Sample, held: bool) -> Estimate:
-        self.answered = self.run
-        before, estimate = self.run.stream.rows, self.run.update(sample)
-        if self.run.stream.rows > before and self._look.row(sample.t):
+        run = self.answered = self.runs.current
+        before, estimate = run.stream.rows, run.update(sample)
+        if run.stream.rows > before and self._look.row(sample.t):
             self._examine(sample, held)
         self._look.seen(sample.t)
-        if self.run.fresh and self._weighing.steady > LIKELY:
+        if run.fresh and self._weighing.steady > LIKELY:
             self.runs.note_steady()
-        if self._naming.judging and self.run.fresh and self._naming.judge(self.runs, held):
+        if run.fresh and self._naming.judging and self._naming.judge(self.runs, held):
             self._watch_anew(self.runs.go_back())
         return estimate
 
     def _examine(self, sample: Sample, held: bool) -> None:
         """Look at the innovations of the last row, which the run has taken."""
         self._look.clear()
-        self._tracker.row(self.run, self._weighing.modes.level)
-        if self._weighing.taken(self.run):
+        self._tracker.row(self.runs.current, self._weighing.modes.level)
+        if self._weighing.taken(self.runs.current):
             self._decide(sample, held)
-            changed = self._weighing.likely[0] > UNLIKELY
+            changed = self._weighing.modes.handing + self._weighing.modes.other > UNLIKELY
             self.mixed = self._following and (changed or self._tracker.lasting is not None)
 
     # ------------------------------------------------------------------ doubting
@@ -187,25 +190,22 @@ class PayloadWatch:
         began = max(self._weighing.steady_t, sample.t - PATIENCE)
         until = began - max(sample.t - began, TAKEN_BACK)
         shift = self._weighing.modes.shift()[0]
-        rest = self._tracker.rest(shift) or self._naming.corrects_the_recognition(
-            sample.t, float(shift[0]) / self.runs.unit
-        )
-        self._naming.begin(sample.t, began, run, rest)
-        reference = self.runs.reference_for_next()
-        following = self._background.submit(next_run, run, reference, until, self._weighing.sticks)
+        step, corrects = float(shift[0]) / self.runs.unit, self._naming.corrects_the_recognition
+        self._naming.begin(sample.t, began, run, self._tracker.rest(shift) or corrects(sample.t, step))
+        next_about = run, self.runs.reference_for_next(), until, self._weighing.sticks
+        following = self._background.submit(next_run, *next_about)
         self._change, self._doubted_at = Change(sample.t, began, state, following), None
 
     def _settle(self, change: Change, sample: Sample) -> None:
         """A sample while the payload may go on changing; then the next run begins, or the run before goes on."""
-        modes = self._weighing.modes
-        looked = self._weighing.passed_over(sample, self.run, change.state)
-        if looked and modes.steady + modes.contact > SURE:
-            self._call_off(change)
-            return
-        if looked:
+        modes, stays = self._weighing.modes, False
+        if self._weighing.passed_over(sample, self.run, change.state):
+            if modes.steady + modes.contact > SURE:
+                self._call_off(change)
+                return
             change.looked(sample.t, modes, self._weighing.row_t)
+            stays = modes.other > LIKELY and change.stays(modes, self._weighing.row_t)
         change.take(sample, modes.level)
-        stays = looked and modes.other > LIKELY and change.stays(modes, self._weighing.row_t)
         if stays or sample.t - change.t > PATIENCE:
             self._take_up_the_next(change)
 

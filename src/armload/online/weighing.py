@@ -7,15 +7,13 @@ all that is mounted keeps a mass then and it lasts for `CONTACT_LONGEST`.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms.momentum_row import MomentumRow, wrench_row
 from armload.online.modes import Modes
 from armload.online.runs import Gaussian, can_be
-from armload.online.sticking import Sticking
+from armload.online.sticking import Sticking, stuck
 from armload.online.thresholds import (
     AFTER_CONTACT,
     CONTACT_LONGEST,
@@ -35,17 +33,6 @@ from armload.recording import GAP, Sample
 from armload.regression import payload_prior_std
 from armload.regression.row_kernels import STILL
 from armload.regression.rows import Row
-
-
-class _Possible(NamedTuple):
-    """Whether a mass can be: of what would have been added by now, of what was before, of all that would be mounted.
-
-    What was on the arm from the start may be taken off.
-    """
-
-    added: bool
-    before: bool
-    mounted: bool
 
 
 class Weighing:
@@ -88,11 +75,6 @@ class Weighing:
         self._sure_since = self._impossible_since = self._lifted_since = self._first_t = np.inf
 
     @property
-    def likely(self) -> tuple[float, float, float]:
-        """Probabilities that the payload is not what the run holds, or changes; of a contact; of a drift of the arm."""
-        return self.modes.handing + self.modes.other, self.modes.contact, self.modes.drift
-
-    @property
     def steady(self) -> float:
         """Probability that the last rows are of the arm as it was and the same payload.
 
@@ -126,16 +108,24 @@ class Weighing:
         self._sure_since = min(self._sure_since, self.row_t) if sure else np.inf
         return self.row_t - self._sure_since >= HOLDS
 
-    def _possible(self, run: PosteriorLeastSquares) -> _Possible:
-        """Which masses can be: nothing lifts the arm but what touches it."""
+    def _possible(self, run: PosteriorLeastSquares) -> tuple[bool, bool, bool]:
+        """Whether masses can be: of what would have been added by now, of what was before, of all that is mounted then.
+
+        Nothing lifts the arm but what touches it; what was on it from the start may be taken off.
+        """
+        if self.modes.handing + self.modes.other <= 0.5:
+            return True, True, True
         (phi, known), (shift, spread), tool = self._before_row(run), self.modes.shift(), run.arm.attached
         state = run.stream.state
         before, variance = float(phi[0]), float(known[0, 0])
         in_all, doubt = (before, variance) if state is None else state.mass_in_all(phi, known)
         in_all += 0.0 if tool is None else tool.mass
-        step, spread = float(shift[0]), float(spread[0, 0])
-        masses = (before + step, variance + spread), (before, variance), (in_all + step, doubt + spread)
-        return _Possible(*(can_be(m, np.sqrt(v), self._unit) for m, v in masses))
+        step, more = float(shift[0]), float(spread[0, 0])
+        return (
+            can_be(before + step, np.sqrt(variance + more), self._unit),
+            can_be(before, np.sqrt(variance), self._unit),
+            can_be(in_all + step, np.sqrt(doubt + more), self._unit),
+        )
 
     def believed(self, lasted: float) -> bool:
         """Whether what has not fitted for so long [s] is believed: then a drift is the arm's."""
@@ -154,7 +144,7 @@ class Weighing:
             return False
         self._motor = stream.posterior.torque == "motor"
         self._coulomb = stream.correction.coulomb(stream.posterior.eta)
-        self._moved = 0.0 if row.h <= 0.0 else self._moved + row.h * float(row.weights.max())
+        self._moved = 0.0 if row.h <= 0.0 else self._moved + row.h * max(row.weights.tolist())
         h, self.row_t = row.t - self.row_t, row.t
         first = FIRST_MOTOR if self._motor else FIRST_TARED if stream.tares else FIRST_UNTARED
         known = stream.seconds > first
@@ -175,14 +165,12 @@ class Weighing:
     def passed_over(self, sample: Sample, run: PosteriorLeastSquares, state: SequentialPosterior | None) -> bool:
         """Weigh a sample that the run does not take, by its `state`; whether a row came of it that says something."""
         assert state is not None
-        row = run.stream.look(*sample)
-        if row is None:
+        if (row := run.stream.look(*sample)) is None:
             return False
         h, self.row_t = row.t - self.row_t, row.t
-        if not 0.0 < h <= GAP:
-            return False
-        self._weigh(row, h, state, run)
-        return True
+        if says := 0.0 < h <= GAP:
+            self._weigh(row, h, state, run)
+        return says
 
     def _weigh(self, row: Row, h: float, state: SequentialPosterior, run: PosteriorLeastSquares) -> None:
         """Weigh a row that the run did not take, or of an arm at rest, for as long as it stands."""
@@ -191,7 +179,7 @@ class Weighing:
         if self._rests(row, state) and (self._seen_steady or self.modes.steady > LIKELY):
             self._seen_steady = True
             error = state.noise / (row.weights * run.stream.noise.block)
-            if self._learns(run):
+            if not (self._motor or run.stream.allows_for_sticking):
                 error = error + self._sticking.share * self._coulomb**2 / 3.0
             row = row._replace(weights=np.ones_like(row.weights))
         seen, scale = state.predict(row._replace(h=h))
@@ -210,27 +198,24 @@ class Weighing:
         """Hand a row to the modes; `error`: of a standstill."""
         modes = self.modes
         before = self._before_row(run)
-        if self._motor or (error is None and self._learns(run)):
-            sticks, share = _sticking(row, run, self._coulomb), 1.0
+        if self._motor or (error is None and not run.stream.allows_for_sticking):
+            sticks, share = stuck(row.weights, run.stream.presliding, self._coulomb), 1.0
             if not self._motor:
                 share = self._sticking.share
                 if taken:
                     self._sticking.take(h, scale, seen, before, sticks, modes)
-            seen = seen.copy()
-            seen[:, 11] += share * scale**2 * sticks * run.stream.noise.block / h
+            if share > 0.0:  # of a block of rows, not of each
+                seen = seen.copy()
+                seen[:, 11] += share * scale**2 * sticks * run.stream.noise.block / h
         modes.expect(early=not self._motor and row.t - self._began < EARLY)
         modes.take(h, seen, row.X, wrench_row(*self._chain, row.q), scale, *before, taken, error)
-        possible = self._possible(run) if modes.handing + modes.other > 0.5 else _Possible(True, True, True)
-        lifted = not possible.added and possible.mounted
-        self._impossible_since = np.inf if possible.added else min(self._impossible_since, row.t)
+        added, was, mounted = self._possible(run)
+        lifted = not added and mounted
+        self._impossible_since = np.inf if added else min(self._impossible_since, row.t)
         self._lifted_since = min(self._lifted_since, row.t) if lifted else self._lifted_since
-        self._taken_off = lifted and (row.t - self._lifted_since > CONTACT_LONGEST or not possible.before)
+        self._taken_off = lifted and (row.t - self._lifted_since > CONTACT_LONGEST or not was)
         if row.t - self._impossible_since >= HOLDS and not self._taken_off:
             modes.no_payload(perhaps_taken_off=lifted)
-
-    def _learns(self, run: PosteriorLeastSquares) -> bool:
-        """Whether the rows of a run do not allow for joints that stick beyond what is expected of any arm."""
-        return bool((run.stream.presliding == run.stream.correction.presliding).all()) and not self._motor
 
     def _rests(self, row: Row, state: SequentialPosterior) -> bool:
         """Whether the arm stands, or has hardly moved since it stood; it is foreseen anew elsewhere."""
@@ -246,13 +231,3 @@ class Weighing:
         if self._gaussian is not None and self._gaussian[0] is run:
             return self._gaussian[1]
         return np.zeros(10), np.diag(payload_prior_std(run.arm) ** 2)
-
-
-def _sticking(row: Row, run: PosteriorLeastSquares, coulomb: NDArray) -> NDArray[np.float64]:
-    """Variance (n,) [N²·m²] of a slow joint's friction, anything up to Coulomb's, f: of a block of rows, not of each.
-
-    The model has f·tanh(dq/w), what sticks has up to ±f at rest: the error is somewhere within ±f·(1 − |tanh|), whose
-    variance is a third of the square, and about the same for a block of rows, so that many say no more than one.
-    """
-    slow = (1.0 / row.weights - 1.0) / run.stream.presliding  # 1 − tanh²
-    return (coulomb * (1.0 - np.sqrt(np.maximum(1.0 - slow, 0.0)))) ** 2 / 3.0

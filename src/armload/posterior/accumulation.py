@@ -10,6 +10,7 @@ there before anyone noticed. Were they kept, a cycle that returns to the same po
 
 from __future__ import annotations
 
+from bisect import bisect
 from collections.abc import Callable
 from copy import deepcopy
 
@@ -70,7 +71,8 @@ class Accumulation:
         work, result = self._handover, None
         self._waiting += rows
         work.follow(as_one)
-        due = any(k in _REFITS or k % _REFIT_EVERY == 0 for k in range(count - len(rows) + 1, count + 1))
+        first = count - len(rows)
+        due = bisect(_REFITS, count) > bisect(_REFITS, first) or count // _REFIT_EVERY > first // _REFIT_EVERY
         if work.pending:
             if count < work.adopt_at and not due:
                 return None

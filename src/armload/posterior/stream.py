@@ -52,6 +52,8 @@ class StreamingPosterior:
         solutions: full solutions so far. rows: how many. row: the last that counted. seconds: what all stand for [s].
     """
 
+    _allows: bool | None = None  # `allows_for_sticking`; None: not asked yet
+
     def __init__(
         self,
         correction: Correction,
@@ -120,6 +122,14 @@ class StreamingPosterior:
         self.prepare()
         noise = self._first.scales.noise[-1] / self.noise.block
         self._regression.presliding[:] = np.maximum(self.correction.presliding, variance / noise)
+        self._allows = None
+
+    @property
+    def allows_for_sticking(self) -> bool:
+        """Whether its rows weigh less than expected of any arm while joints are slow."""
+        if self._allows is None:  # it is asked at each row
+            self._allows = bool((self.presliding != self.correction.presliding).any())
+        return self._allows
 
     @property
     def presliding(self) -> NDArray[np.float64]:
@@ -209,7 +219,8 @@ class StreamingPosterior:
         """phi (10,) and its covariance (10, 10) under the Gaussian prior, as `solve` gives them; noise is `louder`."""
         state, about = self._current, (louder * self.noise.overrated, self.posterior.gain_std**2)
         phi, covariance = under_prior(state.information, state.vector, *self._gaussian, *about)
-        return phi, covariance + spread(self.posterior.moved, phi)
+        moved = self.posterior.moved
+        return phi, covariance if moved is None else covariance + spread(moved, phi)
 
     @property
     def _current(self) -> SequentialPosterior:

@@ -64,51 +64,55 @@ def lag_torques(t, tau, settings, clock, joints):  # pragma: no cover - compiled
 
 @kernel
 def make_rows(
-    q,
-    dq,
-    torque,
-    steps,
-    fresh,
-    settings,
-    rotations,
-    translations,
-    axes,
-    turning,
-    gravity,
-    turned,
-    links,
-    waves,
-    velocity_waves,
-    clock,
-    joints,
-    regressor,
-    pose_lag,
-    velocity_lag,
-):  # pragma: no cover - compiled
+    q, dq, torque, steps, fresh, settings, rotations, translations, axes, turning, gravity,
+    turned, links, waves, velocity_waves, clock, joints, regressor, pose_lag, velocity_lag,
+):  # fmt: skip  # pragma: no cover - compiled
     """M rows from the samples that complete them: h, X, r and weights."""
-    gain, settling = settings[0], settings[2]
-    count, n = q.shape
-    excess = settings[3 : 3 + n]
-    size = regressor.shape[2] + pose_lag.shape[1] + velocity_lag.shape[2]
+    (count, n), size = q.shape, regressor.shape[2] + pose_lag.shape[1] + velocity_lag.shape[2]
     h, X, r, weights = np.empty(count), np.empty((count, n, size)), np.empty((count, n)), np.empty((count, n))
+    arm, lags = (rotations, translations, axes, turning, gravity), (regressor, pose_lag, velocity_lag)
     for m in range(count):
-        momentum, drift = momentum_rows(rotations, translations, axes, turning, gravity, q[m], dq[m])
-        pose, velocity = features_of_sample(q[m], dq[m], waves, velocity_waves)
-        leaning = leaning_row(rotations, translations, axes, turning, turned, links, q[m])
-        inputs = (momentum, drift, leaning, links, dq[m], torque[m], pose, velocity, settings[3 + n :])
-        _lagged(inputs, gain, steps[m], fresh[m], joints, regressor, pose_lag, velocity_lag, X[m], r[m])
-        for j in range(n):
-            weights[m, j] = 1.0 / (1.0 + excess[j] * (1.0 - np.tanh(abs(dq[m, j]) / FRICTION_WIDTH) ** 2))
-        moved = not np.isfinite(clock[2])
-        for j in range(n):
-            moved |= abs(q[m, j] - joints[4, j]) > STILL
-        clock[2] += steps[m]  # not what passed while nothing was seen
-        if moved:
-            clock[2] = 0.0
-            for j in range(n):
-                joints[4, j] = q[m, j]
-        h[m] = 0.0 if clock[2] > settling else steps[m]
+        about = (arm, turned, links, waves, velocity_waves, clock, joints, lags)
+        h[m] = _made(q[m], dq[m], torque[m], steps[m], fresh[m], settings, about, X[m], r[m], weights[m])
     return h, X, r, weights
+
+
+@kernel
+def make_row(
+    q, dq, fresh, settings, rotations, translations, axes, turning, gravity,
+    turned, links, waves, velocity_waves, clock, joints, regressor, pose_lag, velocity_lag,
+):  # fmt: skip  # pragma: no cover - compiled
+    """The same of the sample that `lag_torque` took last."""
+    n, size = q.shape[0], regressor.shape[2] + pose_lag.shape[1] + velocity_lag.shape[2]
+    X, r, weights = np.empty((n, size)), np.empty(n), np.empty(n)
+    arm, lags = (rotations, translations, axes, turning, gravity), (regressor, pose_lag, velocity_lag)
+    about = (arm, turned, links, waves, velocity_waves, clock, joints, lags)
+    return _made(q, dq, joints[0], clock[3], fresh, settings, about, X, r, weights), X, r, weights
+
+
+@kernel
+def _made(q, dq, torque, step, fresh, settings, about, X, r, weights):  # pragma: no cover - compiled
+    """One row into X, r and weights; returns what it stands for [s]."""
+    arm, turned, links, waves, velocity_waves, clock, joints, lags = about
+    rotations, translations, axes, turning, gravity = arm
+    regressor, pose_lag, velocity_lag = lags
+    gain, settling, n = settings[0], settings[2], len(q)
+    momentum, drift = momentum_rows(rotations, translations, axes, turning, gravity, q, dq)
+    pose, velocity = features_of_sample(q, dq, waves, velocity_waves)
+    leaning = leaning_row(rotations, translations, axes, turning, turned, links, q)
+    inputs = (momentum, drift, leaning, links, dq, torque, pose, velocity, settings[3 + n :])
+    _lagged(inputs, gain, step, fresh, joints, regressor, pose_lag, velocity_lag, X, r)
+    for j in range(n):
+        weights[j] = 1.0 / (1.0 + settings[3 + j] * (1.0 - np.tanh(abs(dq[j]) / FRICTION_WIDTH) ** 2))
+    moved = not np.isfinite(clock[2])
+    for j in range(n):
+        moved |= abs(q[j] - joints[4, j]) > STILL
+    clock[2] += step  # not what passed while nothing was seen
+    if moved:
+        clock[2] = 0.0
+        for j in range(n):
+            joints[4, j] = q[j]
+    return 0.0 if clock[2] > settling else step
 
 
 @kernel

@@ -20,7 +20,7 @@ Sources: Hsu, Bodson, Sastry, Paden 1987; Middleton & Goodwin 1988; Slotine & Li
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,7 +32,7 @@ from armload.recording import JITTERED
 from armload.regression.features import JointFeatures
 from armload.regression.lag import GAIN, checked_gain
 from armload.regression.mismatch import Correction
-from armload.regression.row_kernels import FRESH, lag_torque, lag_torques, make_rows
+from armload.regression.row_kernels import FRESH, lag_torque, lag_torques, make_row, make_rows
 
 REGRESSOR_RATE = 200.0  # [Hz] rows are made no more often where a rate is set: they hold nothing above a few hertz
 SPACING = JITTERED / REGRESSOR_RATE  # [s] between rows at least
@@ -142,7 +142,7 @@ class FilteredRegression:
         self._check((len(times), self.arm.n), poses, dq, tau)
         index, steps, fresh, torque = lag_torques(times, tau, self._settings, self._clock, self._joints)
         times, poses = times[index], poses[index]
-        return Rows(times, poses, *self._made(poses, dq[index], torque, steps, fresh))
+        return Rows(times, poses, *self._scaled(*make_rows(poses, dq[index], torque, steps, fresh, *self._known())))
 
     def row(self, t: float, q: NDArray, dq: NDArray, tau: NDArray) -> Row | None:
         """The row that a sample completes, if it does; q, dq, tau (n,).
@@ -155,9 +155,7 @@ class FilteredRegression:
         if not done:
             return None
         q, dq = _writable(q), _writable(dq)
-        step, fresh = self._clock[3:], np.array([done == FRESH])
-        h, X, r, weights = self._made(q[None], dq[None], self._joints[:1], step, fresh)
-        return Row(t, q, h[0], X[0], r[0], weights[0])
+        return Row(t, q, *self._scaled(*make_row(q, dq, done == FRESH, *self._known())))
 
     def __call__(
         self, t: ArrayLike, q: ArrayLike, dq: ArrayLike, tau: ArrayLike
@@ -174,13 +172,16 @@ class FilteredRegression:
                 f"joint of {self.arm.name} at each time"
             )
 
-    def _made(self, q: NDArray, dq: NDArray, torque: NDArray, steps: NDArray, fresh: NDArray) -> tuple:
-        states = (self._clock, self._joints, self._regressor, self._pose, self._velocity)
+    def _known(self) -> tuple:
+        """What the kernels of rows need besides samples: settings, the arm, and the states of the lags."""
         arm = (*self._momentum.chain, self._turned, self._links, self._waves, self._velocity_waves)
-        made = make_rows(q, dq, torque, steps, fresh, self._settings, *arm, *states)
+        return self._settings, *arm, self._clock, self._joints, self._regressor, self._pose, self._velocity
+
+    def _scaled(self, h: Any, X: NDArray, r: NDArray, weights: NDArray) -> tuple:
+        """Rows with the payload's torque as the joints' sensors show it."""
         if self._torque_gain is not None:
-            made[1][:, :, :10] *= self._torque_gain[:, None]
-        return made
+            X[..., :10] *= self._torque_gain[:, None]
+        return h, X, r, weights
 
 
 def _writable(x: NDArray[np.float64]) -> NDArray[np.float64]:
