@@ -149,6 +149,7 @@ def test_update_adds_a_session_and_refuses_a_payload(folder, profile, capsys, tm
             "cannot use a profile",
         ),
         (["live", "run.csv", "--robot", "panda", "--learn", "--headless"], "there is no --profile"),
+        (["live", "run.csv", "--robot", "panda", "--profile", "arm.profile", "--learn", "--loop"], "leave one of the"),
         (
             ["live", "run.csv", "--robot", "panda", "--profile", "arm.profile", "--tool", "franka-hand"],
             "give one of them",
@@ -174,6 +175,70 @@ def test_a_stream_uses_a_profile_and_leaves_it_as_it_was_where_nothing_was_learn
     assert last["relative_to"] == "profile"
     assert "is as it was" in said.err
     assert profile.read_bytes() == before
+
+
+@pytest.fixture(scope="module")
+def long(folder):
+    """A log of the empty arm that a stream may be learned from."""
+    panda, motion = arm("panda"), random_motion(arm("panda"), 7, duration=22.0)
+    run = Run(motion, None, World.real_like(panda, 3), seed=11)
+    (log,) = simulate_many(panda, [run], rate=100.0, duration=22.0, workers=1, resolution=COARSE)
+    write_recording(folder / "long.csv", log)
+    return str(folder / "long.csv")
+
+
+def test_measurements_that_a_stream_has_taught_are_learned_once(long, profile, tmp_path, capsys):
+    path, record = tmp_path / "learning.profile", str(tmp_path / "record.csv")
+    path.write_bytes(profile.read_bytes())
+    learn = ["--robot", "panda", "--profile", str(path), "--learn", "--headless", "--speed", "max"]
+    assert main(["live", long, *learn, "--record", record]) == 0
+    assert "learned 22 s" in capsys.readouterr().err
+    learned = path.read_bytes()
+    assert main(["live", long, *learn]) == 0
+    assert f"is as it was: {long} holds measurements of {long}" in capsys.readouterr().err
+    for log in (long, record):
+        assert main(["profile", log, "--robot", "panda", "--out", str(path), "--update"]) == 2
+        assert f"{log} holds measurements of {long}" in capsys.readouterr().err
+    assert path.read_bytes() == learned
+    found = _said(["identify", record, "--robot", "panda", "--profile", str(path)], capsys)
+    assert found["interval"] == "approximate"
+
+
+def test_a_stream_adds_to_what_its_profile_s_file_holds_when_it_ends(folder, long, profile, tmp_path, monkeypatch):
+    from armload.app.cli import headless
+
+    path, begun = tmp_path / "shared.profile", profile.read_bytes()
+    path.write_bytes(begun)
+    streamed = headless.lines
+
+    def meanwhile(*given):
+        yield from streamed(*given)
+        assert main(["profile", str(folder / "day3.csv"), "--robot", "panda", "--out", str(path), "--update"]) == 0
+
+    monkeypatch.setattr(headless, "lines", meanwhile)
+    argv = ["live", long, "--robot", "panda", "--profile", str(path), "--learn", "--headless", "--speed", "max"]
+    assert main(argv) == 0
+    names = [session.name.rsplit("/", 1)[-1] for session in load_profile(path).sessions]
+    assert names == ["day0.csv", "day1.csv", "day2.csv", "day3.csv", "long.csv"]
+
+
+def test_a_profile_that_another_program_changed_meanwhile_is_left_so(folder, profile, tmp_path, monkeypatch, capsys):
+    import armload.posterior
+
+    path, learn = tmp_path / "shared.profile", armload.posterior.learn_profile
+    path.write_bytes(profile.read_bytes())
+
+    def meanwhile(*given, **named):
+        made = learn(*given, **named)
+        path.write_bytes(b"of another program")
+        return made
+
+    monkeypatch.setattr(armload.posterior, "learn_profile", meanwhile)
+    assert main(["profile", str(folder / "day3.csv"), "--robot", "panda", "--out", str(path), "--update"]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert "changed by another program" in said.err
+    assert path.read_bytes() == b"of another program"
 
 
 def _said(words, capsys):

@@ -23,7 +23,7 @@ from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
 from armload.online.gate import Health, all_finite
 from armload.online.judgement import Judgement
-from armload.online.learning import learned_from
+from armload.online.learning import Seen, learned_from
 from armload.online.listening import Listening
 from armload.online.state import load_state, save_state
 from armload.online.thresholds import KIND_LATEST, SELDOM
@@ -128,6 +128,7 @@ class OnlineIdentifier:
         self._published = -math.inf
         self._since: float | None = None
         self._blind = False  # whether a change of payload would not be seen now
+        self._seen = Seen()
         self.event: Event | None = None
         self._event_t, self._event_shift = -math.inf, 0.0  # of the event on the samples' clock, and to the stream's [s]
         self._judgement.reset()
@@ -146,6 +147,8 @@ class OnlineIdentifier:
             return self._present()
         if self._since is None:
             self._since = self._stream.clock
+        if self.profile is not None:
+            self._seen.take(sample)
         self._identify(sample)
         self._blind = self._watch is not None and self._watch.blind
         return self._present()
@@ -166,16 +169,26 @@ class OnlineIdentifier:
                 self._judgement.conclude(estimate, self.engine, self.relative_to, self._stream.now)
         return self._present()
 
-    def learned(self, name: str = "stream") -> Profile | None:
+    def learned(self, name: str = "stream", profile: Profile | None = None) -> Profile | None:
         """The profile with this stream as one more session (`learning.learned_from`); None: there is nothing to learn.
 
+        Args:
+            name: of the session. profile: to add to in the place of the stream's own, which has grown to it meanwhile.
+
         Raises:
-            IdentificationError: there is no profile to learn for.
+            IdentificationError: there is no profile to learn for, it is learned from some of these samples already, or
+                the one to add to is no later state of the stream's own.
+            ModelError: that is of another arm.
         """
         if self.profile is None or self._watch is None:
             raise IdentificationError("nothing is learned without a profile: make one with `armload profile`")
         self._watch.hold()
-        return learned_from(self.profile, () if self._judgement.doubts.another else self._watch.runs, name)
+        into = self.profile if profile is None else profile
+        into.check(self.arm)
+        if into.features != self.profile.features:
+            raise IdentificationError("the profile was made anew while the stream ran: nothing is added to it")
+        runs = () if self._judgement.doubts.another else self._watch.runs
+        return learned_from(into, runs, name, tuple(self._seen.marks))
 
     def close(self) -> None:
         """Stop what runs beside; the identifier may go on."""

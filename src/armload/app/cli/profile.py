@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from armload.app.cli.arguments import Parser, add_arm_arguments, add_column_arguments, file_name, output_file, weighed
 from armload.app.cli.named import arm_of, payload_of, read_logs
+from armload.app.cli.outputs import check_unchanged, contents_of
 from armload.app.cli.printing import console, print_json, print_note, table, working
 from armload.errors import UsageError
 
@@ -77,11 +78,12 @@ def run(options: argparse.Namespace) -> None:
             f"{options.out} exists: give --update to add the logs to it, or another name, or remove it to begin anew"
         )
     from armload.identification import check_usable
-    from armload.posterior import learn_profile, load_profile, save_profile, with_known_weight
+    from armload.posterior import check_new, learn_profile, load_profile, save_profile, with_known_weight
     from armload.posterior.profile_session import check_fits
 
     with working("reading") as say:
         arm = arm_of(options)
+        before = contents_of(options.out)
         known = load_profile(options.out) if options.update else None
         if known is not None:
             _check_frame(known, arm, options.frame)
@@ -95,6 +97,7 @@ def run(options: argparse.Namespace) -> None:
             profile = with_known_weight(known, arm, logs[0], *options.mass)
         else:
             if known is not None:
+                check_new(logs, known)
                 for log in logs:
                     check_fits(known, arm, log, tool)
             profile = learn_profile(
@@ -105,6 +108,7 @@ def run(options: argparse.Namespace) -> None:
                 known=known,
                 progress=lambda done, total: say(f"learning: {done} of {total} logs"),
             )
+    check_unchanged("--out", options.out, before)
     save_profile(profile, options.out)
     if options.json:
         print_json(_fields(profile) | {"out": options.out})
