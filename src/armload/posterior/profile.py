@@ -100,7 +100,8 @@ class Profile:
         """The first twelve digits of the SHA-256 of what it knows."""
         from hashlib import sha256
 
-        return sha256(np.ascontiguousarray(self.A).tobytes() + self.b.tobytes()).hexdigest()[:12]
+        gain = b"" if self.gain is None else self.gain.tobytes()
+        return sha256(np.ascontiguousarray(self.A).tobytes() + self.b.tobytes() + gain).hexdigest()[:12]
 
     def learned_from(self, log: Recording) -> str | None:
         """The session of the same measurements, or of some of them; None: there is none."""

@@ -87,13 +87,14 @@ def with_session(
     means, P = found.mean[problem.eta.stop :], found.covariance[problem.eta.stop :, problem.eta.stop :]
     S, seen = scales.noise[-1], len(known.sessions) + STATED
     A, b = without_drift(data.A / S[:, None, None], data.b / S[:, None], known.drift)
+    drift = (seen * known.drift + means**2 + np.diag(P)) / (seen + 1.0)  # with this session's, as of those before
     about = (data.blocks.duration, logs, name, marks)
     return replace(
         known,
         A=known.A + A / known.repeated,
         b=known.b + b / known.repeated,
-        drift=(seen * known.drift + means**2 + np.diag(P)) / (seen + 1.0),
-        sessions=remembered([*known.sessions, record(correction, means, P + np.diag(known.drift), S, *about)]),
+        drift=drift,
+        sessions=remembered([*known.sessions, record(correction, means, P + np.diag(drift), S, *about)]),
         poses=np.concatenate([known.poses, *(poses(log) for log in logs)]),
     )
 
