@@ -11,7 +11,9 @@ import pytest
 from armload.app.cli import main
 from armload.app.cli.profile import _next
 from armload.arms import arm
+from armload.inertia import InertialParameters
 from armload.motion import random_motion, save_motion, taie2024
+from armload.payloads import hand_on
 from armload.payloads import test_payload as make_payload
 from armload.posterior import load_profile
 from armload.recording import write_recording
@@ -138,6 +140,24 @@ def test_update_adds_a_session_and_refuses_a_payload(folder, profile, capsys, tm
     ("argv", "expected"),
     [
         (["profile", "show"], "takes one profile"),
+        (["profile", "show", "arm.profile", "--out", "x", "--update"], "leave out --out, --update"),
+        (["profile", "day3.csv", "--robot", "panda", "--out", "new.profile", "--figure", "x.png"], "profile show P"),
+        (["profile", "day3.csv", "--robot", "panda", "--out", "new.profile", "--tare-episode", "1"], "--tare-episode"),
+        (
+            [
+                "profile",
+                "day3.csv",
+                "--robot",
+                "panda",
+                "--out",
+                "arm.profile",
+                "--update",
+                "--mass",
+                "2±0.1",
+                "--one-session",
+            ],
+            "leave --one-session out",
+        ),
         (["profile", "day0.csv"], "needs --robot"),
         (["profile", "day0.csv", "--robot", "panda", "--out", "none.profile", "--update"], "no profile at"),
         (["profile", "day3.csv", "--robot", "panda", "--out", "arm.profile"], "arm.profile exists: give --update"),
@@ -220,6 +240,24 @@ def test_a_stream_adds_to_what_its_profile_s_file_holds_when_it_ends(folder, lon
     assert main(argv) == 0
     names = [session.name.rsplit("/", 1)[-1] for session in load_profile(path).sessions]
     assert names == ["day0.csv", "day1.csv", "day2.csv", "day3.csv", "long.csv"]
+
+
+def test_a_known_weight_below_a_known_tool_weighs_as_much_as_both(folder, profile, tmp_path):
+    panda, hand = arm("panda"), hand_on(arm("panda")).parameters
+    weight = InertialParameters.from_com(2.0, (0.0, 0.0, 0.1), 2e-3 * np.eye(3), hand.frame)
+    motion = random_motion(panda, 8, duration=6.0)
+    run = Run(motion, hand + weight, World.real_like(panda, 3), seed=12)
+    (log,) = simulate_many(panda, [run], rate=100.0, duration=6.0, workers=1, resolution=COARSE)
+    write_recording(folder / "hung.csv", log)
+    both, gains = hand.mass + 2.0, []
+    for mass, more in ((2.0, ["--tool", "franka-hand"]), (both, [])):
+        path = tmp_path / f"{mass}.profile"
+        path.write_bytes(profile.read_bytes())
+        words = ["profile", str(folder / "hung.csv"), "--robot", "panda", "--out", str(path), "--update"]
+        assert main([*words, "--mass", f"{mass}±0.002", *more]) == 0
+        gains.append(load_profile(path).gain)
+    np.testing.assert_allclose(gains[0], gains[1], rtol=1e-12)
+    assert np.abs(gains[0]).max() < 0.03
 
 
 def test_a_profile_that_another_program_changed_meanwhile_is_left_so(folder, profile, tmp_path, monkeypatch, capsys):

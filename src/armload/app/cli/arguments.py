@@ -284,13 +284,15 @@ def add_tool_and_topic_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--topic", metavar="T", help="JointState topic of a bag, where it has several")
 
 
-def add_column_arguments(parser: argparse.ArgumentParser) -> None:
+def add_column_arguments(parser: argparse.ArgumentParser, tare: bool = True) -> None:
     """`--columns`, `--effort-key`, `--rate`, `--episode`, and for the tare: what the header of a log leaves open."""
     add = parser.add_argument_group("logs that are tables (CSV, Parquet, NPZ, HDF5, MATLAB, LeRobot)").add_argument
     add("--columns", type=file_name, metavar="SPEC", help=COLUMNS)
     add("--effort-key", type=file_name, metavar="K", help="list-valued column of the joint torques (--columns tau=K)")
     add("--rate", dest="log_rate", type=at_least(1e-3, float), metavar="HZ", help="of a log without times")
     add("--episode", type=at_least(0), metavar="K", help="which one of a file or data set that holds several")
+    if not tare:
+        return
     add("--tare-episode", type=at_least(0), metavar="K", help="that of the tare (default: as --episode)")
     add(
         "--tare-columns",

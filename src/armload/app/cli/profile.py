@@ -58,7 +58,7 @@ def parser() -> Parser:
         "--mass", type=weighed, metavar="M±S", help="the log is of a known weight [kg], with its 1 sigma; with --update"
     )
     parser.add_argument("--topic", metavar="T", help="JointState topic of a bag, where it has several")
-    add_column_arguments(parser)
+    add_column_arguments(parser, tare=False)
     parser.add_argument("--figure", type=output_file, metavar="F.png", help="with show: draw where the arm is known")
     parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     return parser
@@ -69,6 +69,10 @@ def run(options: argparse.Namespace) -> None:
     if options.logs[0] == "show":
         _show(options)
         return
+    if options.figure is not None:
+        raise UsageError("--figure draws a profile that there is: armload profile show P --figure F.png")
+    if options.mass is not None and options.one_session:
+        raise UsageError("--one-session is of several logs, --mass of one: leave --one-session out")
     if options.mass is not None and (not options.update or len(options.logs) != 1):
         raise UsageError("--mass is of the one log of a known weight that --update adds to the profile --out")
     if options.robot is None or options.out is None:
@@ -94,7 +98,8 @@ def run(options: argparse.Namespace) -> None:
             check_usable(log, arm)
         say("learning")
         if known is not None and options.mass is not None:
-            profile = with_known_weight(known, arm, logs[0], *options.mass)
+            mass, std = options.mass
+            profile = with_known_weight(known, arm, logs[0], mass if tool is None else mass + float(tool[0]), std)
         else:
             if known is not None:
                 check_new(logs, known)
@@ -140,6 +145,10 @@ def _show(options: argparse.Namespace) -> None:
 
     if len(options.logs) != 2:
         raise UsageError("armload profile show takes one profile: armload profile show arm.profile")
+    kept = ("logs", "robot", "frame", "gravity", "figure", "json")
+    if stray := [name for name, value in vars(options).items() if name not in kept and value not in (None, False)]:
+        given = ", ".join(f"--{name.replace('_', '-')}" for name in stray)
+        raise UsageError(f"armload profile show shows what is in its file: leave out {given}")
     profile = load_profile(options.logs[1])
     arm = None
     if options.robot is not None:
