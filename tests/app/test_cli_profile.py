@@ -11,7 +11,9 @@ import pytest
 from armload.app.cli import main
 from armload.app.cli.profile import _next
 from armload.arms import arm
+from armload.inertia import InertialParameters
 from armload.motion import random_motion, save_motion, taie2024
+from armload.payloads import hand_on
 from armload.payloads import test_payload as make_payload
 from armload.posterior import load_profile
 from armload.recording import write_recording
@@ -138,6 +140,27 @@ def test_update_adds_a_session_and_refuses_a_payload(folder, profile, capsys, tm
     ("argv", "expected"),
     [
         (["profile", "show"], "takes one profile"),
+        (["profile", "show", "arm.profile", "--out", "x", "--update"], "--out and --update are of learning"),
+        (
+            ["profile", "day3.csv", "--robot", "panda", "--out", "new.profile", "--figure", "x.png"],
+            "--figure is of armload profile show",
+        ),
+        (["profile", "day3.csv", "--robot", "panda", "--out", "new.profile", "--tare-episode", "1"], "--tare-episode"),
+        (
+            [
+                "profile",
+                "day3.csv",
+                "--robot",
+                "panda",
+                "--out",
+                "arm.profile",
+                "--update",
+                "--mass",
+                "2±0.1",
+                "--one-session",
+            ],
+            "leave --one-session out",
+        ),
         (["profile", "day0.csv"], "needs --robot"),
         (["profile", "day0.csv", "--robot", "panda", "--out", "none.profile", "--update"], "no profile at"),
         (["profile", "day3.csv", "--robot", "panda", "--out", "arm.profile"], "arm.profile exists: give --update"),
@@ -149,6 +172,7 @@ def test_update_adds_a_session_and_refuses_a_payload(folder, profile, capsys, tm
             "cannot use a profile",
         ),
         (["live", "run.csv", "--robot", "panda", "--learn", "--headless"], "there is no --profile"),
+        (["live", "run.csv", "--robot", "panda", "--profile", "arm.profile", "--learn", "--loop"], "leave one of the"),
         (
             ["live", "run.csv", "--robot", "panda", "--profile", "arm.profile", "--tool", "franka-hand"],
             "give one of them",
@@ -174,6 +198,88 @@ def test_a_stream_uses_a_profile_and_leaves_it_as_it_was_where_nothing_was_learn
     assert last["relative_to"] == "profile"
     assert "is as it was" in said.err
     assert profile.read_bytes() == before
+
+
+@pytest.fixture(scope="module")
+def long(folder):
+    """A log of the empty arm that a stream may be learned from."""
+    panda, motion = arm("panda"), random_motion(arm("panda"), 7, duration=22.0)
+    run = Run(motion, None, World.real_like(panda, 3), seed=11)
+    (log,) = simulate_many(panda, [run], rate=100.0, duration=22.0, workers=1, resolution=COARSE)
+    write_recording(folder / "long.csv", log)
+    return str(folder / "long.csv")
+
+
+def test_measurements_that_a_stream_has_taught_are_learned_once(long, profile, tmp_path, capsys):
+    path, record = tmp_path / "learning.profile", str(tmp_path / "record.csv")
+    path.write_bytes(profile.read_bytes())
+    learn = ["--robot", "panda", "--profile", str(path), "--learn", "--headless", "--speed", "max"]
+    assert main(["live", long, *learn, "--record", record]) == 0
+    assert "learned 22 s" in capsys.readouterr().err
+    learned = path.read_bytes()
+    assert main(["live", long, *learn]) == 0
+    assert f"is as it was: {long} holds measurements of {long}" in capsys.readouterr().err
+    for log in (long, record):
+        assert main(["profile", log, "--robot", "panda", "--out", str(path), "--update"]) == 2
+        assert f"{log} holds measurements of {long}" in capsys.readouterr().err
+    assert path.read_bytes() == learned
+    found = _said(["identify", record, "--robot", "panda", "--profile", str(path)], capsys)
+    assert found["interval"] == "approximate"
+
+
+def test_a_stream_adds_to_what_its_profile_s_file_holds_when_it_ends(folder, long, profile, tmp_path, monkeypatch):
+    from armload.app.cli import headless
+
+    path, begun = tmp_path / "shared.profile", profile.read_bytes()
+    path.write_bytes(begun)
+    streamed = headless.lines
+
+    def meanwhile(*given):
+        yield from streamed(*given)
+        assert main(["profile", str(folder / "day3.csv"), "--robot", "panda", "--out", str(path), "--update"]) == 0
+
+    monkeypatch.setattr(headless, "lines", meanwhile)
+    argv = ["live", long, "--robot", "panda", "--profile", str(path), "--learn", "--headless", "--speed", "max"]
+    assert main(argv) == 0
+    names = [session.name.rsplit("/", 1)[-1] for session in load_profile(path).sessions]
+    assert names == ["day0.csv", "day1.csv", "day2.csv", "day3.csv", "long.csv"]
+
+
+def test_a_known_weight_below_a_known_tool_weighs_as_much_as_both(folder, profile, tmp_path):
+    panda, hand = arm("panda"), hand_on(arm("panda")).parameters
+    weight = InertialParameters.from_com(2.0, (0.0, 0.0, 0.1), 2e-3 * np.eye(3), hand.frame)
+    motion = random_motion(panda, 8, duration=6.0)
+    run = Run(motion, hand + weight, World.real_like(panda, 3), seed=12)
+    (log,) = simulate_many(panda, [run], rate=100.0, duration=6.0, workers=1, resolution=COARSE)
+    write_recording(folder / "hung.csv", log)
+    both, gains = hand.mass + 2.0, []
+    for mass, more in ((2.0, ["--tool", "franka-hand"]), (both, [])):
+        path = tmp_path / f"{mass}.profile"
+        path.write_bytes(profile.read_bytes())
+        words = ["profile", str(folder / "hung.csv"), "--robot", "panda", "--out", str(path), "--update"]
+        assert main([*words, "--mass", f"{mass}±0.002", *more]) == 0
+        gains.append(load_profile(path).gain)
+    np.testing.assert_allclose(gains[0], gains[1], rtol=1e-12)
+    assert np.abs(gains[0]).max() < 0.03
+
+
+def test_a_profile_that_another_program_changed_meanwhile_is_left_so(folder, profile, tmp_path, monkeypatch, capsys):
+    import armload.posterior
+
+    path, learn = tmp_path / "shared.profile", armload.posterior.learn_profile
+    path.write_bytes(profile.read_bytes())
+
+    def meanwhile(*given, **named):
+        made = learn(*given, **named)
+        path.write_bytes(b"of another program")
+        return made
+
+    monkeypatch.setattr(armload.posterior, "learn_profile", meanwhile)
+    assert main(["profile", str(folder / "day3.csv"), "--robot", "panda", "--out", str(path), "--update"]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert "changed by another program" in said.err
+    assert path.read_bytes() == b"of another program"
 
 
 def _said(words, capsys):

@@ -11,10 +11,11 @@ from armload import arm
 from armload.devices import Simulator
 from armload.errors import IdentificationError
 from armload.motion import random_motion
-from armload.online import OnlineIdentifier
+from armload.online import OnlineIdentifier, learning
 from armload.payloads import draw_payload
 from armload.posterior import checked_solver, learn_profile
 from armload.posterior.scales import AnotherArm
+from armload.recording import Recording, marks_of
 from armload.simulation import Run, Sensors, World, simulate, simulate_many
 from armload.simulation.resolution import COARSE
 
@@ -59,6 +60,22 @@ def streamed(panda, world, profile, held, look=None, seconds=SECONDS):
     learned = stream.learned("today")
     stream.close()
     return last, learned
+
+
+def test_samples_of_a_stream_have_the_marks_of_a_log_of_them_and_a_bounded_number(monkeypatch):
+    rng, seen = np.random.default_rng(4), learning.Seen()
+    q, dq, tau = rng.normal(size=(3, 20_000, 7))
+    dq[:500] = 0.0
+    log = Recording(0.01 * np.arange(len(q)), q, dq, tau)
+    for sample in log:
+        seen.take(sample)
+    assert tuple(seen.marks) == marks_of(log)
+    monkeypatch.setattr(learning, "_MOST", 100)
+    few = learning.Seen()
+    for sample in log:
+        few.take(sample)
+    assert 25 < len(few.marks) <= 100
+    assert set(few.marks) < set(seen.marks)
 
 
 @pytest.mark.full

@@ -128,6 +128,21 @@ def test_a_profile_of_many_logs_remembers_a_bounded_number_of_their_samples(youn
     assert all(set(one.marks) < set(marks) for one, marks in zip(kept, logs, strict=True))
 
 
+def test_a_session_that_is_added_is_held_against_the_drift_of_all_as_those_before_are(panda, life, young):
+    """T ≤ deltaᵀ·D⁻¹·delta, and the k-th session's own delta² is part of (k + 3)·D, of which three count beforehand."""
+    log = life[1][3]
+    shifted = replace(log, tau=log.tau + np.array([3.0, -3.0, 2.0, 2.0, 1.0, -1.0, 0.5]))
+    grown = learn_profile(panda, [shifted], known=young)
+    assert abs(grown.sessions[-1].offset[0]) > 1.0
+    assert grown.sessions[-1].statistic <= 3 * panda.n * (len(grown.sessions) + 3)
+
+
+def test_a_profile_with_another_gain_is_another_one(young):
+    """A stream's saved state has rows with the gains, and is not gone on from with others."""
+    weighed = replace(young, gain=np.full(young.n, 0.01))
+    assert len({young.digest, weighed.digest, replace(weighed, gain=2.0 * weighed.gain).digest}) == 3
+
+
 @pytest.mark.full  # some seconds
 def test_a_profile_knows_the_payload_better_than_a_tare_of_another_day(panda, life, run, profile):
     truth = life[0].truth.phi

@@ -18,7 +18,7 @@ from armload.online.estimate import OnlineEstimate
 from armload.online.event import Event
 from armload.online.gate import Health, all_finite
 from armload.online.judgement import Judgement
-from armload.online.learning import learned_from
+from armload.online.learning import Seen, learned_from
 from armload.online.listening import Listening
 from armload.online.state import load_state, save_state
 from armload.online.thresholds import KIND_LATEST, SELDOM
@@ -126,6 +126,7 @@ class OnlineIdentifier:
         self._published = -math.inf
         self._since: float | None = None
         self._blind = False  # whether a change of payload would not be seen now
+        self._seen = Seen()
         self.event: Event | None = None
         self._event_t, self._event_shift = -math.inf, 0.0  # of the event on the samples' clock, and to the stream's [s]
         self._judgement.reset()
@@ -143,6 +144,8 @@ class OnlineIdentifier:
         if sample is None:
             return self._present()
         self._since = self._stream.clock if self._since is None else self._since
+        if self.profile is not None:
+            self._seen.take(sample)
         if self._watch is None:
             self._pass_on(sample)
         else:
@@ -167,16 +170,20 @@ class OnlineIdentifier:
                 self._judgement.conclude(estimate, self.engine, self.relative_to, self._stream.now)
         return self._present()
 
-    def learned(self, name: str = "stream") -> Profile | None:
+    def learned(self, name: str = "stream", profile: Profile | None = None) -> Profile | None:
         """The profile with this stream as one more session (`learning.learned_from`); None: there is nothing to learn.
 
+        Args:
+            name: of the session. profile: to add to in the place of the stream's own, which has grown to it meanwhile.
+
         Raises:
-            IdentificationError: there is no profile to learn for.
+            IdentificationError: there is no profile to learn for; and as `learning.learned_from`, as ModelError.
         """
         if self.profile is None or self._watch is None:
             raise IdentificationError("nothing is learned without a profile: make one with `armload profile`")
         self._watch.hold()
-        return learned_from(self.profile, () if self._judgement.doubts.another else self._watch.runs, name)
+        runs = () if self._judgement.doubts.another else self._watch.runs
+        return learned_from(self.profile, profile or self.profile, runs, name, tuple(self._seen.marks))
 
     def close(self) -> None:
         """Stop what runs beside; the identifier may go on."""

@@ -37,7 +37,8 @@ class SessionRecord:
     duration [s]; date: [s since 1970], None where the log does not say. offset, coulomb: (n,) by which they differ from
     the mean session [N·m]. statistic: T of `posterior.drift`, chi-squared of 3·n where the session is like the others.
     noise: (n,) the residual's long-run deviation √S over the one expected. logs: digests of the logs (`digest_of`); of
-    a stream, and in a profile of an earlier version, there are none. marks: of the logs' samples (`marks_of`).
+    a stream, and in a profile of an earlier version, there are none. marks: of the samples
+    of its logs or stream (`marks_of`).
     """
 
     name: str
@@ -99,12 +100,19 @@ class Profile:
         """The first twelve digits of the SHA-256 of what it knows."""
         from hashlib import sha256
 
-        return sha256(np.ascontiguousarray(self.A).tobytes() + self.b.tobytes()).hexdigest()[:12]
+        gain = b"" if self.gain is None else self.gain.tobytes()
+        return sha256(np.ascontiguousarray(self.A).tobytes() + self.b.tobytes() + gain).hexdigest()[:12]
 
     def learned_from(self, log: Recording) -> str | None:
         """The session of the same measurements, or of some of them; None: there is none."""
-        digest, marks = digest_of(log), set(marks_of(log))
-        return next((one.name for one in self.sessions if digest in one.logs or marks.intersection(one.marks)), None)
+        digest = digest_of(log)
+        same = next((one.name for one in self.sessions if digest in one.logs), None)
+        return self.holding(marks_of(log)) if same is None else same
+
+    def holding(self, marks: Iterable[str]) -> str | None:
+        """The session of samples with some of these marks (`marks_of`, `mark_of`); None: there is none."""
+        asked = set(marks)
+        return next((one.name for one in self.sessions if asked.intersection(one.marks)), None)
 
     def check(self, arm: Arm) -> None:
         """See that it is of this arm, on this base.

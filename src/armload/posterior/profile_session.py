@@ -64,12 +64,18 @@ def without_drift(
 
 
 def with_session(
-    known: Profile, correction: Correction, data: RegressionData, logs: Sequence[Recording] = (), name: str = ""
+    known: Profile,
+    correction: Correction,
+    data: RegressionData,
+    logs: Sequence[Recording] = (),
+    name: str = "",
+    marks: Sequence[str] = (),
 ) -> Profile:
     """A profile and one more session, whose rows have the profile's features; the scales stay, the drift's size learns.
 
     Args:
         data: of the session. logs: it came from, for their names and poses. name: of a session that is no log.
+        marks: of its samples (`mark_of`).
     """
     data.session = known.session(correction, len(known.sessions) + 1)
     runs = [known.data(correction, GAIN, SMOOTH.block), data]
@@ -81,13 +87,14 @@ def with_session(
     means, P = found.mean[problem.eta.stop :], found.covariance[problem.eta.stop :, problem.eta.stop :]
     S, seen = scales.noise[-1], len(known.sessions) + STATED
     A, b = without_drift(data.A / S[:, None, None], data.b / S[:, None], known.drift)
-    about = (data.blocks.duration, logs, name)
+    drift = (seen * known.drift + means**2 + np.diag(P)) / (seen + 1.0)  # with this session's, as of those before
+    about = (data.blocks.duration, logs, name, marks)
     return replace(
         known,
         A=known.A + A / known.repeated,
         b=known.b + b / known.repeated,
-        drift=(seen * known.drift + means**2 + np.diag(P)) / (seen + 1.0),
-        sessions=remembered([*known.sessions, record(correction, means, P + np.diag(known.drift), S, *about)]),
+        drift=drift,
+        sessions=remembered([*known.sessions, record(correction, means, P + np.diag(drift), S, *about)]),
         poses=np.concatenate([known.poses, *(poses(log) for log in logs)]),
     )
 
@@ -100,6 +107,7 @@ def record(
     duration: float,
     logs: Sequence[Recording],
     name: str,
+    marks: Sequence[str] = (),
 ) -> SessionRecord:
     """What is kept of a session: its offsets and friction (d,) and their covariance, its noise, its time [s]."""
     dates = [log.date for log in logs if log.date is not None]
@@ -112,7 +120,7 @@ def record(
         float(drift @ np.linalg.solve(covariance, drift)),
         tuple(np.sqrt(S / whole_noise(correction, SMOOTH)).tolist()),
         tuple(digest_of(log) for log in logs),
-        tuple(mark for log in logs for mark in marks_of(log)),
+        (*marks, *(mark for log in logs for mark in marks_of(log))),
     )
 
 

@@ -4,7 +4,7 @@ from armload.recording.alignment import Alignment, same_motion
 from armload.recording.chunks import read_long, recording_chunks
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.compensated import arm_as_set, with_gravity
-from armload.recording.copies import check_own_measurements, digest_of, marks_of, shared_samples
+from armload.recording.copies import check_own_measurements, digest_of, mark_of, marks_of, shared_samples
 from armload.recording.files import LOG_SUFFIXES, has_topics, is_log, read_recording, write_recording
 from armload.recording.lerobot import data_set_episodes, is_data_set
 from armload.recording.recording import BLOCK, CHANNELS, GAP, JITTERED, Recording, Sample
@@ -36,6 +36,7 @@ __all__ = [
     "is_data_set",
     "is_log",
     "largest",
+    "mark_of",
     "marks_of",
     "parts_of",
     "read_long",

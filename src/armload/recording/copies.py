@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.errors import RecordingError
-from armload.recording.recording import Recording
+from armload.recording.recording import Recording, Sample
 from armload.recording.spooled import blocks
 
 # samples of a moving arm of which one is remembered: nine of three seconds at 200 Hz, 31 of 20 s at 100 Hz
@@ -45,8 +45,14 @@ def marks_of(log: Recording) -> tuple[str, ...]:
     So a log and a part of it, or two that overlap, have marks in common, and logs of other measurements have none.
     Source: sampling by hash, Broder, Proc. Compression and Complexity of Sequences, 1997.
     """
-    hashes = (int.from_bytes(hashlib.blake2b(sample, digest_size=7).digest()) for sample in _moving(log))
-    return tuple(f"{h // ONE_IN:012x}" for h in hashes if h % ONE_IN == 0)
+    return tuple(mark for measured in _moving(log) if (mark := _mark(measured)) is not None)
+
+
+def mark_of(sample: Sample) -> str | None:
+    """The hash of one sample of a stream, as `marks_of` a log of it has it; None: it is none of those that are kept."""
+    if not np.any(sample.dq):
+        return None
+    return _mark((np.concatenate([sample.q, sample.dq, sample.tau]) + 0.0).tobytes())
 
 
 def shared_samples(log: Recording, other: Recording) -> int:
@@ -65,6 +71,11 @@ def shared_samples(log: Recording, other: Recording) -> int:
     there = np.flatnonzero(log.t[here] == other.t)
     here = here[there]
     return len(here) if _keys(log, here) == _keys(other, there) else 0
+
+
+def _mark(measured: bytes) -> str | None:
+    value = int.from_bytes(hashlib.blake2b(measured, digest_size=7).digest())
+    return f"{value // ONE_IN:012x}" if value % ONE_IN == 0 else None
 
 
 def _moving(log: Recording) -> Iterator[bytes]:

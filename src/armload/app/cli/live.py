@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import time
 from typing import TYPE_CHECKING
 
@@ -22,7 +23,7 @@ from armload.app.cli.arguments import (
 from armload.app.cli.named import arm_of, columns_for, columns_of, payload_of, read_logs, robot_of
 from armload.app.cli.outputs import check_output
 from armload.app.cli.printing import print_note
-from armload.errors import ArmloadError, UsageError
+from armload.errors import ArmloadError, IdentificationError, ModelError, UsageError
 from armload.runtime.interruption import held_back
 
 if TYPE_CHECKING:
@@ -159,6 +160,8 @@ def run(options: argparse.Namespace) -> int | None:
     if options.learn:
         if options.profile is None:
             raise UsageError("--learn adds to a profile, but there is no --profile; make one with `armload profile`")
+        if options.loop:
+            raise UsageError("--loop and --learn: a log would count again each time; leave one of the two out")
         check_output("--profile", options.profile)
         clear_left_over(options.profile)
     profile = None if options.profile is None else load_profile(options.profile)
@@ -256,9 +259,14 @@ def _arm_of(options: argparse.Namespace) -> Arm:
 
 def _learn(session, path: str) -> None:
     """Add what the stream has shown of the empty arm to a profile's file."""
-    from armload.posterior import save_profile
+    from armload.posterior import load_profile, save_profile
 
-    profile = session.identifier.learned(session.source.name)
+    try:  # to what the file holds now: another program may have added to it while the stream ran
+        now = load_profile(path) if os.path.exists(path) else None
+        profile = session.identifier.learned(session.source.name, now)
+    except (IdentificationError, ModelError) as error:
+        print_note(f"{path} is as it was: {error}")
+        return
     if profile is None:
         print_note(f"{path} is as it was: the stream showed no 20 s of the empty arm as the profile knows it")
         return

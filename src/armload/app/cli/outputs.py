@@ -95,6 +95,26 @@ def check_output(option: str, path: str) -> None:
         raise UsageError(f"{option} {path} cannot be written: {reason}; name a {what} where you can write")
 
 
+def contents_of(path: str) -> bytes | None:
+    """What tells a file's contents from any others: their SHA-256; None: it is not there."""
+    import hashlib
+
+    try:
+        return hashlib.sha256(Path(path).read_bytes()).digest()
+    except OSError:
+        return None
+
+
+def check_unchanged(option: str, path: str, before: bytes | None) -> None:
+    """See that a file which is to be replaced is as it was when it was read.
+
+    Raises:
+        UsageError: another program has changed it meanwhile.
+    """
+    if contents_of(path) != before:
+        raise UsageError(f"{option} {path} was changed by another program meanwhile: it is left so; ask once more")
+
+
 def _hinders(path: str) -> str:
     """Why a file cannot be written, or a folder not be made and filled; "" where nothing hinders.
 

@@ -18,6 +18,7 @@ from armload.app.cli.arguments import (
     weighed,
 )
 from armload.app.cli.named import arm_of, payload_of, read_logs
+from armload.app.cli.outputs import check_unchanged, contents_of
 from armload.app.cli.printing import console, print_json, print_note, table, working
 from armload.errors import UsageError
 
@@ -79,6 +80,8 @@ def run(options: argparse.Namespace) -> None:
         _show(options)
         return
     refuse_idle(given(options, "figure"), "of armload profile show")
+    if options.mass is not None and options.one_session:
+        raise UsageError("--one-session is of several logs, --mass of one: leave --one-session out")
     if options.mass is not None and (not options.update or len(options.logs) != 1):
         raise UsageError("--mass is of the one log of a known weight that --update adds to the profile --out")
     if options.robot is None or options.out is None:
@@ -88,11 +91,12 @@ def run(options: argparse.Namespace) -> None:
             f"{options.out} exists: give --update to add the logs to it, or another name, or remove it to begin anew"
         )
     from armload.identification import check_usable
-    from armload.posterior import learn_profile, load_profile, save_profile, with_known_weight
+    from armload.posterior import check_new, learn_profile, load_profile, save_profile, with_known_weight
     from armload.posterior.profile_session import check_fits
 
     with working("reading") as say:
         arm = arm_of(options)
+        before = contents_of(options.out)
         known = load_profile(options.out) if options.update else None
         if known is not None:
             _check_frame(known, arm, options.frame)
@@ -103,9 +107,11 @@ def run(options: argparse.Namespace) -> None:
             check_usable(log, arm)
         say("learning")
         if known is not None and options.mass is not None:
-            profile = with_known_weight(known, arm, logs[0], *options.mass)
+            mass, std = options.mass
+            profile = with_known_weight(known, arm, logs[0], mass if tool is None else mass + float(tool[0]), std)
         else:
             if known is not None:
+                check_new(logs, known)
                 for log in logs:
                     check_fits(known, arm, log, tool)
             profile = learn_profile(
@@ -116,6 +122,7 @@ def run(options: argparse.Namespace) -> None:
                 known=known,
                 progress=lambda done, total: say(f"learning: {done} of {total} logs"),
             )
+    check_unchanged("--out", options.out, before)
     save_profile(profile, options.out)
     if options.json:
         print_json(_fields(profile) | {"out": options.out})
