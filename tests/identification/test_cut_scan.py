@@ -10,9 +10,10 @@ from scipy.stats import multivariate_normal
 
 from armload.identification.cut_scan import Unchanged, log_evidence, of_the_log
 from armload.identification.cut_statistics import Cuts
+from armload.identification.segments import changes_of_payload
 from armload.motion import random_motion
 from armload.payloads import draw_payload
-from armload.posterior import SmoothPosteriorLeastSquares
+from armload.posterior import SmoothPosteriorLeastSquares, learn_profile
 from armload.posterior.problem import Problem
 from armload.posterior.solve import solve
 from armload.regression.information import RegressionData
@@ -47,6 +48,23 @@ def test_a_cut_says_what_a_solution_of_its_own_with_the_same_scales_does(panda, 
         np.testing.assert_allclose(information / scale, own.information / scale, atol=1e-6)
         np.testing.assert_allclose(vector, own.vector, atol=1e-6 * np.abs(own.vector).max())
     np.testing.assert_allclose(of_the_log(twice, (2.0, 3.0)).noise, scales.noise)
+
+
+def test_a_profile_and_a_tare_beside_it_carry_the_same_and_a_sound_log_is_not_doubted(panda):
+    """What was taken off a run is told by its rows, by least squares: of both it is one body."""
+    profile = learn_profile(panda, [log_of(panda, seed) for seed in range(4, 8)])
+    log = log_of(panda, 1, [(0.0, draw_payload("boxes", 3, 1.0))])
+    physics = SmoothPosteriorLeastSquares(panda, log_of(panda, 2), profile=profile)
+    search = Cuts(physics, RowsOfLog(physics.stream.regression(), log), 1.0)
+    taken = []
+    for run, less in zip(physics.stream.tares, search.whole.known, strict=True):
+        A, b = run.A[:, 10:, :10].reshape(-1, 10), (run.b - less.b)[:, 10:].ravel()
+        scale = np.linalg.norm(A, axis=0)
+        taken.append(np.linalg.lstsq(A / scale, b, rcond=None)[0] / scale)
+    np.testing.assert_allclose(*taken, rtol=1e-6, atol=1e-9)
+    changes = changes_of_payload(log, panda, log_of(panda, 2), profile)
+    assert changes.times == []
+    assert not changes.doubted
 
 
 def test_what_torques_drift_by_is_told_by_the_information_of_the_drift(panda):

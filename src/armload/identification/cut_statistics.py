@@ -19,6 +19,7 @@ T, which decides, is of the whole model at the likeliest of them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
@@ -33,8 +34,9 @@ from armload.identification.added_mass import MASS_MAY_CHANGE, of_mass
 from armload.identification.cut_scan import Unchanged, log_evidence, of_the_log
 from armload.identification.thresholds import DRIFT_SAID, LOSS_DIFFERS, PAYLOAD_MAY_CHANGE, TORQUE_DRIFT
 from armload.posterior import SmoothPosteriorLeastSquares
+from armload.posterior.problem import Problem
 from armload.posterior.scales import Scales
-from armload.posterior.solve import solve
+from armload.posterior.solve import solve, threads
 from armload.regression import JointFeatures, payload_prior_std, solution_prior_std
 from armload.regression.information import RegressionData
 from armload.regression.noise import SMOOTH, NoiseModel
@@ -130,7 +132,7 @@ class Cuts:
         self.weak, self.body = solution_prior_std(physics.arm), payload_prior_std(physics.arm)[0] * body_root()
         loss = LOSS_DIFFERS * max(held, 0.0) if physics.arm.motor_torque else 0.0  # [kg]
         self.lost = np.diag((loss * self.weak / self.weak[0]) ** 2)
-        known = [_without_payload(tare, physics.arm, physics.start) for tare in physics.stream.tares]
+        known = _without_payload(physics.stream.tares, physics.arm, physics.start)
         self.few = replace(physics.features, pose=min(_FEW, physics.features.pose))
         self.whole = _Model(known, physics.start)
         self.rough = self.whole.of_features(self.few)
@@ -229,12 +231,22 @@ class Cuts:
         return Statistics(T, of_mass(information / self.kappa, vector / self.kappa))
 
 
-def _without_payload(data: RegressionData, arm: Arm, start: Scales | None) -> RegressionData:
-    """What a tare or a profile says of the arm, less what it seems to carry, which is then known to be nothing."""
-    found = solve([data], payload_prior_std(arm), None, SMOOTH, 1, start)
-    out = copy(data)
-    out.A, out.b, out.c, out.blocks = data.A.copy(), data.b.copy(), data.c.copy(), data.blocks.mapped(np.copy)
-    out.less(found.phi)
-    out.A[:, :10], out.A[:, :, :10], out.b[:, :10] = 0.0, 0.0, 0.0
-    out.blocks.sums[:, :, :10] = 0.0
+def _without_payload(runs: Sequence[RegressionData], arm: Arm, start: Scales | None) -> list[RegressionData]:
+    """What a tare, a profile or both say of the arm, less what they seem to carry, which is then known to be nothing.
+
+    All have the same mounted: what each by itself seems to carry would differ by its own errors.
+    """
+    if not runs:
+        return []
+    with threads().limit(limits=1):
+        problem = Problem(list(runs), payload_prior_std(arm), None, SMOOTH, same=True)
+        phi = problem.posterior(problem.scales(start)).mean[:10]
+    out = []
+    for data in runs:
+        own = copy(data)
+        own.A, own.b, own.c, own.blocks = data.A.copy(), data.b.copy(), data.c.copy(), data.blocks.mapped(np.copy)
+        own.less(phi)
+        own.A[:, :10], own.A[:, :, :10], own.b[:, :10] = 0.0, 0.0, 0.0
+        own.blocks.sums[:, :, :10] = 0.0
+        out.append(own)
     return out
