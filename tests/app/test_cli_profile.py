@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 from dataclasses import replace
 
 import numpy as np
@@ -240,6 +242,32 @@ def test_a_stream_adds_to_what_its_profile_s_file_holds_when_it_ends(folder, lon
     assert main(argv) == 0
     names = [session.name.rsplit("/", 1)[-1] for session in load_profile(path).sessions]
     assert names == ["day0.csv", "day1.csv", "day2.csv", "day3.csv", "long.csv"]
+
+
+def test_a_stream_that_is_stopped_by_sigterm_has_taught_its_profile(long, profile, tmp_path, monkeypatch, capsys):
+    from armload.app.cli import headless
+
+    path, streamed = tmp_path / "stopped.profile", headless.lines
+    path.write_bytes(profile.read_bytes())
+
+    def stopped(*given):
+        yield from streamed(*given)
+        os.kill(os.getpid(), signal.SIGTERM)
+        yield from ()
+
+    def unheard(*_):
+        raise AssertionError("SIGTERM was not heard")
+
+    monkeypatch.setattr(headless, "lines", stopped)
+    before = signal.signal(signal.SIGTERM, unheard)
+    try:
+        argv = ["live", long, "--robot", "panda", "--profile", str(path), "--learn", "--headless", "--speed", "max"]
+        assert main(argv) == 130
+        assert signal.getsignal(signal.SIGTERM) is unheard
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert "learned 22 s" in capsys.readouterr().err
+    assert len(load_profile(path).sessions) == 4
 
 
 def test_a_known_weight_below_a_known_tool_weighs_as_much_as_both(folder, profile, tmp_path):
