@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from armload.app.cli import main
-from armload.app.cli.profile import _next
+from armload.app.cli.profile import _next, _of_motors, _print
 from armload.arms import arm
 from armload.inertia import InertialParameters
 from armload.motion import random_motion, save_motion, taie2024
@@ -78,6 +78,15 @@ def test_show_says_what_is_known_and_how_the_arm_drifted(profile, capsys, tmp_pa
     fields = json.loads(capsys.readouterr().out)
     assert len(fields["sessions"]) == 3
     assert np.isfinite(fields["drift_offset"]).all()
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e"])
+def test_what_a_misfit_tells_is_said_of_the_side_of_the_gears_on_which_torque_is_measured(name, profile, capsys):
+    """Of motor currents the friction of gears hides whose arm it is: `check_fits` does not ask there."""
+    _print(replace(load_profile(profile), arm_name=name), _of_motors(replace(load_profile(profile), arm_name=name)))
+    said = capsys.readouterr().err
+    assert ("above 60 it is another arm's" in said) == (not arm(name).motor_torque)
+    assert ("another arm of the type stays below" in said) == arm(name).motor_torque
 
 
 def test_a_figure_is_of_the_profile_s_own_arm_in_the_form_that_its_name_says(profile, capsys, tmp_path):
