@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from armload.app.cli import main
-from armload.app.cli.profile import _next
+from armload.app.cli.profile import _next, _of_motors, _print
 from armload.arms import arm
 from armload.inertia import InertialParameters
 from armload.motion import random_motion, save_motion, taie2024
@@ -76,6 +78,15 @@ def test_show_says_what_is_known_and_how_the_arm_drifted(profile, capsys, tmp_pa
     fields = json.loads(capsys.readouterr().out)
     assert len(fields["sessions"]) == 3
     assert np.isfinite(fields["drift_offset"]).all()
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e"])
+def test_what_a_misfit_tells_is_said_of_the_side_of_the_gears_on_which_torque_is_measured(name, profile, capsys):
+    """Of motor currents the friction of gears hides whose arm it is: `check_fits` does not ask there."""
+    _print(replace(load_profile(profile), arm_name=name), _of_motors(replace(load_profile(profile), arm_name=name)))
+    said = capsys.readouterr().err
+    assert ("above 60 it is another arm's" in said) == (not arm(name).motor_torque)
+    assert ("another arm of the type stays below" in said) == arm(name).motor_torque
 
 
 def test_a_figure_is_of_the_profile_s_own_arm_in_the_form_that_its_name_says(profile, capsys, tmp_path):
@@ -243,6 +254,32 @@ def test_a_stream_adds_to_what_its_profile_s_file_holds_when_it_ends(folder, lon
     assert main(argv) == 0
     names = [session.name.rsplit("/", 1)[-1] for session in load_profile(path).sessions]
     assert names == ["day0.csv", "day1.csv", "day2.csv", "day3.csv", "long.csv"]
+
+
+def test_a_stream_that_is_stopped_by_sigterm_has_taught_its_profile(long, profile, tmp_path, monkeypatch, capsys):
+    from armload.app.cli import headless
+
+    path, streamed = tmp_path / "stopped.profile", headless.lines
+    path.write_bytes(profile.read_bytes())
+
+    def stopped(*given):
+        yield from streamed(*given)
+        os.kill(os.getpid(), signal.SIGTERM)
+        yield from ()
+
+    def unheard(*_):
+        raise AssertionError("SIGTERM was not heard")
+
+    monkeypatch.setattr(headless, "lines", stopped)
+    before = signal.signal(signal.SIGTERM, unheard)
+    try:
+        argv = ["live", long, "--robot", "panda", "--profile", str(path), "--learn", "--headless", "--speed", "max"]
+        assert main(argv) == 130
+        assert signal.getsignal(signal.SIGTERM) is unheard
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert "learned 22 s" in capsys.readouterr().err
+    assert len(load_profile(path).sessions) == 4
 
 
 def test_a_known_weight_below_a_known_tool_weighs_as_much_as_both(folder, profile, tmp_path):

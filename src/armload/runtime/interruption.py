@@ -43,3 +43,23 @@ def held_back() -> Iterator[Interruption]:
             signal.signal(number, handler)
         if interruption.name is not None:
             raise KeyboardInterrupt
+
+
+@contextmanager
+def ended_by_sigterm() -> Iterator[None]:
+    """Within, SIGTERM, by which a service or a container is stopped, ends as Ctrl-C does: what is left to do is done.
+
+    In another thread than the main one, where signals do not come, nothing is changed.
+    """
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 import time
+from contextlib import nullcontext
 from typing import TYPE_CHECKING
 
 from armload.app.cli.arguments import (
@@ -24,7 +25,7 @@ from armload.app.cli.named import arm_of, columns_for, columns_of, payload_of, r
 from armload.app.cli.outputs import check_output
 from armload.app.cli.printing import print_note
 from armload.errors import ArmloadError, IdentificationError, ModelError, UsageError
-from armload.runtime.interruption import held_back
+from armload.runtime.interruption import ended_by_sigterm, held_back
 
 if TYPE_CHECKING:
     from armload.arms import Arm
@@ -192,7 +193,10 @@ def run(options: argparse.Namespace) -> int | None:
     age, aged = age_of(tare, began, options.tare_age)
     for note in aged:
         _warn(note)
-    with Steadied(source) if options.steady else source as source:
+    with (
+        ended_by_sigterm() if options.learn else nullcontext(),
+        Steadied(source) if options.steady else source as source,
+    ):
         recorder = Recorder(mcap, arm.n, arm.joint_names) if mcap else None
         more = {"known": known, "recorder": recorder, "tare_age": age}
         session = Session(source, arm, tare, options.method, _warn, profile, **more)

@@ -127,7 +127,7 @@ def run(options: argparse.Namespace) -> None:
     if options.json:
         print_json(_fields(profile) | {"out": options.out})
         return
-    _print(profile)
+    _print(profile, arm.motor_torque)
     size = Path(options.out).stat().st_size / 1e6
     use = f"armload identify LOG --robot {options.robot} --profile {options.out}"
     print(f"wrote {options.out} ({size:.1f} MB); use it with: {use}")
@@ -171,9 +171,15 @@ def _show(options: argparse.Namespace) -> None:
     if options.json:
         print_json(_fields(profile))
         return
-    _print(profile)
+    _print(profile, _of_motors(profile) if arm is None else arm.motor_torque)
     if options.figure is not None:
         print_note(f"wrote {options.figure}")
+
+
+def _of_motors(profile: Profile) -> bool:
+    from armload.arms import ARMS
+
+    return profile.arm_name in ARMS and ARMS[profile.arm_name].torque_side == "motor"
 
 
 def _arm_of(profile: Profile) -> Any:
@@ -206,7 +212,7 @@ def _fields(profile: Profile) -> dict[str, Any]:
     }
 
 
-def _print(profile: Profile) -> None:
+def _print(profile: Profile, of_motors: bool) -> None:
     from armload.inertia import Z95
     from armload.posterior.drift import CHANGED
 
@@ -231,9 +237,14 @@ def _print(profile: Profile) -> None:
         name, time = _name(session), f"{session.duration:.0f}"
         rows.add_row(name, time, offsets, f"{session.statistic:.0f}", f"{max(session.noise):.1f}")
     console().print(rows)
+    others = (
+        "of motor currents another arm of the type stays below, too"
+        if of_motors
+        else (f"above {CHANGED:.0f} it is another arm's")
+    )
     print_note(
         f"misfit is T of how the session's offsets and friction differ from the others': about {_USUAL * n} or less, "
-        f"above {CHANGED:.0f} it is another arm's; noise is over what is expected, the largest joint's"
+        f"{others}; noise is over what is expected, the largest joint's"
     )
     for line in _next(profile):
         print_note(line)
