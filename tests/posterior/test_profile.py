@@ -14,7 +14,7 @@ from armload.inertia import InertialParameters
 from armload.lab.episodes import draw_episodes
 from armload.lab.episodes.motion_kinds import MotionSource
 from armload.online import OnlineIdentifier
-from armload.posterior import HybridIdentifier, learn_profile, load_profile, save_profile
+from armload.posterior import HybridIdentifier, learn_profile, load_profile, profile_learning, save_profile
 from armload.posterior.problem import Problem
 from armload.posterior.profile import remembered
 from armload.posterior.profile_learning import by_clock
@@ -135,6 +135,20 @@ def test_a_session_that_is_added_is_held_against_the_drift_of_all_as_those_befor
     grown = learn_profile(panda, [shifted], known=young)
     assert abs(grown.sessions[-1].offset[0]) > 1.0
     assert grown.sessions[-1].statistic <= 3 * panda.n * (len(grown.sessions) + 3)
+
+
+def test_of_many_sessions_those_beyond_a_number_are_added_one_by_one(panda, life, profile, monkeypatch):
+    """So that memory stays bounded: what is known agrees within a third of its deviation, whatever the logs' order."""
+    monkeypatch.setattr(profile_learning, "AT_ONCE", 4)
+    told: list[tuple[int, int]] = []
+    many = learn_profile(panda, life[1], progress=lambda done, total: told.append((done, total)))
+    back = learn_profile(panda, life[1][::-1])
+    assert told == [(k, DAYS) for k in range(1, DAYS + 1)]
+    assert {one.name for one in many.sessions} == {one.name for one in profile.sessions}
+    (phi, covariance), (own, _), (again, _) = (one.mounted(panda) for one in (profile, many, back))
+    std = np.sqrt(np.diag(covariance))
+    assert np.all(np.abs(own - phi) < std / 3.0)
+    assert np.all(np.abs(own - again) < std / 30.0)
 
 
 def test_a_profile_with_another_gain_is_another_one(young):

@@ -28,7 +28,7 @@ from armload.posterior.drift import SESSION
 from armload.posterior.problem import Problem
 from armload.posterior.profile import Profile, SessionRecord, attached_mass, fingerprint, remembered
 from armload.posterior.profile_agreement import carried, check_agree
-from armload.posterior.profile_session import STATED, log_data, poses, record, with_session, without_drift
+from armload.posterior.profile_session import STATED, check_fits, log_data, poses, record, with_session, without_drift
 from armload.posterior.scales import Scales
 from armload.posterior.solve import threads
 from armload.recording import Recording, digest_of, marks_of
@@ -42,6 +42,9 @@ from armload.regression.noise import SMOOTH
 CAPACITIES = (128, 256, 384)
 # by which factor the noise of a log may count for more, by steps that a density can tell apart
 REPEATED = tuple(2.0**k for k in range(7))
+# sessions that are learned together, whose own offsets and friction are unknowns of one solution: memory grows with the
+# cube of their number, to 5 GB. What is beyond is added one after another, as to a profile that there is
+AT_ONCE = 48
 _FEWEST = 4  # logs below which none is left out: then capacity and noise are those of a tare
 _FOLDS = 5  # into which the logs are parted
 _STEPS = 5  # of expectation–maximisation, as for a tare
@@ -70,33 +73,56 @@ def learn_profile(
         progress: called as progress(done, total) after every log.
 
     Raises:
-        IdentificationError: no log, the same measurements twice, or a log that carries what the others do not.
+        IdentificationError: no log, the same measurements twice, or a log that carries what the others do not; of more
+            than `AT_ONCE` sessions also one of another arm.
         ModelError: `known` is of another arm.
     """
     if not logs:
         raise IdentificationError("a profile needs at least one log of the arm: found none")
     check_new(logs, known)
     correction = Correction(arm, rated_effort(arm))
-    if known is not None:
-        known.check(arm)
-        features = known.features
-    else:
-        features = JointFeatures(arm.n, CAPACITIES[-1] if len(logs) >= _FEWEST else CAPACITIES[0])
     numbers = list(sessions) if sessions is not None else by_clock(logs)
     tools = list(mounted) if mounted is not None else [None] * len(logs)
-    parts = []
-    for k, (log, tool) in enumerate(zip(logs, tools, strict=True)):
-        parts.append(log_data(correction, log, features, Session(numbers[k] + 1, 1.0), tool))
+    told = 0
+
+    def rows(k: int, features: JointFeatures) -> RegressionData:
+        nonlocal told
+        data, told = log_data(correction, logs[k], features, Session(numbers[k] + 1, 1.0), tools[k]), told + 1
         if progress is not None:
-            progress(k + 1, len(logs))
-    with threads().limit(limits=1):
-        if known is None:
-            return _learned(correction, parts, logs)
-        for number in dict.fromkeys(numbers):
-            of = [k for k in range(len(logs)) if numbers[k] == number]
-            data = RegressionData.joined([parts[k] for k in of])
+            progress(told, len(logs))
+        return data
+
+    later = list(range(len(logs)))
+    if known is not None:
+        known.check(arm)
+    else:
+        features = JointFeatures(arm.n, CAPACITIES[-1] if len(logs) >= _FEWEST else CAPACITIES[0])
+        together = _together(logs, numbers)
+        parts = [rows(k, features) for k in together]
+        with threads().limit(limits=1):
+            known = _learned(correction, parts, [logs[k] for k in together])
+        del parts
+        later = [k for k in later if k not in set(together)]
+        for k in later:
+            check_fits(known, arm, logs[k], tools[k])
+    for number in dict.fromkeys(numbers[k] for k in later):
+        of = [k for k in later if numbers[k] == number]
+        data = RegressionData.joined([rows(k, known.features) for k in of])
+        with threads().limit(limits=1):
             known = with_session(known, correction, data, [logs[k] for k in of])
-        return known
+    return known
+
+
+def _together(logs: Sequence[Recording], numbers: Sequence[int]) -> list[int]:
+    """The logs of the sessions that are learned together; of many, the samples themselves decide which."""
+    if len(set(numbers)) <= AT_ONCE:
+        return list(range(len(logs)))
+    first: dict[int, str] = {}
+    for number, log in zip(numbers, logs, strict=True):
+        digest = digest_of(log)
+        first[number] = min(first.get(number, digest), digest)
+    kept = set(sorted(first, key=lambda number: first[number])[:AT_ONCE])
+    return [k for k, number in enumerate(numbers) if number in kept]
 
 
 def check_new(logs: Sequence[Recording], known: Profile | None) -> None:
