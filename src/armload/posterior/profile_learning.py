@@ -43,8 +43,9 @@ CAPACITIES = (128, 256, 384)
 # by which factor the noise of a log may count for more, by steps that a density can tell apart
 REPEATED = tuple(2.0**k for k in range(7))
 # sessions that are learned together, whose own offsets and friction are unknowns of one solution: memory grows with the
-# cube of their number, to 7 GB here. What is beyond is added one after another, as to a profile that there is
-AT_ONCE = 48
+# square of their number and faster, 1 GB with 12 of a Panda, 2 with 24, 7 with 48. A stated bound: what is beyond is
+# added one after another, as to a profile that there is
+AT_ONCE = 24
 _FEWEST = 4  # logs below which none is left out: then capacity and noise are those of a tare
 _FOLDS = 5  # into which the logs are parted
 _STEPS = 5  # of expectation–maximisation, as for a tare
