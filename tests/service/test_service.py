@@ -20,6 +20,7 @@ import pytest
 
 from armload.payloads import test_payload
 from armload.recording import write_recording
+from armload.service import ArmSettings, Service, ServiceSettings
 
 HELD = test_payload().parameters
 # for four minutes at most, and never before other processes, whatever priority it was started with
@@ -303,6 +304,25 @@ def test_on_busy_cores_the_age_is_what_an_outsider_measures(serve, cell):
             process.kill()
         for process in busy:
             process.wait()
+
+
+@pytest.mark.parametrize(
+    ("stopped", "answered", "ends"), [(False, False, True), (False, True, False), (True, False, False)]
+)
+def test_an_error_ends_a_service_only_if_an_arm_cannot_begin(monkeypatch, stopped, answered, ends):
+    settings = ServiceSettings((ArmSettings("panda", name="left", source="sim"),))
+    service = Service(settings)
+    process = subprocess.Popen([sys.executable, "-c", ""], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    monkeypatch.setattr(service, "_started", lambda _: process)
+    monkeypatch.setattr(service, "_listen", lambda *_: "no such thing")
+    service._answers["left"]["t"] = 1.0 if answered else None
+    if stopped:
+        service._gone.set()
+    with process:
+        how = service._one_life(settings.arms[0])
+    service.close()
+    assert (service.error is not None) == ends
+    assert how == ("ended: no such thing" if answered else None)
 
 
 @pytest.mark.parametrize("stream", ["stdout", "stderr"])

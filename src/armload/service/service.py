@@ -149,11 +149,15 @@ class Service:
             _hang_up(process)
             code = process.wait()
             self.processes.pop(name, None)
-        if error is not None and self._restarts[name] == 0:  # later it may be a file that is being written anew
-            self.error = f"{name}: {error}"
-            return None
         if error is not None:
-            return f"cannot begin: {error}"
+            if self._gone.is_set():  # as it was ended
+                return None
+            with self._state:
+                answered = self._answers[name].get("t") is not None
+            if not answered and self._restarts[name] == 0:  # later it may be a file that is being written anew
+                self.error = f"{name}: {error}"
+                return None
+            return f"{'ended' if answered else 'cannot begin'}: {error}"
         if code == 0:
             return None
         return f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
