@@ -313,6 +313,15 @@ def test_what_holds_of_every_kind_of_log_is_what_was_measured():
     )
 
 
+def test_the_table_of_the_first_two_seconds_is_that_of_the_committed_run(monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "benchmarks"))
+    early = importlib.import_module("early_limits")
+    found = json.loads((RESULTS / "early_limits.json").read_text())
+    assert found["asked"] == pytest.approx(early.ASKED)
+    changes = [early.Change(**one) for one in found["changes"]]
+    assert early.table(changes) in (ROOT / "docs" / "online_measured.md").read_text(encoding="utf-8")
+
+
 def test_what_holds_for_a_minute_is_what_was_measured():
     page = (ROOT / "docs" / "hybrid_measured.md").read_text(encoding="utf-8")
     found = json.loads((RESULTS / "minute_logs.json").read_text())

@@ -10,7 +10,7 @@ from armload.app.cli import main
 from armload.errors import RecordingError, UsageError
 from armload.recording import ColumnSpec
 from armload.service import ArmSettings, ServiceSettings, read_settings
-from armload.service.settings import read_token
+from armload.service.access import read_token
 
 CELL = """
 every = 0.5

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote, urlsplit
 
 from armload.errors import UsageError
-from armload.service.settings import is_loopback
+from armload.service.access import is_loopback
 
 if TYPE_CHECKING:
     from armload.service.service import Service

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import ipaddress
 import json
 import math
 import re
@@ -18,6 +17,7 @@ from armload.errors import IdentificationError, UsageError
 from armload.identification.arm_options import ArmOptions
 from armload.identification.known_options import KnownOptions, centre, weighed
 from armload.recording.growing_file import RECORDS
+from armload.service.access import is_loopback, read_token
 from armload.service.idle import check_arm, check_service
 from armload.service.mqtt import checked
 from armload.service.webhook import check_webhook
@@ -190,14 +190,6 @@ class ServiceSettings:
             )
 
 
-def is_loopback(host: str) -> bool:
-    """Whether an address is of this machine alone."""
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
-
-
 def read_settings(path: str | Path, **over: Any) -> ServiceSettings:
     """The settings in a TOML file; paths in it are relative to its folder.
 
@@ -224,25 +216,6 @@ def read_settings(path: str | Path, **over: Any) -> ServiceSettings:
     if file is not None:
         service["token"] = read_token(path.parent / str(file))
     return ServiceSettings(arms, **{**service, **over})
-
-
-def read_token(path: str | Path) -> str:
-    """The token in a file.
-
-    Raises:
-        UsageError: the file cannot be read, or holds fewer than 16 characters.
-    """
-    try:
-        token = Path(path).read_text(encoding="utf-8").strip()
-    except OSError as error:
-        raise UsageError(f"the token's file {path} cannot be read: {error.strerror}") from None
-    except ValueError:  # bytes that are no UTF-8, or a name with a zero in it
-        raise UsageError(
-            f"the token's file {str(path)!r} is no text: expected 16 characters of ASCII or more"
-        ) from None
-    if len(token) < 16 or not token.isascii():
-        raise UsageError(f"the token in {path} has {len(token)} characters: expected 16 or more, all of ASCII")
-    return token
 
 
 def _arm(table: dict[str, Any], path: Path) -> ArmSettings:

@@ -284,7 +284,7 @@ def _warn(text: str) -> None:
 
 def _serve(session, options: argparse.Namespace) -> int | None:
     from armload.app.page.page import Page
-    from armload.service.settings import read_token
+    from armload.service.access import read_token
 
     token = None if options.token_file is None else read_token(options.token_file)
     page = None

@@ -9,7 +9,8 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from armload.app.cli.arguments import COLUMN_OPTIONS, check_tare_age, given, refuse_idle
+from armload.app.cli.arguments import COLUMN_OPTIONS, check_tare_age
+from armload.app.cli.idle import given, refuse_idle
 from armload.app.cli.measure_arguments import parser
 from armload.app.cli.named import (
     arm_of,

@@ -7,7 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armload.app.cli.arguments import AS_NAMED, COLUMN_OPTIONS, given, refuse_idle
+from armload.app.cli.arguments import AS_NAMED, COLUMN_OPTIONS
+from armload.app.cli.idle import given, refuse_idle
 from armload.app.cli.printing import print_note
 from armload.errors import RecordingError, UsageError
 

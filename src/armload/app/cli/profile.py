@@ -12,11 +12,10 @@ from armload.app.cli.arguments import (
     add_arm_arguments,
     add_column_arguments,
     file_name,
-    given,
     output_file,
-    refuse_idle,
     weighed,
 )
+from armload.app.cli.idle import given, refuse_idle
 from armload.app.cli.named import arm_of, payload_of, read_logs
 from armload.app.cli.outputs import check_unchanged, contents_of
 from armload.app.cli.printing import console, print_json, print_note, table, working

@@ -15,10 +15,9 @@ from armload.app.cli.arguments import (
     add_column_arguments,
     at_least,
     file_name,
-    given,
     output_file,
-    refuse_idle,
 )
+from armload.app.cli.idle import given, refuse_idle
 from armload.app.cli.named import arm_of, arm_of_dataset, payload_of, read_logs
 from armload.app.cli.outputs import check_page
 from armload.app.cli.printing import print_note, print_table, working

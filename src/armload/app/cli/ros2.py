@@ -14,9 +14,8 @@ from armload.app.cli.arguments import (
     at_least,
     check_tare_age,
     file_name,
-    given,
-    refuse_idle,
 )
+from armload.app.cli.idle import given, refuse_idle
 from armload.app.cli.named import arm_of, motion_of, payload_of, read_logs, world_of
 from armload.app.cli.printing import print_note
 

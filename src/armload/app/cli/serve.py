@@ -125,7 +125,7 @@ def run(options: argparse.Namespace) -> int | None:
 def settings_of(options: argparse.Namespace) -> ServiceSettings:
     """What a command line asks for."""
     from armload.service import ArmSettings, ServiceSettings, read_settings
-    from armload.service.settings import read_token
+    from armload.service.access import read_token
 
     names = ("every", "host", "port", "webhook", "mqtt", "duration")
     over: dict[str, Any] = {name: value for name in names if (value := getattr(options, name)) is not None}

@@ -15,7 +15,7 @@ from urllib.parse import quote
 from armload.app.page.token_door import TokenDoor
 from armload.errors import UsageError
 from armload.runtime.extras import install
-from armload.service.settings import is_loopback
+from armload.service.access import is_loopback
 
 # [length of all links] from what is looked at to the eye: the whole arm is seen, or the payload and the wrist
 _FROM_AFAR, _FROM_CLOSE = (0.7, -0.7, 0.28), (0.3, -0.3, 0.12)

@@ -18,7 +18,7 @@ from http.cookies import CookieError, SimpleCookie
 from urllib.parse import SplitResult, parse_qs, quote, unquote, urlsplit
 
 from armload.errors import UsageError
-from armload.service.settings import is_loopback
+from armload.service.access import is_loopback
 
 _PATIENCE = 10.0  # [s] for a request's head
 _MOST = 64  # connections at once: a page takes a few for each who looks on
