@@ -319,7 +319,14 @@ def test_the_table_of_the_first_two_seconds_is_that_of_the_committed_run(monkeyp
     found = json.loads((RESULTS / "early_limits.json").read_text())
     assert found["asked"] == pytest.approx(early.ASKED)
     changes = [early.Change(**one) for one in found["changes"]]
-    assert early.table(changes) in (ROOT / "docs" / "online_measured.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "online_measured.md").read_text(encoding="utf-8")
+    assert early.table(changes) in page
+    assert found["asked on motor currents"] == pytest.approx(early.ASKED_MOTOR)
+    logs = {}
+    for name, real in found["real"].items():
+        nothing = [one.pop("nothing") for one in real]
+        logs[name] = list(zip([early.Change(**one) for one in real], nothing, strict=True))
+    assert early.real_table(logs) in page
 
 
 def test_what_holds_for_a_minute_is_what_was_measured():
