@@ -256,6 +256,20 @@ def test_a_family_that_the_log_denies_says_nothing_of_what_is_undetermined_eithe
     np.testing.assert_allclose(ends[1].low, ends[0].low, atol=1e-9)
 
 
+def test_a_drawing_determines_only_what_it_says(tray):
+    """An inertia that it leaves open by three times its own size is determined by a log that tells it, or not at all."""
+    held, log, _, panda = tray
+    short = log.between(0.0, 1.0)
+    open_ended = Payload("tray", held, uncertainty=Uncertainty(0.01, 2e-3, 3.0))
+    alone, vague = identify(short, panda), identify(short, panda, body=open_ended)
+    exact = identify(short, panda, body=Payload("tray", held, uncertainty=STATED))
+    assert not alone.determined[4:].all()
+    assert vague.determined[:4].all()
+    assert not vague.determined[4:].all()
+    assert inside(vague.phi_low, held, vague.phi_high)
+    assert exact.determined.all()
+
+
 def test_of_a_kind_that_was_given_nobody_is_sent_to_another_method(tray):
     _, log, tare, panda = tray
     notes = " ".join(identify(log, panda, tare=tare, family="wide").notes)

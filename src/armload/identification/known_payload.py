@@ -11,7 +11,7 @@ from armload.errors import IdentificationError
 from armload.estimators import Identifier
 from armload.identification.intervals import Before
 from armload.identification.thresholds import LEANS
-from armload.inertia import NAMES, UNITS, Z95
+from armload.inertia import NAMES, UNITS, Z95, inertia_matrix
 from armload.inertia import determined as determined_by
 from armload.posterior import HybridIdentifier, Known, KnownBody, KnownCentre, KnownMass, PosteriorLeastSquares
 
@@ -101,16 +101,25 @@ def determined_with(
     """Which parameters (10,) the log or what is known determines.
 
     Args:
-        determined: by the log alone (10,). known: what an answer rests on, too; of a body all are. std: of the answer
-            (10,). before: what was known of any payload.
+        determined: by the log alone (10,). known: what an answer rests on, too. std: of the answer (10,). before: what
+            was known of any payload.
     """
     if known is None:
         return determined
     if known.body is not None:
-        return np.ones(10, dtype=bool)
+        return determined | determined_by(std, np.maximum(before.std, _sizes(known.body.phi)))
     given = determined_by(std, before.std) & known.which
     given[1:4] &= given[0] | determined[0]
     return determined | given
+
+
+def _sizes(phi: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How large each of the ten is of such a body: the least spread that says nothing of it, however large a body is.
+
+    Of a moment or a product of inertia that is zero by symmetry it is the size of its like.
+    """
+    moments = np.full(3, np.linalg.norm(phi[1:4]))
+    return np.r_[abs(phi[0]), moments, np.full(6, np.abs(inertia_matrix(phi[4:]).diagonal()).max())]
 
 
 def rests_on_prior(
