@@ -257,7 +257,7 @@ def test_a_family_that_the_log_denies_says_nothing_of_what_is_undetermined_eithe
 
 
 def test_a_drawing_determines_only_what_it_says(tray):
-    """An inertia that it leaves open by three times its own size is determined by a log that tells it, or not at all."""
+    """An inertia that it leaves open by three times its size is determined by a log that tells it, or not at all."""
     held, log, _, panda = tray
     short = log.between(0.0, 1.0)
     open_ended = Payload("tray", held, uncertainty=Uncertainty(0.01, 2e-3, 3.0))
