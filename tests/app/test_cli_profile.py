@@ -126,10 +126,19 @@ def test_a_session_of_several_logs_is_shown_with_all_their_names(folder, capsys,
 def test_a_log_that_fits_less_well_than_an_arm_s_own_is_named(profile):
     known = load_profile(profile)
     assert not any("was it made by this arm?" in line for line in _next(known))
-    odd = replace(known.sessions[1], statistic=30.0)
+    odd = replace(known.sessions[1], statistic=48.0)
     said = [line for line in _next(replace(known, sessions=(known.sessions[0], odd))) if "misfit" in line]
     assert len(said) == 1
     assert said[0].startswith("day1.csv fits less well")
+
+
+def test_of_a_hundred_profiles_of_many_sound_sessions_hardly_one_asks_about_any(profile):
+    """Sessions of one arm, T as its definition has it: chi-squared of three for each joint."""
+    known, rng, asked = load_profile(profile), np.random.default_rng(4), 0
+    for _ in range(300):
+        found = (replace(known.sessions[0], statistic=float(T)) for T in rng.chisquare(3 * known.n, size=40))
+        asked += any("made by this arm" in line for line in _next(replace(known, sessions=tuple(found))))
+    assert 0 < asked <= 9
 
 
 def test_update_adds_a_session_and_refuses_a_payload(folder, profile, capsys, tmp_path):

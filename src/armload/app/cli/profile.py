@@ -41,8 +41,9 @@ same in all of them. With --mass, the log is of a known weight, which tells how 
 Use it with: armload identify LOG --profile arm.profile
 """
 
-# T of a session per joint up to which it is like the others: offset and two friction terms have a mean of 1 each
-_USUAL = 3
+# share of sound profiles in which a session is asked about. T of a session like the others is chi-squared: an offset
+# and two friction terms of each joint; of simulated arms that drift as assumed it is about half of that
+_ASKED = 0.01
 
 
 def parser() -> Parser:
@@ -242,7 +243,7 @@ def _print(profile: Profile, of_motors: bool) -> None:
         else (f"above {CHANGED:.0f} it is another arm's")
     )
     print_note(
-        f"misfit is T of how the session's offsets and friction differ from the others': about {_USUAL * n} or less, "
+        f"misfit is T of how the session's offsets and friction differ from the others': about {3 * n} or less, "
         f"{others}; noise is over what is expected, the largest joint's"
     )
     for line in _next(profile):
@@ -252,6 +253,15 @@ def _print(profile: Profile, of_motors: bool) -> None:
 def _name(session: SessionRecord) -> str:
     """The names of a session's logs, without their folders."""
     return ", ".join(Path(log).name for log in session.name.split(", "))
+
+
+def _most(profile: Profile) -> float:
+    """T that the sessions of one arm seldom reach, however many there are."""
+    from scipy.stats import chi2
+
+    from armload.posterior.drift import CHANGED
+
+    return min(CHANGED, float(chi2.isf(_ASKED / len(profile.sessions), 3 * profile.n)))
 
 
 def _next(profile: Profile) -> tuple[str, ...]:
@@ -266,7 +276,7 @@ def _next(profile: Profile) -> tuple[str, ...]:
         else f"{_name(session)} fits less well than an arm's own logs do (misfit {session.statistic:.0f}): was it made "
         "by this arm?"
         for session in profile.sessions
-        if session.statistic > _USUAL * profile.n
+        if session.statistic > _most(profile)
     ]
     common = common_gain(profile)
     if common is not None:
