@@ -432,6 +432,18 @@ def test_a_torque_that_is_computed_and_not_measured_is_told_by_its_lack_of_frict
     assert COMPUTED not in identify(replace(wanted, tau=wanted.tau + rubs), panda).notes
 
 
+def test_a_computed_torque_is_never_called_calibrated_where_gears_would_rub_in_it():
+    """A UR's target_moment, named by its user: what is held is not in it."""
+    robot = arm("ur5e")
+    t = np.arange(0.0, 6.0, 5e-3)
+    q, dq, ddq = random_motion(robot, 7, duration=6.0)(t)
+    empty = random_motion(robot, 8, duration=6.0)(t)
+    wanted, before = (Recording(t, *x[:2], robot.torque(*x)) for x in ((q, dq, ddq), empty))
+    for found in (identify(wanted, robot), identify(wanted, robot, tare=before)):
+        assert COMPUTED in found.notes
+        assert found.interval == "approximate"
+
+
 @pytest.mark.parametrize(
     ("name", "turned"),
     [

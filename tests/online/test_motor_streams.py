@@ -10,9 +10,10 @@ import pytest
 from scipy.signal import savgol_filter
 
 from armload import OnlineIdentifier, Recording, arm, read_recording
-from armload.arms import payload_regressor
+from armload.arms import payload_regressor, rated_effort
 from armload.inertia import com_to_phi
 from armload.motion import JoinedMotion, StraightMotion, random_motion
+from armload.recording import Sample
 from armload.simulation import Sensors, World, simulate
 
 RATE = 200.0
@@ -92,3 +93,23 @@ def test_half_a_kilogram_more_on_a_real_arm_is_never_denied(real_pair, taken):
     for after in (0.5, 1.0, 2.0, 4.9):
         one = estimates[np.searchsorted(log.t, taken + after) - 1]
         assert one.low[0] <= 2.805 + 0.5 <= one.high[0]
+
+
+def test_an_arm_that_moves_is_not_too_slow_while_its_rows_are_left_out():
+    """What is doubted, or follows a change, is taken by no run, and counts as motion all the same."""
+    robot = arm("ur5e")
+    t = np.arange(0.0, 6.0, 0.01)
+    moved = np.where(t < 4.0, t, np.maximum(t - 1.0, 4.0))[:, None]  # it stands from 4 to 5 s
+    speed = ((t < 4.0) | (t > 5.0))[:, None] * 2.0 * np.pi * np.array([0.5, 1.0, 0.5, 1.0, 1.5, 1.0])
+    angle = 2.0 * np.pi * np.array([0.5, 1.0, 0.5, 1.0, 1.5, 1.0]) * moved
+    q, dq = np.array([0.0, -1.4, 1.6, -1.6, -1.5, 0.0]) - 0.2 * np.cos(angle), 0.2 * speed * np.sin(angle)
+    tau = robot.torque(q, dq, 0.2 * speed**2 * np.cos(angle)) + 0.05 * rated_effort(robot) * np.tanh(dq / 0.03)
+    identifier = OnlineIdentifier(robot)
+    for k in np.flatnonzero(t < 4.9):
+        identifier.update(t[k], q[k], dq[k], tau[k])
+    weighing, run = identifier._watch._weighing, identifier.engine
+    assert weighing.blind
+    for k in np.flatnonzero(t >= 4.9):
+        weighing.passed_over(Sample(t[k], q[k], dq[k], tau[k]), run, run.stream.state)
+    assert not weighing.blind
+    identifier.close()

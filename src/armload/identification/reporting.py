@@ -68,7 +68,7 @@ def answered(
     mass_std = float(estimate.std[0])
     if determined[0] and -HELD * mass_std <= estimate.phi[0] < -Z95 * mass_std:
         every_note.append(less_than_nothing(float(estimate.phi[0]), mass_std, relative_to))
-    if found.frictionless:
+    if found.frictionless and COMPUTED not in doubts:
         every_note.append(COMPUTED)
     if found.friction_found:
         every_note.append(
@@ -123,7 +123,8 @@ def _doubts(found: Found, arm: Arm, mass_determined: bool, relative_to: str) -> 
     else:
         leans = leaning(arm, found.tilt, "motor" if arm.motor_torque or found.friction_found else "link")
     driven = driven_by_friction(found.backwards) if found.backwards else None
-    doubts = driven, leans, _doubt(found, arm, mass_determined, relative_to)
+    computed = COMPUTED if found.frictionless and arm.motor_torque else None  # gears rub in every motor's current
+    doubts = driven, computed, leans, _doubt(found, arm, mass_determined, relative_to)
     return [doubt for doubt in doubts if doubt is not None]
 
 

@@ -23,6 +23,10 @@ A payload that changes at a cut is two payloads, phi before and phi after, in th
     ln p(tau | cut) = −½·yᵀ·K⁻¹·y − ½·ln|K|
 
 is averaged over the cuts, none of which is likelier than another.
+
+Torque of the motors' side holds viscous friction and the inertia of the rotors, too. On a motion to and fro, whose
+acceleration is opposite to its position, they look like gravity that is missing: what is called so has to be so with
+both among the unknowns (`gears`). The first question is asked without them, as they would hide another arm.
 """
 
 from __future__ import annotations
@@ -51,6 +55,9 @@ from armload.regression.prior import within_reach
 
 _MOST_WINDOWS = 120  # spread over the log: one factor needs no more, whatever the log's length
 _ALIKE = 4  # neighbouring windows that err alike, and count for one
+# [rated torques per rad/s, per rad/s²] standard deviation of viscous friction and of the rotors' inertia, as motor
+# currents show them: a UR10e's joints have 0.04 to 0.06, and 0.008 to 0.024 where both are fitted beside gravity
+_VISCOUS, _ROTOR = 0.05, 0.02
 _POINTS = 9  # model evaluations per window of 0.25 s: the trapezoidal rule errs by 0.3 % at 1 Hz
 _WEIGHT = np.r_[0.5, np.ones(_POINTS - 2), 0.5] / (_POINTS - 1)  # of each in its mean
 
@@ -96,15 +103,16 @@ def torque_scale(
     constants: NDArray[np.float64] | None = None,
     most: int = _MOST_WINDOWS,
     lacks: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
+    gears: bool = False,
 ) -> TorqueScale | None:
     """Fit the model above to a log; None if the log is too short to say anything.
 
     constants: (n,) [N·m/A] if tau is current. most: windows, spread over the log. lacks: what was taken out of tau, at
-    positions (M, n), (M, n) [N·m].
+    positions (M, n), (M, n) [N·m]. gears: whether viscous friction and the rotors' inertia may be in tau, too.
     """
     if constants is not None:
         recording = replace(recording, tau=recording.tau * constants)
-    system = _System.of(recording, arm, most, lacks)
+    system = _System.of(recording, arm, most, lacks, gears)
     if system is None:
         return None
     A, b, y, inner = system.A, system.b, system.y, system.inner
@@ -167,6 +175,7 @@ class _System(NamedTuple):
         arm: Arm,
         most: int = _MOST_WINDOWS,
         lacks: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
+        gears: bool = False,
     ) -> _System | None:
         """The model above of a log; None: it is too short to say anything."""
         parts = _some(windows(recording), most)
@@ -179,9 +188,12 @@ class _System(NamedTuple):
         rated = rated_effort(arm)
         offset = np.broadcast_to(np.eye(n), (W, n, n))
         level = friction[:, :, None] * np.eye(n)
-        A = np.concatenate([payload, offset, level], axis=2)  # (W, n, 10 + 2n)
         mass = HEAVIEST * rated_mass(arm)
-        prior = np.concatenate([within_reach(mass), OFFSET * rated, FRICTION * rated])  # standard deviations
+        columns, prior = [payload, offset, level], [within_reach(mass), OFFSET * rated, FRICTION * rated]
+        if gears:
+            columns += [x[:, :, None] * np.eye(n) for x in _changes(recording, parts)]
+            prior += [_VISCOUS * rated, _ROTOR * rated]
+        A, prior = np.concatenate(columns, axis=2), np.concatenate(prior)  # (W, n, 10 + 2n or 4n), standard deviations
         # a joint at rest is held by any friction below stiction: tanh knows nothing of it
         noise = (rated * np.hypot(MODEL_ERROR, STICTION * (1.0 - np.minimum(moving, 1.0)))).ravel()
         return cls(W, A.reshape(W * n, -1) * prior / noise[:, None], own.ravel() / noise, tau.ravel() / noise)
@@ -207,6 +219,13 @@ def _averages(recording: Recording, arm: Arm, parts: Windows) -> tuple[NDArray, 
     friction = integrals(recording, lambda rows: np.tanh(dq[rows] / FRICTION_WIDTH), parts) / T
     moving = integrals(recording, lambda rows: np.abs(np.tanh(dq[rows] / FRICTION_WIDTH)), parts) / T
     return own, payload, tau, friction, moving
+
+
+def _changes(recording: Recording, parts: Windows) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Window means of velocity [rad/s] and acceleration [rad/s²], each (W, n)."""
+    T = (recording.t[parts.last] - recording.t[parts.first])[:, None]
+    q, dq = ((x[parts.last] - x[parts.first]) / T for x in (recording.q, recording.dq))
+    return q, dq
 
 
 def _points(parts: Windows) -> NDArray[np.intp]:

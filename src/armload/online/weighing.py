@@ -144,7 +144,7 @@ class Weighing:
             return False
         self._motor = stream.posterior.torque == "motor"
         self._coulomb = stream.correction.coulomb(stream.posterior.eta)
-        self._moved = 0.0 if row.h <= 0.0 else self._moved + row.h * max(row.weights.tolist())
+        self._has_moved(row)
         h, self.row_t = row.t - self.row_t, row.t
         first = FIRST_MOTOR if self._motor else FIRST_TARED if stream.tares else FIRST_UNTARED
         known = stream.seconds > first
@@ -167,10 +167,15 @@ class Weighing:
         assert state is not None
         if (row := run.stream.look(*sample)) is None:
             return False
+        self._has_moved(row)
         h, self.row_t = row.t - self.row_t, row.t
         if says := 0.0 < h <= GAP:
             self._weigh(row, h, state, run)
         return says
+
+    def _has_moved(self, row: Row) -> None:
+        """Count for how long a joint has moved, whether the run takes the row or not."""
+        self._moved = 0.0 if row.h <= 0.0 else self._moved + row.h * max(row.weights.tolist())
 
     def _weigh(self, row: Row, h: float, state: SequentialPosterior, run: PosteriorLeastSquares) -> None:
         """Weigh a row that the run did not take, or of an arm at rest, for as long as it stands."""

@@ -24,7 +24,12 @@ from armload.errors import UsageError
 if TYPE_CHECKING:
     from armload.posterior import Profile
     from armload.posterior.profile import SessionRecord
+    from armload.recording import Recording
 
+_OF_MOTORS = (
+    "answers with a profile of motor currents are called approximate, as their intervals were not checked: record a "
+    "tare of the same day for those that are to be calibrated, and leave the profile out"
+)
 _USAGE = """armload profile LOG… --robot R --out P [--update] …
        armload profile show P [--figure F.png] [--json]"""
 _EXAMPLES = """\
@@ -124,6 +129,8 @@ def run(options: argparse.Namespace) -> None:
             )
     check_unchanged("--out", options.out, before)
     save_profile(profile, options.out)
+    for note in _notes(logs):
+        print_note(note)
     if options.json:
         print_json(_fields(profile) | {"out": options.out})
         return
@@ -246,8 +253,25 @@ def _print(profile: Profile, of_motors: bool) -> None:
         f"misfit is T of how the session's offsets and friction differ from the others': about {3 * n} or less, "
         f"{others}; noise is over what is expected, the largest joint's"
     )
+    if of_motors:
+        print_note(_OF_MOTORS)
     for line in _next(profile):
         print_note(line)
+
+
+def _notes(logs: list[Recording]) -> list[str]:
+    """What the readers did to the logs; what they did to several alike is said once."""
+    of: dict[str, list[str]] = {}
+    for log in logs:
+        for note in log.notes:
+            alike = note.removeprefix(log.source)
+            of.setdefault(alike, []).append(log.source if alike != note else "")
+    return [
+        sources[0]
+        + (f" and {len(sources) - 1} other log{'s' * (len(sources) > 2)}" if sources[0] and len(sources) > 1 else "")
+        + note
+        for note, sources in of.items()
+    ]
 
 
 def _name(session: SessionRecord) -> str:
