@@ -354,14 +354,18 @@ def test_a_page_whose_browser_slept_shows_nothing_old_as_new(panda, analytic_log
 def test_on_a_tablet_the_picture_is_as_wide_as_the_screen_and_both_panels_are_below_it(holding):
     until(lambda: mass(holding))
     width, height = TABLET
-    picture = until(lambda: holding.locator("[data-dock-root] > :first-child").bounding_box())
-    assert picture["width"] == width
-    assert picture["height"] > 0.3 * height
-    edges = "x => { const r = x.getBoundingClientRect(); return [r.top, r.left, r.right]; }"
-    for part in ("[data-armload=mass]", ".uplot"):  # drawn anew ten times a second: all asked at once
-        boxes = until(lambda part=part: holding.locator(part).evaluate_all(f"all => all.map({edges})"))
-        assert all(top >= picture["y"] + picture["height"] for top, _, _ in boxes)
-        assert all(0.0 <= left < right <= width for _, left, right in boxes)
+    edges = """all => all.map(q => [...document.querySelectorAll(q)].map(x => {
+        const r = x.getBoundingClientRect(); return [r.left, r.top, r.right, r.bottom]; }))"""
+    asked = ["[data-dock-root] > :first-child", "[data-armload=mass]", ".uplot"]
+
+    def laid_out():  # the page is drawn anew ten times a second, and laid out as it fills: all are asked at once
+        (picture, *_), *panels = holding.evaluate(edges, asked)
+        left, _, right, bottom = picture
+        if not all(panels) or (left, right) != (0.0, width) or not 0.3 * height < bottom < height:
+            return False
+        return all(top >= bottom and 0.0 <= left < right <= width for panel in panels for left, top, right, _ in panel)
+
+    until(laid_out)
     folder = os.environ.get("ARMLOAD_PICTURES")
     if folder:
         holding.screenshot(path=Path(folder) / "tablet.png")
