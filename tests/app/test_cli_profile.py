@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from armload.app.cli import main
-from armload.app.cli.profile import _next, _of_motors, _print
+from armload.app.cli.profile_text import next_steps, of_motors, print_profile
 from armload.arms import arm
 from armload.inertia import InertialParameters
 from armload.motion import random_motion, save_motion, taie2024
@@ -83,7 +83,8 @@ def test_show_says_what_is_known_and_how_the_arm_drifted(profile, capsys, tmp_pa
 @pytest.mark.parametrize("name", ["panda", "ur10e"])
 def test_what_a_misfit_tells_is_said_of_the_side_of_the_gears_on_which_torque_is_measured(name, profile, capsys):
     """Of motor currents the friction of gears hides whose arm it is: `check_fits` does not ask there."""
-    _print(replace(load_profile(profile), arm_name=name), _of_motors(replace(load_profile(profile), arm_name=name)))
+    known = replace(load_profile(profile), arm_name=name)
+    print_profile(known, of_motors(known))
     said = capsys.readouterr().err
     assert ("above 60 it is another arm's" in said) == (not arm(name).motor_torque)
     assert ("another arm of the type stays below" in said) == arm(name).motor_torque
@@ -101,9 +102,9 @@ def test_what_was_done_to_the_logs_is_said_once_for_all_of_them(folder, tmp_path
 
 
 def test_that_answers_with_a_profile_of_motor_currents_are_approximate_is_said_when_it_is_learned(profile, capsys):
-    for of_motors in (True, False):
-        _print(load_profile(profile), of_motors)
-        assert ("are called approximate" in capsys.readouterr().err) == of_motors
+    for motors in (True, False):
+        print_profile(load_profile(profile), motors)
+        assert ("are called approximate" in capsys.readouterr().err) == motors
 
 
 def test_a_figure_is_of_the_profile_s_own_arm_in_the_form_that_its_name_says(profile, capsys, tmp_path):
@@ -142,9 +143,9 @@ def test_a_session_of_several_logs_is_shown_with_all_their_names(folder, capsys,
 
 def test_a_log_that_fits_less_well_than_an_arm_s_own_is_named(profile):
     known = load_profile(profile)
-    assert not any("was it made by this arm?" in line for line in _next(known))
+    assert not any("was it made by this arm?" in line for line in next_steps(known))
     odd = replace(known.sessions[1], statistic=48.0)
-    said = [line for line in _next(replace(known, sessions=(known.sessions[0], odd))) if "misfit" in line]
+    said = [line for line in next_steps(replace(known, sessions=(known.sessions[0], odd))) if "misfit" in line]
     assert len(said) == 1
     assert said[0].startswith("day1.csv fits less well")
 
@@ -154,7 +155,7 @@ def test_of_a_hundred_profiles_of_many_sound_sessions_hardly_one_asks_about_any(
     known, rng, asked = load_profile(profile), np.random.default_rng(4), 0
     for _ in range(300):
         found = (replace(known.sessions[0], statistic=float(T)) for T in rng.chisquare(3 * known.n, size=40))
-        asked += any("made by this arm" in line for line in _next(replace(known, sessions=tuple(found))))
+        asked += any("made by this arm" in line for line in next_steps(replace(known, sessions=tuple(found))))
     assert 0 < asked <= 9
 
 

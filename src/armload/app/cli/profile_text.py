@@ -1,0 +1,138 @@
+"""What `armload profile` says of a profile: its sessions, its drift, what does not fit, and what to record next."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from armload.app.cli.printing import console, print_note, table
+
+if TYPE_CHECKING:
+    from armload.posterior import Profile
+    from armload.posterior.profile import SessionRecord
+
+_OF_MOTORS = (
+    "answers with a profile of motor currents are called approximate, as their intervals were not checked: record a "
+    "tare of the same day for those that are to be calibrated, and leave the profile out"
+)
+# share of sound profiles in which a session is asked about. T of a session like the others is chi-squared: an offset
+# and two friction terms of each joint; of simulated arms that drift as assumed it is about half of that
+_ASKED = 0.01
+
+
+def of_motors(profile: Profile) -> bool:
+    """Whether its arm is a built-in one whose torque is measured at the motors."""
+    from armload.arms import ARMS
+
+    return profile.arm_name in ARMS and ARMS[profile.arm_name].torque_side == "motor"
+
+
+def fields_of(profile: Profile) -> dict[str, Any]:
+    """The profile as one JSON object."""
+    from dataclasses import asdict
+
+    n = profile.n
+    drift = profile.drift.reshape(-1, n) ** 0.5
+    return {
+        "robot": profile.arm_name,
+        "frame": profile.frame,
+        "duration": profile.duration,
+        "pose_features": profile.features.pose,
+        "repeated": profile.repeated,
+        "torque_gain": None if profile.gain is None else (1.0 + profile.gain).tolist(),
+        "torque_gain_std": profile.gain_std,
+        "torque_gain_joint_std": None if profile.gain_joint_std is None else profile.gain_joint_std.tolist(),
+        "drift_offset": drift[0].tolist(),
+        "drift_coulomb": drift[1].tolist(),
+        "sessions": [asdict(session) for session in profile.sessions],
+        "next": list(next_steps(profile)),
+    }
+
+
+def print_profile(profile: Profile, motors: bool) -> None:
+    """Print the profile on stdout and what to do about it on stderr; `motors`: its torque is measured at the motors."""
+    from armload.inertia import Z95
+    from armload.posterior.drift import CHANGED
+
+    n, drift = profile.n, profile.drift.reshape(-1, profile.n) ** 0.5
+    count = "1 session" if len(profile.sessions) == 1 else f"{len(profile.sessions)} sessions"
+    print(
+        f"{profile.arm_name} about {profile.frame}: {count}, {profile.duration:.0f} s, "
+        f"{profile.features.pose} features of the pose, noise counted {profile.repeated:g} times"
+    )
+    rows = table("from session to session, 1 sigma [N·m]", "", *(f"joint {j + 1}" for j in range(n)))
+    for name, values in (("offset", drift[0]), ("Coulomb friction", drift[1])):
+        rows.add_row(name, *(f"{x:.3f}" for x in values))
+    if profile.gain is not None and profile.gain_std is not None:
+        rows.add_row("torque sensor's gain", *(f"{1.0 + x:.3f}" for x in profile.gain))
+        if profile.gain_joint_std is not None:
+            rows.add_row("± (95 %)", *(f"{Z95 * x:.3f}" for x in profile.gain_joint_std))
+        print(f"a known weight was hung on: the torque is known to {100 * profile.gain_std:.1f} %")
+    console().print(rows)
+    rows = table("sessions", "log", "time [s]", "offsets [N·m]", "misfit", "noise")
+    for session in profile.sessions:
+        offsets = " ".join(f"{x:+.2f}" for x in session.offset)
+        name, time = _name(session), f"{session.duration:.0f}"
+        rows.add_row(name, time, offsets, f"{session.statistic:.0f}", f"{max(session.noise):.1f}")
+    console().print(rows)
+    others = (
+        "of motor currents another arm of the type stays below, too"
+        if motors
+        else (f"above {CHANGED:.0f} it is another arm's")
+    )
+    print_note(
+        f"misfit is T of how the session's offsets and friction differ from the others': about {3 * n} or less, "
+        f"{others}; noise is over what is expected, the largest joint's"
+    )
+    if motors:
+        print_note(_OF_MOTORS)
+    for line in next_steps(profile):
+        print_note(line)
+
+
+def _name(session: SessionRecord) -> str:
+    """The names of a session's logs, without their folders."""
+    return ", ".join(Path(log).name for log in session.name.split(", "))
+
+
+def _most(profile: Profile) -> float:
+    """T that the sessions of one arm seldom reach, however many there are."""
+    from scipy.stats import chi2
+
+    from armload.posterior.drift import CHANGED
+
+    return min(CHANGED, float(chi2.isf(_ASKED / len(profile.sessions), 3 * profile.n)))
+
+
+def next_steps(profile: Profile) -> tuple[str, ...]:
+    """What to record next, and what does not fit."""
+    from armload.posterior.drift import CHANGED
+    from armload.posterior.torque_gain import common_gain
+
+    advice = [
+        f"{_name(session)} does not fit the other sessions (misfit {session.statistic:.0f}): another arm, "
+        "another base, or something was mounted; learn the profile without it"
+        if session.statistic > CHANGED
+        else f"{_name(session)} fits less well than an arm's own logs do (misfit {session.statistic:.0f}): was it made "
+        "by this arm?"
+        for session in profile.sessions
+        if session.statistic > _most(profile)
+    ]
+    common = common_gain(profile)
+    if common is not None:
+        advice.append(
+            f"by the known weight the torque of all joints is off by {100 * common:+.0f} %, more than an arm's is: "
+            "weigh it again; every answer by this profile rests on it"
+        )
+    if len(profile.sessions) < 4:
+        count = len(profile.sessions)
+        few = "one session does not tell" if count == 1 else f"{count} sessions do not tell"
+        advice.append(f"{few} how the arm drifts: record it on four days or more")
+    moved = profile.poses.max(axis=0) - profile.poses.min(axis=0)
+    still = [str(j + 1) for j in range(profile.n) if moved[j] < 0.5]
+    if still:
+        joints = f"joint{'s' if len(still) > 1 else ''} {', '.join(still)}"
+        advice.append(
+            f"{joints} moved by less than half a radian in all logs: move {'them' if len(still) > 1 else 'it'} further"
+        )
+    return tuple(advice)
