@@ -327,6 +327,42 @@ def test_the_table_of_the_first_two_seconds_is_that_of_the_committed_run(monkeyp
         nothing = [one.pop("nothing") for one in real]
         logs[name] = list(zip([early.Change(**one) for one in real], nothing, strict=True))
     assert early.real_table(logs) in page
+    page = " ".join(page.split())
+
+    def told(evidence):
+        return sum(one[1] > early.ASKED_MOTOR[1] for one in evidence)
+
+    changes = {name: [one for one, _ in found] for name, found in logs.items()}
+    noticed = {name: sum(one.noticed for one in found) for name, found in changes.items()}
+    loud = told(one.louder for one in changes["loaded"])
+    never = sum(told([nothing[0]]) or nothing[0][0] > early.ASKED_MOTOR[0] for of in logs.values() for _, nothing in of)
+    assert (noticed, loud, never) == ({"empty": 25, "loaded": 1}, 3, 3)
+    assert "on the empty arm it notices 25 of 32" in page
+    assert "1 of 32, where three are told" in page
+    assert "so are three of the 64 that did not happen" in page
+
+
+def test_how_payloads_of_no_family_fare_is_that_of_the_committed_benchmark():
+    result = json.loads((RESULTS / "benchmark.json").read_text())
+    methods = result["populations"]["odd"]["methods"]
+    mass = {name: np.array(methods[name]["mae"])[:, 0] for name in ("hybrid", "map-gp")}
+    ratio = dict(zip(result["times"], mass["hybrid"] / mass["map-gp"], strict=True))
+    most = max(value for t, value in ratio.items() if t >= 0.5)
+    assert (
+        f"After 0.1 s the mass error is {ratio[0.1]:.1f} times that of `map-gp`; from half a second on it is "
+        f"at most {100 * (most - 1):.0f} % larger"
+    ) in " ".join(README.split())
+
+
+def test_what_five_minutes_of_one_day_are_worth_is_that_of_the_committed_run():
+    found = json.loads((RESULTS / "life.json").read_text())["same day"]
+    page = (ROOT / "docs" / "profiles.md").read_text(encoding="utf-8")
+    for row in ("300 s here", "300 s anywhere"):
+        cells = [
+            " · ".join(f"{found[f'{row}|{t}'][what] / found[f'20 s elsewhere|{t}'][what]:.2f}" for t in (1, 6))
+            for what in ("mass [g]", "first moments [g·m]", "inertia [g·m²]")
+        ]
+        assert f"| {row} | {' | '.join(cells)} |" in page
 
 
 def test_what_holds_for_a_minute_is_what_was_measured():

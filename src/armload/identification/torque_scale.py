@@ -224,8 +224,8 @@ def _averages(recording: Recording, arm: Arm, parts: Windows) -> tuple[NDArray, 
 def _changes(recording: Recording, parts: Windows) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Window means of velocity [rad/s] and acceleration [rad/s²], each (W, n)."""
     T = (recording.t[parts.last] - recording.t[parts.first])[:, None]
-    q, dq = ((x[parts.last] - x[parts.first]) / T for x in (recording.q, recording.dq))
-    return q, dq
+    dq, ddq = ((x[parts.last] - x[parts.first]) / T for x in (recording.q, recording.dq))
+    return dq, ddq
 
 
 def _points(parts: Windows) -> NDArray[np.intp]:
