@@ -91,14 +91,14 @@ def test_what_a_misfit_tells_is_said_of_the_side_of_the_gears_on_which_torque_is
 
 
 def test_what_was_done_to_the_logs_is_said_once_for_all_of_them(folder, tmp_path, capsys):
-    for k in range(2):  # the last row is there twice
+    for k in range(3):  # the last row is there twice
         lines = (folder / f"day{k}.csv").read_text().splitlines()
         (tmp_path / f"twice{k}.csv").write_text("\n".join([*lines, lines[-1]]) + "\n")
-    logs = [str(tmp_path / f"twice{k}.csv") for k in range(2)]
+    logs = [str(tmp_path / f"twice{k}.csv") for k in range(3)]
     assert main(["profile", *logs, "--robot", "panda", "--out", str(tmp_path / "arm.profile")]) == 0
     said = [line for line in capsys.readouterr().err.splitlines() if "repeat" in line]
     assert len(said) == 1
-    assert "twice0.csv and 1 other log" in said[0]
+    assert f"{logs[0]} and 2 other logs" in said[0]
 
 
 def test_that_answers_with_a_profile_of_motor_currents_are_approximate_is_said_when_it_is_learned(profile, capsys):

@@ -23,7 +23,7 @@ from armload.identification.notes import (
     UNCHECKED,
     changed_within,
     learned_from,
-    of_both,
+    of_readers,
     paused,
     rested,
     torques_drift,
@@ -89,7 +89,7 @@ def identify(
     known = plausible_known(known_of(arm, mass, com, drawn, families), arm)
     recording = recording if isinstance(recording, Recording) else read_recording(recording, arm)
     tare = tare if tare is None or isinstance(tare, Recording) else read_recording(tare, arm)
-    read = recording.notes if tare is None else of_both(recording, tare)
+    read = recording.notes if tare is None else of_readers(recording, tare)
     notes = (*read, *paused(recording), *rested(recording, arm))
     for log in (recording, tare):
         if log is not None:

@@ -17,16 +17,19 @@ from armload.recording import Recording
 RECORD = "record the arm as it is, without the payload, on any motion of 20 s, and name the log with --tare"
 
 
-def of_both(recording: Recording, tare: Recording) -> tuple[str, ...]:
-    """What the readers of log and tare did; what they did to both alike is said once."""
-    notes = list(recording.notes)
-    for note in tare.notes:
-        alike = recording.source + note.removeprefix(tare.source)
-        if note.startswith(tare.source) and alike in notes:
-            notes[notes.index(alike)] = f"{recording.source} and {alike.replace(recording.source, tare.source, 1)}"
-        else:
-            notes.append(note)
-    return tuple(notes)
+def of_readers(*logs: Recording) -> tuple[str, ...]:
+    """What the readers of some logs did; what they did to several alike is said once."""
+    of: dict[str, list[str]] = {}
+    for log in logs:
+        for note in log.notes:
+            alike = note.removeprefix(log.source)
+            of.setdefault(alike, []).extend([log.source] if alike != note else [])
+    return tuple(_together(sources) + alike for alike, sources in of.items())
+
+
+def _together(names: list[str]) -> str:
+    """The names of a few logs, or of one and how many others there are."""
+    return f"{names[0]} and {len(names) - 1} other logs" if len(names) > 2 else " and ".join(names)
 
 
 MAY_CHANGE = (

@@ -24,7 +24,6 @@ from armload.errors import UsageError
 
 if TYPE_CHECKING:
     from armload.posterior import Profile
-    from armload.recording import Recording
 
 _USAGE = """armload profile LOG… --robot R --out P [--update] …
        armload profile show P [--figure F.png] [--json]"""
@@ -88,6 +87,7 @@ def run(options: argparse.Namespace) -> None:
             f"{options.out} exists: give --update to add the logs to it, or another name, or remove it to begin anew"
         )
     from armload.identification import check_usable
+    from armload.identification.notes import of_readers
     from armload.posterior import check_new, learn_profile, load_profile, save_profile, with_known_weight
     from armload.posterior.profile_session import check_fits
 
@@ -121,7 +121,7 @@ def run(options: argparse.Namespace) -> None:
             )
     check_unchanged("--out", options.out, before)
     save_profile(profile, options.out)
-    for note in _notes(logs):
+    for note in of_readers(*logs):
         print_note(note)
     if options.json:
         print_json(fields_of(profile) | {"out": options.out})
@@ -182,18 +182,3 @@ def _arm_of(profile: Profile) -> Any:
         raise UsageError(f"the profile is of {profile.arm_name}: name its URDF with --robot")
     x, y, z = (float(part) for part in profile.gravity)
     return arm(profile.arm_name, profile.frame, (x, y, z))
-
-
-def _notes(logs: list[Recording]) -> list[str]:
-    """What the readers did to the logs; what they did to several alike is said once."""
-    of: dict[str, list[str]] = {}
-    for log in logs:
-        for note in log.notes:
-            alike = note.removeprefix(log.source)
-            of.setdefault(alike, []).append(log.source if alike != note else "")
-    return [
-        sources[0]
-        + (f" and {len(sources) - 1} other log{'s' * (len(sources) > 2)}" if sources[0] and len(sources) > 1 else "")
-        + note
-        for note, sources in of.items()
-    ]
