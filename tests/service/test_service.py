@@ -333,8 +333,9 @@ def test_a_full_disk_under_its_output_ends_no_service(cell, stream):
     other = {"stdout": "stderr", "stderr": "stdout"}[stream]
     command = [sys.executable, "-m", "armload", "serve", str(cell("left", port=free_port())), "--duration", "300"]
     port = int(re.search(r"port = (\d+)", Path(command[4]).read_text()).group(1))
+    buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}  # as users have it
     with open("/dev/full", "w") as full:
-        process = subprocess.Popen(command, text=True, **{stream: full, other: subprocess.PIPE})
+        process = subprocess.Popen(command, text=True, env=buffered, **{stream: full, other: subprocess.PIPE})
         reader = threading.Thread(target=process.communicate, daemon=True)  # a pipe that fills would hold it up
         reader.start()
         try:

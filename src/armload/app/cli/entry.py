@@ -29,7 +29,7 @@ from contextlib import contextmanager
 
 from armload.app.cli.arguments import Parser, attach_values
 from armload.app.cli.outputs import check_outputs
-from armload.app.cli.printing import print_note
+from armload.app.cli.printing import drop_unwritten, print_note
 from armload.errors import ArmloadError, UsageError
 from armload.runtime.extras import missing
 from armload.runtime.version import __version__
@@ -87,10 +87,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     with warnings.catch_warnings(), _notes_on_stderr(), _no_interruption_lost():
         warnings.showwarning = _show_warning
         code = _guarded(arguments, show_traceback)
-    try:
-        sys.stdout.flush()
-    except OSError:  # reported already; the interpreter flushes once more when it ends: drop that
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    drop_unwritten()  # reported already; the interpreter flushes once more when it ends
     return code
 
 

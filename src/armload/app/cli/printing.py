@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -48,6 +49,14 @@ def print_note(text: str) -> None:
     """One line on stderr, so that stdout holds the answer only; where it cannot be written, nothing ends for that."""
     with suppress(OSError):  # a log on a full disk
         print(f"armload: {' '.join(text.split())}", file=sys.stderr, flush=True)
+
+
+def drop_unwritten() -> None:
+    """Drop what stdout still holds if it cannot be written, so that nothing tries to once more."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @contextmanager

@@ -24,7 +24,7 @@ from armload.app.cli.arguments import (
     output_folder,
 )
 from armload.app.cli.named import robot_of
-from armload.app.cli.printing import print_note
+from armload.app.cli.printing import drop_unwritten, print_note
 from armload.errors import UsageError
 
 if TYPE_CHECKING:
@@ -201,3 +201,5 @@ class _Output:
                 self._lines.get_nowait()
             self._lines.put_nowait(None)
             self._thread.join(2.0)
+        if self._failed is not None:
+            drop_unwritten()  # said already, and no error of the service
