@@ -15,7 +15,13 @@ import numpy as np
 
 from armload.arms import Arm
 from armload.errors import RecordingError
-from armload.identification.thresholds import JOINTS_EXCHANGED, MODEL_MISFIT, SWAPPED_MISFIT, SWAPPED_SHARE
+from armload.identification.thresholds import (
+    EXCHANGED_BY_GEARS,
+    JOINTS_EXCHANGED,
+    MODEL_MISFIT,
+    SWAPPED_MISFIT,
+    SWAPPED_SHARE,
+)
 from armload.identification.torque_scale import TorqueScale, torque_scale
 from armload.recording import Recording
 
@@ -67,13 +73,27 @@ def check_for_exchanged_joints(recording: Recording, arm: Arm) -> None:
     evidence, i, j = max(found, default=(-np.inf, 0, 0))
     if evidence < seen.evidence + JOINTS_EXCHANGED:
         return
-    if all(b.evidence > a.evidence for a, b in _in_parts(recording, _joints_exchanged(recording, i, j), arm)):
+    other = _joints_exchanged(recording, i, j)
+    if all(b.evidence > a.evidence for a, b in _in_parts(recording, other, arm)) and _with_gears_too(
+        recording, other, arm
+    ):
         _check_mounted_as_given(recording, arm, lambda fit: fit.evidence > evidence)
         raise RecordingError(
             f"{recording.source}: joints {i + 1} and {j + 1} seem to be exchanged, in q, dq and tau: expected the "
             f"order of {arm.name}'s joints ({', '.join(arm.joint_names)}); a ROS driver may give that of the alphabet; "
             "name the columns, or exchange them"
         )
+
+
+def _with_gears_too(recording: Recording, other: Recording, arm: Arm) -> bool:
+    """Whether another log fits better with viscous friction and rotors among the unknowns, too.
+
+    Of motor currents they are what makes one wrist joint look like the other.
+    """
+    as_it_is, exchanged = (torque_scale(log, arm, most=_WINDOWS, gears=True) for log in (recording, other))
+    if as_it_is is None or exchanged is None:
+        return False
+    return exchanged.evidence > as_it_is.evidence + EXCHANGED_BY_GEARS
 
 
 def _check_mounted_as_given(recording: Recording, arm: Arm, better: Callable[[TorqueScale], bool]) -> None:
