@@ -16,7 +16,7 @@ and 8.3 after 1 s, and with T/100 s on motor currents, which asks for 12.2 and 1
 
 noticed   changes with an event within a second
 told      those whose log evidence is above that 0.5 and 1 s after the change: *at best* with noise as the posterior
-          expects it, *as loud* with twice its variance
+          expects it, *as loud* with twice its variance, as a stream begins with (`LEVEL`)
 nothing   of the real logs: the same of their samples without the payload's torque, that is, where nothing changed
 
 Written to benchmarks/results/early_limits.json and two tables of docs/online_measured.md; 25 minutes of one core. A
@@ -36,7 +36,7 @@ from script import RESULTS, ROOT, markdown_table, options, say, write, write_tab
 
 from armload.identification import choose
 from armload.online import OnlineIdentifier
-from armload.online.thresholds import EARLY_RARE, RARE, SURE
+from armload.online.thresholds import EARLY_RARE, LEVEL, RARE, SURE
 from armload.posterior import PosteriorLeastSquares
 from armload.posterior.sequential import SequentialPosterior
 from armload.recording import GAP, Recording
@@ -45,7 +45,6 @@ from armload.regression.prior import BODY_SIZES, body_root
 
 PAGE = ROOT / "docs" / "online_measured.md"
 LOOKED = (0.5, 1.0)  # [s] after the change
-LOUD = 2.0  # [variance of the noise] of *as loud*: rows of a short run fit worse than they will
 JUST = 0.02  # [s] before it, when the posterior is kept: a sample more than the row that shows it
 
 
@@ -59,7 +58,7 @@ ASKED, ASKED_MOTOR = asked_for(EARLY_RARE), asked_for(RARE)
 
 class Change(NamedTuple):
     """mass: that is taken up [kg]. at: [s] of the stream. noticed: whether within a second. evidence, louder: the log
-    evidence at `LOOKED`, with noise as expected and `LOUD` times its variance; None: nothing was known yet.
+    evidence at `LOOKED`, with noise as expected and `LEVEL` times its variance; None: nothing was known yet.
     """
 
     mass: float
@@ -139,7 +138,7 @@ def told(stream: Stream) -> list[list[float]] | None:
                 state.take(row._replace(h=row.t - row_t))
             row_t = row.t
         if sample.t >= began + LOOKED[len(found[0])]:
-            for louder, values in zip((1.0, LOUD), found, strict=True):
+            for louder, values in zip((1.0, LEVEL), found, strict=True):
                 values.append(log_evidence(state, root, louder))
             if len(found[0]) == len(LOOKED):
                 break

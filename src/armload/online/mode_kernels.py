@@ -37,8 +37,9 @@ def take_row(
 
     Args:
         h … taken: as of `Modes.take`. loud: (2, n) of the present block, Σ N and Σ B. level: how large the noise is,
-            and the block's length so far [s]. listening: what decides about it. rest: (2, n) mean and variance of the
-            error of what is foreseen of an arm that stands [N·m]; the variance is negative before its first row.
+            the block's length so far [s], and how many blocks it is the mean of. listening: what decides about it.
+            rest: (2, n) mean and variance of the error of what is foreseen of an arm that stands [N·m]; the variance
+            is negative before its first row.
         root: (10, 10) mass·R. effort: (n,). pushes: sizes and times of drifts and contacts. hands: (2, K, 6) deviations
             and times of a hand's force and moment. others: sizes and times of bodies. rates: how often each kind begins
             or ends, and how. p … c: probabilities, states; of a hand f (K, 7, 6) mean and covariance. since: moments,
@@ -85,6 +86,8 @@ def _listen(h, scale, d, v, steady, loud, level, listening):  # pragma: no cover
         loud[0, j] = loud[1, j] = 0.0
     level[1] = 0.0
     if steady > 0.5:
+        level[2] += 1.0
+        share = max(share, 1.0 / level[2])  # the mean of all, until it forgets the first
         level[0] += share * (min(level[0] * (total / n), outlier * level[0]) - level[0])
         level[0] = max(level[0], lowest)
 

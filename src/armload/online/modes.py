@@ -38,6 +38,8 @@ from armload.online.thresholds import (
     HANDED_OVER,
     HANDING_TIMES,
     LETS_GO,
+    LEVEL,
+    LEVEL_BEGINS,
     LEVEL_BLOCK,
     LEVEL_OUTLIER,
     LEVEL_SHARE,
@@ -84,7 +86,7 @@ class Modes:
         self._x, self._P = np.zeros((bodies, 10)), np.zeros((bodies, 10, 10))
         self._A, self._c = np.zeros((starts, 10, 10)), np.zeros((starts, 10))  # of A the lower triangle
         self._since = np.array([STARTS, np.zeros(starts), np.zeros(starts)])  # [s], log evidence found, age [s]
-        self._loud, self._level = np.zeros((2, n)), np.array([LOWEST_LEVEL, 0.0])  # and the block's length so far [s]
+        self._loud, self._level = np.zeros((2, n)), np.array([LEVEL, 0.0, LEVEL_BEGINS])
         self._about_level = np.array([SAME_ERROR, LEVEL_BLOCK, LEVEL_SHARE, LEVEL_OUTLIER, LOWEST_LEVEL, LIKELY])
         self._rest = np.zeros((2, n))  # mean and variance of what is foreseen wrongly at rest [N·m]
         self.reset()
