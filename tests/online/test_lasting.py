@@ -126,3 +126,17 @@ def test_modes_give_the_level_that_a_new_run_begins_with():
         seen = np.column_stack([np.zeros((7, 10)), np.sqrt(2.0) * rng.normal(size=7), np.ones(7)])
         modes.take(0.04, seen, np.zeros((7, 10)), np.zeros((7, 6)), np.ones(7), np.zeros(10), np.zeros((10, 10)), True)
     assert modes.level == pytest.approx(2.0, rel=0.25)
+
+
+@pytest.mark.parametrize(("variance", "least", "most"), [(1.0, 1.0, 1.4), (3.0, 2.4, 3.4)])
+def test_how_loud_a_stream_is_shows_within_a_second(variance, least, most):
+    """Noise as expected, which would hide an early change if it were held to be louder, and noise that is louder."""
+    found = []
+    for seed in range(12):
+        modes, rng = Modes(1.5, np.ones(7)), np.random.default_rng(seed)
+        for _ in range(200):
+            seen = np.column_stack([np.zeros((7, 10)), np.sqrt(variance) * rng.normal(size=7), np.ones(7)])
+            rest = np.zeros((7, 10)), np.zeros((7, 6)), np.ones(7), np.zeros(10), np.zeros((10, 10))
+            modes.take(0.005, seen, *rest, True)
+        found.append(modes.level)
+    assert least <= np.mean(found) <= most
