@@ -524,3 +524,15 @@ def test_identify_takes_the_hybrid_by_itself_and_says_its_intervals_are_calibrat
     assert found.consistent
     turned = replace(panda, gravity=(0.0, 0.0, -9.81))
     assert identify(logs[1].run, turned, tare=logs[1].tare).phi == pytest.approx(found.phi)
+
+
+def test_no_log_is_trusted_less_than_the_logs_that_were_seen():
+    """Traits unlike all logs that a bag was trained on, as a profile's are: a UR3e's leaves say 1 in 200 and less then.
+
+    60 is the least trust that 40 new episodes of any shipped arm got.
+    """
+    calibration = shipped_model(arm("ur3e")).calibration
+    assert calibration.bag is not None
+    unlike = np.random.default_rng(0).normal(scale=3.0, size=(500, 18))
+    assert max(calibration.level * 10.0 ** float(calibration.bag.row(x).mean()) for x in unlike) > 200.0
+    assert max(calibration.kappa(x) for x in unlike) <= 60.0
