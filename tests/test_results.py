@@ -337,7 +337,7 @@ def test_the_table_of_the_first_two_seconds_is_that_of_the_committed_run(monkeyp
     loud = told(one.louder for one in changes["loaded"])
     never = sum(told([nothing[0]]) or nothing[0][0] > early.ASKED_MOTOR[0] for of in logs.values() for _, nothing in of)
     assert (noticed, loud, never) == ({"empty": 26, "loaded": 1}, 3, 3)
-    assert "on the empty arm it notices 25 of 32" in page
+    assert "on the empty arm it notices 26 of 32" in page
     assert "1 of 32, where three are told" in page
     assert "so are three of the 64 that did not happen" in page
 
