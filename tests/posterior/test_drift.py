@@ -164,18 +164,23 @@ def test_a_stream_that_is_concluded_doubts_an_old_tare_as_a_log_does(panda, old)
 
 
 def test_a_stream_says_within_seconds_that_its_tare_is_old_and_nothing_of_a_sound_one(panda, sound):
+    """Three of four old ones at least say so within six seconds; none of them is believed after five."""
+
     def old(world):
         friction = replace(world.friction, level=1.3 * world.friction.level)
         return replace(world, offset=world.offset - OFFSET, friction=friction)
 
-    for log, changed in ((logs_of(panda, old, count=1)[0], True), (sound[0], False)):
+    found = []
+    for log, changed in (*((log, True) for log in logs_of(panda, old, count=4)), (sound[0], False)):
         online = OnlineIdentifier(panda, log.tare)
         said = [online.update(*sample) for sample in log.run]
         online.close()
         notes = {x for each in said for x in each.notes if x.startswith("the arm is not as it was at its tare")}
-        assert bool(notes) == changed
         assert all("the intervals do not allow for it" in note for note in notes)
         assert any(each.calibrated for each in said if each.t - log.run.t[0] >= 5.0) != changed
+        found.append(bool(notes))
+    assert sum(found[:-1]) >= 3
+    assert not found[-1]
 
 
 @pytest.mark.full  # some seconds
