@@ -558,12 +558,12 @@ def test_a_torque_that_is_no_current_is_not_called_one(panda):
     assert "current" not in str(caught.value)
 
 
-def to_and_fro(robot, seed, share):
+def to_and_fro(robot, seed):
     """A periodic motion, whose acceleration is opposite to its position, with gears as a real UR10e's."""
     rng, t = np.random.default_rng(seed), np.arange(0.0, 10.0, 8e-3)
     q, dq, ddq = np.tile([0.0, -1.4, 1.6, -1.6, -1.5, 0.0], (len(t), 1)), 0.0, 0.0
     for k in range(1, 6):
-        w, size = 0.24 * np.pi * k, share * np.array([1.2, 0.5, 0.7, 0.9, 0.9, 1.4]) * rng.uniform(-1.0, 1.0, 6)
+        w, size = 0.24 * np.pi * k, 0.33 * np.array([1.2, 0.5, 0.7, 0.9, 0.9, 1.4]) * rng.uniform(-1.0, 1.0, 6)
         angle = w * t[:, None] + rng.uniform(0.0, 2.0 * np.pi, 6)
         q, dq, ddq = q + size * np.sin(angle), dq + w * size * np.cos(angle), ddq - w**2 * size * np.sin(angle)
     gears = 0.05 * np.tanh(dq / 0.03) + 0.05 * dq + 0.02 * ddq + 0.007 * rng.normal(size=q.shape)
@@ -573,7 +573,7 @@ def to_and_fro(robot, seed, share):
 @pytest.mark.parametrize(("name", "seed"), [("ur3e", 1), ("ur3e", 4), ("ur5e", 3)])
 def test_rotors_and_viscous_friction_are_no_gravity_taken_out(name, seed):
     robot = arm(name)
-    log = to_and_fro(robot, seed, 0.33)
+    log = to_and_fro(robot, seed)
     check_plausible(log, robot)
     with pytest.raises(RecordingError, match="gravity taken out"):
         check_plausible(replace(log, tau=log.tau - robot.torque(log.q)), robot)
@@ -583,7 +583,7 @@ def test_rotors_and_viscous_friction_are_no_gravity_taken_out(name, seed):
 def test_viscous_friction_and_rotors_are_no_exchanged_joints(seed):
     """They make a wrist joint's torque look like another's."""
     robot = arm("ur3e")
-    log = to_and_fro(robot, seed, 0.33)
+    log = to_and_fro(robot, seed)
     check_plausible(log, robot)
     order = [2, 1, 0, 3, 4, 5]
     with pytest.raises(RecordingError, match="joints 1 and 3 seem to be exchanged"):

@@ -168,9 +168,9 @@ SWAPPED_SHARE = 0.45
 # exchanged 15 and more, but for a small arm (test_joints_in_the_order_of_the_alphabet_are_refused_by_name,
 # `benchmarks/wrong_logs.py`)
 JOINTS_EXCHANGED = 6.0
-# [log odds] by which they do at least with viscous friction and rotors among the unknowns. Of 156 sound simulated logs
-# of motor currents no exchange does by more than 0.3, of the first and third joint exchanged it is 3.2 and more
-# (test_viscous_friction_and_rotors_are_no_exchanged_joints)
+# [log odds] by which two joints exchanged back explain a log better with viscous friction and rotors among the
+# unknowns, too. Of 156 sound simulated logs of motor currents no exchange does by more than 0.3, of the first and third
+# joint exchanged it is 3.2 and more (test_viscous_friction_and_rotors_are_no_exchanged_joints)
 EXCHANGED_BY_GEARS = 1.0
 # of the misfit, what is left in the parts of a log whose payload changed: 0.03 of a simulated one, where parts of logs
 # of another robot, unit, sign or base keep 0.3 and more (test_a_payload_that_is_put_down_is_not_taken_for_no_torque)

@@ -68,10 +68,11 @@ STARTS = np.array([0.05, 0.1, 0.2, 0.4, 0.8, 1.6])
 SAME_ERROR = 0.1
 # [of the expected noise] where the level begins: rows of a short run fit worse than they will
 LEVEL = 2.0
-# [blocks] that this counts for at first: one block shows as much. If it were forgotten no faster than later on, 21 of
-# 64 changes within the first 2 s of a stream would be missed instead of 13, with 4 blocks 16. Begun at 1 they are 10,
-# but then sound arms beyond their worlds are doubted in 19 % of the moments instead of 5, and with an old tare ten
-# changes are seen that are none instead of three (seeds 95000 to 95063; `benchmarks/wrong_streams.py`)
+# [blocks] that the level's beginning counts for: one block shows as much. If it were forgotten no faster than later on,
+# 21 of 64 changes within the first 2 s of a stream would be missed instead of 13, with 4 blocks 16. With a level that
+# begins at 1 they are 10, but then sound arms beyond their worlds are doubted in 19 % of the moments instead of 5, and
+# with an old tare ten changes are seen that are none instead of three (seeds 95000 to 95063;
+# `benchmarks/wrong_streams.py`)
 LEVEL_BEGINS = 1.0
 # [of the expected noise] the least level: the posterior expects no more than it has reason to
 LOWEST_LEVEL = 1.0

@@ -44,8 +44,8 @@ LIGHT_MASS = 0.35
 FAR_OUT = 0.5
 _LEAST = 0.4  # of c: the least that 95 % of what was hardly more than nothing needed (`benchmarks/wide_and_light.py`)
 # range of the factor: a guard, where the bag is asked about traits unlike all it has seen. In 40 new episodes of each
-# shipped arm none is above 59.8 (`benchmarks/trust.py`'s records); a profile's traits took a UR3e's to 250 and more, so
-# that the mass was lost (test_no_log_is_trusted_less_than_the_logs_that_were_seen)
+# shipped arm none is above 59.8 (drawn as in `benchmarks/trust.py`, --seed 3300); a profile's traits took a UR3e's to
+# 250 and more, so that the mass was lost (test_no_log_is_trusted_less_than_the_logs_that_were_seen)
 _KAPPA = (0.01, 60.0)
 # [decades] standard deviation of log10 kappa about what the traits tell: 0 to 0.44 by arm and time in episodes that the
 # bags have not seen, in the middle 0.3 (`benchmarks/trust.py`)
