@@ -1,7 +1,9 @@
 """A whole measurement on the simulator: said, checked, agreed to, run, ended early, answered; and what stops it."""
 
 import signal
+import time
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,7 +19,7 @@ from armload.motion import PathMotion, taie2024
 from armload.motion.point_to_point import PointToPoint
 from armload.payloads import test_payload as held_payload
 from armload.posterior import KnownMass
-from armload.recording import read_recording
+from armload.recording import Sample, read_recording
 from armload.simulation import Sensors, World
 
 WHOLE = taie2024()
@@ -245,6 +247,39 @@ def test_a_measurement_begins_at_rest_and_writes_over_nothing(panda, simulated, 
     (tmp_path / "empty.csv").touch()
     with pytest.raises(RecordingError, match=r"empty.csv exists"):
         Procedure(simulated(), panda, MOTION, tmp_path)
+
+
+class Standing:
+    """An arm that stands, whose samples are so old [s] when they are looked at, one every 0.1 s of a clock."""
+
+    name = "an arm"
+
+    def __init__(self, lags):
+        self.lags, self.seen, self._lag = lags, 0, 0.0
+
+    def __iter__(self):
+        for lag in self.lags:
+            self.seen, self._lag = self.seen + 1, lag
+            yield Sample(0.1 * self.seen, START, np.zeros(7), np.zeros(7))
+
+    def lag(self):
+        return self._lag
+
+    def commanded(self):
+        return START
+
+
+def test_samples_that_waited_are_waited_for_only_while_they_get_newer(panda, tmp_path, monkeypatch):
+    caught_up, stays = Standing([0.0, *np.arange(60.0, 0.0, -0.1), *[0.0] * 4]), Standing([0.3] * 1000)
+    for mover in (caught_up, stays):
+        clock = SimpleNamespace(monotonic=lambda mover=mover: 0.1 * mover.seen, time=time.time)
+        monkeypatch.setattr("armload.measuring.procedure.time", clock)
+        if mover is caught_up:
+            assert Procedure(mover, panda, MOTION, tmp_path).plan.legs
+        else:
+            with pytest.raises(SafetyError, match=r"are 0\.3 s old when they are looked at, and do not get newer"):
+                Procedure(mover, panda, MOTION, tmp_path)
+    assert stays.seen < 60
 
 
 def test_a_motion_that_ends_elsewhere_goes_back_in_between(panda):

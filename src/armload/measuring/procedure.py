@@ -33,7 +33,7 @@ ENOUGH = "the accuracy asked for is reached"
 _LOOK = 0.02  # [s] between two looks at the accuracy: a tenth of a braking time
 _STILL = 0.2  # [s] for which the arm must have stood before a movement: what was just put on has swung out
 _FRESH = 0.05  # [s] older samples waited somewhere, while somebody mounted the payload, say
-_TO_SETTLE = 5.0  # [s] of waiting for that
+_TO_SETTLE = 5.0  # [s] of waiting for that, and for samples that waited to get newer
 _TO_SWING_OUT = 1.0  # [s] of waiting for an arm that somebody has just stopped
 _WARM_UP = 0.5  # [s] of the tare that the identifier is fed before the arm moves, so that all it compiles is compiled
 
@@ -76,7 +76,7 @@ class Procedure:
     Raises:
         RecordingError: a log is there already, or the folder cannot be made.
         SourceError: the arm does not say where it is.
-        SafetyError: the arm moves, or is too far from the motion's start.
+        SafetyError: the arm moves, or is too far from the motion's start; or this machine is too busy to look at it.
         IdentificationError, ModelError: see `Basis.known`.
     """
 
@@ -173,11 +173,25 @@ class Procedure:
         return plan
 
     def _standing(self, patience: float) -> NDArray[np.float64]:
-        """Where the arm is commanded to be; it must come to rest within `patience` [s] of its own clock."""
+        """Where the arm is commanded to be; it must come to rest within `patience` [s] of its own clock.
+
+        Samples that waited somewhere are passed over, as long as this machine catches up with them.
+        """
         begun: float | None = None  # of the newest stretch of rest, among samples that did not wait anywhere
         asked: float | None = None  # the first of these samples
+        waited: tuple[float, float] | None = None  # how old a sample was that waited, and when that was seen
         for sample in self.mover:
-            fresh = self.mover.lag() < _FRESH
+            lag, now = self.mover.lag(), time.monotonic()
+            fresh = lag < _FRESH
+            if fresh:
+                waited = None
+            elif waited is None or now - waited[1] > _TO_SETTLE:
+                if waited is not None and lag >= waited[0]:
+                    raise SafetyError(
+                        f"the samples of {self.mover.name} are {lag:.2g} s old when they are looked at, and do not get "
+                        f"newer: expected less than {_FRESH:g} s; give this machine less other work"
+                    )
+                waited = lag, now
             begun = None if not fresh or is_moving(sample.dq) else sample.t if begun is None else begun
             if begun is not None and sample.t - begun >= _STILL:
                 return self.mover.commanded()
