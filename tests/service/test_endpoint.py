@@ -12,7 +12,7 @@ import pytest
 
 from armload.errors import UsageError
 from armload.service import Endpoint
-from armload.service.endpoint import _MOST
+from armload.service.endpoint import _MOST, _Handler
 
 
 class Cell:
@@ -149,5 +149,35 @@ def test_the_word_before_the_token_may_be_written_in_any_case(said, status):
     endpoint = Endpoint(Cell(), "127.0.0.1", 0, token="secret")
     try:
         assert request(endpoint.url, "/arms", headers={"Authorization": said})[0] == status
+    finally:
+        endpoint.close()
+
+
+def hung_up(connection, end):
+    """Whether who sends a byte from time to time is hung up on before `end`."""
+    while time.monotonic() < end:
+        try:
+            connection.sendall(b"x")
+            if connection.recv(1) == b"":
+                return True
+        except TimeoutError:  # nothing is said yet
+            continue
+        except ConnectionError:
+            return True
+    return False
+
+
+def test_a_client_that_sends_its_request_byte_by_byte_is_hung_up_on(monkeypatch):
+    monkeypatch.setattr(_Handler, "patience", 0.5)
+    endpoint = Endpoint(Cell(), "127.0.0.1", 0)
+    address = "127.0.0.1", int(endpoint.url.rpartition(":")[2])
+    try:
+        with socket.create_connection(address, timeout=0.05) as slow:
+            slow.sendall(b"GET /health HTTP/1.1\r\nHost: localhost\r\nX: ")
+            assert hung_up(slow, time.monotonic() + 10.0)
+        with asked(address, "/stream/ended")[0] as still:
+            still.settimeout(1.5)
+            with pytest.raises(TimeoutError):  # who has asked is not hung up on
+                still.recv(4096)
     finally:
         endpoint.close()
