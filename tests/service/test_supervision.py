@@ -98,3 +98,22 @@ while True:
     assert [each["text"] for each in heard if "alarm" in each] == ["sim was lost: gone"]
     until(lambda: len(noted) >= 2)
     assert noted == ["left: sim was lost: gone; it is opened again in 0.1 s", "left: source_lost raised"]
+
+
+def test_a_process_that_hangs_is_ended_once_and_the_one_after_it_again(noted, monkeypatch):
+    class Hung:
+        def __init__(self):
+            self.kills = 0
+
+        def kill(self):
+            self.kills += 1  # and it takes its time to go
+
+    arm = ArmSettings(name="left", source="sim", robot="panda")
+    supervisor, first, second = Service(ServiceSettings(arms=[arm]), note=noted.append), Hung(), Hung()
+    monkeypatch.setitem(supervisor._heard, "left", time.monotonic() - 1000.0)
+    for process in (first, first, first, second, second):
+        supervisor.processes["left"] = process
+        supervisor._look()
+    supervisor.processes.clear()
+    assert (first.kills, second.kills) == (1, 1)
+    assert len([note for note in noted if "is ended" in note]) == 2

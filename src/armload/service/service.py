@@ -58,6 +58,7 @@ class Service:
         self._ended: set[str] = set()
         self._spare = Spare(settings.arms, settings.spare)
         self._listeners: list[Listener] = []
+        self._hung: dict[str, subprocess.Popen[bytes]] = {}  # the last that was ended because it said nothing
         self._state, self._gone = threading.RLock(), threading.Event()
         self._receivers: list[Webhook | Mqtt] = []  # of alarms
         if settings.webhook is not None:
@@ -241,7 +242,8 @@ class Service:
                 self._tell(name, time.monotonic())
                 first = self._answers[name].get("t") is None
             process = self.processes.get(name)
-            if silent > (HUNG_COMPILING if first else HUNG) and process is not None:
+            if silent > (HUNG_COMPILING if first else HUNG) and process not in (None, self._hung.get(name)):
+                self._hung[name] = process  # it may take its time to go
                 self._note(name, f"its process has said nothing for {silent:.0f} s and is ended")
                 process.kill()
 
