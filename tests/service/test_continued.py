@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import pytest
 
+from armload.errors import RecordingError
 from armload.online import OnlineIdentifier
 from armload.payloads import test_payload, write_payload
 from armload.payloads.uncertainty import Uncertainty
@@ -102,9 +103,19 @@ def test_what_is_known_of_payloads_counts_in_a_stream_that_begins_and_in_one_tha
     assert determined["plain"] < 10
 
 
+def test_a_log_that_is_replayed_is_no_tare_of_itself(panda, analytic_log, tmp_path):
+    run = tmp_path / "run.csv"
+    write_recording(run, analytic_log(panda, test_payload().parameters, duration=2.0))
+    settings = ArmSettings(name="left", source=str(run), robot="panda", method="map", tare=str(run))
+    process = ArmProcess(settings, 0.1)
+    with pytest.raises(RecordingError, match="share 400 measured samples"):
+        process._made_session()
+    process.source.close()
+
+
 def test_a_state_is_of_the_tare_that_the_stream_goes_by_whatever_its_file_says_since(panda, analytic_log, tmp_path):
     run, tare = tmp_path / "run.csv", tmp_path / "tare.csv"
-    write_recording(run, analytic_log(panda, duration=2.0))
+    write_recording(run, analytic_log(panda, test_payload().parameters, duration=2.0))
     write_recording(tare, analytic_log(panda, duration=3.0))
     named = {"name": "left", "source": str(run), "robot": "panda", "method": "map", "tare": str(tare)}
     settings = ArmSettings(**named, save=str(tmp_path / "state"))

@@ -28,7 +28,7 @@ from armload.online import OnlineEstimate, OnlineIdentifier
 from armload.online.state import saved_at
 from armload.posterior import Known, Profile, load_profile
 from armload.posterior.drift import SESSION
-from armload.recording import Sample, read_recording
+from armload.recording import Sample, check_own_measurements, read_recording
 from armload.runtime.atomic import clear_left_over
 from armload.runtime.compiling import COMPILING, compiling
 from armload.service.catching_up import CatchingUp
@@ -195,6 +195,8 @@ class ArmProcess:
         known = settings.known_on(self.arm)
         identifier = self._restored(profile, known)
         tare = None if settings.tare is None else read_recording(settings.tare, self.arm)
+        if tare is not None and settings.source != "sim" and "://" not in settings.source:
+            check_own_measurements(read_recording(settings.source, self.arm), tare)
         age, aged = age_of(tare, time.time() if "://" in settings.source else None, settings.tare_age)
         for note in aged if identifier is None else ():  # a state that goes on has its tare's age
             self.note(note)

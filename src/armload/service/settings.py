@@ -57,8 +57,8 @@ class ArmSettings(ArmOptions, KnownOptions):
     """One arm.
 
     name: in lines and addresses. source: see `open_source`. save: the folder of its state; None: nothing is kept.
-    record: a `.csv` or `.mcap` file that does not exist yet. rating: the most it may hold [kg]; None: what the arm is
-    rated for.
+    record: a `.csv` or `.mcap` file; if it exists, the next name that is free is taken. rating: the most it may hold
+    [kg]; None: what the arm is rated for.
     com_range: the farthest its payload's centre of mass may be [m]. loop: replay a log again and again.
     rate: of the simulator [Hz]; None: 1000.
     apply: "auto": what is identified is told to the robot's controller (`Feedback`).
