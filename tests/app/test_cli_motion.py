@@ -254,6 +254,8 @@ def test_a_trajectory_from_the_present_pose_does_not_leave_the_way_there_to_the_
         ("--from 1.6,-0.4,0.1,-2.1,0,1.5,0.9", "more than the 1 rad of --approach"),
         ("--from 0.8,-0.4,0.1,-2.1,0,1.5,0.9 --box 0.4,0.3,0.5,0.1,0.1,0.5", "because of the way to the start"),
         ("--box 0.4,0.2,0.5,0.1,0.1,0.5", "give it with --from"),
+        ("--floor 0.1", "give it with --from"),
+        ("--floor none", "give it with --from"),
     ],
 )
 def test_a_way_from_the_present_pose_that_is_not_allowed_is_refused(designed, tmp_path, capsys, words, expected):

@@ -27,6 +27,15 @@ READY = np.array([0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8])
 QUICK = {"starts": 1, "stages": ((8, 100.0), (12, 2000.0))}
 
 
+def test_a_larger_share_is_offered_only_where_one_is_left():
+    """The xArm7 holds its rated payload here with 0.993 of a joint's torque, and no share is above 1."""
+    start = np.array([0.0, -0.3, 0.0, 1.0, 0.0, 1.2, 0.0])
+    with pytest.raises(MotionError, match=r"start elsewhere, or give the payload's mass \(2\.32 kg can be held\)"):
+        Constraints(arm("xarm7"), start)
+    with pytest.raises(MotionError, match=r"allow a larger share \(more than 0\.9"):
+        Constraints(arm("xarm7"), start, payload=PayloadRange(3.2))
+
+
 @pytest.fixture(scope="module")
 def panda():
     return arm("panda")

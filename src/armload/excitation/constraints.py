@@ -165,4 +165,5 @@ class Constraints:
 
 def _or_share(needed: float) -> str:
     """A larger share as a way out, where one is enough for the start; a motion needs some more."""
-    return f", allow a larger share (more than {np.ceil(100.0 * needed) / 100.0:g})" if needed < 1.0 else ""
+    rounded = np.ceil(100.0 * needed) / 100.0
+    return f", allow a larger share (more than {rounded:g})" if rounded < 1.0 else ""

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from armload.motion import Motion
 
 _DEFAULT = "panda"
+_FLOOR = 0.0  # [m] in the base's frame
 _LEAD = 0.5  # [s] until the first point of a ros2 trajectory from the present pose, where the arm is already
 
 
@@ -41,7 +42,7 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
         "--approach", type=at_least(0.0, float, 10.0), metavar="RAD", help="farthest of a joint from there (default: 1)"
     )
     add("--payload", type=at_least(0.0, float), metavar="KG", help="heaviest on the way (default: as rated)")
-    add("--floor", type=floor, default=0.0, metavar="Z", help="height of the floor [m], or none (default: 0)")
+    add("--floor", type=floor, default=_FLOOR, metavar="Z", help="height of the floor [m], or none (default: 0)")
     add("--box", type=box, action="append", default=[], metavar="X,Y,Z,SX,SY,SZ", help="an obstacle; repeat for more")
 
 
@@ -56,8 +57,10 @@ def run_export(options: argparse.Namespace) -> int:
     motion, lead = motion_of(options.motion, arm, needed), {}
     if options.start is not None:
         motion, lead = _led(motion, arm, options), {"lead": _LEAD}
-    elif options.approach is not None or options.payload is not None or options.box:
-        raise UsageError("--approach, --payload and --box are of the way from the present pose: give it with --from")
+    elif options.approach is not None or options.payload is not None or options.box or options.floor != _FLOOR:
+        raise UsageError(
+            "--approach, --payload, --floor and --box are of the way from the present pose: give it with --from"
+        )
     if options.out is None:
         print(motion_text(motion, options.format, options.rate, joint_names=arm.joint_names, **lead), end="")
         return 0
