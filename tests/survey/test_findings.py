@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import warnings
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -138,6 +140,38 @@ def test_logs_without_dates_are_counted_from_one_and_nothing_has_half_a_log_or_p
     for axis in (ax.xaxis, histogram.axes[0].yaxis):
         ticks = axis.get_ticklocs()
         assert np.array_equal(ticks, np.round(ticks))
+
+
+def test_where_some_logs_have_no_date_all_are_in_order_on_one_axis(rows):
+    """Days since 1970 and the number of a log are no common axis: the one lies 57 years from the other."""
+    for one in rows:
+        one["date"] = None if one["arm"] == "loose" else one["date"]
+    payloads, drift = survey_sections(rows, arm_findings(rows), 7)[1:3]
+    axes = [ax for figure, _ in (*payloads.figures[:1], *drift.figures) for ax in figure.axes]
+    seen = [np.asarray(line.get_xdata()) for ax in axes for line in ax.lines if len(line.get_xdata()) > 2]
+    assert len(seen) > 4
+    assert all(np.array_equal(x, np.arange(1.0, 21.0)) for x in seen)
+
+
+@pytest.mark.parametrize("days", [0.004, 0.08, 2.4, 70.0, 800.0])
+def test_dates_of_any_span_are_drawn_without_a_warning_and_apart(rows, days):
+    first, *_, last = (one for one in rows if one["arm"] == "sound" and one["status"] == "answered")
+    several = [
+        one | {"arm": arm, "date": 1.79e9 + DAY * days * share}
+        for arm in "abcd"
+        for one, share in zip((first, last), (0.0, 1.0), strict=True)
+    ]
+    sections = survey_sections(several, arm_findings(several), 7)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for figure, _ in (*sections[1].figures, *sections[2].figures):
+            figure.canvas.draw()
+    for figure, _ in sections[2].figures:
+        for ax in figure.axes:
+            left, right = ax.get_xlim()
+            shown = [tick for tick in ax.xaxis.get_major_ticks() if left <= tick.get_loc() <= right]
+            boxes = [tick.label1.get_window_extent() for tick in shown]
+            assert all(a.x1 < b.x0 for a, b in pairwise(boxes))
 
 
 @pytest.mark.parametrize(

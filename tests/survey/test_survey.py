@@ -91,6 +91,28 @@ def test_there_is_a_row_for_each_payload_and_its_mass_is_the_true_one(surveyed, 
     assert {len(row) for of in rows.values() for row in of} == {len(columns(7))}
 
 
+def test_the_row_of_a_part_says_which_part_it_is(surveyed, fleet):
+    before, after = rows_of(surveyed, fleet)["a/taken.parquet"]
+    assert "the answer is of part 1 of 2; " in before["notes"]
+    assert "held at the end" not in before["notes"]
+    assert "the answer is of the last of 2 parts, what is held at the end; " in after["notes"]
+
+
+def test_arms_without_a_tare_of_their_own_are_named_before_their_logs_are_answered(fleet, tmp_path):
+    shutil.copy(fleet / "a" / "empty.csv", tmp_path / "a.csv")
+    said: list[str] = []
+    own_tares = replace(SETTINGS, tare=str(tmp_path / "{arm}.csv"), method=None)
+    logs = [str(fleet / name / "broken.csv") for name in ("a", "b")]
+    for log in logs[:1]:
+        Path(log).write_text("this is no log\n")
+    survey(logs, own_tares, tmp_path / "out.csv", jobs=1, say=said.append)
+    Path(logs[0]).unlink()
+    assert [line for line in said if "--tare" in line] == [
+        f"no --tare {own_tares.tare} of 1 of 2 arms (b): answered without"
+    ]
+    assert "--tare" in said[0]
+
+
 def test_a_broken_file_is_a_row_with_its_reason(surveyed, fleet):
     rows = rows_of(surveyed, fleet)
     for name, reason in (("b/text.csv", "no columns"), ("b/cut.parquet", "not a Parquet file")):

@@ -45,7 +45,7 @@ def check_for_exchanged_torques(recording: Recording, arm: Arm, seen: TorqueScal
     misfit, i, j = min((fit.misfit, i, j) for fit, i, j in fits)
     enough = misfit < min(SWAPPED_MISFIT, SWAPPED_SHARE * seen.misfit)
     if enough and all(b.misfit < a.misfit for a, b in _in_parts(recording, _torques_exchanged(recording, i, j), arm)):
-        _check_mounted_as_given(recording, arm, lambda fit: fit.misfit < misfit)
+        check_mounted_as_given(recording, arm, lambda fit: fit.misfit < misfit)
         raise RecordingError(
             f"{recording.source}: tau{i + 1} and tau{j + 1} seem to be exchanged (misfit {seen.misfit:.1f} times a "
             f"sound robot's, {misfit:.1f} with these two columns the other way round): expected the torques in the "
@@ -77,7 +77,7 @@ def check_for_exchanged_joints(recording: Recording, arm: Arm) -> None:
     if all(b.evidence > a.evidence for a, b in _in_parts(recording, other, arm)) and _with_gears_too(
         recording, other, arm
     ):
-        _check_mounted_as_given(recording, arm, lambda fit: fit.evidence > evidence)
+        check_mounted_as_given(recording, arm, lambda fit: fit.evidence > evidence)
         raise RecordingError(
             f"{recording.source}: joints {i + 1} and {j + 1} seem to be exchanged, in q, dq and tau: expected the "
             f"order of {arm.name}'s joints ({', '.join(arm.joint_names)}); a ROS driver may give that of the alphabet; "
@@ -96,8 +96,8 @@ def _with_gears_too(recording: Recording, other: Recording, arm: Arm) -> bool:
     return exchanged.evidence > as_it_is.evidence + EXCHANGED_BY_GEARS
 
 
-def _check_mounted_as_given(recording: Recording, arm: Arm, better: Callable[[TorqueScale], bool]) -> None:
-    """Refuse a log that the base mounted another way explains better than an exchange.
+def check_mounted_as_given(recording: Recording, arm: Arm, better: Callable[[TorqueScale], bool]) -> None:
+    """Refuse a log that the base mounted another way explains better than it is explained as it stands.
 
     better: whether such a fit, of as many windows as joints are asked of, is.
 

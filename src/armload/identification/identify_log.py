@@ -146,11 +146,14 @@ def _account(recording: Recording, arm: Arm, question: Question) -> _Account:
     edges, answers = [recording.t[0], *times, recording.t[-1]], [whole]
     if times:
         parts = [recording.between(a + SETTLED * (k > 0), b) for k, (a, b) in enumerate(pairwise(edges))]
-        said = (*question.notes, changed_within([t - recording.t[0] for t in times], len(parts)))
-        last = replace(question, notes=said)
-        others = replace(last, asked=replace(question.asked, known=None))  # what is known is what is held at the end
-        answers = [answer_of_one_payload(part, arm, others) for part in parts[:-1]]
-        answers.append(answer_of_one_payload(parts[-1], arm, last))
+        since = [t - recording.t[0] for t in times]
+        of_parts = [
+            replace(question, notes=(*question.notes, changed_within(since, k, len(parts))))
+            for k in range(1, len(parts) + 1)
+        ]
+        unknown = replace(question.asked, known=None)  # what is known is what is held at the end
+        of_parts[:-1] = [replace(of_part, asked=unknown) for of_part in of_parts[:-1]]
+        answers = [answer_of_one_payload(part, arm, of_part) for part, of_part in zip(parts, of_parts, strict=True)]
         if whole.moves and 2 * sum(answer.moves for answer in answers) > len(answers):
             edges, answers = [edges[0], edges[-1]], [whole]  # there is no rigid body in the parts either: it swings
     if changes.drift is not None:

@@ -268,13 +268,14 @@ MOTOR_PROFILE = (
 )
 
 
-def changed_within(times: list[float], parts: int) -> str:
-    """That the payload changes within a log, when, and which part the answer is of."""
+def changed_within(times: list[float], part: int, parts: int) -> str:
+    """That the payload changes within a log, when, and which part, from 1, the answer is of."""
     when = ", ".join(f"{t:.2f}" for t in times)
+    others = "`segments` of the JSON, or a survey's other rows, have the others"
+    which = f"the last of {parts} parts, what is held at the end" if part == parts else f"part {part} of {parts}"
     return (
-        f"the payload changes within the log, {when} s after its start: the answer is of the last of {parts} parts, "
-        "what is held at the end; `segments` of the JSON has them all; if nothing was taken up or put down, something "
-        "pushed the arm, or a torque is wrong"
+        f"the payload changes within the log, {when} s after its start: the answer is of {which}; {others}; "
+        "if nothing was taken up or put down, something pushed the arm, or a torque is wrong"
     )
 
 

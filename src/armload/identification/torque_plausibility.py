@@ -10,7 +10,11 @@ from numpy.typing import NDArray
 from armload.arms import ARMS, Arm, rated_effort
 from armload.errors import RecordingError
 from armload.identification.compensated import check_gravity_was_missing
-from armload.identification.exchanged import check_for_exchanged_joints, check_for_exchanged_torques
+from armload.identification.exchanged import (
+    check_for_exchanged_joints,
+    check_for_exchanged_torques,
+    check_mounted_as_given,
+)
 from armload.identification.thresholds import (
     CURRENT_HIGH,
     CURRENT_LOW,
@@ -26,6 +30,8 @@ from armload.identification.thresholds import (
     NO_TORQUE,
     OTHER_FORM,
     PARTS_SHARE,
+    SWAPPED_MISFIT,
+    SWAPPED_SHARE,
 )
 from armload.identification.torque_scale import TorqueScale, log_odds_of_change, torque_scale
 from armload.recording import Recording, blocks, largest, parts_of, span
@@ -185,6 +191,8 @@ def _check_torque_is_the_arms(recording: Recording, arm: Arm) -> None:
             "torque in N·m, gravity included; check the robot, the unit, the torque channel and the base (--gravity)"
         )
     if fit.misfit > MODEL_MISFIT:
+        sound = min(SWAPPED_MISFIT, SWAPPED_SHARE * fit.misfit)
+        check_mounted_as_given(recording, arm, lambda other: other.misfit < sound)
         raise RecordingError(
             f"{recording.source}: tau does not fit {arm.name} with any payload (misfit {fit.misfit:.1f} times a sound "
             "robot's): expected a log of this robot; check the robot, the order of the joints and the base (--gravity)"

@@ -105,12 +105,13 @@ def _payloads(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) ->
     held = [row for row in rows if row["status"] == ANSWERED and row["held"]]
     if not held:
         return Section("Payloads", "Nothing was held in any log.")
+    dated = _are_dated(held)
     with look():
         over_time = new_figure(4.2)
         ax = over_time.subplots()
         for k, finding in enumerate(findings):
             of = [row for row in held if row["arm"] == finding.arm]
-            x, mass = _days(of), np.array([row["mass"] for row in of])
+            x, mass = _days(of, dated), np.array([row["mass"] for row in of])
             half = np.abs(np.array([[row["mass_low"], row["mass_high"]] for row in of]).reshape(-1, 2).T - mass)
             style: dict[str, Any] = {
                 "rasterized": len(held) > _MOST_DRAWN,
@@ -120,7 +121,7 @@ def _payloads(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) ->
             }
             ax.errorbar(x, mass, half, fmt="osD^v"[k // len(COLOURS) % 5], label=finding.arm, alpha=0.75, **style)
             _dated(ax, x, 9)
-        ax.set_xlabel(_time_label(held))
+        ax.set_xlabel(_time_label(dated))
         ax.set_ylabel("mass [kg]")
         if len(findings) <= 30:
             over_time.legend(*ax.get_legend_handles_labels(), loc="outside right upper", fontsize=8)
@@ -155,7 +156,7 @@ def _arms(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding], n: int
 
 
 def _drift(rows: Sequence[dict[str, Any]], shown: Sequence[ArmFinding], n: int, name: str) -> Figure:
-    across = min(4, len(shown))
+    across, dated = min(4, len(shown)), _are_dated(rows)
     down = -(-len(shown) // across)
     with look():
         figure = new_figure(0.7 + 1.5 * down)
@@ -167,7 +168,7 @@ def _drift(rows: Sequence[dict[str, Any]], shown: Sequence[ArmFinding], n: int, 
                 for of in by_log([row for row in rows if row["arm"] == finding.arm])
                 if of[0][f"{name}_1"] is not None
             ]
-            x, drawn = _days([of[0] for of in logs]), []
+            x, drawn = _days([of[0] for of in logs], dated), []
             for j in range(n):
                 y = [float(np.mean([row[f"{name}_{j + 1}"] for row in of])) for of in logs]
                 ax.plot(x, y, ".", markersize=3, color=COLOURS[j % len(COLOURS)], label=f"joint {j + 1}")
@@ -182,7 +183,7 @@ def _drift(rows: Sequence[dict[str, Any]], shown: Sequence[ArmFinding], n: int, 
         _limit(alike)
         for ax in panels[len(shown) :]:
             ax.set_visible(False)
-        figure.supxlabel(_time_label(rows), fontsize=9)
+        figure.supxlabel(_time_label(dated), fontsize=9)
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=n, markerscale=2)
     return figure
 
@@ -249,11 +250,16 @@ def _folder(logs: Sequence[str]) -> str:
     return common[: common.rfind("/") + 1]
 
 
-def _days(rows: Sequence[dict[str, Any]]) -> np.ndarray:
-    """When rows were recorded: days since the first of January 1970, or their number where no log has a date."""
-    if any(row["date"] is None for row in rows):
+def _are_dated(rows: Sequence[dict[str, Any]]) -> bool:
+    """Whether all answered logs say when they were recorded: one axis cannot show days and the order of logs."""
+    return all(row["date"] is not None for row in rows if row["status"] == ANSWERED)
+
+
+def _days(rows: Sequence[dict[str, Any]], dated: bool) -> np.ndarray:
+    """When rows were recorded, to the millisecond, or their number where logs are not all dated."""
+    if not dated:
         return np.arange(1.0, len(rows) + 1.0)
-    return np.array([np.datetime64(int(1e3 * row["date"]), "ms") for row in rows])
+    return np.array([int(1e3 * row["date"]) for row in rows], dtype="datetime64[ms]")
 
 
 def _dated(ax: Any, x: np.ndarray, most: int) -> None:
@@ -261,7 +267,8 @@ def _dated(ax: Any, x: np.ndarray, most: int) -> None:
     if x.dtype.kind == "M":
         from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 
-        ax.xaxis.set_major_locator(locator := AutoDateLocator(minticks=3, maxticks=most))
+        # asked for three ticks of two to three days it would have to take hours, too many for a panel, and warns of it
+        ax.xaxis.set_major_locator(locator := AutoDateLocator(minticks=2, maxticks=most))
         ax.xaxis.set_major_formatter(ConciseDateFormatter(locator, show_offset=False))
     else:
         _whole(ax.xaxis, most)
@@ -274,9 +281,8 @@ def _whole(axis: Any, most: int = 9) -> None:
     axis.set_major_locator(MaxNLocator(most, integer=True))
 
 
-def _time_label(rows: Sequence[dict[str, Any]]) -> str:
-    dated = all(row["date"] is not None for row in rows if row["status"] == ANSWERED)
-    return "date" if dated else "logs in order: they do not say when they were recorded"
+def _time_label(dated: bool) -> str:
+    return "date" if dated else "logs in order: not all of them say when they were recorded"
 
 
 def _since(finding: ArmFinding) -> str:

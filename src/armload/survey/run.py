@@ -26,6 +26,7 @@ from armload.survey.rows import UNUSABLE
 from armload.survey.settings import Settings
 from armload.survey.table_file import check_suffix, write_rows
 
+_MOST_NAMED = 5  # arms in a sentence: each row has the note of its own
 _MISSING = "missing"  # content of a file that cannot be read
 
 
@@ -76,8 +77,13 @@ def survey(
         logs = find_logs(paths, arm_of, without=[out, folder, *named, *tares])
     n = settings.arm().n
     # what all logs of an arm would fail of is said before the first is answered
-    for arm in sorted({log.arm for log in logs} - {""}):
+    arms = sorted({log.arm for log in logs} - {""})
+    for arm in arms:
         settings.profile_of(arm)
+    for what in ("tare", "profile"):
+        if without := settings.arms_without(what, arms):
+            of = ", ".join(without[:_MOST_NAMED]) + ", …" * (len(without) > _MOST_NAMED)
+            say(f"no --{what} {getattr(settings, what)} of {len(without)} of {len(arms)} arms ({of}): answered without")
     settings.mounted()
     _check_method(settings)
     count = "1 log" if len(logs) == 1 else f"{len(logs)} logs"

@@ -61,6 +61,12 @@ class Settings(ArmOptions):
         wanted = [what for what in ("tare", "profile") if getattr(self, what) is not None]
         return [f"there is no {what} of the arm {arm}" for what in wanted if self.of_arm(what, arm) is None]
 
+    def arms_without(self, what: str, arms: Collection[str]) -> list[str]:
+        """The arms of which there is no tare, or no profile, where one of each was named by a template."""
+        if _ARM not in (getattr(self, what) or ""):
+            return []
+        return [arm for arm in sorted(arms) if self.of_arm(what, arm) is None]
+
     def key(self, log: Log, content: str) -> str:
         """Of all that the rows of a log depend on: its content, settings, every file they name, version and columns."""
         files = [self.of_arm("tare", log.arm), self.of_arm("profile", log.arm), *self._models()]
