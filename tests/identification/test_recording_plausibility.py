@@ -17,6 +17,7 @@ from armload.inertia import InertialParameters
 from armload.lab.episodes import draw_episodes
 from armload.motion import random_motion, taie2024
 from armload.payloads import draw_payload, franka_hand
+from armload.payloads import test_payload as box_of_the_examples
 from armload.recording import Recording, read_recording, with_gravity, write_recording
 from armload.recording.windows import integrals, windows
 from armload.simulation import Run, Sensors, World, simulate, simulate_many
@@ -336,6 +337,18 @@ def test_a_base_on_a_wall_or_a_ceiling_is_not_taken_for_exchanged_joints(name, s
     check_plausible(log, hung)
     with pytest.raises(RecordingError, match=rf"far better with gravity about {gravity} m/s² .*--gravity"):
         check_plausible(log, robot)
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_a_base_that_leans_by_45_degrees_is_not_taken_for_another_robot(panda, seed):
+    leaning = replace(panda, gravity=np.array([6.94, 0.0, -6.94]))
+    world = World.real_like(leaning, seed)
+    log = simulate(
+        leaning, random_motion(panda, seed), box_of_the_examples(), rate=100.0, duration=6.0, world=world, seed=seed
+    )
+    check_plausible(log, leaning)
+    with pytest.raises(RecordingError, match=r"far better with gravity about 6\.94,0,-6\.94 m/s² .*--gravity"):
+        check_plausible(log, panda)
 
 
 def test_a_payload_that_is_put_down_within_a_log_is_not_taken_for_exchanged_columns(panda):
