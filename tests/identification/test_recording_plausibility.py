@@ -339,6 +339,19 @@ def test_a_base_on_a_wall_or_a_ceiling_is_not_taken_for_exchanged_joints(name, s
         check_plausible(log, robot)
 
 
+@pytest.mark.parametrize(("seed", "gravity"), [(2, "9.81,0,0"), (7, "0,-9.81,0")])
+def test_a_base_on_a_wall_is_named_where_the_log_fits_no_payload(panda, seed, gravity):
+    """Here no exchange of joints or columns comes near, and only the misfit tells that something is wrong."""
+    hung = replace(panda, gravity=np.array([float(x) for x in gravity.split(",")]))
+    t = np.arange(0.0, 6.0, 0.02)
+    q, dq, ddq = random_motion(panda, seed)(t)
+    held = draw_payload("boxes", seed, 0.9).parameters
+    log = Recording(t, q, dq, hung.with_payload(held).torque(q, dq, ddq))
+    check_plausible(log, hung)
+    with pytest.raises(RecordingError, match=rf"far better with gravity about {gravity} m/s² .*--gravity"):
+        check_plausible(log, panda)
+
+
 @pytest.mark.parametrize("seed", [2, 3])
 def test_a_base_that_leans_by_45_degrees_is_not_taken_for_another_robot(panda, seed):
     leaning = replace(panda, gravity=np.array([6.94, 0.0, -6.94]))

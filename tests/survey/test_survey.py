@@ -98,19 +98,15 @@ def test_the_row_of_a_part_says_which_part_it_is(surveyed, fleet):
     assert "the answer is of the last of 2 parts, what is held at the end; " in after["notes"]
 
 
-def test_arms_without_a_tare_of_their_own_are_named_before_their_logs_are_answered(fleet, tmp_path):
-    shutil.copy(fleet / "a" / "empty.csv", tmp_path / "a.csv")
+def test_arms_without_a_tare_of_their_own_are_named_before_any_log_is_answered(own, tmp_path):
+    shutil.copy(own / "a" / "empty.csv", tmp_path / "a.csv")
+    (own / "a" / "text.csv").write_text("this is no log\n")
+    template = str(tmp_path / "{arm}.csv")
     said: list[str] = []
-    own_tares = replace(SETTINGS, tare=str(tmp_path / "{arm}.csv"), method=None)
-    logs = [str(fleet / name / "broken.csv") for name in ("a", "b")]
-    for log in logs[:1]:
-        Path(log).write_text("this is no log\n")
-    survey(logs, own_tares, tmp_path / "out.csv", jobs=1, say=said.append)
-    Path(logs[0]).unlink()
-    assert [line for line in said if "--tare" in line] == [
-        f"no --tare {own_tares.tare} of 1 of 2 arms (b): answered without"
-    ]
-    assert "--tare" in said[0]
+    logs = [str(own / name / "text.csv") for name in ("a", "b")]
+    survey(logs, Settings("panda", tare=template), tmp_path / "out.csv", jobs=1, say=said.append)
+    assert said[0] == f"no --tare {template} of 1 of 2 arms (b): answered without"
+    assert not any("--profile" in line for line in said)
 
 
 def test_a_broken_file_is_a_row_with_its_reason(surveyed, fleet):

@@ -195,7 +195,7 @@ class ArmProcess:
         known = settings.known_on(self.arm)
         identifier = self._restored(profile, known)
         tare = None if settings.tare is None else read_recording(settings.tare, self.arm)
-        if tare is not None and settings.source != "sim" and "://" not in settings.source:
+        if tare is not None and settings.replays:
             check_own_measurements(read_recording(settings.source, self.arm), tare)
         age, aged = age_of(tare, time.time() if "://" in settings.source else None, settings.tare_age)
         for note in aged if identifier is None else ():  # a state that goes on has its tare's age

@@ -19,16 +19,15 @@ def check_arm(arm: ArmSettings) -> None:
     Raises:
         UsageError: there is one.
     """
-    robot, sim = "://" in arm.source, arm.source == "sim"
     if arm.mounted is not None and arm.apply is None:
         _refuse(
             arm.name,
             "mounted",
             'says what the controller must count, too, but nothing is told to it: give apply = "auto"',
         )
-    if arm.loop and (robot or sim):
+    if arm.loop and not arm.replays:
         _refuse(arm.name, "loop", f"replays a log again and again, but the source is {arm.source}: name a log")
-    if arm.rate is not None and not sim:
+    if arm.rate is not None and arm.source != "sim":
         _refuse(arm.name, "rate", f"is of the simulator, but the source is {arm.source}: name sim")
 
 

@@ -108,6 +108,11 @@ class ArmSettings(ArmOptions, KnownOptions):
             )
 
     @property
+    def replays(self) -> bool:
+        """Whether the source is a log."""
+        return self.source != "sim" and "://" not in self.source
+
+    @property
     def _has_controller(self) -> bool:
         scheme, _, rest = self.source.partition("://")
         return bool(rest) and scheme in WITH_CONTROLLER
