@@ -19,6 +19,7 @@ from armload.identification.thresholds import MISFIT
 from armload.inertia import Z95, InertialParameters, distance_to_body, is_consistent, nearest_body
 from armload.lab.episodes import Recipe, draw_episodes, simulate_episodes
 from armload.motion import random_motion, taie2024
+from armload.payloads import test_payload as box_of_the_examples
 from armload.posterior import PosteriorLeastSquares, shipped_model
 from armload.recording import Recording, read_recording, shared_samples
 from armload.regression import payload_prior_std
@@ -348,6 +349,18 @@ def test_real_logs_have_a_body_within_the_error_bars(real_answer, log, tare, rob
     assert answer.method == "hybrid"
     assert not any("no body fits" in note or "friction drives" in note for note in answer.notes)
     assert len(answer.segments) == 1  # the payload stays
+
+
+@pytest.mark.parametrize("seed", [2, 4])
+def test_a_base_on_a_ceiling_is_said_where_a_short_log_passes_as_one_of_a_base_that_stands(seed):
+    panda = arm("panda")
+    hung = replace(panda, gravity=(0.0, 0.0, 9.81))
+    how = {"rate": 100.0, "duration": 3.0, "world": World.real_like(hung, seed), "seed": seed}
+    log = simulate(hung, random_motion(panda, seed), box_of_the_examples(), **how)
+    wrong, right = identify(log, panda), identify(log, hung)
+    assert "far better with gravity about 0,0,9.81 m/s² in the axes of the base than with 0,0,-9.81" in wrong.notes[0]
+    assert wrong.interval == "approximate"
+    assert not any("far better" in note for note in right.notes)
 
 
 def test_error_bars_that_lean_on_the_prior_are_named_and_those_that_a_log_tells_are_not(

@@ -6,15 +6,16 @@ the base mounted otherwise explains the log better.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
-from itertools import combinations, pairwise, product
+from itertools import combinations, pairwise
 
 import numpy as np
 
 from armload.arms import Arm
 from armload.errors import RecordingError
+from armload.identification.mounting import better_gravity, check_mounted_as_given
 from armload.identification.thresholds import (
     EXCHANGED_BY_GEARS,
     JOINTS_EXCHANGED,
@@ -22,10 +23,8 @@ from armload.identification.thresholds import (
     SWAPPED_MISFIT,
     SWAPPED_SHARE,
 )
-from armload.identification.torque_scale import TorqueScale, torque_scale
+from armload.identification.torque_scale import FEW_WINDOWS, TorqueScale, torque_scale
 from armload.recording import Recording
-
-_WINDOWS = 24  # as many as a log of six seconds has: they tell joints that bear the arm, and all pairs are tried
 
 
 def check_for_exchanged_torques(recording: Recording, arm: Arm, seen: TorqueScale) -> None:
@@ -45,7 +44,7 @@ def check_for_exchanged_torques(recording: Recording, arm: Arm, seen: TorqueScal
     misfit, i, j = min((fit.misfit, i, j) for fit, i, j in fits)
     enough = misfit < min(SWAPPED_MISFIT, SWAPPED_SHARE * seen.misfit)
     if enough and all(b.misfit < a.misfit for a, b in _in_parts(recording, _torques_exchanged(recording, i, j), arm)):
-        check_mounted_as_given(recording, arm, lambda fit: fit.misfit < misfit)
+        check_mounted_as_given(recording, arm, better_gravity(recording, arm, lambda fit: fit.misfit < misfit))
         raise RecordingError(
             f"{recording.source}: tau{i + 1} and tau{j + 1} seem to be exchanged (misfit {seen.misfit:.1f} times a "
             f"sound robot's, {misfit:.1f} with these two columns the other way round): expected the torques in the "
@@ -65,10 +64,10 @@ def check_for_exchanged_joints(recording: Recording, arm: Arm) -> None:
     Raises:
         RecordingError: so it is; the sentence names the two joints.
     """
-    seen = None if recording.joint_names is not None else torque_scale(recording, arm, most=_WINDOWS)
+    seen = None if recording.joint_names is not None else torque_scale(recording, arm, most=FEW_WINDOWS)
     if seen is None or seen.evidence > -JOINTS_EXCHANGED:  # no evidence is far above 0
         return
-    fits = _fits(recording, arm, _joints_exchanged, partial(torque_scale, most=_WINDOWS))
+    fits = _fits(recording, arm, _joints_exchanged, partial(torque_scale, most=FEW_WINDOWS))
     found = [(fit.evidence, i, j) for fit, i, j in fits if fit.misfit <= MODEL_MISFIT]
     evidence, i, j = max(found, default=(-np.inf, 0, 0))
     if evidence < seen.evidence + JOINTS_EXCHANGED:
@@ -77,7 +76,7 @@ def check_for_exchanged_joints(recording: Recording, arm: Arm) -> None:
     if all(b.evidence > a.evidence for a, b in _in_parts(recording, other, arm)) and _with_gears_too(
         recording, other, arm
     ):
-        check_mounted_as_given(recording, arm, lambda fit: fit.evidence > evidence)
+        check_mounted_as_given(recording, arm, better_gravity(recording, arm, lambda fit: fit.evidence > evidence))
         raise RecordingError(
             f"{recording.source}: joints {i + 1} and {j + 1} seem to be exchanged, in q, dq and tau: expected the "
             f"order of {arm.name}'s joints ({', '.join(arm.joint_names)}); a ROS driver may give that of the alphabet; "
@@ -90,37 +89,10 @@ def _with_gears_too(recording: Recording, other: Recording, arm: Arm) -> bool:
 
     Of motor currents they are what makes one wrist joint look like the other.
     """
-    as_it_is, exchanged = (torque_scale(log, arm, most=_WINDOWS, gears=True) for log in (recording, other))
+    as_it_is, exchanged = (torque_scale(log, arm, most=FEW_WINDOWS, gears=True) for log in (recording, other))
     if as_it_is is None or exchanged is None:
         return False
     return exchanged.evidence > as_it_is.evidence + EXCHANGED_BY_GEARS
-
-
-def check_mounted_as_given(recording: Recording, arm: Arm, better: Callable[[TorqueScale], bool]) -> None:
-    """Refuse a log that the base mounted another way explains better than it is explained as it stands.
-
-    better: whether such a fit, of as many windows as joints are asked of, is.
-
-    Raises:
-        RecordingError: so it is; the sentence says about which gravity that is.
-    """
-    size = float(np.linalg.norm(arm.gravity))
-    ways = [size * np.array(way) / np.linalg.norm(way) for way in product((-1, 0, 1), repeat=3) if any(way)]
-    fits = [(torque_scale(recording, replace(arm, gravity=way), most=_WINDOWS), way) for way in ways]
-    found = [(fit.evidence, way) for fit, way in fits if fit is not None and not fit.is_wrong and better(fit)]
-    if not found:
-        return
-    way = max(found, key=lambda pair: pair[0])[1]
-    raise RecordingError(
-        f"{recording.source}: tau fits {arm.name} far better with gravity about {_written(way)} m/s² in the axes of "
-        f"the base than with {_written(arm.gravity)}: expected the base mounted as given; say how it is (--gravity), "
-        "or check the order of the joints"
-    )
-
-
-def _written(gravity: Iterable[float]) -> str:
-    """As `--gravity` takes it."""
-    return ",".join(f"{round(x, 2) + 0.0:g}" for x in gravity)
 
 
 def _fits(

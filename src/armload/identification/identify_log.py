@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
@@ -16,6 +17,7 @@ from armload.errors import IdentificationError
 from armload.identification.answer import Identification, Segment
 from armload.identification.compensated import check_gravity_was_missing
 from armload.identification.found import Asked, found_in
+from armload.identification.mounting import likelier_gravity, mounted_otherwise
 from armload.identification.notes import (
     ALLOWED,
     MAY_CHANGE,
@@ -33,6 +35,7 @@ from armload.identification.plausibility import check_plausible
 from armload.identification.segments import changes_of_payload
 from armload.identification.tare_age import drift_since
 from armload.identification.thresholds import EXPLAINS, LOWEST_RATE, SETTLED
+from armload.identification.torque_scale import torque_scale
 from armload.inertia import HELD, Z95, InertialParameters
 from armload.payloads import Payload, read_payload
 from armload.posterior import KnownCentre, KnownMass, Profile, load_profile
@@ -118,6 +121,10 @@ def identify(
                 answer = replace(other.answer, interval="approximate", notes=(*other.answer.notes, UNCHECKED))
                 account = other._replace(answer=answer)
     answer, own = account.answer, None
+    if answer.interval == "approximate" and answer.gravity is None and recording.channel == "measured":
+        way = likelier_gravity(recording, arm, partial(torque_scale, recording, arm))
+        if way is not None:
+            answer = replace(answer, notes=(mounted_otherwise(way, arm), *answer.notes))
     if profile is not None:
         own = profile.learned_from(recording) or (None if tare is None else profile.learned_from(tare))
     return answer if own is None else replace(answer, interval="approximate", notes=(learned_from(own), *answer.notes))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -13,8 +14,8 @@ from armload.identification.compensated import check_gravity_was_missing
 from armload.identification.exchanged import (
     check_for_exchanged_joints,
     check_for_exchanged_torques,
-    check_mounted_as_given,
 )
+from armload.identification.mounting import better_gravity, check_mounted_as_given, likelier_gravity
 from armload.identification.thresholds import (
     CURRENT_HIGH,
     CURRENT_LOW,
@@ -178,6 +179,7 @@ def _check_torque_is_the_arms(recording: Recording, arm: Arm) -> None:
     if arm.motor_torque:
         _check_form(recording, arm, fit)
     if fit.is_wrong:
+        check_mounted_as_given(recording, arm, likelier_gravity(recording, arm, partial(torque_scale, recording, arm)))
         if ARMS.get(arm.known_as or "") is None and 1.0 / CURRENT_HIGH < fit.scale < 1.0 / CURRENT_LOW:
             raise _currents(recording, arm, fit)  # its gears and sensors are not described: the size says so by itself
         if fit.is_negative:
@@ -192,7 +194,7 @@ def _check_torque_is_the_arms(recording: Recording, arm: Arm) -> None:
         )
     if fit.misfit > MODEL_MISFIT:
         sound = min(SWAPPED_MISFIT, SWAPPED_SHARE * fit.misfit)
-        check_mounted_as_given(recording, arm, lambda other: other.misfit < sound)
+        check_mounted_as_given(recording, arm, better_gravity(recording, arm, lambda other: other.misfit < sound))
         raise RecordingError(
             f"{recording.source}: tau does not fit {arm.name} with any payload (misfit {fit.misfit:.1f} times a sound "
             "robot's): expected a log of this robot; check the robot, the order of the joints and the base (--gravity)"
@@ -225,12 +227,13 @@ def _check_form(recording: Recording, arm: Arm, seen: TorqueScale) -> None:
     facts = ARMS.get(arm.known_as or "")
     constants = (facts and facts.torque_constants) or (CURRENT_USUAL,) * arm.n
     forms = {
-        "currents": torque_scale(recording, arm, np.array(constants)),
-        "compensated": torque_scale(recording, arm, lacks=arm.torque),
+        "currents": partial(torque_scale, recording, arm, np.array(constants)),
+        "compensated": partial(torque_scale, recording, arm, lacks=arm.torque),
     }
+    fits = {name: form() for name, form in forms.items()}
     sound = {
         name: fit.evidence
-        for name, fit in forms.items()
+        for name, fit in fits.items()
         if fit is not None and fit.is_determined and not fit.is_wrong and fit.misfit <= MODEL_MISFIT
     }
     likeliest = max(sound, key=lambda name: sound[name], default="")
@@ -239,10 +242,12 @@ def _check_form(recording: Recording, arm: Arm, seen: TorqueScale) -> None:
     if sound[likeliest] < seen.evidence + log_odds_of_change(recording, arm) + OTHER_FORM:
         return
     if likeliest == "currents":
+        check_mounted_as_given(recording, arm, likelier_gravity(recording, arm, forms[likeliest]))
         raise _currents(recording, arm, seen)
     with_it, without = (torque_scale(recording, arm, lacks=lacks, gears=True) for lacks in (None, arm.torque))
     if with_it and without and without.evidence < with_it.evidence + _STILL:
         return  # what moves to and fro accelerates against its position: rotors look like gravity that lacks
+    check_mounted_as_given(recording, arm, likelier_gravity(recording, arm, forms[likeliest]))
     raise RecordingError(
         f"{recording.source}: tau seems to have gravity taken out: expected the measured joint torque in N·m, gravity "
         "included; say what the controller was set to carry (--compensated nothing, or a payload's file; of a ROS 2 "

@@ -54,6 +54,8 @@ from armload.recording.windows import Windows, integrals, windows
 from armload.regression.prior import within_reach
 
 _MOST_WINDOWS = 120  # spread over the log: one factor needs no more, whatever the log's length
+# as many as a log of six seconds has: for where many accounts of a log are compared, as all pairs of joints exchanged
+FEW_WINDOWS = 24
 _ALIKE = 4  # neighbouring windows that err alike, and count for one
 # [rated torques per rad/s, per rad/s²] standard deviation of viscous friction and of the rotors' inertia, as motor
 # currents show them: a UR10e's joints have 0.04 to 0.06, and 0.008 to 0.024 where both are fitted beside gravity
