@@ -23,11 +23,14 @@ def cell(tmp_path):
     return write
 
 
-def test_a_log_that_does_not_exist_is_not_waited_for(cell, capsys):
-    assert main(["serve", cell("none.csv"), "--quiet", "--duration", "60"]) == 2
+@pytest.mark.parametrize("duration", ["0", "60"])
+@pytest.mark.parametrize("key", ["source", "tare", "profile", "tool"])
+def test_a_file_that_does_not_exist_is_said_before_a_service_begins_however_short_it_is(cell, capsys, key, duration):
+    file = cell("none.csv") if key == "source" else cell("sim", f'{key} = "none.csv"')
+    assert main(["serve", file, "--quiet", "--duration", duration]) == 2
     (said,) = capsys.readouterr().err.splitlines()
-    assert "left: " in said
-    assert "none.csv does not exist: expected the path of a log" in said
+    assert f"left: {key}: " in said
+    assert "none.csv does not exist: expected the path of a" in said
 
 
 @pytest.mark.parametrize(

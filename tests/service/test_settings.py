@@ -77,6 +77,7 @@ def test_the_page_has_a_row_for_every_setting():
     ("change", "said"),
     [
         (("rating = 2.5", "ratting = 2.5"), "unknown setting 'ratting'"),
+        (("every = 0.5", "[arms.left]"), r"unknown setting 'arms': .*; settings of an arm below \[\[arm\]\]"),
         (("rating = 2.5", 'rating = "2.5"'), 'rating is "2.5": expected a number'),
         (("rating = 2.5", 'record = "/dev/full"'), "ends in .csv or .mcap"),
         (("every = 0.5", "every = true"), "every is true: expected a number"),

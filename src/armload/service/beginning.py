@@ -9,7 +9,7 @@ from pathlib import Path
 from armload.arms import arm
 from armload.errors import ArmloadError, UsageError
 from armload.runtime.extras import require
-from armload.service.settings import ServiceSettings
+from armload.service.settings import NO_FILES, READ, ArmSettings, ServiceSettings
 
 
 def checked(settings: ServiceSettings) -> None:
@@ -28,12 +28,24 @@ def checked(settings: ServiceSettings) -> None:
             check_spec(each.source)
         except ArmloadError as error:
             raise type(error)(f"{each.name}: {error}") from None
+        _check_files(each)
         if each.save is not None:
             _check_folder(f"{each.name}: its state cannot be kept in", Path(each.save), made=True)
         if each.record is not None:
             _check_folder(f"{each.name}: its record cannot be kept in", Path(each.record).parent, made=False)
             if each.record.lower().endswith(".mcap"):
                 _check_mcap(each.name)
+
+
+def _check_files(arm: ArmSettings) -> None:
+    """See that there is what an arm's process will read: it would say so only once it has begun."""
+    for key in ("source", *READ):
+        named = getattr(arm, key)
+        if named is None or named in NO_FILES or (key == "source" and not arm.replays):
+            continue
+        if not Path(named).exists():
+            what = "a log" if key == "source" else "a file"
+            raise UsageError(f"{arm.name}: {key}: {named} does not exist: expected the path of {what}")
 
 
 def _check_mcap(name: str) -> None:

@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     from armload.inertia import InertialParameters
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
-_PATHS = ("tare", "profile", "tool", "save", "record", "mounted", "body")
+READ = ("tare", "profile", "tool", "mounted", "body")  # files that an arm's process reads
+_PATHS = (*READ, "save", "record")
+NO_FILES = ("franka-hand", "test", "nothing")  # in the place of a payload's file
 _NAMES_OR_PATHS = ("robot", "method")  # a path has a suffix or a folder, a name has neither
 TOOL_OR_TARE = (  # but for a tare that is taken on the stream itself
     "whether the tool was mounted at the tare, or in the profile's logs, cannot be found out on a stream: give the "
@@ -232,7 +234,7 @@ def _arm(table: dict[str, Any], path: Path) -> ArmSettings:
         if key not in settings:
             raise UsageError(f"{where}: there is no {key}: expected name, source and robot for each arm")
     for key in _PATHS:
-        if key in settings and settings[key] not in ("franka-hand", "test", "nothing"):
+        if key in settings and settings[key] not in NO_FILES:
             settings[key] = str(path.parent / settings[key])
     for key in _NAMES_OR_PATHS:
         said = Path(settings.get(key, ""))
@@ -268,6 +270,8 @@ def _checked(
     for key, value in said.items():
         if key not in fields or key in without:
             known = ", ".join([*(name for name in fields if name not in without), *also])
+            if kind is ServiceSettings:
+                known += "; settings of an arm below [[arm]]"
             if kind is ArmSettings and key in _OF_THE_SERVICE:  # TOML counts what follows [[arm]] to that arm
                 raise UsageError(f"{where}: {key} is of the service: write it above the first [[arm]]")
             raise UsageError(f"{where}: unknown setting {key!r}: expected some of {known}")

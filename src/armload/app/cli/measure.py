@@ -227,6 +227,8 @@ def _apply(found: Measurement, mover: Mover, mounted: Any, options: argparse.Nam
 
 
 def _simulated(options: argparse.Namespace, arm: Arm, motion: Motion | None, loaded: bool) -> dict[str, Any]:
+    if options.at is not None and len(options.at) != arm.n:
+        raise UsageError(f"--at has {len(options.at)} joint positions: {arm.name} has {arm.n}; give {arm.n}, in rad")
     payload = payload_of(options.payload, arm)
     stands = arm.limits.middle if motion is None else motion.position([0.0])[0]
     return {
