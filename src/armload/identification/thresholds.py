@@ -150,7 +150,7 @@ STICTION = 0.1
 # of the arm's own torque, what a sound log may show at least: 1 is a factor of 1.7 away
 # (test_the_torque_scale_is_one_for_the_arm_itself_and_the_factor_for_another)
 SCALE_LOW = 0.6
-# of the arm's own torque, what a sound log may show at most: the same factor (test_the_wrong_arm_or_base_is_refused)
+# of the arm's own torque, what a sound log may show at most: the same factor (test_the_wrong_arm_is_refused)
 SCALE_HIGH = 1.7
 # [standard deviations] that the scale must be beyond either: one side of a normal 95 % interval
 SCALE_SURE = 2.0
