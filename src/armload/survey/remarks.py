@@ -24,11 +24,11 @@ def may_be_log(path: str | Path) -> bool:
     >>> [may_be_log(name) for name in ("a.xlsx", "a.bag.active", "month.tar.gz", "notes.md", "notes.md.gz")]
     [True, True, True, False, False]
     """
-    path = PurePosixPath(path)
-    suffix = path.suffix.lower()
+    name = PurePosixPath(path)
+    suffix = name.suffix.lower()
     if suffix in PACKED_SUFFIXES:
-        return PurePosixPath(path.stem).suffix.lower() in ("", ".tar", *NAMED_SUFFIXES)
-    return suffix in _OTHERS or suffix in NAMED_SUFFIXES or (suffix in _UNFINISHED and is_log(path.stem))
+        return PurePosixPath(name.stem).suffix.lower() in ("", ".tar", *NAMED_SUFFIXES)
+    return suffix in _OTHERS or suffix in NAMED_SUFFIXES or (suffix in _UNFINISHED and is_log(name.stem))
 
 
 def of_passed(names: Sequence[str]) -> str:
