@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -86,7 +87,7 @@ def _trajectory(content: dict[str, Any], name: str, arm: Arm) -> Motion:
             "points with positions and time_from_start"
         ) from None
     rest = np.zeros(arm.n)
-    return read_trajectory(message, arm, (start, rest, rest))
+    return replace(read_trajectory(message, arm, (start, rest, rest)), begins=first)
 
 
 def _table(text: str, name: str, arm: Arm) -> Motion:
