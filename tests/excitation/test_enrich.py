@@ -11,7 +11,7 @@ from armload.arms import arm
 from armload.devices.ros2.trajectory_file import read_path
 from armload.errors import MotionError
 from armload.excitation import Constraints, Criterion, PayloadRange, Surroundings, enrich, problems
-from armload.motion import PathMotion, load_motion, save_motion
+from armload.motion import PathMotion, export_motion, load_motion, save_motion
 from armload.motion.point_to_point import PointToPoint
 
 READY = np.array([0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8])
@@ -225,3 +225,24 @@ def test_a_program_for_ur_robots_of_another_arm_is_refused_before_anything_is_co
     words = ["motion", "enrich", str(tmp_path / "m.json"), "--robot", "panda", "--out", str(tmp_path / "o.script")]
     assert main(words) == 2
     assert "which have 6 joints: panda has 7" in capsys.readouterr().err
+
+
+def test_a_path_whose_times_are_in_milliseconds_is_asked_about_at_once(panda, allowed):
+    rows = np.array([READY, READY + 0.1, READY])
+    slow = PathMotion(np.array([0.0, 2000.0, 4000.0]), rows, np.zeros((3, 7)), np.zeros((3, 7)), "slow")
+    with pytest.raises(MotionError, match=r"'slow' takes 4000 s, and no joint goes faster than 9.*are these ms\?"):
+        enrich(slow, allowed, Criterion(panda, "same"))
+
+
+def test_a_table_with_semicolons_is_told_what_parts_columns(panda, tmp_path):
+    (tmp_path / "p.csv").write_text("t;q1;q2;q3;q4;q5;q6;q7\n0;0;0;0;0;0;0;0\n")
+    with pytest.raises(MotionError, match="in s and rad, parted by commas"):
+        read_path(str(tmp_path / "p.csv"), panda)
+
+
+@pytest.mark.parametrize("form", ["p.json", "p.yaml"])
+def test_a_trajectory_where_a_motion_is_expected_is_called_one(panda, path, tmp_path, form):
+    cubic(panda, READY, np.full(7, 0.1), tmp_path / "p.json")
+    export_motion(path, tmp_path / "p.yaml", "ros2", joint_names=panda.joint_names)
+    with pytest.raises(MotionError, match="it is a JointTrajectory, for controllers"):
+        load_motion(tmp_path / form)

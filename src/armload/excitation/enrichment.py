@@ -31,6 +31,7 @@ DISTANCE, ANGLE = 5e-3, np.deg2rad(2.0)  # [m], [rad] at the payload frame
 _POINTS_PER_SECOND = 6.0  # control points: changes so small tell by their acceleration, up to about 3 Hz
 _SHORTEST = 0.5  # [s] of a stretch that is changed
 _STILL = 1e-3  # [rad/s] of the fastest joint: the path stands
+_FAR = 0.05  # [rad] that a path goes, which hence does not stand
 _STAGES = ((10, 50.0), (14, 1000.0))  # iterations of L-BFGS and weight of the penalty
 _RATE = 25.0  # [Hz] of the samples while it is looked for, four for each control point
 _ANY = 100.0  # [rad] of --travel: no bound
@@ -89,6 +90,7 @@ def enrich(
         raise MotionError(f"a change of {asked} is asked for: expected room in one of them")
     distance, angle = max(distance, _NO_DISTANCE), max(angle, _NO_ANGLE)
     _check_at_rest(constraints, path)
+    _check_pace(path)
     constraints = _as_the_path(constraints, path)
     passed = [one for one in used(constraints, path) if one.share > 1.0 and one.what != "rest"]
     if passed:
@@ -153,6 +155,16 @@ def _check_at_rest(constraints: Constraints, path: Motion) -> None:
                 f"the path {path.name!r} does not {where} at rest: {arm.joint_names[j]} moves at {speed[j]:.3g} "
                 f"{unit_of('velocity', arm.limits.slides[j])}; expected a path from rest to rest"
             )
+
+
+def _check_pace(path: Motion) -> None:
+    """See that a path that goes anywhere does so in seconds: one of hours would be looked at 1000 times a second."""
+    fastest = float(np.abs(path.velocity(path.instants(200.0))).max())
+    if fastest <= _STILL and float(np.ptp(_poses(path), axis=0).max()) > _FAR:
+        raise MotionError(
+            f"the path {path.name!r} takes {path.duration:g} s, and no joint goes faster than {fastest:.2g} rad/s: "
+            "times are in s; are these ms?"
+        )
 
 
 def _way_out(constraints: Constraints, passed: Used) -> str:

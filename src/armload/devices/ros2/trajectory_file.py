@@ -96,7 +96,9 @@ def _table(text: str, name: str, arm: Arm) -> Motion:
     names = [cell.strip() for cell in header.split(",")]
     wanted = {kind: [f"{kind}{k + 1}" for k in range(arm.n)] for kind in ("q", "dq", "ddq")}
     if "t" not in names or any(column not in names for column in wanted["q"]) or f"q{arm.n + 1}" in names:
-        raise MotionError(f"{name} has the columns {', '.join(names)}: expected t, q1 … q{arm.n} in s and rad")
+        raise MotionError(
+            f"{name} has the columns {', '.join(names)}: expected t, q1 … q{arm.n} in s and rad, parted by commas"
+        )
     try:
         rows = np.array([[float(cell) for cell in line.split(",")] for line in lines]).reshape(-1, len(names))
         t = rows[:, names.index("t")]
